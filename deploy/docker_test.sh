@@ -149,7 +149,7 @@ while client is None:
         tries -= 1
         assert tries, "foxglove does not listen"
         time.sleep(1.0)
-client.subscribe("/drone1/truth")
+client.subscribe("/drone1/ground_truth")
 while (message := client.next()) is not None:
     shown += isinstance(message, bytes) and message[0] == 1
 assert shown > 100, f"{shown} messages"
@@ -201,7 +201,7 @@ configuration = zenoh.Config.from_file("keys/viewer/zenoh.json5")
 configuration.insert_json5("connect/endpoints", f'["tls/{sys.argv[1]}"]')
 arrived = queue.Queue()
 with zenoh.open(configuration) as session:
-    session.declare_subscriber("lapwing/drone1/truth", arrived.put)
+    session.declare_subscriber("lapwing/drone1/ground_truth", arrived.put)
     arrived.get(timeout=10.0)
 VIEWER
 [ -n "$(container plant)" ] || fail "the flight was over before all had tried"

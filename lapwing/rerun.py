@@ -50,7 +50,7 @@ def blueprint(topics: set[str]) -> Any:
     """Space beside curves, map and events, of those topics that there are."""
     import rerun.blueprint as layout
 
-    vehicle = next((topic.split("/")[1] for topic in sorted(topics) if topic.endswith("/truth")), "")
+    vehicle = next((topic.split("/")[1] for topic in sorted(topics) if topic.endswith("/ground_truth")), "")
 
     def there(name: str) -> str | None:
         topic = f"/{vehicle}/{name}"

@@ -14,7 +14,6 @@ from lapwing.messages.types import (
     Estimate,
     FluidPressure,
     Imu,
-    LiftCommand,
     Log,
     MagneticField,
     NavSatFix,
@@ -24,6 +23,7 @@ from lapwing.messages.types import (
     PoseStamped,
     Range,
     Reading,
+    RotorWrench,
     Setpoint,
     Status,
     TFMessage,
@@ -57,9 +57,9 @@ CLOCK = Topic("clock", Clock, rate="rates.pose")
 TF = Topic("tf", TFMessage, rate="rates.pose")
 WALL_TIME = Topic("wall_time", WallTime, rate="rates.status", deterministic=False)
 
-TRUTH = Topic("{vehicle}/truth", VehicleState)
-BODIES = Topic("{vehicle}/bodies", BodyStates, rate="rates.body_states")
-CONTACT = Topic("{vehicle}/contact", ContactForces, rate="rates.contact_forces")
+TRUTH = Topic("{vehicle}/ground_truth", VehicleState)
+BODIES = Topic("{vehicle}/body_states", BodyStates, rate="rates.body_states")
+CONTACT = Topic("{vehicle}/contact_forces", ContactForces, rate="rates.contact_forces")
 POSE = Topic("{vehicle}/pose", PoseStamped, rate="rates.pose")
 ODOM = Topic("{vehicle}/odom", Odometry, rate="rates.pose")
 IMU = Topic("{vehicle}/imu", Imu, rate="sensors.imu.rate")
@@ -68,32 +68,32 @@ GPS = Topic("{vehicle}/gps/fix", NavSatFix, rate="sensors.gps.rate")
 GPS_VELOCITY = Topic("{vehicle}/gps/velocity", TwistWithCovarianceStamped, rate="sensors.gps.rate")
 BARO = Topic("{vehicle}/baro", FluidPressure, rate="sensors.barometer.rate")
 SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
-AIRSPEED = Topic("{vehicle}/airspeed", FluidPressure, rate="sensors.airspeed.rate")
-AIRSPEED_RECEIVED = Topic("{vehicle}/airspeed/received", FluidPressure, rate="sensors.airspeed.rate")
+AIRSPEED = Topic("{vehicle}/differential_pressure", FluidPressure, rate="sensors.airspeed.rate")
+AIRSPEED_RECEIVED = Topic("{vehicle}/differential_pressure/received", FluidPressure, rate="sensors.airspeed.rate")
 RANGEFINDER = Topic("{vehicle}/rangefinder", Range, rate="sensors.rangefinder.rate")
 OPTICAL_FLOW = Topic("{vehicle}/optical_flow", OpticalFlow, rate="sensors.optical_flow.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
 TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # what of it is flown is in SETPOINT
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
 ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
-LIFT = Topic("{vehicle}/lift", LiftCommand)
+LIFT = Topic("{vehicle}/rotor_wrench", RotorWrench)
 ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
-OPERATOR = Topic("{vehicle}/operator", OperatorInput, rate="rates.commands")
-COMMAND_ACKS = Topic("{vehicle}/answers", CommandAcks, rate="rates.commands")
+OPERATOR = Topic("{vehicle}/vehicle_command", OperatorInput, rate="rates.commands")
+COMMAND_ACKS = Topic("{vehicle}/vehicle_command_ack", CommandAcks, rate="rates.commands")
 EVENTS = Topic("{vehicle}/events", Log, deterministic=False)  # found in the other topics after the flight
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
 _PLACES = {topic: place for place, topic in enumerate(TOPICS)}
 _NAMED = {topic.name: topic for topic in TOPICS}
 _VEHICLE = "{vehicle}"
-_OWN_SENSOR = f"{_VEHICLE}/own_sensor/"
+_CUSTOM_SENSOR = f"{_VEHICLE}/custom_sensor/"
 
 
 @cache
-def own_sensor(name: str) -> Topic:
+def custom_sensor(name: str) -> Topic:
     """The topic of a sensor of the user's own, at its own rate; by its name in the scene."""
-    return Topic(f"{_OWN_SENSOR}{name}", Reading)
+    return Topic(f"{_CUSTOM_SENSOR}{name}", Reading)
 
 
 @cache
@@ -117,8 +117,8 @@ def topic_named(name: str) -> Topic:
     Raises:
         ValueError: there is none.
     """
-    if name.startswith(_OWN_SENSOR):
-        return own_sensor(name.removeprefix(_OWN_SENSOR))
+    if name.startswith(_CUSTOM_SENSOR):
+        return custom_sensor(name.removeprefix(_CUSTOM_SENSOR))
     if name in _NAMED:
         return _NAMED[name]
     vehicle, _, rest = name.partition("/")

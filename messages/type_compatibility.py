@@ -1,5 +1,6 @@
 """Whether a message type as a log defines it is the one that this version has."""
 
+from lapwing.messages.former_names import with_current_fields
 from lapwing.messages.parse import PRIMITIVES, Definition, parse
 from lapwing.messages.types import DEFINITIONS, TYPES
 
@@ -39,7 +40,7 @@ def _definitions(type_name: str, text: str) -> dict[str, Definition]:
             head, _, own = part.partition("\n")
             package, _, short = head.removeprefix(_HEAD).strip().partition("/")
             name = f"{package}/msg/{short.removeprefix('msg/')}"
-        found[name] = parse(name, own)
+        found[name] = with_current_fields(parse(name, own))
     return found
 
 

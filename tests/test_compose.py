@@ -223,7 +223,7 @@ def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(t
     services = compose(SCENE="lapwing/scenes/hover.toml", SPEED="1", LINKS=f"--keys={keys}")
     with flying(services, "foxglove", tmp_path, "--set", "run.duration=6") as (running, ports):
         client = patient(ports["0.0.0.0:8765"], running["foxglove"])
-        client.subscribe("/drone1/truth", "/drone1/events")
+        client.subscribe("/drone1/ground_truth", "/drone1/events")
         seen = {0: 0, 1: 0}  # messages by subscription
         while (message := client.next()) is not None:
             if isinstance(message, bytes) and message[0] == 1:

@@ -159,7 +159,7 @@ def module_path(monkeypatch):
 def readings(**keys):
     keys = {{"module": "{name}", **keys}}
     flight = lapwing.fly("hover", {{f"sensors.{name}.{{key}}": value for key, value in keys.items()}})
-    return flight, flight.topic("own_sensor/{name}")["values"][:, 0]
+    return flight, flight.topic("custom_sensor/{name}")["values"][:, 0]
 
 
 def test_ideal_sensor_measures_the_speed():

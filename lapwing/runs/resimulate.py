@@ -86,7 +86,7 @@ def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = F
         operators = {vehicle: _at(dict(given_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
         times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
         last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
-        before = read.digest()
+        before = read.digest(current_names=True)
     with tempfile.TemporaryDirectory() as place:
         again = Path(place) / "again.mcap"
         fly_single(setup, again, observer=observer, operator=operators, last=last)

@@ -44,22 +44,22 @@ SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which outcome, events,
 class FlightData(FlightTopics):
     """Recorded topics of a flight, and the metrics derived from them.
 
-    `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic("bodies")` is any topic.
+    `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic(NAME)` is any topic.
 
     Attributes:
         origin: where it comes from, with the log's metadata.
         vehicle: name.
-        fleet: what is true of every vehicle that flew, "truth" by name; this one among them.
+        fleet: what is true of every vehicle that flew, "ground_truth" by name; this one among them.
         others: the other vehicles that flew, each a flight with what is shown of it in space.
         failure: why it ended before its time; "" where it did not, or where a log does not say.
         diverged: whether that is a state that was no longer finite.
     """
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = "", diverged: bool = False):
-        """Create a flight from topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        """Create a flight from topics by their name without the vehicle's: "ground_truth", "gps/fix", "clock"."""
         super().__init__(topics, origin)
         self.failure, self.diverged = failure, diverged
-        self.fleet = {self.vehicle: self._topics["truth"]} if "truth" in self._topics else {}
+        self.fleet = {self.vehicle: self._topics["ground_truth"]} if "ground_truth" in self._topics else {}
         self.others: tuple[FlightData, ...] = ()
 
     @classmethod
@@ -68,7 +68,7 @@ class FlightData(FlightTopics):
 
         Args:
             path: of the MCAP log.
-            vehicle: its name; by default that of the first topic /NAME/truth.
+            vehicle: its name; by default that of the first topic /NAME/ground_truth.
             only: the topics wanted, None for all.
 
         Raises:
@@ -79,7 +79,7 @@ class FlightData(FlightTopics):
             fleet = _vehicles(known, log.metadata)
             named = vehicle or next(iter(fleet), None)
             if named is None or named not in fleet:
-                raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/truth)")
+                raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/ground_truth)")
             others = {topic.key(name) for name in fleet for topic in IN_SPACE}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
             return cls._of_log(log, str(path), log.histories(_wanted(own, only, fleet)), named, fleet)
@@ -99,7 +99,7 @@ class FlightData(FlightTopics):
             known = [name for name, kind in log.topics().items() if kind in TYPES]
             fleet = _vehicles(known, log.metadata)
             if not fleet:
-                raise ValueError(f"{path}: no flight in this log (no topic /NAME/truth)")
+                raise ValueError(f"{path}: no flight in this log (no topic /NAME/ground_truth)")
             histories = log.histories(_wanted(known, only, fleet))
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
@@ -145,7 +145,7 @@ class FlightData(FlightTopics):
         for own in members(graph.setup):
             views = {_short(of_all(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
             found.append(cls(views, Origin.of_setup(own), failure, diverged))
-        truths = {flight.vehicle: flight.truth for flight in found if flight.has("truth")}
+        truths = {flight.vehicle: flight.truth for flight in found if flight.has("ground_truth")}
         for flight in found:
             flight.fleet, flight.others = truths, tuple(other for other in found if other is not flight)
         return found
@@ -156,7 +156,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def reference(self) -> np.ndarray:
-        """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "truth", shape (n, 6).
+        """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "ground_truth", shape (n, 6).
 
         The references of x, y, z and yaw are the setpoints, those of roll and pitch what the inner loops follow.
         The run may have ended between two topics: n is the count of the shortest. Without a reference it is 0.
@@ -244,8 +244,10 @@ class FlightData(FlightTopics):
         status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
         found = events(self.truth, status, setpoint, self.armed, self.origin.scene)
         load = self.origin.scene.get("cooperative_load")
-        if load and self.has("bodies") and self.has("lift"):  # nobody steers: no other kind of event is told
-            found += slack(self.topic("bodies"), self.topic("lift"), load)
+        if (
+            load and self.has("body_states") and self.has("rotor_wrench")
+        ):  # nobody steers: no other kind of event is told
+            found += slack(self.topic("body_states"), self.topic("rotor_wrench"), load)
         return found
 
     @property
@@ -264,7 +266,7 @@ def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) 
 
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
     """The vehicles whose truth is among the topics of a log, in the order of its scene."""
-    found = [name.split("/")[1] for name in topics if name.endswith("/truth")]
+    found = [name.split("/")[1] for name in topics if name.endswith("/ground_truth")]
     said = metadata.get("vehicle", "").split(", ")
     return sorted(found, key=lambda name: said.index(name) if name in said else len(said))
 

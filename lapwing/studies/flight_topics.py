@@ -22,7 +22,7 @@ class FlightTopics:
     """
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin):
-        """Create from topics by their name without the vehicle's: "truth", "gps/fix", "clock"."""
+        """Create from topics by their name without the vehicle's: "ground_truth", "gps/fix", "clock"."""
         self.origin, self.vehicle = origin, origin.vehicle
         self._topics = dict(topics)
 
@@ -56,7 +56,7 @@ class FlightTopics:
     @property
     def truth(self) -> TopicView:
         """The true state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
-        return self.topic("truth")
+        return self.topic("ground_truth")
 
     @property
     def setpoint(self) -> TopicView:
@@ -105,7 +105,7 @@ class FlightTopics:
         """A field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
         return self.topic(topic)[field]
 
-    def to_dataframe(self, topic: str = "truth") -> Any:
+    def to_dataframe(self, topic: str = "ground_truth") -> Any:
         """A topic as a pandas DataFrame: a column for each number or text, the times [s] as index.
 
         Raises:

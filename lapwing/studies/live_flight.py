@@ -48,7 +48,7 @@ class LiveFlight:
                 columns = history(topic.message, payloads)
                 views[topic.name.removeprefix("{vehicle}/")] = TopicView(np.array(times, np.int64), columns)
                 del said[: len(now) - 1]  # the newest begins the next step
-        if "truth" not in views or len(views["truth"]) < 2:
+        if "ground_truth" not in views or len(views["ground_truth"]) < 2:
             return None
         return FlightData(views, Origin.of_setup(self._setup))
 

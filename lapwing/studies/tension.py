@@ -41,7 +41,7 @@ def tension(position: np.ndarray, velocity: np.ndarray, force: np.ndarray, load:
 
 
 def link_tension(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> np.ndarray:
-    """Return the `tension` of a flight from the topics "bodies" (the load first) and "lift"."""
+    """Return the `tension` of a flight from the topics "body_states" (the load first) and "rotor_wrench"."""
     n = min(len(bodies), len(lift))
     x, y, z, w = np.moveaxis(bodies.orientation[:n, 1:], 2, 0)
     matrix = python_function(rotation_matrix)((w, x, y, z))

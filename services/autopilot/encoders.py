@@ -58,7 +58,9 @@ def _actuators(x: MotorCommand, time_ns: np.ndarray) -> Fields:
 
 
 def _estimate_sample(rejected: int) -> Any:
-    return Estimate(header(0, "world"), rejected=tuple(name for bit, name in enumerate(NAMES) if rejected >> bit & 1))
+    return Estimate(
+        header(0, "world"), rejected_sources=tuple(name for bit, name in enumerate(NAMES) if rejected >> bit & 1)
+    )
 
 
 def _estimate(x: StateEstimate, time_ns: np.ndarray) -> Fields:
@@ -74,7 +76,7 @@ def _estimate(x: StateEstimate, time_ns: np.ndarray) -> Fields:
         "position_std": x.position_std,
         "velocity_std": x.velocity_std,
         "attitude_std": x.attitude_std,
-        "health": x.health,
+        "health_flags": x.health,
     }
 
 
@@ -84,7 +86,8 @@ def _status_sample(texts: Sequence[str], words: Sequence[Any]) -> Callable[[int,
         return Status(
             header(0, "body"), w.mode, texts[phase], text=w.failsafe,
             mission_current=w.mission_current, mission_count=w.mission_count, mission_reached=w.mission_reached,
-            mission_state=w.mission_state, offboard_fresh=w.offboard_fresh, prearm=() if armed else tuple(w.prearm),
+            mission_state=w.mission_state, offboard_available=w.offboard_available,
+            arming_blockers=() if armed else tuple(w.arming_blockers),
             failsafe=bool(w.failsafe), home=Vector3(*w.home),
         )  # fmt: skip
 

@@ -23,13 +23,16 @@ _ABOVE_SEA, _ABOVE_HOME, _NO_PLACE = (0, 5), (3, 6), 2  # MAV_FRAME
 
 _Params = Sequence[float]
 _ACTIONS: dict[int, tuple[str, Callable[[_Params], dict[str, Any]]]] = {  # by MAV_CMD
-    16: ("waypoint", lambda p: {"hold": _zero(p[0]), "radius": p[1] if p[1] > 0.0 else math.nan, "yaw": _yaw(p[3])}),
-    19: ("loiter_time", lambda p: {"hold": _zero(p[0])}),
+    16: (
+        "waypoint",
+        lambda p: {"hold_time": _zero(p[0]), "radius": p[1] if p[1] > 0.0 else math.nan, "yaw": _yaw(p[3])},
+    ),
+    19: ("loiter_time", lambda p: {"hold_time": _zero(p[0])}),
     20: ("return", lambda p: {}),
     21: ("land", lambda p: {"yaw": _yaw(p[3])}),
     22: ("takeoff", lambda p: {"yaw": _yaw(p[3])}),
-    93: ("delay", lambda p: {"hold": _zero(p[0])}),
-    112: ("delay", lambda p: {"hold": _zero(p[0])}),
+    93: ("delay", lambda p: {"hold_time": _zero(p[0])}),
+    112: ("delay", lambda p: {"hold_time": _zero(p[0])}),
     115: ("yaw", lambda p: {"yaw": _yaw(p[0])}),
     177: ("jump", lambda p: {"values": (p[0], p[1])}),
     178: ("speed", lambda p: {"values": (p[1],)}),

@@ -9,7 +9,7 @@ from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.kernels.cell import Cell
-from lapwing.messages import LiftCommand, Vector3, header
+from lapwing.messages import RotorWrench, Vector3, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common import ports
@@ -22,7 +22,7 @@ def create(setup: RunConfig) -> Service:
     """Return the formation control of a run."""
     config = setup.services[NAME]
     n = len(setup.port(ports.LIFT).like.thrust)
-    message = LiftCommand(header(0, "body"), (0.0,) * n, (Vector3(),) * n)
+    message = RotorWrench(header(0, "body"), (0.0,) * n, (Vector3(),) * n)
     encoder = TopicEncoder(topic.LIFT, ports.LIFT, 1, _lift, lambda: message)
     return Service(NAME, [Block(NAME, config.parameters, Cell(0.0), config.inputs, config.ports)], [encoder])
 

@@ -166,8 +166,8 @@ class Adapter:
             self._step()
         elif topic is COMMAND_ACKS:
             acknowledgements = self.vehicle.get(COMMAND_ACKS)
-            self.commands.acknowledge(acknowledgements.answers)
-            self.missions.observe((), acknowledgements.answers)
+            self.commands.acknowledge(acknowledgements.acks)
+            self.missions.observe((), acknowledgements.acks)
             for text in acknowledgements.text:
                 self._announcements.say(text)
         elif topic is STATUS:

@@ -30,12 +30,12 @@ def _turn(item: Any) -> _Params:
 
 
 _COMMANDS: dict[str, tuple[int, Callable[[Any], _Params]]] = {  # by action: MAV_CMD and its first parameters
-    "waypoint": (mavlink.MAV_CMD_NAV_WAYPOINT, lambda i: (i.hold, _radius(i), 0.0, _heading(i.yaw))),
+    "waypoint": (mavlink.MAV_CMD_NAV_WAYPOINT, lambda i: (i.hold_time, _radius(i), 0.0, _heading(i.yaw))),
     "takeoff": (mavlink.MAV_CMD_NAV_TAKEOFF, lambda i: (0.0, 0.0, 0.0, _heading(i.yaw))),
     "land": (mavlink.MAV_CMD_NAV_LAND, lambda i: (0.0, 0.0, 0.0, _heading(i.yaw))),
     "return": (mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH, lambda i: ()),
-    "loiter_time": (mavlink.MAV_CMD_NAV_LOITER_TIME, lambda i: (i.hold, 0.0, 0.0, _heading(i.yaw))),
-    "delay": (mavlink.MAV_CMD_NAV_DELAY, lambda i: (i.hold, -1.0, -1.0, -1.0)),
+    "loiter_time": (mavlink.MAV_CMD_NAV_LOITER_TIME, lambda i: (i.hold_time, 0.0, 0.0, _heading(i.yaw))),
+    "delay": (mavlink.MAV_CMD_NAV_DELAY, lambda i: (i.hold_time, -1.0, -1.0, -1.0)),
     "jump": (mavlink.MAV_CMD_DO_JUMP, lambda i: i.values[:2]),
     "speed": (
         mavlink.MAV_CMD_DO_CHANGE_SPEED,
@@ -47,7 +47,7 @@ _COMMANDS: dict[str, tuple[int, Callable[[Any], _Params]]] = {  # by action: MAV
     "loiter_to_alt": (mavlink.MAV_CMD_NAV_LOITER_TO_ALT, lambda i: ()),
     "roi": (mavlink.MAV_CMD_DO_SET_ROI_LOCATION, lambda i: ()),
     "set_home": (mavlink.MAV_CMD_DO_SET_HOME, lambda i: (float(math.isnan(i.position.x)),)),
-    "condition": (mavlink.MAV_CMD_CONDITION_DELAY, lambda i: (i.hold,)),
+    "condition": (mavlink.MAV_CMD_CONDITION_DELAY, lambda i: (i.hold_time,)),
     "fence_inclusion": (mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, lambda i: i.values[:1]),
     "fence_exclusion": (mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION, lambda i: i.values[:1]),
     "fence_circle_in": (mavlink.MAV_CMD_NAV_FENCE_CIRCLE_INCLUSION, lambda i: (i.radius,)),

@@ -75,7 +75,7 @@ def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[A
 
 
 def _without_heading(i: Any) -> Any:
-    return MissionItem(i.action, i.position, math.nan, i.radius, i.hold, i.values)
+    return MissionItem(i.action, i.position, math.nan, i.radius, i.hold_time, i.values)
 
 
 def _item(m: Any, datum: Datum) -> Any:

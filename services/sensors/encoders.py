@@ -61,7 +61,7 @@ def wires(setup: RunConfig, sonar: SonarWiring | None, fix: int) -> list[TopicEn
 
 def own_wire(frame: str, port: Port) -> TopicEncoder:
     """The topic of a sensor of the user's own."""
-    return TopicEncoder(topic.own_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
+    return TopicEncoder(topic.custom_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
 
 
 def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:

@@ -85,7 +85,7 @@ def test_the_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
     for axis, value in published.items():
         assert flown["rmse"][axis] < value, axis
     with LogReader(tmp_path / "log.mcap") as log:
-        times_ns, truth = log.history("/drone1/truth")
+        times_ns, truth = log.history("/drone1/ground_truth")
     t, height, thrust = times_ns * 1e-9, truth["pose.position.z"], truth["rotor_thrust"].sum(axis=1)
     there, home = ((t > begin) & (t < begin + 4.0) for begin in (13.0, 98.0))  # hovering at 10 m, before and after
     assert height[there | home].min() > 9.5

@@ -71,7 +71,7 @@ class MemoryLog:
     @property
     def landed(self) -> bool:
         """True if the vehicle has landed."""
-        return classify(self.view("truth"), self.view("status")).kind in LANDED
+        return classify(self.view("ground_truth"), self.view("status")).kind in LANDED
 
     def view(self, name: str) -> TopicView:
         """A topic as columns."""

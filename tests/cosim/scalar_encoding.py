@@ -12,7 +12,6 @@ from lapwing.messages import (
     Estimate,
     FluidPressure,
     Imu,
-    LiftCommand,
     MagneticField,
     NavSatFix,
     NavSatStatus,
@@ -23,6 +22,7 @@ from lapwing.messages import (
     PoseWithCovariance,
     Quaternion,
     Range,
+    RotorWrench,
     Setpoint,
     Status,
     TFMessage,
@@ -236,8 +236,8 @@ def status(given, time_ns, x):
         w.mission_count,
         w.mission_reached,
         w.mission_state,
-        w.offboard_fresh,
-        () if x.armed else tuple(w.prearm),
+        w.offboard_available,
+        () if x.armed else tuple(w.arming_blockers),
         bool(w.failsafe),
         Vector3(*w.home),
         x.battery_warning,
@@ -246,7 +246,7 @@ def status(given, time_ns, x):
 
 
 def lift(given, time_ns, x):
-    return LiftCommand(header(time_ns, "body"), x.thrust, tuple(Vector3(*m) for m in x.moment_body))
+    return RotorWrench(header(time_ns, "body"), x.thrust, tuple(Vector3(*m) for m in x.moment_body))
 
 
 BUILDERS = {

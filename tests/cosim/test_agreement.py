@@ -85,13 +85,13 @@ def test_the_cases_do_what_they_are_named_after():
         return fly(resolve(load(scene, [*overrides, f"run.duration={duration}"])), scripted(script) if script else None)
 
     faults = flown("sensors that fail")
-    assert any(m.rejected for m in faults.messages("estimate"))
+    assert any(m.rejected_sources for m in faults.messages("estimate"))
     assert any(m.status.status < 0 for m in faults.messages("gps/fix"))
     charge = flown("a battery runs down").column("battery", lambda m: m.percentage)
     assert charge[-1] < charge[0]
     operator = flown("an operator")
     assert operator.messages("status")[-1].armed
-    assert [len(m.commands) for m in operator.messages("operator") if m.commands] == [2, 1]
-    bodies = flown("five bodies of which two break").messages("truth")
+    assert [len(m.commands) for m in operator.messages("vehicle_command") if m.commands] == [2, 1]
+    bodies = flown("five bodies of which two break").messages("ground_truth")
     assert bodies[-1].rotor_speed[1] == pytest.approx(0.0, abs=1e-9)
     assert bodies[-1].rotor_speed[3] == bodies[-1].rotor_thrust[3] == 0.0

@@ -29,7 +29,7 @@ def page(first, ticks=50):
     parts = [("/drone1/imu", Imu, times, imu, ticks * 64 + 1)]
     for rest, rejected in ((0, ()), (1, ("gps",)), (2, ("baro", "mag"))):
         some = ticks[(ticks % 5 == 0) & (ticks % 3 == rest)]
-        sample = Estimate(header(0, "world"), rejected=rejected)
+        sample = Estimate(header(0, "world"), rejected_sources=rejected)
         columns = {**stamp_columns(some * TICK), "velocity": rng.normal(size=(len(some), 3))}
         parts.append(
             ("/drone1/estimate", Estimate, some * TICK, Record.of(sample).encode(len(some), columns), some * 64)
@@ -91,14 +91,14 @@ def test_pages_and_single_messages_stand_in_order_of_the_calls(tmp_path):
     path = tmp_path / "mixed"
     given = OperatorInput(header(50 * TICK, "")).encode()
     with LogWriter(path, {}, {}) as log:
-        log.write("/drone1/operator", OperatorInput, given, 0)
+        log.write("/drone1/vehicle_command", OperatorInput, given, 0)
         log.write_page(page(0))
-        log.write("/drone1/operator", OperatorInput, given, 50 * TICK)
+        log.write("/drone1/vehicle_command", OperatorInput, given, 50 * TICK)
         log.write("/drone1/imu", Imu, Imu().encode(), 50 * TICK)
         log.write_page(page(51))
     imu = [entry for entry in contents(path) if entry[0] == "/drone1/imu"]
     assert [(time, sequence) for _, _, time, sequence, _ in imu] == [(k * TICK, k) for k in range(101)]
-    at = [k for k, entry in enumerate(contents(path)) if entry[0] == "/drone1/operator"]
+    at = [k for k, entry in enumerate(contents(path)) if entry[0] == "/drone1/vehicle_command"]
     assert at == [0, 1 + len(single(page(0)))]
 
 
@@ -219,7 +219,7 @@ def test_history_of_a_topic(tmp_path):
         assert times.tolist() == [time_ns for *_, time_ns in estimates]
         decoded = [Estimate.decode(payload) for _, _, payload, _ in estimates]
         assert columns["velocity"].tolist() == [list(message.velocity) for message in decoded]
-        assert columns["rejected"] == [message.rejected for message in decoded]
+        assert columns["rejected_sources"] == [message.rejected_sources for message in decoded]
         both = log.histories()
         assert both.keys() == {"/drone1/imu", "/drone1/estimate"}
         assert both["/drone1/imu"][1]["linear_acceleration"].shape == (100, 3)

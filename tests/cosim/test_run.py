@@ -150,7 +150,7 @@ def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_p
     alone = single(tmp_path, *bodies)
     assert processes(tmp_path, "test-broken", *bodies)["digest"] == alone
     with LogReader(tmp_path / "test-broken.mcap") as log:
-        told = [BodyStates.decode(payload) for *_, payload in log.messages(["/drone1/bodies"])]
+        told = [BodyStates.decode(payload) for *_, payload in log.messages(["/drone1/body_states"])]
         assert b"torn_off" in log.attachments["setup.json"]
     assert told[60].force[3].z != 0.0
     assert told[-1].force[3].z == 0.0
@@ -161,7 +161,7 @@ def test_another_seed_gives_other_bits(tmp_path):
     assert single(tmp_path, wind, "run.seed=1") == single(tmp_path, wind, "run.seed=1")
     assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
     with LogReader(tmp_path / "single.mcap") as log:
-        told = [VehicleState.decode(payload).wind.x for *_, payload in log.messages(["/drone1/truth"])]
+        told = [VehicleState.decode(payload).wind.x for *_, payload in log.messages(["/drone1/ground_truth"])]
     assert sum(told) / len(told) == pytest.approx(1.0, abs=0.1)  # the wind at the vehicle, not 0
 
 

@@ -66,4 +66,4 @@ def test_plotjuggler_plots_what_there_is():
 
 def test_a_field_that_is_not_there_is_found():
     with pytest.raises(ValueError):
-        check("/drone1/truth", ["pose", "yaw"])
+        check("/drone1/ground_truth", ["pose", "yaw"])

@@ -46,12 +46,12 @@ def test_the_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
     thinned_log.write(tmp_path / "sample.mcap", thinned_log.take(flown))
     kept = thinned_log.read(tmp_path / "sample.mcap")
     assert thinned_log.first_difference(kept, flown) == []
-    truth, number = flown.messages("truth"), 156  # one of those that are kept
+    truth, number = flown.messages("ground_truth"), 156  # one of those that are kept
     speed = tuple(w + 0.25 for w in truth[number].rotor_speed)
-    later = {("truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
+    later = {("ground_truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
     began, field = thinned_log.first_difference(kept, Changed(flown, later))
     before, at = (t * flown.setup.interval for t in (number - 1, number + 1))
-    assert began.startswith(f"/{flown.setup.vehicle}/truth: differs first, after t = ")
+    assert began.startswith(f"/{flown.setup.vehicle}/ground_truth: differs first, after t = ")
     after, until = (float(part.split(" s")[0]) for part in began.split("t = ")[1:])
     assert after <= before < until <= at
     old = truth[number].rotor_speed[0]
@@ -66,14 +66,14 @@ def test_a_flight_cut_short_differs_nowhere(flown):
 
 
 def test_a_single_message_between_those_kept_is_found_too(flown):
-    message = flown.messages("truth")[151]._replace(air_density=7.0).encode()
-    (began,) = thinned_log.first_difference(thinned_log.take(flown), Changed(flown, {("truth", 151): message}))
-    assert "truth: differs first" in began
+    message = flown.messages("ground_truth")[151]._replace(air_density=7.0).encode()
+    (began,) = thinned_log.first_difference(thinned_log.take(flown), Changed(flown, {("ground_truth", 151): message}))
+    assert "ground_truth: differs first" in began
 
 
 def test_topics_that_come_and_go_are_named(flown):
     kept = thinned_log.take(flown)
-    gone = {f"/{flown.setup.vehicle}/more": kept[f"/{flown.setup.vehicle}/truth"], **kept}
+    gone = {f"/{flown.setup.vehicle}/more": kept[f"/{flown.setup.vehicle}/ground_truth"], **kept}
     assert thinned_log.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]
     del kept["/tf"]
     assert thinned_log.first_difference(kept, flown) == ["/tf: this topic is new"]

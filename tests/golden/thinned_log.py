@@ -65,7 +65,8 @@ def read(path: Path) -> Sample:
     """A sample that `write` has kept."""
     with LogReader(path) as log:
         table = json.loads(zlib.decompress(log.attachments[HASHES_FILE]))
-        found = {name: TopicSample(row[0], row[1], row[2], []) for name, row in table.items()}
+        current = {recorded: name for name, recorded in log.recorded_names.items()}
+        found = {current[name]: TopicSample(row[0], row[1], row[2], []) for name, row in table.items()}
         for name, kind, time_ns, payload in log.messages():
             found[name].kept.append((time_ns, kind, payload))
     return found

@@ -85,7 +85,7 @@ def test_a_fleet_of_one_is_told_as_a_fleet(tmp_path):
 
 def test_a_replay_publishes_every_vehicle(flown):
     folder, _, figures = flown
-    said = command("replay", folder / "a.mcap", "--speed", "max", "--topics", "/left/truth,/scout/imu",
+    said = command("replay", folder / "a.mcap", "--speed", "max", "--topics", "/left/ground_truth,/scout/imu",
                    "--listen", "tcp/127.0.0.1:0", "--record", folder / "r.mcap",
                    "--mavlink", "udpout:127.0.0.1:14599")  # fmt: skip
     assert "messages published" in said

@@ -44,7 +44,7 @@ def test_the_run_ends_with_one_line_and_a_whole_log(tmp_path, mode):
         assert log.complete
         assert "File too large" in log.metadata["failure"]
         assert log.digest() == log.metadata["digest"]
-        times = [time_ns for topic, _, time_ns, _ in log.messages() if topic == "/drone1/truth"]
+        times = [time_ns for topic, _, time_ns, _ in log.messages() if topic == "/drone1/ground_truth"]
     assert times == [k * 4_000_000 for k in range(1000)]
 
 

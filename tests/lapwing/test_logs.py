@@ -29,7 +29,7 @@ def write(path, ticks=500, from_tick=500, by=0.0, without=range(0), **about):
             aside = by * max(0, k - from_tick + 1)
             state = VehicleState(header(time, "world"), Pose(Point(aside, 0.0, 0.01 * k)), rotor_speed=(k, 2.0 * k))
             if k not in without:
-                log.write("/drone1/truth", VehicleState, state.encode(), time)
+                log.write("/drone1/ground_truth", VehicleState, state.encode(), time)
             if k % 5 == 0:
                 log.write("/clock", Clock, Clock(stamp(time)).encode(), time)
             if k % 100 == 0:
@@ -47,8 +47,8 @@ def test_info_tells_the_making_the_topics_and_the_gaps(lapwing, tmp_path):
     assert lines["duration"].startswith("1.996 s, from 0 to 1.996 s")
     assert lines["digest"] == LogReader(tmp_path / "a.mcap").digest()
     assert lines["/clock"] == "100 50 1.2 rosgraph_msgs/msg/Clock"
-    assert lines["/drone1/truth"].startswith("490 250 ")
-    assert lines["/drone1/truth"].endswith(" lapwing_msgs/msg/VehicleState 1, longest 0.044 s")
+    assert lines["/drone1/ground_truth"].startswith("490 250 ")
+    assert lines["/drone1/ground_truth"].endswith(" lapwing_msgs/msg/VehicleState 1, longest 0.044 s")
     assert "0.00 mode a;b" in " ".join(out.split())
     assert lines["no"] == "resimulate lacks an attachment setup.json"
 
@@ -71,7 +71,7 @@ def test_verify_finds_the_first_message_that_differs_and_how_it_grows(lapwing, t
     code, out, err = lapwing("verify", a, b)
     assert (code, err.count("\n")) == (3, 1)
     assert out.splitlines()[0] == "seed: 7 | 8"
-    assert out.splitlines()[1] == "first difference: /drone1/truth at t = 0.8 s, pose.position.x: 0.0 | 0.001"
+    assert out.splitlines()[1] == "first difference: /drone1/ground_truth at t = 0.8 s, pose.position.x: 0.0 | 0.001"
     rows = [list(map(float, line.split())) for line in out.splitlines()[3:]]
     assert [row[0] for row in rows] == pytest.approx([0.0, 0.012, 0.1, 1.0, 1.196])
     # pushed aside by 1 mm a tick, ticks are 4 ms
@@ -92,10 +92,10 @@ def test_a_message_that_one_log_lacks_is_a_difference(lapwing, tmp_path):
     write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap", without=[300])
     code, out, _ = lapwing("verify", "a.mcap", "b.mcap")
     assert code == 3
-    assert out == "first difference: /drone1/truth at t = 1.2 s, messages: 1 messages | 0 messages\n"
+    assert out == "first difference: /drone1/ground_truth at t = 1.2 s, messages: 1 messages | 0 messages\n"
     write(tmp_path / "c.mcap", ticks=400)
     code, out, _ = lapwing("verify", "a.mcap", "c.mcap")
-    assert "/drone1/truth at t = 1.6 s" in out
+    assert "/drone1/ground_truth at t = 1.6 s" in out
 
 
 def test_what_a_killed_writer_has_flushed_is_recovered(lapwing, tmp_path):
@@ -138,7 +138,7 @@ def test_a_damaged_chunk_is_left_out_and_named(lapwing, tmp_path):
     assert code == 0
     assert out.startswith("left out: damaged chunk at byte")
     with LogReader("b.mcap") as log:
-        times = [t // TICK for topic, _, t, _ in log.messages(["/drone1/truth"])]
+        times = [t // TICK for topic, _, t, _ in log.messages(["/drone1/ground_truth"])]
         assert log.complete
         assert log.metadata["recovered"].startswith("a.mcap: damaged chunk")
     assert 350 <= len(times) < 500
@@ -148,19 +148,22 @@ def test_a_damaged_chunk_is_left_out_and_named(lapwing, tmp_path):
 def test_export_writes_a_table_a_topic_with_units(lapwing, tmp_path):
     write(tmp_path / "a.mcap")
     code, out, _ = lapwing(
-        "export", "a.mcap", "--csv", "csv", "--mat", "a.mat", "--topics", "/drone1/truth,/drone1/status"
+        "export", "a.mcap", "--csv", "csv", "--mat", "a.mat", "--topics", "/drone1/ground_truth,/drone1/status"
     )
     assert code == 0
-    assert out.splitlines() == ["csv/drone1.truth.csv", "csv/drone1.status.csv", "a.mat"] or len(out.splitlines()) == 3
-    with open("csv/drone1.truth.csv", newline="") as file:
+    assert (
+        out.splitlines() == ["csv/drone1.ground_truth.csv", "csv/drone1.status.csv", "a.mat"]
+        or len(out.splitlines()) == 3
+    )
+    with open("csv/drone1.ground_truth.csv", newline="") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 500
     assert float(rows[7]["time [s]"]) == 7 * 0.004
     assert float(rows[7]["pose.position.z [m]"]) == 0.01 * 7
     assert float(rows[7]["rotor_speed.1 [rad/s]"]) == 14.0
     found = loadmat("a.mat", simplify_cells=True)
-    assert np.array_equal(found["drone1_truth"]["rotor_speed_1"], 2.0 * np.arange(500))
-    assert found["drone1_truth"]["units"]["rotor_speed_1"] == "rad/s"
+    assert np.array_equal(found["drone1_ground_truth"]["rotor_speed_1"], 2.0 * np.arange(500))
+    assert found["drone1_ground_truth"]["units"]["rotor_speed_1"] == "rad/s"
     assert found["drone1_status"]["mode"] == "a;b"
     with open("csv/drone1.status.csv", newline="") as file:
         assert next(csv.DictReader(file))["mode"] == "a;b"
@@ -170,7 +173,7 @@ def test_parquet_has_types_and_units(lapwing, tmp_path):
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `parquet`")
     write(tmp_path / "a.mcap")
     assert lapwing("export", "a.mcap", "--parquet", "tables")[0] == 0
-    table = parquet.read_table("tables/drone1.truth.parquet")
+    table = parquet.read_table("tables/drone1.ground_truth.parquet")
     assert table.column("rotor_speed.1").to_pylist() == [2.0 * k for k in range(500)]
     assert table.schema.field("rotor_speed.1").metadata == {b"unit": b"rad/s"}
     assert table.schema.field("ground_contact").type == "bool"
@@ -194,7 +197,7 @@ def foreign(tmp_path):
 def test_a_foreign_log_is_told_and_what_it_lacks(lapwing, foreign):
     code, out, _ = lapwing("info", foreign)
     assert code == 0
-    assert "no report lacks a topic /NAME/truth" in " ".join(out.split())
+    assert "no report lacks a topic /NAME/ground_truth" in " ".join(out.split())
     assert "/a 3 " in " ".join(out.split())
 
 
@@ -238,7 +241,7 @@ def test_a_log_of_another_version_is_refused_where_its_messages_would_be_read_wr
     before = sorted(os.listdir())
     code, out, err = lapwing(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
-    assert f"/drone1/truth: {OLD}; expected a log of this version, Lapwing " in err
+    assert f"/drone1/ground_truth: {OLD}; expected a log of this version, Lapwing " in err
     assert ", got one of Lapwing 0.0.9" in err
     assert sorted(os.listdir()) == before
 

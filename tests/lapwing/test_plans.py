@@ -41,7 +41,7 @@ def test_the_others_fly_as_they_would_without_it():
     scene = load("fleet", [*only, *plan_options.overrides(given, Path("fleet"), only)])
     flown = fly(resolve(scene, plan_options.commands(given, scene)))
     assert flown.messages("right/status")[-1].mode == "mission"
-    assert flown.view("right/truth").position[-1, 2] > 1.0
+    assert flown.view("right/ground_truth").position[-1, 2] > 1.0
     without = fly(resolve(load("fleet", only)))
     for name in ("left", "scout"):
-        assert (flown.view(f"{name}/truth").position == without.view(f"{name}/truth").position).all()
+        assert (flown.view(f"{name}/ground_truth").position == without.view(f"{name}/ground_truth").position).all()

@@ -11,8 +11,8 @@ from lapwing.messages import (
     BodyStates,
     Clock,
     Imu,
-    LiftCommand,
     Pose,
+    RotorWrench,
     Vector3,
     VehicleState,
     header,
@@ -82,10 +82,10 @@ def test_elements_of_sequences_have_their_number_in_the_name():
 
 
 def test_one_value_for_all_and_columns_of_width_one():
-    lift = Record.of(LiftCommand(thrust=(0.0,), moment=(Vector3(),)))
+    lift = Record.of(RotorWrench(thrust=(0.0,), moment=(Vector3(),)))
     column = np.array([1.0, 2.0, 3.0])
     records = lift.encode(3, {"thrust": column, "moment.0": (4.0, 5.0, 6.0), "moment.0.z": 7})
-    decoded = [LiftCommand.decode(payload) for payload in payloads(records)]
+    decoded = [RotorWrench.decode(payload) for payload in payloads(records)]
     assert [message.thrust for message in decoded] == [(1.0,), (2.0,), (3.0,)]
     assert {message.moment for message in decoded} == {((4.0, 5.0, 7.0),)}
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from samples import flat, sample, value, varied
 
-from lapwing.messages import TYPES, BatteryState, Estimate, Imu, LiftCommand, Status, Vector3, header, stamp_ns
+from lapwing.messages import TYPES, BatteryState, Estimate, Imu, RotorWrench, Status, Vector3, header, stamp_ns
 from lapwing.messages import topic_columns as module
 from lapwing.messages.topic_columns import ColumnBuilder, history, history_of_pages
 
@@ -49,8 +49,8 @@ def test_strings_of_the_same_total_length_are_told_apart():
 
 
 def test_sequences_of_varying_length():
-    messages = [Estimate(rejected=names) for names in [(), ("gps",), ("baro", "mag")]]
-    assert history(Estimate, [m.encode() for m in messages])["rejected"] == [(), ("gps",), ("baro", "mag")]
+    messages = [Estimate(rejected_sources=names) for names in [(), ("gps",), ("baro", "mag")]]
+    assert history(Estimate, [m.encode() for m in messages])["rejected_sources"] == [(), ("gps",), ("baro", "mag")]
     messages = [BatteryState(cell_voltage=cells) for cells in [(), (1.5,), (2.5, 3.5), (4.5,)]]
     cells = history(BatteryState, [m.encode() for m in messages])["cell_voltage"]
     assert cells.dtype == object
@@ -58,13 +58,13 @@ def test_sequences_of_varying_length():
 
 
 def test_what_not_every_message_has_is_no_column():
-    messages = [LiftCommand(moment=(Vector3(),) * count) for count in (1, 2)]
-    columns = history(LiftCommand, [message.encode() for message in messages])
+    messages = [RotorWrench(moment=(Vector3(),) * count) for count in (1, 2)]
+    columns = history(RotorWrench, [message.encode() for message in messages])
     assert "moment.0" in columns
     assert "moment.1" not in columns
-    with pytest.raises(KeyError, match=r"LiftCommand: field moment.1 is not in every message"):
+    with pytest.raises(KeyError, match=r"RotorWrench: field moment.1 is not in every message"):
         columns["moment.1"]
-    with pytest.raises(KeyError, match="LiftCommand: no field momnt; near it: moment"):
+    with pytest.raises(KeyError, match="RotorWrench: no field momnt; near it: moment"):
         columns["momnt"]
 
 
@@ -85,7 +85,9 @@ def test_damaged_messages_are_refused():
 
 
 def test_pages_are_the_same_as_payloads():
-    messages = [Status(mode=mode, prearm=why) for mode, why in [("a", ()), ("b", ("x",)), ("c", ()), ("d", ("y",))]]
+    messages = [
+        Status(mode=mode, arming_blockers=why) for mode, why in [("a", ()), ("b", ("x",)), ("c", ()), ("d", ("y",))]
+    ]
     payloads = [message.encode() for message in messages]
     expected = history(Status, payloads)
 
@@ -101,7 +103,7 @@ def test_pages_are_the_same_as_payloads():
 
 
 def test_a_history_can_be_pickled():
-    columns = history(LiftCommand, [LiftCommand(moment=(Vector3(k, 0.0, 0.0),)).encode() for k in range(3)])
+    columns = history(RotorWrench, [RotorWrench(moment=(Vector3(k, 0.0, 0.0),)).encode() for k in range(3)])
     assert pickle.loads(pickle.dumps(columns))["moment.0.x"].tolist() == [0.0, 1.0, 2.0]
 
 

@@ -4,7 +4,7 @@ from lapwing.messages.topics import CLOCK, EVENTS, GPS, TOPICS, WALL_TIME
 EXPECTED = {
     "/clock", "/tf", "/wall_time",
     *(f"/drone1/{name}" for name in (
-        "truth", "pose", "odom", "imu", "mag", "gps/fix", "baro", "sonar", "battery", "setpoint", "estimate",
+        "ground_truth", "pose", "odom", "imu", "mag", "gps/fix", "baro", "sonar", "battery", "setpoint", "estimate",
         "actuators", "status",
     )),
 }  # fmt: skip

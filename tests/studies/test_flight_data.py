@@ -54,7 +54,7 @@ def test_a_log_and_memory_say_the_same(recorded, in_memory):
 
 def test_only_what_is_wanted_is_kept(run):
     found = fly(run, (TRUTH, SETPOINT))
-    assert found.topics == ["setpoint", "truth"]
+    assert found.topics == ["ground_truth", "setpoint"]
     with pytest.raises(ValueError, match="hover: has no topic status; it has setpoint, truth"):
         found.status  # noqa: B018
 

@@ -21,7 +21,7 @@ def test_fields_are_attributes(in_memory):
     truth, setpoint = in_memory.truth, in_memory.setpoint
     n = TICKS + 1
     assert (truth.position.shape, truth.orientation.shape, truth.attitude.shape) == ((n, 3), (n, 4), (n, 3))
-    assert np.array_equal(truth.position, in_memory.column("truth", "pose.position"))
+    assert np.array_equal(truth.position, in_memory.column("ground_truth", "pose.position"))
     assert np.array_equal(truth["pose.position.z"], truth.position[:, 2])
     assert (setpoint.position.shape, setpoint.yaw.shape, truth.rotor_speed.shape) == ((n, 3), (n,), (n, 4))
     assert setpoint.phase[0] == "climb"
@@ -48,7 +48,7 @@ def test_dataframe_without_pandas(in_memory, monkeypatch):
 
 def test_dataframe_has_a_column_for_every_number(in_memory):
     pytest.importorskip("pandas")
-    frame = in_memory.to_dataframe("truth")
+    frame = in_memory.to_dataframe("ground_truth")
     assert len(frame) == TICKS + 1
     assert frame.index.name == "time"
     assert {"pose.position.x", "velocity.z", "rotor_speed.3", "ground_contact"} <= set(frame.columns)

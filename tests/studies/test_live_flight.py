@@ -26,8 +26,8 @@ def steps():
         before = graph.tick
         graph.advance(min(graph.tick + 30, setup.last_tick + 1))
         pages = list(graph.pages(before, graph.tick))
-        live.take(held + [page for page in pages if page.topic.name.endswith("truth")])
-        held = [page for page in pages if not page.topic.name.endswith("truth")]  # come later
+        live.take(held + [page for page in pages if page.topic.name.endswith("ground_truth")])
+        held = [page for page in pages if not page.topic.name.endswith("ground_truth")]  # come later
         if (step := live.step((before - 1) * setup.interval_ns)) is not None:
             found.append(step)
     live.take(held)
@@ -42,7 +42,7 @@ def whole():
 def test_the_steps_are_the_flight_each_begun_with_the_last_message_before(steps, whole):
     assert len(steps) > 10
     for one, other in itertools.pairwise(steps):
-        assert one.times("truth")[-1] == other.times("truth")[0]
+        assert one.times("ground_truth")[-1] == other.times("ground_truth")[0]
     rows = [step.truth.position[1:] if k else step.truth.position for k, step in enumerate(steps)]
     assert np.array_equal(np.concatenate(rows), whole.truth.position)
     rows = [step.reference[1:] if k else step.reference for k, step in enumerate(steps)]

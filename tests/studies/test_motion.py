@@ -79,7 +79,7 @@ def fleet():
     first = flight()
     truth = {name: first.truth[name] for name in first.truth.fields}
     truth["pose.position"] = first.truth.position + np.array([0.0, 4.0, 0.0])
-    second = FlightData({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
+    second = FlightData({"ground_truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
     second.vehicle = "second"
     first.others = (second,)
     first.fleet = {"second": second.truth, first.vehicle: first.truth}
@@ -174,9 +174,9 @@ def test_a_load_hangs_by_a_cable_from_the_hook_and_all_places_are_from_the_centr
 def test_a_body_that_tells_less_often_moves_evenly_in_between():
     whole = slung()
     seldom = TopicView(
-        np.arange(0, TICKS, 10) * 10**7, {k: whole.topic("bodies")[k][::10] for k in ("name", "pose", "force")}
+        np.arange(0, TICKS, 10) * 10**7, {k: whole.topic("body_states")[k][::10] for k in ("name", "pose", "force")}
     )
-    views = {name: whole.topic(name) for name in whole.topics} | {"bodies": seldom}
+    views = {name: whole.topic(name) for name in whole.topics} | {"body_states": seldom}
     (table,) = json.loads(motion_3d.to_json([FlightData(views, whole.origin)]))["flights"]
     heights = numbers(table["bodies"][1]["p"]).reshape(-1, 3)[:, 2]
     assert heights[: TICKS - 10] == pytest.approx(T[: TICKS - 10] - 1.8, abs=1e-5)
@@ -278,7 +278,7 @@ def standing():
     place[:, 0, 0], place[:, 1, 0], force[:, :, 2] = 0.2, -0.2, 50.0
     whole = flight()
     contact = TopicView(np.arange(0, TICKS, 2) * 10**7, {"position": place, "force": force})
-    return FlightData({**{name: whole.topic(name) for name in whole.topics}, "contact": contact}, whole.origin)
+    return FlightData({**{name: whole.topic(name) for name in whole.topics}, "contact_forces": contact}, whole.origin)
 
 
 def test_the_page_is_given_the_forces_on_every_foot_where_they_are_told():
@@ -331,7 +331,7 @@ def test_a_browser_draws_the_mesh_where_the_vehicle_is_and_as_it_is_turned(tmp_p
     plain = flight(scene=WITH_MESH)
     truth = {name: plain.truth[name] for name in plain.truth.fields}
     truth["pose.orientation"] = np.tile([0.0, 0.0, 0.5**0.5, 0.5**0.5], (TICKS, 1))  # x of the body points north
-    given = FlightData({"truth": TopicView(np.arange(TICKS) * 10**7, truth)}, plain.origin)
+    given = FlightData({"ground_truth": TopicView(np.arange(TICKS) * 10**7, truth)}, plain.origin)
     given.digest = "0" * 32
     with chromium.Browser(write(given, tmp_path / "flight.html"), tmp_path / "profile") as browser:
         x, y, z, face = browser.run(

@@ -87,7 +87,7 @@ def messages(std=0.05, rotors=4, reference=True, east=0.0):
             air_density=1.2,
             ground_contact=t >= SECONDS,
         )
-        yield "truth", truth
+        yield "ground_truth", truth
         asked = [value + offset for value, offset in zip(position + angles, OFFSET, strict=True)]
         if reference:
             phase = "climb" if t < 3.0 else "hover"
@@ -100,7 +100,7 @@ def messages(std=0.05, rotors=4, reference=True, east=0.0):
             estimated = pose._replace(position=Point(position[0] + ESTIMATE_ERROR, *position[1:]))
             wrong = ("gps", "sonar") if tick == 50 else ("gps",) if tick == 100 else ()
             spread = dict.fromkeys(("position_std", "velocity_std", "attitude_std"), Vector3(std, std, std))
-            yield "estimate", Estimate(stamp, estimated)._replace(rejected=wrong, **spread)
+            yield "estimate", Estimate(stamp, estimated)._replace(rejected_sources=wrong, **spread)
             yield "status", Status(stamp)._replace(landed=t >= SECONDS, finished=t >= SECONDS)
 
 
@@ -363,7 +363,7 @@ def test_attitude_error_is_in_the_body_frame(tmp_path):
     estimated = Quaternion(x=c * roll[0], y=c * roll[0], z=c * roll[1], w=c * roll[1])  # true * roll, by hand
     stamp = header(0, "world")
     both = [
-        ("truth", VehicleState(stamp, Pose(Point(), true))),
+        ("ground_truth", VehicleState(stamp, Pose(Point(), true))),
         ("estimate", Estimate(stamp, Pose(Point(), estimated))),
     ]
     later = [(topic, m._replace(header=header(10**9, "world"))) for topic, m in both]

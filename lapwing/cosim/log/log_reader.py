@@ -25,6 +25,7 @@ class LogReader:
 
     Attributes:
         metadata: of the record `lapwing`; empty in other tools' logs.
+        recorded_names: name of each topic in the file by its current name.
         attachments: file name to contents.
         complete: False if the file has no end (its writer was killed); it then ends with its last whole chunk.
         damaged: a line for each chunk that was left out because it is damaged; with `skip_damaged` only.
@@ -44,7 +45,7 @@ class LogReader:
         except BaseException:
             self._file.close()
             raise
-        self.metadata = self._contents.metadata
+        self.metadata, self.recorded_names = self._contents.metadata, self._contents.recorded_names
         self.attachments = self._contents.attachments
         self.complete, self.damaged = self._contents.complete, self._contents.damaged
 
@@ -150,11 +151,15 @@ class LogReader:
         """The topics that enter the digest."""
         return {c.topic for c in self._contents.channels.values() if c.metadata.get(DETERMINISTIC) != "false"}
 
-    def digest(self) -> str:
-        """Digest of the deterministic messages, computed anew; equals `metadata["digest"]` of an intact log."""
-        digest = Digest()
+    def digest(self, current_names: bool = False) -> str:
+        """Compute the digest of the deterministic messages; that of an intact log equals `metadata["digest"]`.
+
+        Args:
+            current_names: name the topics as this version does, to compare with a run of this version.
+        """
+        digest, recorded = Digest(), self.recorded_names
         for topic, _, time_ns, payload in self.messages(self.deterministic_topics()):
-            digest.update(topic, time_ns, payload)
+            digest.update(topic if current_names else recorded[topic], time_ns, payload)
         return digest.hexdigest()
 
     def close(self) -> None:

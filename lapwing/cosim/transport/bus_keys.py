@@ -10,7 +10,7 @@ ENDED_KEY = "_ended"  # of the owner of time: that the run has come to its end, 
 REFUSED_KEY = "_refused"  # how many messages of strangers somebody has refused
 DEADLINES_KEY = "_deadlines"  # of a run that keeps a speed: how late somebody was
 COMPILING_KEY = "_compiling"  # somebody compiles kernels
-RECORDED_KEY = "_recorded"  # how far the log is; an empty message: it is complete
+RECORDED_KEY = "_log_progress"  # how far the log is; an empty message: it is complete
 HEARD_KEY = "_heard"  # a token: somebody has received the last message of every service that it takes messages from
 LOGGED_KEY = "_logged"  # a token: somebody has received the last message of the recorder
 

@@ -22,7 +22,7 @@ def read_log_flight(path: Path) -> Recording:
     if not flight.has("actuators") or not len(flight.actuators):
         raise ValueError(f"{path}: no motor outputs (topic actuators); log the motor commands and fly again")
     truth = flight.truth
-    times = flight.times("truth")
+    times = flight.times("ground_truth")
     interval = 1.0 / RATE
     if len(times) < 2 or times[-1] - times[0] < 50 * interval:
         raise ValueError(f"{path}: shorter than {50 * interval:g} s; expected a flight")

@@ -105,7 +105,7 @@ def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -
     times, apart = _apart(a, b, topic, (field.rpartition(".")[0], field))
     if not len(times):
         return ()
-    truth = next((name for name in a.topics() if name.endswith("/truth") and name in b.topics()), None)
+    truth = next((name for name in a.topics() if name.endswith("/ground_truth") and name in b.topics()), None)
     instants, moved = _apart(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
     position = dict(zip(instants.tolist(), moved.tolist(), strict=True))
     after = (times - first_ns) * 1e-9

@@ -41,8 +41,8 @@ class Info(NamedTuple):
     def missing(self) -> dict[str, str]:
         """Commands that cannot use the log, with what it lacks for each."""
         found = {}
-        if not any(topic.name.endswith("/truth") for topic in self.topics):
-            found["report"] = "a topic /NAME/truth"
+        if not any(topic.name.endswith("/ground_truth") for topic in self.topics):
+            found["report"] = "a topic /NAME/ground_truth"
         elif self.other_versions:
             found["report"] = found["replay"] = f"messages of this version: {'; '.join(self.other_versions.values())}"
         if SETUP_FILE not in self.files:

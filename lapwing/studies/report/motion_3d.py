@@ -95,7 +95,7 @@ def of_truth(
 
 def of_bodies(flight: FlightData, drawn: Sequence[tuple[tuple[Stroke, ...], tuple[Rotor, ...]]]) -> tuple[Body, ...]:
     """The bodies of the topic of that name, in its order, with strokes and rotors of each."""
-    said = flight.topic("bodies")
+    said = flight.topic("body_states")
     names = said["name"][0]
     return tuple(
         Body(names[k], said.times, said.position[:, k], said.orientation[:, k], *looks, said.force[:, k])
@@ -180,9 +180,9 @@ def _body(body: Body, times: np.ndarray, kept: np.ndarray, later: bool) -> dict[
 
 def _contact(flight: FlightData, times: np.ndarray) -> dict[str, Any] | None:
     """Points that may touch the ground, and the forces on them, point by point in each row; None where nobody tells."""
-    if not flight.has("contact"):
+    if not flight.has("contact_forces"):
         return None
-    told = flight.topic("contact")
+    told = flight.topic("contact_forces")
     rows = np.searchsorted(told.times, times - 1e-9).clip(max=len(told) - 1)
     return {"points": told.position.shape[1], "p": _array(told.position[rows]), "f": _array(told.force[rows])}
 

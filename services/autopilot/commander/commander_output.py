@@ -21,8 +21,8 @@ class Status(NamedTuple):
     mission_count: int
     mission_reached: int  # index of the last reached item
     mission_state: int  # MISSION_STATE of MAVLink
-    offboard_fresh: bool  # offboard setpoints are available
-    prearm: tuple[str, ...]  # arming blockers; ignored while the motors run along the trajectory
+    offboard_available: bool  # offboard setpoints are available
+    arming_blockers: tuple[str, ...]  # arming blockers; ignored while the motors run along the trajectory
     home: tuple[float, float, float]  # world x, y, and height of the ground [m]
     released: bool  # open the gripper
     battery_warning: int  # 0 none, 1 low, 2 critical, 3 nearly empty

@@ -46,7 +46,7 @@ FAILSAFES = (
     Failsafe(status_texts.LINK_LOST, _link_lost, lambda p: 0.0, "NAV_DLL_ACT"),
     Failsafe(
         status_texts.SETPOINTS_LOST,
-        lambda v, s: s.mode_name == "offboard" and not s.guidance.offboard_fresh,
+        lambda v, s: s.mode_name == "offboard" and not s.guidance.offboard_available,
         lambda p: 0.0,
         "FS_OFFBOARD_ACT",
     ),

@@ -97,7 +97,7 @@ class Guidance:
         return self.home[2] + constants.resting_height + self.parameters[parameter]
 
     @property
-    def offboard_fresh(self) -> bool:
+    def offboard_available(self) -> bool:
         """True if offboard setpoints are recent."""
         return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
 

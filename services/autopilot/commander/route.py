@@ -24,7 +24,7 @@ def check_items(items: Sequence[Any]) -> None:
             raise ValueError(f"item {number}: {item.action} needs a place")
         if item.action == "takeoff" and MAXIMUM_TAKEOFF_HEIGHT < item.position.z < math.inf:
             raise ValueError(f"item {number}: expected a take-off to at most {MAXIMUM_TAKEOFF_HEIGHT:g} m")
-        if math.isinf(item.yaw) or not (math.isfinite(item.hold) and item.hold >= 0.0):
+        if math.isinf(item.yaw) or not (math.isfinite(item.hold_time) and item.hold_time >= 0.0):
             raise ValueError(f"item {number}: expected a finite yaw, and a time of 0 s or more")
         if item.action == "jump" and not (len(item.values) > 1 and 0 <= item.values[0] < len(items)):
             raise ValueError(f"item {number}: expected a jump to an item from 0 to {len(items) - 1}, and how often")

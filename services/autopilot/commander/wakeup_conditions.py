@@ -36,7 +36,7 @@ def quiet_time(context: Context) -> float:
         return 0.0
     inputs, parameters = guidance.inputs, guidance.parameters
     link_left = parameters["COM_DL_LOSS_T"] - inputs.link_age if inputs.linked else math.inf
-    setpoints_left = parameters["COM_OF_LOSS_T"] - inputs.offboard_age if guidance.offboard_fresh else math.inf
+    setpoints_left = parameters["COM_OF_LOSS_T"] - inputs.offboard_age if guidance.offboard_available else math.inf
     return min(link_left, setpoints_left)
 
 

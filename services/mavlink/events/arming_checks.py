@@ -102,7 +102,7 @@ class ArmingWatch:
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
         """The next report, where one is due."""
-        told = v.reports_asked, tuple(v.status.prearm)
+        told = v.reports_asked, tuple(v.status.arming_blockers)
         if told == self._told and v.time_ns < self._next:
             return
         self._next = v.time_ns + INTERVAL

@@ -53,5 +53,5 @@ def estimator_status(v: VehicleCache) -> Any:
         return None
     spread = math.hypot(e.position_std.x, e.position_std.y)
     return mavlink.MAVLink_estimator_status_message(
-        v.boot_us, 0 if e.health else _GIVEN, *(0.0,) * 6, spread, e.position_std.z
+        v.boot_us, 0 if e.health_flags else _GIVEN, *(0.0,) * 6, spread, e.position_std.z
     )

@@ -39,5 +39,5 @@ def odometry(v: VehicleCache) -> Any:
         _triangle(u.y**2, u.x**2, u.z**2),
         0,
         mavlink.MAV_ESTIMATOR_TYPE_AUTOPILOT,
-        _BAD if e.health else _GOOD,
+        _BAD if e.health_flags else _GOOD,
     )

@@ -74,13 +74,13 @@ def heartbeat(v: VehicleCache) -> Any:
 def healthy(v: VehicleCache) -> bool:
     """Whether the estimate is to be trusted."""
     e = v.get(ESTIMATE)
-    return e is not None and e.health == 0
+    return e is not None and e.health_flags == 0
 
 
 def _refused(v: VehicleCache, source: str) -> bool:
     """Whether the estimator has no use for the newest reading of a sensor, or has got none."""
     e = v.get(ESTIMATE)
-    return e is not None and source in e.rejected
+    return e is not None and source in e.rejected_sources
 
 
 def sensor_health(v: VehicleCache) -> Iterator[tuple[str, int, bool]]:
@@ -104,7 +104,7 @@ def sys_status(v: VehicleCache) -> Any:
         present |= bits
         sound |= bits if good else 0
     sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
-    sound |= 0 if v.status.prearm else mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    sound |= 0 if v.status.arming_blockers else mavlink.MAV_SYS_STATUS_PREARM_CHECK
     return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)
 
 

@@ -13,7 +13,7 @@ from lapwing.cosim.run_errors import DivergedError
 from lapwing.cosim.scene import SceneError
 from lapwing.kernels import on_compile
 from lapwing.kernels.cell import Cell
-from lapwing.messages.topics import CLOCK, IMU, TF, of_vehicle, own_sensor, topic_named
+from lapwing.messages.topics import CLOCK, IMU, TF, custom_sensor, of_vehicle, topic_named
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import from_resolved, load, parse, reseed, resolve
 from tests.cosim.memory_log import fly
@@ -68,13 +68,13 @@ def test_a_vehicle_says_in_a_fleet_what_it_says_alone(vehicle, setup, flown):
 
 def test_random_numbers_go_by_the_vehicle(flown):
     """Two of one type under the same law: what differs beside their place is the wind, drawn for each."""
-    left, right = (flown.view(f"{name}/truth").wind for name in ("left", "right"))
+    left, right = (flown.view(f"{name}/ground_truth").wind for name in ("left", "right"))
     assert (left != right).any()
 
 
 def test_a_vehicle_stands_where_it_starts_and_its_path_begins_there(flown):
     for name, (x, y) in {"left": (0.0, 3.0), "right": (0.0, -3.0), "scout": (-3.0, 0.0)}.items():
-        assert flown.view(f"{name}/truth").position[0, :2] == pytest.approx((x, y))
+        assert flown.view(f"{name}/ground_truth").position[0, :2] == pytest.approx((x, y))
         assert flown.view(f"{name}/setpoint").position[0, :2] == pytest.approx((x, y))
     assert flown.view("scout/estimate").position[0, :2] == pytest.approx((-3.0, 0.0), abs=0.1)
 
@@ -145,7 +145,7 @@ def test_names_and_systems_are_numbered(tmp_path):
 def test_topics_of_a_vehicle_of_a_fleet():
     assert of_vehicle(IMU, "left") is topic_named("left/imu")
     assert (topic_named("left/imu").key(), of_vehicle(TF, "left")) == ("/left/imu", TF)
-    assert topic_named("left/own_sensor/x") is of_vehicle(own_sensor("x"), "left")
+    assert topic_named("left/custom_sensor/x") is of_vehicle(custom_sensor("x"), "left")
     with pytest.raises(ValueError, match=r"^no topic \{vehicle\}/imuu$"):
         topic_named("left/imuu")
 

@@ -140,7 +140,7 @@ def test_what_cannot_be_is_refused(changes, message):
 def test_the_autopilot_lifts_it_carries_it_and_holds_height():
     flight = lapwing.fly("slung_load", {"run.duration": 20.0})
     assert not flight.failure
-    body, truth = flight.topic("bodies"), flight.truth
+    body, truth = flight.topic("body_states"), flight.truth
     holding, loaded = truth.times > 18.0, body.times > 18.0
     assert truth.position[holding, 2] == pytest.approx(6.11, abs=0.15)
     away = truth.position[np.searchsorted(truth.times, body.times[loaded])] - body.position[loaded, 0]

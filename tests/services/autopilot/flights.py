@@ -63,8 +63,8 @@ def fly_by_sensors(seconds, script, *overrides):
 
 def error(flown, start):
     """Largest distance [m] of the estimate from the truth from a time on."""
-    known, true = (flown.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "truth"))
-    times, true_times = flown.times("estimate"), flown.times("truth")
+    known, true = (flown.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "ground_truth"))
+    times, true_times = flown.times("estimate"), flown.times("ground_truth")
     nearest = true[np.searchsorted(true_times, times).clip(0, len(true) - 1)]
     return np.linalg.norm(known - nearest, axis=1)[times >= start].max()
 
@@ -77,12 +77,12 @@ def at(flown, topic, t, value):
 
 def height(flown, t):
     """True height [m] of the vehicle's origin at t [s]."""
-    return at(flown, "truth", t, lambda m: m.pose.position.z)
+    return at(flown, "ground_truth", t, lambda m: m.pose.position.z)
 
 
 def place(flown, t):
     """True position [m] at t [s]."""
-    return tuple(at(flown, "truth", t, lambda m: tuple(m.pose.position)))
+    return tuple(at(flown, "ground_truth", t, lambda m: tuple(m.pose.position)))
 
 
 def mode(flown, t):
@@ -97,11 +97,11 @@ def said(flown):
 
 def results(flown):
     """Results of the answers, by id."""
-    return {a.id: a.result for answers in _all(flown, lambda m: m.answers) for a in answers}
+    return {a.id: a.result for answers in _all(flown, lambda m: m.acks) for a in answers}
 
 
 def _all(flown, value):
-    return [value(m) for m in flown.messages("answers")]
+    return [value(m) for m in flown.messages("vehicle_command_ack")]
 
 
 ACCEPTED, REJECTED, DENIED = CommandAck.ACCEPTED, CommandAck.TEMPORARILY_REJECTED, CommandAck.DENIED

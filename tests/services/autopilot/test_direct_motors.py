@@ -27,10 +27,10 @@ def test_a_flight_whose_voltages_come_from_outside_is_the_controllers_to_the_bit
     again = memory_log.fly(scene, lambda tick: given.get(tick, ()))
     assert volts.max() > 5.0
     count = len(volts)
-    for name in ("truth", "actuators"):
+    for name in ("ground_truth", "actuators"):
         one, other = (f.payloads(name)[:count] for f in (flown, again))
         assert len(one) == len(other) == count
-        if name == "truth":
+        if name == "ground_truth":
             assert one == other
     assert np.array_equal(again.column("actuators", lambda m: tuple(m.motor_voltage))[:count], volts)
     thrust = [f.column("actuators", lambda m: tuple(m.thrust))[:count] for f in (flown, again)]
@@ -44,7 +44,7 @@ def test_they_hold_between_their_stamps_within_what_the_motors_take_and_the_cont
     fly_single(setup, log, operator=scripted(script))
     with LogReader(log) as read:
         times, actuators = read.history("/drone1/actuators")
-        _, truth = read.history("/drone1/truth")
+        _, truth = read.history("/drone1/ground_truth")
         stated = read.metadata["digest"]
     direct = (times >= 3_000_000_000) & (times < 3_100_000_000)
     highest = setup.services["autopilot"].parameters.airframe.voltage_max

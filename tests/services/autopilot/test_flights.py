@@ -29,7 +29,7 @@ pytestmark = pytest.mark.long
 
 def angles(flown, t):
     """True roll, pitch and yaw [rad] at t [s]."""
-    q = at(flown, "truth", t, lambda m: tuple(m.pose.orientation))
+    q = at(flown, "ground_truth", t, lambda m: tuple(m.pose.orientation))
     return to_roll_pitch_yaw(Quaternion(q[3], *q[:3]))
 
 
@@ -71,9 +71,9 @@ def test_a_mission_with_speed_jump_delay_and_return():
     assert order[:2] in ([0, 1], [1, 2])
     assert order.count(2) + order.count(3) >= 3  # the jump led back once
     assert flown.landed
-    assert flown.times("truth")[-1] < 60.0
+    assert flown.times("ground_truth")[-1] < 60.0
     assert place(flown, 60.0) == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
-    assert max(flown.column("truth", lambda m: m.pose.position.z)) == pytest.approx(4.35, abs=0.2)
+    assert max(flown.column("ground_truth", lambda m: m.pose.position.z)) == pytest.approx(4.35, abs=0.2)
 
 
 def test_refusals_say_why():
@@ -98,10 +98,10 @@ def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost():
     velocity = command("offboard_position", *[float("nan")] * 3, 1.0, 0.0, 0.0)
     flown = fly(14, UP | {(6, 9): [velocity], 6.2: [command("offboard", id=1)]})
     assert results(flown)[1] == ACCEPTED
-    assert at(flown, "truth", 9.0, lambda m: m.velocity.x) == pytest.approx(1.0, abs=0.05)
+    assert at(flown, "ground_truth", 9.0, lambda m: m.velocity.x) == pytest.approx(1.0, abs=0.05)
     assert mode(flown, 9.5) == "offboard"
     assert mode(flown, 10.3) == "hold"
-    assert at(flown, "truth", 14.0, lambda m: m.velocity.x) == pytest.approx(0.0, abs=0.05)
+    assert at(flown, "ground_truth", 14.0, lambda m: m.velocity.x) == pytest.approx(0.0, abs=0.05)
     assert "the offboard setpoints are lost: hold" in said(flown)
 
 
@@ -116,7 +116,7 @@ def test_a_lost_ground_station_brings_it_home_in_simulation_time():
 def test_sticks_ask_for_velocities_along_the_heading():
     script = UP | {5.9: [command("position_control")], (6, 9): [command("manual", 0.2, 0.0, 0.0, 0.0)]}
     flown = fly(9, script)
-    assert at(flown, "truth", 9.0, lambda m: m.velocity.x) == pytest.approx(0.2 * 5.0, abs=0.05)
+    assert at(flown, "ground_truth", 9.0, lambda m: m.velocity.x) == pytest.approx(0.2 * 5.0, abs=0.05)
 
 
 def test_a_fence_turns_it_back():
@@ -179,9 +179,9 @@ def test_offboard_attitude_tilts_by_the_angle_along_the_heading():
     script = UP | {5.9: [tilted], (6, 9): [tilted], 6.1: [command("offboard", id=1)]}
     flown = fly(9, script)
     assert results(flown)[1] == ACCEPTED
-    _, _, z, w = at(flown, "truth", 8.5, lambda m: tuple(m.pose.orientation))
+    _, _, z, w = at(flown, "ground_truth", 8.5, lambda m: tuple(m.pose.orientation))
     assert 2.0 * math.acos(math.hypot(w, z)) == pytest.approx(angle, abs=0.02)
-    east, north, up = (at(flown, "truth", 8.5, lambda m: tuple(m.velocity))[k] for k in range(3))
+    east, north, up = (at(flown, "ground_truth", 8.5, lambda m: tuple(m.velocity))[k] for k in range(3))
     assert math.atan2(north, east) == pytest.approx(yaw, abs=0.1)
     assert math.hypot(east, north) == pytest.approx(9.80665 * math.tan(angle) * 2.3, rel=0.1)
     assert up == pytest.approx(0.0, abs=0.05)  # no thrust is given: the altitude is held
@@ -237,7 +237,7 @@ def test_gains_change_in_flight_and_act():
     lag = []
     for flown in (changed, same):
         asked, flew = (flown.column(topic, value) for topic, value in (
-            ("setpoint", lambda m: m.position.z), ("truth", lambda m: m.pose.position.z)))  # fmt: skip
+            ("setpoint", lambda m: m.position.z), ("ground_truth", lambda m: m.pose.position.z)))  # fmt: skip
         lag.append(max(abs(asked - flew)[2000:]))
     assert lag[0] > 1.2 * lag[1]
 
@@ -252,14 +252,14 @@ def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
         flown = fly(20, script, *sets, f"run.seed={seed}")
         assert said(flown)[:3] == ["armed", "landed", "disarmed: landed"]
         assert results(flown)[6] == ACCEPTED
-        refused = {source for m in flown.messages("estimate") for source in m.rejected}
+        refused = {source for m in flown.messages("estimate") for source in m.rejected_sources}
         assert not refused & {"gps", "gps_velocity"}
         for t in (13.0, 15.9):
-            z = [at(flown, topic, t, lambda m: m.pose.orientation.z) for topic in ("estimate", "truth")]
+            z = [at(flown, topic, t, lambda m: m.pose.orientation.z) for topic in ("estimate", "ground_truth")]
             assert 2.0 * abs(z[0] - z[1]) < 0.01  # yaw [rad]
-            where = [at(flown, topic, t, lambda m: tuple(m.pose.position)) for topic in ("estimate", "truth")]
+            where = [at(flown, topic, t, lambda m: tuple(m.pose.position)) for topic in ("estimate", "ground_truth")]
             assert math.dist(*where) < 0.05  # [m]
-            assert at(flown, "estimate", t, lambda m: m.health) == 0
+            assert at(flown, "estimate", t, lambda m: m.health_flags) == 0
         assert height(flown, 20.0) > 1.5
 
 

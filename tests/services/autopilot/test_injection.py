@@ -53,7 +53,7 @@ LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33
 
 def rejected(flown, start, source):
     """Share of the estimates from a time on in which a source was refused or missing."""
-    found = flown.column("estimate", lambda m: source in m.rejected)[flown.times("estimate") >= start]
+    found = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
     return float(np.mean(found))
 
 

@@ -35,7 +35,7 @@ ALL = [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT]
 
 def rejected(flown, start, source):
     """Share of the estimates from a time on in which a source was refused or missing."""
-    found = flown.column("estimate", lambda m: source in m.rejected)[flown.times("estimate") >= start]
+    found = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
     return float(np.mean(found))
 
 
@@ -111,8 +111,11 @@ def test_a_rangefinder_that_the_autopilot_does_not_read_cannot_fail():
 def test_an_airspeed_that_fails_is_told_as_it_arrives_and_nothing_flies_by_it(kind):
     flown = fly_by_sensors(12, {9: [inject("airspeed", kind)]}, ENABLED, TUBE)
     assert results(flown)[7] == ACCEPTED
-    after = flown.times("airspeed") > 9.1
-    read, got = (flown.column(name, lambda m: m.fluid_pressure)[after] for name in ("airspeed", "airspeed/received"))
+    after = flown.times("differential_pressure") > 9.1
+    read, got = (
+        flown.column(name, lambda m: m.fluid_pressure)[after]
+        for name in ("differential_pressure", "differential_pressure/received")
+    )
     there = np.isfinite(got)
     assert np.isfinite(read).all()
     if kind == OFF:

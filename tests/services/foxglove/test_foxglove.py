@@ -145,7 +145,7 @@ def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
     ]
     with subprocess.Popen([sys.executable, "-m", "lapwing", *words, "--foxglove", f"127.0.0.1:{port}"]) as run:
         client = patient(port, run)
-        client.subscribe(f"/{vehicle}/truth", f"/{vehicle}/events")
+        client.subscribe(f"/{vehicle}/ground_truth", f"/{vehicle}/events")
         got, events = [], []
         while (message := client.next()) is not None:
             if isinstance(message, bytes) and message[0] == 1:
@@ -154,7 +154,7 @@ def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
         assert run.wait(timeout=60) == 0
     with LogReader(path) as read:
         kept = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/events"])]
-        flown = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/truth"])]
+        flown = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/ground_truth"])]
     first = flown.index(got[0])
     assert got == flown[first : first + len(got)]  # none is missing, and all in order
     assert len(got) > 100

@@ -57,7 +57,7 @@ class StandIn:
         self.fences, self.rally = (), ()
         self.setpoint = self.stick = None
         self.setpoint_at = -1e9
-        self.commands, self.answers, self.text, self.prearm = [], [], [], ()
+        self.commands, self.answers, self.text, self.arming_blockers = [], [], [], ()
         self.deaf = set()  # kinds that are not answered
         self.status, self.more = {}, []  # other fields of the status, and other messages
         self.kinds = {}
@@ -84,12 +84,12 @@ class StandIn:
         pose = Pose(Point(*self.position), Quaternion(0.0, 0.0, math.sin(half), math.cos(half)))
         status = Status(
             head, self.mode, self.mode, self.armed, self.landed, False, "", self.current, len(self.items), self.reached,
-            self.state, self.fresh, self.prearm, False,
+            self.state, self.fresh, self.arming_blockers, False,
         )  # fmt: skip
         yield STATUS, status._replace(**self.status)
         yield from self.more
         yield COMMAND_ACKS, CommandAcks(head, tuple(self.answers), tuple(self.text))
-        yield ESTIMATE, Estimate(head, pose, Vector3(*self.velocity), rejected=self.rejected)
+        yield ESTIMATE, Estimate(head, pose, Vector3(*self.velocity), rejected_sources=self.rejected)
         self.answers, self.text = [], []
 
     @property
@@ -110,8 +110,8 @@ class StandIn:
         return 0
 
     def do_arm(self, c):
-        if self.prearm and not c.values[0]:
-            self.text += [f"cannot arm: {reason}" for reason in self.prearm]
+        if self.arming_blockers and not c.values[0]:
+            self.text += [f"cannot arm: {reason}" for reason in self.arming_blockers]
             return 1
         self.armed = True
 

@@ -214,7 +214,7 @@ def test_sequence_numbers_begin_again():
 
 def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
     bench = Bench()
-    bench.vehicle.prearm = (
+    bench.vehicle.arming_blockers = (
         status_texts.NO_READINGS.format("gps"),
         f"{status_texts.BATTERY_LOW}: 6%",
         status_texts.NOT_LEVEL,
@@ -234,7 +234,7 @@ def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
     messages = one.station.all("EVENT")
     _, _, summary = one.values(messages[0])
     assert summary[3][0] == 0  # can_arm
-    bench.vehicle.prearm = ()
+    bench.vehicle.arming_blockers = ()
     bench.step(60)
     _, event, summary = one.values(one.station.all("EVENT")[-2])
     assert event["type"] == "summary"

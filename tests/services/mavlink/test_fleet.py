@@ -56,11 +56,15 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
     with LogReader(log) as read:
         assert read.complete
         told = {
-            name: [c.kind for *_, m in read.messages([f"/{name}/operator"]) for c in OperatorInput.decode(m).commands]
+            name: [
+                c.kind
+                for *_, m in read.messages([f"/{name}/vehicle_command"])
+                for c in OperatorInput.decode(m).commands
+            ]
             for name in ("left", "right", "scout")
         }
         up = {
-            name: max(VehicleState.decode(m).pose.position.z for *_, m in read.messages([f"/{name}/truth"]))
+            name: max(VehicleState.decode(m).pose.position.z for *_, m in read.messages([f"/{name}/ground_truth"]))
             for name in told
         }
     assert set(told["left"]) | set(told["scout"]) <= {"link"}  # that a station is there

@@ -87,7 +87,7 @@ def test_arm_take_off_go_to_return_land_disarm():
 
 def test_a_refused_command_is_told_with_its_reason():
     async def story(drone, vehicle):
-        vehicle.prearm = ("no GPS fix",)
+        vehicle.arming_blockers = ("no GPS fix",)
         await first(drone.telemetry.health(), lambda health: not health.is_armable)
         told = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "no GPS fix" in s.text))
         await asyncio.sleep(0.3)
@@ -237,12 +237,12 @@ def test_orbit_failures_and_the_log(tmp_path):
 
 def test_events_and_arming_checks_are_read():
     async def story(drone, vehicle):
-        vehicle.prearm = ("the vehicle does not stand level",)
+        vehicle.arming_blockers = ("the vehicle does not stand level",)
         report = await first(drone.events.health_and_arming_checks(), lambda report: report.all_problems)
         assert [problem.message for problem in report.all_problems] == ["The vehicle does not stand level"]
         assert not report.current_mode_intention.can_arm_or_run
         assert {"gyro", "gps", "battery", "attitude_estimate"} <= {c.name for c in report.health_components}
-        vehicle.prearm = ()
+        vehicle.arming_blockers = ()
         await first(drone.events.health_and_arming_checks(), lambda r: r.current_mode_intention.can_arm_or_run)
         told = []
 

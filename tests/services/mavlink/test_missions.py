@@ -68,7 +68,7 @@ def test_there_and_back_is_the_same(items, kind):
         assert after.action == before.action
         if before.action in places:
             assert tuple(after.position) == pytest.approx(tuple(before.position), abs=0.02, nan_ok=True)  # 1e-7 degrees
-        for name in ("yaw", "radius", "hold"):
+        for name in ("yaw", "radius", "hold_time"):
             assert getattr(after, name) == pytest.approx(getattr(before, name), abs=1e-6, nan_ok=True), before.action
         assert after.values == pytest.approx(before.values, nan_ok=True)
 

@@ -75,7 +75,7 @@ def run(tmp_path, name, *options):
 
 def commands(log):
     with LogReader(log) as read:
-        messages = read.messages(["/drone1/operator"])
+        messages = read.messages(["/drone1/vehicle_command"])
         return {c.kind for *_, m in messages for c in OperatorInput.decode(m).commands}
 
 

@@ -61,7 +61,7 @@ def test_another_mode_is_told_at_once():
 def test_what_hinders_arming_is_shown_and_long_texts_come_in_pieces():
     bench = Bench()
     station = bench.station()
-    bench.vehicle.prearm = ("no GPS fix",)
+    bench.vehicle.arming_blockers = ("no GPS fix",)
     bench.vehicle.text = ["x" * 60 + "y" * 60]
     bench.step(60)
     assert not station.last("SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK

@@ -231,7 +231,11 @@ def test_cameras_keep_their_number_in_the_mission_but_do_nothing():
     for seq, command in enumerate((16, mavlink.MAV_CMD_IMAGE_START_CAPTURE, 16)):
         client.send("mission_item_int", *item(seq, command))
     bench.step(3)
-    assert [(i.action, i.hold) for i in bench.vehicle.items] == [("waypoint", 0.0), ("delay", 0.0), ("waypoint", 0.0)]
+    assert [(i.action, i.hold_time) for i in bench.vehicle.items] == [
+        ("waypoint", 0.0),
+        ("delay", 0.0),
+        ("waypoint", 0.0),
+    ]
     assert [m.text for m in client.all("STATUSTEXT")] == ["item 1: IMAGE_START_CAPTURE skipped"]
 
 

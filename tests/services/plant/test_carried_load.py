@@ -70,8 +70,8 @@ def test_under_one_vehicle_it_moves_as_where_both_are_one_system(tmp_path):
         COMMON.format(load=f"[slung_load]\n{CABLE}", vehicles=together),
     )
     beside, one = (fly(resolve(parse(tmp_path / "one.toml", text))) for text in scenes)
-    loads = [log.view("bodies").position[:, 0] for log in (beside, one)]
-    vehicles = [log.view("truth").position for log in (beside, one)]
+    loads = [log.view("body_states").position[:, 0] for log in (beside, one)]
+    vehicles = [log.view("ground_truth").position for log in (beside, one)]
     assert loads[1][-1, 2] > 1.5
     assert np.abs(loads[0] - loads[1]).max() < 0.002
     assert np.abs(vehicles[0] - vehicles[1]).max() < 0.002
@@ -84,7 +84,7 @@ def hook(truth):
 
 
 def test_hanging_still_the_cables_carry_its_weight_and_lean_by_it(flown):
-    told, left, right = (flown.view(name) for name in ("left/bodies", "left/truth", "right/truth"))
+    told, left, right = (flown.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth"))
     assert told.force[-1, 0] == pytest.approx((0.0, 0.0, 2.0 * 9.80665), abs=0.5)  # it swings a little along x
     assert told.force[-1, 0, 2] == pytest.approx(2.0 * 9.80665, abs=0.05)
     place = told.position[-1, 0]
@@ -100,8 +100,8 @@ def test_hanging_still_the_cables_carry_its_weight_and_lean_by_it(flown):
 
 
 def test_only_the_first_tells_of_the_load(flown):
-    assert "left/bodies" in flown.topics
-    assert "right/bodies" not in flown.topics
+    assert "left/body_states" in flown.topics
+    assert "right/body_states" not in flown.topics
 
 
 def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
@@ -133,7 +133,7 @@ def test_refuses_what_cannot_be_carried(tmp_path, override, message):
 def test_the_shipped_scene_lifts_it(tmp_path):
     setup = resolve(load("carried_load", ["run.duration=14.0"]))
     log = fly(setup)
-    told = log.view("left/bodies")
+    told = log.view("left/body_states")
     assert math.isclose(told.position[0, 0, 2], 0.0)
     assert told.position[-1, 0, 2] > 2.5
     assert told.force[-1, 0, 2] == pytest.approx(3.0 * 9.80665, abs=3.0)

@@ -25,7 +25,7 @@ def up_of_body(orientation):
 
 def missing(flight):
     """What thrust, weight and the forces on the feet leave of mass times acceleration [N], shape (n, 3)."""
-    truth, told, mass = flight.truth, flight.topic("contact"), flight.origin.scene["airframe"]["mass"]["total"]
+    truth, told, mass = flight.truth, flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
     assert np.array_equal(told.times, truth.times)
     thrust = truth.rotor_thrust.sum(axis=1)[:, None] * up_of_body(truth.orientation)
     weight = np.array([0.0, 0.0, -mass * G])
@@ -36,7 +36,7 @@ def missing(flight):
 def test_with_thrust_and_weight_they_are_mass_times_acceleration_from_take_off_to_rest(friction):
     """Bounces of the landing included, in which the ground does more than carry the weight."""
     flight = lapwing.fly("hover", {**ASKED, "effects.ground_contact.friction": friction})
-    force = flight.topic("contact").force
+    force = flight.topic("contact_forces").force
     assert abs(missing(flight)).max() < 1e-6
     assert np.ptp(force[:, :, 2].sum(axis=1)) > 50.0
     airborne = ~flight.truth.ground_contact
@@ -46,7 +46,7 @@ def test_with_thrust_and_weight_they_are_mass_times_acceleration_from_take_off_t
 
 def test_standing_still_they_are_the_weight_a_quarter_on_each_foot():
     flight = lapwing.fly("hover", STANDING)
-    told, mass = flight.topic("contact"), flight.origin.scene["airframe"]["mass"]["total"]
+    told, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
     feet = len(flight.origin.scene["airframe"]["contact"]["feet"])
     still = told.force[25:225]
     assert still.sum(axis=1) == pytest.approx(np.tile([0.0, 0.0, mass * G], (200, 1)), abs=1e-6)
@@ -57,7 +57,7 @@ def test_standing_still_they_are_the_weight_a_quarter_on_each_foot():
 
 def test_on_a_slope_friction_and_normal_forces_make_the_weight():
     flight = lapwing.fly("hover", {**STANDING, "environment.terrain.slope": [0.2, 0.0]})
-    told, mass = flight.topic("contact"), flight.origin.scene["airframe"]["mass"]["total"]
+    told, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
     assert told.force[100].sum(axis=0) == pytest.approx([0.0, 0.0, mass * G], abs=1e-3)
     lower, upper = told.force[100, [1, 2], 2].sum(), told.force[100, [0, 3], 2].sum()
     assert lower > 1.05 * upper  # the centre of mass is over the lower feet
@@ -69,12 +69,12 @@ def test_of_vehicles_of_several_bodies_too(model):
     scene = {"multibody": "hover", "slung_load": "slung_load"}[model]
     flight = lapwing.fly(scene, {**STANDING, "vehicle.model": model, "run.duration": 0.2})
     mass = flight.origin.scene["airframe"]["mass"]["total"]
-    assert flight.topic("contact").force[10].sum(axis=0)[2] == pytest.approx(mass * G, rel=1e-3)
+    assert flight.topic("contact_forces").force[10].sum(axis=0)[2] == pytest.approx(mass * G, rel=1e-3)
 
 
 def test_a_scene_that_does_not_ask_tells_nothing_of_them_and_one_that_does_flies_the_same():
     asked, plain = lapwing.fly("hover", ASKED), lapwing.fly("hover")
-    assert not plain.has("contact")
+    assert not plain.has("contact_forces")
     assert np.array_equal(asked.truth.position, plain.truth.position)
 
 

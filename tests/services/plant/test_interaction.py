@@ -59,11 +59,11 @@ def flown(setup):
 
 
 def test_who_is_below_feels_the_wash_and_who_is_above_does_not(flown):
-    above, below = (flown.view(f"{name}/truth").wind for name in ("above", "below"))
+    above, below = (flown.view(f"{name}/ground_truth").wind for name in ("above", "below"))
     assert -0.2 < above[-1, 2] < 0.0  # what the one below draws down
     assert below[-1, 2] < -2.0
     assert np.abs(below[:200]).max() < 0.05  # 3 m beside
-    height = flown.view("below/truth").position[:, 2]
+    height = flown.view("below/ground_truth").position[:, 2]
     assert height[-1] < height[500] - 0.02  # pushed down
 
 
@@ -76,7 +76,7 @@ def test_who_meets_nobody_flies_as_one_without_the_effects(tmp_path, setup):
     far = ["vehicle.1.initial_position=[0.0, 500.0]", "run.duration=1.0"]
     there = fly(resolve(scene(tmp_path, *far)))
     alone = fly(members(resolve(scene(tmp_path, *far)))[1]._replace(services=_unacquainted(setup, tmp_path, far)))
-    assert there.payloads("below/truth") == alone.payloads("truth")
+    assert there.payloads("below/ground_truth") == alone.payloads("ground_truth")
 
 
 def _unacquainted(setup, tmp_path, far):
@@ -91,7 +91,7 @@ def test_a_set_up_survives_text_and_another_seed(setup, tmp_path):
 
 def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
     meeting = fly(resolve(scene(tmp_path, "vehicle.0.trajectory.phase.0.z.to=1.0")))
-    a, b = (meeting.view(f"{name}/truth").position for name in ("above", "below"))
+    a, b = (meeting.view(f"{name}/ground_truth").position for name in ("above", "below"))
     gap = np.linalg.norm(a - b, axis=1)
     radius = resolve(scene(tmp_path).vehicles[0]).services["plant"].parameters.core.vehicle.effects[1].radius
     assert gap.min() == pytest.approx(2.0 * radius, rel=0.02)

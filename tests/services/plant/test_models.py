@@ -25,7 +25,7 @@ LOAD, CRATE = SCENES / "cooperative_load.toml", SCENES / "unload.toml"
 
 def ticks(scene, count):
     """The plant's truth at the first `count` ticks, of a scene that nobody controls."""
-    return memory_log.fly(scene, last=count - 1).messages("truth")
+    return memory_log.fly(scene, last=count - 1).messages("ground_truth")
 
 
 @pytest.mark.parametrize(("path", "model"), [(SATELLITE, gyrostat), (OS4, os4)])
@@ -65,7 +65,7 @@ def test_motors_reach_the_speed_at_which_torque_and_drag_balance():
 def carry(scene, count):
     """(bodies, lift) of each tick, plant and control in turn."""
     flown = memory_log.fly(scene, last=count - 1)
-    return list(zip(flown.messages("bodies"), flown.messages("lift"), strict=True))
+    return list(zip(flown.messages("body_states"), flown.messages("rotor_wrench"), strict=True))
 
 
 def three(path):

@@ -147,7 +147,7 @@ def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
     with LogReader(tmp_path / "a.mcap") as log:
         types = {topic: [kind] for topic, kind in log.topics().items()}
         recorded = [PoseStamped.decode(payload) for *_, payload in log.messages(["/drone1/pose"])]
-        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     types.pop("/wall_time")  # made by who writes the log
     assert types.items() <= topics.items()
     place = recorded.index(next(m for m in recorded if plain(m) == plain(heard[0])))
@@ -184,7 +184,7 @@ def test_a_node_drives_the_motors(tmp_path, port, graph):
     assert run.returncode == 0, said
     with LogReader(tmp_path / "a.mcap") as log:
         _, recorded = log.history("/drone1/actuators")
-        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     given = [command for message in inputs for command in message.commands if command.kind == "offboard_motors"]
     assert {(command.source, command.values) for command in given} == {(SOURCE, tuple(volts))}
     assert np.all(recorded["motor_voltage"] == volts, axis=1).any()
@@ -211,7 +211,7 @@ def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, g
     with LogReader(tmp_path / "a.mcap") as log:
         types = {topic: [kind] for topic, kind in log.topics().items()}
         inputs = {
-            name: [OperatorInput.decode(payload) for *_, payload in log.messages([f"/{name}/operator"])]
+            name: [OperatorInput.decode(payload) for *_, payload in log.messages([f"/{name}/vehicle_command"])]
             for name in ("left", "right", "scout")
         }
     types.pop("/wall_time")
@@ -264,7 +264,7 @@ def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tm
     assert (run.returncode, node.returncode) == (0, 0), said
     assert "1 commands taken\n" in told
     with LogReader(tmp_path / "a.mcap") as log:
-        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     assert [(c.source, c.kind) for message in inputs for c in message.commands] == [(SOURCE, "arm")]
     assert ("arming", "armed") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
@@ -352,7 +352,7 @@ def test_ros2_itself_sees_the_run_and_commands_it(tmp_path, port):
     assert "commands taken\n" in said
     with LogReader(tmp_path / "a.mcap") as log:
         _, flown = log.history("/drone1/pose")
-        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/operator"])]
+        inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     kinds = [command.kind for message in inputs for command in message.commands]
     assert [kind for kind in kinds if kind != "offboard_position"] == ["offboard", "arm"]
     assert flown["pose.position"][-1] == pytest.approx([2.0, 1.0, 3.0], abs=0.5)

@@ -75,7 +75,7 @@ def scene(tmp_path):
 
 def test_its_readings_are_logged_and_reach_an_estimator(scene):
     flight = fly(scene())
-    readings = flight.topic("own_sensor/anemometer")["values"]
+    readings = flight.topic("custom_sensor/anemometer")["values"]
     true = np.linalg.norm(flight.truth["velocity"][::5], axis=1)
     assert readings[:, 0] == pytest.approx(true)
     assert (readings[:, 1] == 1.0).all()
@@ -93,7 +93,7 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
         "sensors.height.module=own_height", "sensors.height.rate=25.0", "sensors.second.module=own_anemometer"
     )
     setup, flight = resolve(given), lapwing.fly(given)
-    speed, second, height = (flight.topic(f"own_sensor/{name}") for name in ("anemometer", "second", "height"))
+    speed, second, height = (flight.topic(f"custom_sensor/{name}") for name in ("anemometer", "second", "height"))
     assert (speed["values"] == second["values"]).all()
     assert height["values"][:, 0] == pytest.approx(flight.truth.position[::10, 2])
     assert set(height["sensor"]) == {"height"}
@@ -102,12 +102,12 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
     logs = [lapwing.read_log(tmp_path / f"{name}.mcap") for name in ("single", "own")]
     logs.append(lapwing.read_log(flight.save(tmp_path / "saved.mcap")))
     assert {log.digest for log in logs} == {flight.digest}
-    assert (logs[1].topic("own_sensor/height")["values"] == height["values"]).all()
+    assert (logs[1].topic("custom_sensor/height")["values"] == height["values"]).all()
 
 
 def test_a_preset_and_its_noise(scene):
-    noisy = fly(scene("sensors.anemometer.preset=noisy")).topic("own_sensor/anemometer")["values"][:, 0]
-    ideal = fly(scene()).topic("own_sensor/anemometer")["values"][:, 0]
+    noisy = fly(scene("sensors.anemometer.preset=noisy")).topic("custom_sensor/anemometer")["values"][:, 0]
+    ideal = fly(scene()).topic("custom_sensor/anemometer")["values"][:, 0]
     assert np.std(noisy - ideal) == pytest.approx(0.1, rel=0.3)
 
 

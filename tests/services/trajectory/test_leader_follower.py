@@ -103,7 +103,7 @@ def test_follower_setpoint_follows_the_leader(tmp_path):
     told, core = flown.view("wing/setpoint"), path(tmp_path)
     assert told.position[400] == pytest.approx(at(core, 400).position_world)
     assert flown.messages("wing/setpoint")[400].phase == "beside"
-    assert flown.view("wing/truth").position[-1] == pytest.approx(told.position[-1], abs=0.15)
+    assert flown.view("wing/ground_truth").position[-1] == pytest.approx(told.position[-1], abs=0.15)
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_flights_of_a_fleet_are_those_of_its_vehicles():
     flights, log = fly_each(setup, TOPICS), fly(setup)
     assert [flight.vehicle for flight in flights] == ["left", "right", "scout"]
     for flight in flights:
-        assert (flight.truth.position == log.view(f"{flight.vehicle}/truth").position).all()
+        assert (flight.truth.position == log.view(f"{flight.vehicle}/ground_truth").position).all()
         assert (flight.setpoint.position == log.view(f"{flight.vehicle}/setpoint").position).all()
         assert flight.setup.vehicle == flight.vehicle
         assert set(flight.fleet) == {"left", "right", "scout"}

@@ -40,7 +40,7 @@ def test_command_writes_log_that_other_commands_read(flight, tmp_path):
     assert "vehicle clock" in done.stdout
     told = run("info", out)
     assert told.returncode == 0, told.stderr
-    assert "/drone1/truth" in told.stdout
+    assert "/drone1/ground_truth" in told.stdout
     assert run("report", out, "--out", tmp_path / "flight.html").returncode == 0
 
 

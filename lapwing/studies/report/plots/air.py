@@ -7,7 +7,7 @@ from lapwing.studies.report.style import AXIS_COLOURS, STEERED
 
 ORDER = 80
 TITLE = "Air: wind and density"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 MODELS = STEERED
 
 

@@ -6,7 +6,7 @@ from lapwing.studies.report.plot import Plot
 
 ORDER = 20
 TITLE = "Attitude"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 
 
 def draw(flight: FlightData) -> Plot:

@@ -12,7 +12,7 @@ from lapwing.studies.topic_view import TopicView
 
 ORDER = 70
 TITLE = "Estimator: error and 3-sigma bounds"
-NEEDS = ("truth", "estimate")
+NEEDS = ("ground_truth", "estimate")
 MODELS = STEERED
 _COLUMNS = (("position", "m", 1.0), ("velocity", "m/s", 1.0), ("attitude", "°", DEGREES))
 
@@ -65,6 +65,6 @@ def errors(flight: FlightData) -> np.ndarray:
 
 def refusals(flight: FlightData) -> str:
     """Return the share of rejected measurements of each source as a sentence."""
-    count = Counter(source for sources in flight.estimate.rejected for source in sources)
+    count = Counter(source for sources in flight.estimate.rejected_sources for source in sources)
     said = ", ".join(f"{source} {times}" for source, times in count.most_common())
     return f"Measurements refused: {said or 'none'}."

@@ -7,7 +7,7 @@ from lapwing.studies.separation import least_over_time, nearest
 
 ORDER = 42
 TITLE = "Fleet"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 FLEET = True
 
 

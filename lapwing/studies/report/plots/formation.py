@@ -11,24 +11,24 @@ from lapwing.studies.report.style import BOUND, COLOURS
 
 ORDER = 35
 TITLE = "Load, links and quadrotors"
-NEEDS = ("truth", "bodies", "lift")
+NEEDS = ("ground_truth", "body_states", "rotor_wrench")
 MODELS = ("cooperative_load",)
 INSTANTS = 11  # pictures of the links
 
 
 def draw(flight: FlightData) -> Plot:
     """Three panels over time on the left, the view from the side on the right."""
-    t = flight.times("bodies")
-    places = flight.topic("bodies").position
+    t = flight.times("body_states")
+    places = flight.topic("body_states").position
     wanted = _wanted(flight, t)
     error = np.linalg.norm(places[:, 0] - wanted, axis=1)
     links = places[:, :1] - places[:, 1:]
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
-    thrust = flight.topic("lift").thrust
+    thrust = flight.topic("rotor_wrench").thrust
     panels = (
         Panel((Line(t, np.where(error > 0.0, error, np.nan), colour=BOUND),), "load error [m]", log_y=True),
         Panel(_each(t, angle), "link from vertical [°]", row=1),
-        Panel(_each(flight.times("lift"), thrust), "thrust [N]", row=2),
+        Panel(_each(flight.times("rotor_wrench"), thrust), "thrust [N]", row=2),
         side(places, wanted),
     )
     said = (

@@ -10,7 +10,7 @@ from lapwing.studies.saturation import saturation
 
 ORDER = 50
 TITLE = "Motors: speed, voltage and power"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 MODELS = STEERED
 RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
 

@@ -7,7 +7,7 @@ from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, ref
 
 ORDER = 40
 TITLE = "Path"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 
 
 def draw(flight: FlightData) -> Plot:

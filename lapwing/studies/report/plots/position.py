@@ -6,7 +6,7 @@ from lapwing.studies.report.plot import Plot
 
 ORDER = 10
 TITLE = "Position"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 
 
 def draw(flight: FlightData) -> Plot:

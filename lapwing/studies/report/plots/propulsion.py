@@ -10,7 +10,7 @@ from lapwing.studies.report.style import STEERED
 
 ORDER = 60
 TITLE = "Propulsion: thrust, torque and power over speed"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 MODELS = STEERED
 
 

@@ -9,7 +9,7 @@ from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QU
 
 ORDER = 0
 TITLE = "Timeline"
-NEEDS = ("truth", "status")
+NEEDS = ("ground_truth", "status")
 BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
 MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of events that have no lane of their own
 WIDTH = 0.004  # of the whole time, of an instant

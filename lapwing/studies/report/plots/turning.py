@@ -9,7 +9,7 @@ from lapwing.studies.report.style import AXIS_COLOURS
 
 ORDER = 15
 TITLE = "Angular velocity"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 MODELS = ("gyrostat",)
 
 

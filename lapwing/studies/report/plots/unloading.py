@@ -11,7 +11,7 @@ from lapwing.studies.report.style import AXIS_COLOURS, BOUND, REFERENCE
 
 ORDER = 5
 TITLE = "Unloading"
-NEEDS = ("truth", "bodies")
+NEEDS = ("ground_truth", "body_states")
 MODELS = ("unloading",)
 INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time until the pack is taken
 
@@ -19,7 +19,7 @@ INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time u
 def draw(flight: FlightData) -> Plot:
     """The three displacements, door and forces over time, and six instants from the side."""
     crate = flight.origin.scene["unloading"]
-    bodies = flight.topic("bodies")
+    bodies = flight.topic("body_states")
     t, place = bodies.times, bodies.position
     turn = np.array([_pitch(q) for q in np.moveaxis(bodies.orientation[:, :2], 1, 0)]).T
     force = np.linalg.norm(bodies.force, axis=2)

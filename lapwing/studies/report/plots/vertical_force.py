@@ -8,7 +8,7 @@ from lapwing.studies.report.style import COLOURS
 
 ORDER = 25
 TITLE = "Net vertical force and rotor speeds"
-NEEDS = ("truth",)
+NEEDS = ("ground_truth",)
 MODELS = ("os4",)
 DASHES = ("solid", "dash", "dot", "dashdot")  # rotors of one speed lie on each other
 

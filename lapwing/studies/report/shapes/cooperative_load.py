@@ -13,9 +13,9 @@ ARM, LOAD = 0.2, 0.12  # [m] the scene has masses only
 
 def draw(flight: FlightData) -> Motion | None:
     """The load as a box, the quadrotors as crosses, a line for each link."""
-    if not flight.has("bodies"):
+    if not flight.has("body_states"):
         return None
-    count = flight.topic("bodies").position.shape[1] - 1
+    count = flight.topic("body_states").position.shape[1] - 1
     hubs = ARM * np.array([(1.0, 1.0, 0.0), (-1.0, 1.0, 0.0), (-1.0, -1.0, 0.0), (1.0, -1.0, 0.0)]) / np.sqrt(2.0)
     cross = tuple(Stroke(np.array([np.zeros(3), hub]), width=5.0) for hub in hubs)
     rotors = tuple(Rotor(hub, 0.6 * ARM) for hub in hubs)

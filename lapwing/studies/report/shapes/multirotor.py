@@ -24,7 +24,7 @@ def draw(flight: FlightData) -> Motion | None:
     radius = 0.5 * airframe.get("propeller", {}).get("diameter", 0.8 * float(np.linalg.norm(hubs[0])))
     surface = _surface(flight.origin.scene, centre)
     strokes = () if surface else _frame(airframe, hubs, centre)
-    if flight.has("bodies") and flight.topic("bodies").position.shape[1] == 1 + len(hubs):
+    if flight.has("body_states") and flight.topic("body_states").position.shape[1] == 1 + len(hubs):
         own = (Rotor(np.zeros(3), radius),)
         base, *others = of_bodies(flight, [(strokes, ()), *[((), own)] * len(hubs)])
         return Motion((base._replace(surface=surface), *others))
@@ -34,7 +34,7 @@ def draw(flight: FlightData) -> Motion | None:
         for hub, spin, angle in zip(hubs, spins, _angles(flight, len(hubs)), strict=False)
     )
     vehicle, sling = of_truth(flight, strokes, rotors, surface), flight.origin.scene.get("slung_load")
-    if sling is None or not flight.has("bodies"):
+    if sling is None or not flight.has("body_states"):
         return Motion((vehicle,))
     hook = np.array(sling["hook"]) - centre
     return Motion((vehicle, _load(flight, sling)), (Link(0, 1, tuple(hook.tolist()), sling["length"]),))

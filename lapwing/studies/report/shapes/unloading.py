@@ -12,9 +12,9 @@ MODELS = ("unloading",)
 
 def draw(flight: FlightData) -> Motion | None:
     """The bodies of the log, with the floor and the walls of the crate, which stand."""
-    if not flight.has("bodies"):
+    if not flight.has("body_states"):
         return None
-    crate, said = flight.origin.scene["unloading"], flight.topic("bodies")
+    crate, said = flight.origin.scene["unloading"], flight.topic("body_states")
     width, count = crate["width"], said.position.shape[1]
     door = np.array([(0.0, y * width / 2.0, z) for y, z in ((-1, 0), (1, 0), (1, 1), (-1, 1), (-1, 0))])
     door[:, 2] *= crate["door_length"]

@@ -83,7 +83,7 @@ def _outcome(flight: FlightData, least: float) -> Outcome:
         np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0)),
         np.linalg.norm(told.position_std[late], axis=1),
         np.linalg.norm(told.attitude_std[late], axis=1),
-        told.health[late] == 0,
+        told.health_flags[late] == 0,
         least,
     )
 

@@ -105,7 +105,10 @@ def silent() -> tuple[float, float]:
     """Return 1 for each flight with a pushing link that the event, or watching the length, does not report."""
     flight = flown("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
     told = any(event.kind == "slack" for event in flight.events)
-    place, length = flight.topic("bodies").position, np.array(flight.origin.scene["cooperative_load"]["link_length"])
+    place, length = (
+        flight.topic("body_states").position,
+        np.array(flight.origin.scene["cooperative_load"]["link_length"]),
+    )
     off = np.abs(np.linalg.norm(place[:, :1] - place[:, 1:], axis=2) / length - 1.0).max()
     return float(not told), float(off < 1e-9)
 

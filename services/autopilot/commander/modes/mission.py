@@ -140,7 +140,7 @@ class Mode(FlightMode):
         if item.action == "condition":
             self._time_there += view.dt
             left = norm(subtract(self._leg.target, guidance.smoothing.position))
-            return left < max(item.radius, ARRIVED) or 0.0 < item.hold <= self._time_there
+            return left < max(item.radius, ARRIVED) or 0.0 < item.hold_time <= self._time_there
         if self._time_there == 0.0 and not self._reached(guidance, item):
             return False
         if item.action == "loiter_to_alt" and self._leg.target[2] != item.position.z and math.isfinite(item.position.z):
@@ -152,7 +152,7 @@ class Mode(FlightMode):
             self._item_mode = land.Mode(constants, guidance)
             return False
         self._time_there += view.dt
-        return self._time_there >= item.hold
+        return self._time_there >= item.hold_time
 
     def _reached(self, guidance: Guidance, item: Any) -> bool:
         """Return True if position and yaw of the item are reached."""
@@ -169,12 +169,12 @@ def _radius(guidance: Guidance, item: Any) -> float:
 
 def _flown_through(item: Any) -> bool:
     """Return True if the item needs no stop at its position."""
-    return item.action in ("waypoint", "loiter_time") and item.hold == 0.0
+    return item.action in ("waypoint", "loiter_time") and item.hold_time == 0.0
 
 
 def _instant(item: Any) -> bool:
     """Return True if an item takes no time; unsupported items are imported as zero delays."""
-    return item.action in INSTANT or (item.action == "delay" and item.hold == 0.0)
+    return item.action in INSTANT or (item.action == "delay" and item.hold_time == 0.0)
 
 
 def _place(item: Any, here: Vec3) -> Vec3:

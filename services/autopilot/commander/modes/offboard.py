@@ -21,7 +21,7 @@ class Mode(FlightMode):
     """Follows the newest setpoint; a failsafe handles their loss."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        if not guidance.offboard_fresh:
+        if not guidance.offboard_available:
             refused = guidance.inputs.offboard_refused
             raise ValueError(f"offboard: no setpoints are coming{refused and f'; the last was refused: {refused}'}")
         self._attitude: AttitudeFlight | None = None

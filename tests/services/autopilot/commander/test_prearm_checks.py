@@ -13,7 +13,7 @@ def shown(bits, seconds, constants=CONSTANTS):
     session.step(estimate=EXACT, estimate_interval=0.02)
     for _ in range(round(seconds / 0.02)):
         request = session.step(estimate=EXACT._replace(health=bits), estimate_interval=0.02)
-    return list(request.status.prearm), session.commander.state.source_outage
+    return list(request.status.arming_blockers), session.commander.state.source_outage
 
 
 def test_a_refused_reading_is_no_reason_but_a_source_that_stays_away_is():
