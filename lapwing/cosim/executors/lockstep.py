@@ -39,7 +39,7 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     outlets = PacketSender(process, service, graph)
     backlog = LogBackpressure(process, recorder) if owns_time else None
     process.join()
-    outlets.look()
+    outlets.refresh_subscribers()
     if process.core is not None:
         pin(process.core)
         if process.speed is None:
@@ -88,7 +88,7 @@ def _leave(process: Participant, outlets: PacketSender, stop: int) -> None:
     """Hand over what is left of the ticks before `stop`, and wait until everybody has received it."""
     outlets.end(stop)
     process.confirm()
-    process.leave(lambda: outlets.say_end(stop))
+    process.leave(lambda: outlets.publish_end(stop))
 
 
 class _Rows:
@@ -122,7 +122,7 @@ def run_encoder(process: Participant, service: Service) -> None:
     giver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
     outlets = PacketSender(process, elsewhere, graph, hands_over=False)
     process.join()
-    outlets.look()
+    outlets.refresh_subscribers()
     try:
         while not process.stopping:
             tick = graph.tick

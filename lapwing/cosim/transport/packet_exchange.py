@@ -1,4 +1,4 @@
-"""What a process takes from the bus and gives to it, tick by tick."""
+"""Exchange of step packets with other participants over the bus."""
 
 import time
 from collections.abc import Callable
@@ -85,80 +85,98 @@ def sources(process: Participant, graph: BlockDiagram) -> list[PacketReceiver]:
 
 
 @dataclass
-class _Outlet:
-    """The bundles to the consumers that take them the same way."""
+class _StepOutlet:
+    """Step packets to the consumers with one packet schedule."""
 
-    way: PacketSchedule
-    bundles: StepPacketCodec
+    schedule: PacketSchedule
+    codec: StepPacketCodec
     put: Callable[[bytes, int], None]
-    given: int = 0  # tick before which all has gone
+    next_tick: int = 0  # first tick of the next packet
+
+    def publish(self, graph: BlockDiagram, stop: int, interval_ns: int) -> None:
+        """Publish the packets that are complete before the tick `stop`."""
+        while (tick := self.next_tick) + self.schedule.ticks <= stop:
+            if self.codec.due(tick):
+                self.put(self.codec.pack(graph, tick), tick * interval_ns)
+            self.next_tick += self.schedule.every
+
+
+class _TopicPublisher:
+    """Messages on the keys of those topics that have subscribers."""
+
+    def __init__(self, process: Participant, service: Service):
+        self._bus = process.bus
+        self._keys = {topic: process.key(topic) for topic in service.topics}
+        self.puts = {topic: process.bus.publisher(key, drops=True) for topic, key in self._keys.items()}
+        self._subscribed: set[Topic] = set()
+
+    def refresh_subscribers(self) -> None:
+        """Find out which topics have subscribers."""
+        self._subscribed = {topic for topic, key in self._keys.items() if self._bus.has_audience([key])}
+
+    def publish(self, graph: BlockDiagram, first: int, stop: int, interval_ns: int) -> None:
+        """Publish the messages of the ticks [first, stop)."""
+        if self._subscribed:
+            for page in graph.pages(first, stop, self._subscribed, keep=True):
+                for at, payload in zip(page.ticks, page.payloads, strict=True):
+                    self.puts[page.topic](payload.tobytes(), int(at) * interval_ns)
 
 
 class PacketSender:
-    """What a service publishes: bundles to its consumers, batches to recorders, topics to those who listen."""
+    """Publishes the output of a service: step packets, log packets, and topics with subscribers."""
 
     def __init__(self, process: Participant, service: Service, graph: BlockDiagram, hands_over: bool = True):
-        """Declare the publishers; the bundles are somebody else's where it does not hand over."""
+        """Declare the publishers; without `hands_over`, an external program publishes the step packets."""
         key_prefix, bus = process.key_prefix, process.bus
         self._process, self._graph = process, graph
         self._outlets = []
         if hands_over:
-            for way in ways(process.setup, service.name) if process.bundles_ahead else {EACH_TICK}:
-                put = bus.publisher(f"{key_prefix}/{way.key}/{service.name}")
-                bundles = StepPacketCodec(way.ports(process.setup.services[service.name].ports), way.ticks)
-                self._outlets.append(_Outlet(way, bundles, put))
-        self._put_batch = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
-        self._topics = {topic: process.key(topic) for topic in service.topics}
-        self._puts = {topic: bus.publisher(key, drops=True) for topic, key in self._topics.items()}
-        self._listened: set[Topic] = set()
-        self._handed = 0  # tick before which all is handed over
-        self._due = 0.0
+            for schedule in ways(process.setup, service.name) if process.bundles_ahead else {EACH_TICK}:
+                put = bus.publisher(f"{key_prefix}/{schedule.key}/{service.name}")
+                codec = StepPacketCodec(schedule.ports(process.setup.services[service.name].ports), schedule.ticks)
+                self._outlets.append(_StepOutlet(schedule, codec, put))
+        self._put_log = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
+        self._topics = _TopicPublisher(process, service)
+        self._logged = 0  # ticks before this one are in log packets
+        self._log_due = 0.0  # [s] of the monotonic clock
         self._interval_ns = process.setup.interval_ns
         bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared while there is room
-        self._delivery = PublishWatchdog(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
+        self._watchdog = PublishWatchdog(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
 
-    def look(self) -> None:
-        """See which topics somebody listens to."""
-        self._listened = {topic for topic, key in self._topics.items() if self._process.bus.has_audience([key])}
+    def refresh_subscribers(self) -> None:
+        """Find out which topics have subscribers."""
+        self._topics.refresh_subscribers()
 
     def publish(self, first: int, stop: int) -> None:
-        """Hand over what the graph gives at the ticks [first, stop)."""
-        with self._delivery:
+        """Publish the output of the ticks [first, stop)."""
+        with self._watchdog:
             for outlet in self._outlets:
-                while (given := outlet.given) + outlet.way.ticks <= stop:
-                    if outlet.bundles.due(given):
-                        outlet.put(outlet.bundles.pack(self._graph, given), given * self._interval_ns)
-                    outlet.given += outlet.way.every
-            if self._listened:
-                for page in self._graph.pages(first, stop, self._listened, keep=True):
-                    for at, payload in zip(page.ticks, page.payloads, strict=True):
-                        self._puts[page.topic](payload.tobytes(), int(at) * self._interval_ns)
-            if stop - self._handed >= PAGE or time.monotonic() > self._due:
-                self._hand_over(stop)
+                outlet.publish(self._graph, stop, self._interval_ns)
+            self._topics.publish(self._graph, first, stop, self._interval_ns)
+            if stop - self._logged >= PAGE or time.monotonic() > self._log_due:
+                self._publish_log(stop)
                 self._process.tell_of_refused()
-                self.look()
+                self.refresh_subscribers()
 
-    def _hand_over(self, stop: int) -> None:
-        self._due = time.monotonic() + BATCH
-        if stop > self._handed:
-            pages = self._graph.pages(self._handed, stop)
-            self._put_batch(pack_batch(pages, self._handed, stop), (stop - 1) * self._interval_ns)
-            self._handed = stop
+    def _publish_log(self, stop: int) -> None:
+        self._log_due = time.monotonic() + BATCH
+        if stop > self._logged:
+            pages = self._graph.pages(self._logged, stop)
+            self._put_log(pack_batch(pages, self._logged, stop), (stop - 1) * self._interval_ns)
+            self._logged = stop
 
     def end(self, stop: int) -> None:
-        """Hand over what is left of the ticks before `stop`, and say that there will be no more.
-
-        Where who watches the run is gone, consumers are not told: they are to find that out, and not to take it for an
-        end of the run.
-        """
-        self._delivery.close()
-        self._hand_over(stop)
+        """Publish what is left of the ticks before `stop`, then the end (`publish_end`)."""
+        self._watchdog.close()
+        self._publish_log(stop)
         self._process.tell_of_refused()
-        self.say_end(stop)
+        self.publish_end(stop)
 
-    def say_end(self, stop: int) -> None:
-        """Say that there will be no more from the tick `stop` on; whoever has heard it before takes no notice."""
-        time_ns = stop * self._interval_ns
-        bundles = [] if self._process.abandoned else [outlet.put for outlet in self._outlets]
-        for put in (*bundles, self._put_batch, *self._puts.values()):
-            put(b"", time_ns)
+    def publish_end(self, stop: int) -> None:
+        """Publish an empty packet on each key: there is no output from the tick `stop` on. May be repeated.
+
+        Consumers get none if the run monitor is gone: they must detect that themselves instead of seeing a normal end.
+        """
+        steps = [] if self._process.abandoned else [outlet.put for outlet in self._outlets]
+        for put in (*steps, self._put_log, *self._topics.puts.values()):
+            put(b"", stop * self._interval_ns)
