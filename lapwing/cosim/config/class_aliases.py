@@ -9,6 +9,14 @@ FORMER_PACKAGES = ("cosim", "dynamics", "messages", "services", "studies")  # to
 MODULES = {
     "cosim.schedule": "cosim.diagram.tick_schedule",
     "cosim.setup": "cosim.config.run_config",
+    "dynamics.effects.carried_load": "dynamics.effects.shared_slung_load",
+    "dynamics.effects.coaxial_wash": "dynamics.effects.coaxial_interference",
+    "dynamics.effects.induced_velocity": "dynamics.effects.dynamic_inflow",
+    "dynamics.effects.motor_electrics": "dynamics.effects.dc_motor",
+    "dynamics.effects.payload": "dynamics.effects.payload_release",
+    "dynamics.effects.rotor_inflow": "dynamics.effects.axial_inflow",
+    "dynamics.effects.rotor_wash": "dynamics.effects.downwash",
+    "dynamics.effects.wind_random": "dynamics.effects.random_wind_force",
     "dynamics.effects._feet": "dynamics.effects._foot_contact",
     "dynamics.effects._interaction": "dynamics.effects._vehicle_interaction",
     "dynamics.integrators._controlled": "dynamics.integrators._step_doubling",
@@ -59,6 +67,14 @@ CLASSES = {
     "lapwing.cosim.config.run_config:ServiceSetup": "ServiceConfig",
     "lapwing.cosim.config.run_config:Setup": "RunConfig",
     "lapwing.cosim.diagram.tick_schedule:Input": "InputPort",
+    "lapwing.dynamics.effects.axial_inflow:RotorInflow": "AxialInflow",
+    "lapwing.dynamics.effects.coaxial_interference:CoaxialWash": "CoaxialInterference",
+    "lapwing.dynamics.effects.dc_motor:MotorElectrics": "DcMotor",
+    "lapwing.dynamics.effects.downwash:RotorWash": "Downwash",
+    "lapwing.dynamics.effects.dynamic_inflow:InducedVelocity": "DynamicInflow",
+    "lapwing.dynamics.effects.payload_release:Payload": "PayloadRelease",
+    "lapwing.dynamics.effects.random_wind_force:WindRandom": "RandomWindForce",
+    "lapwing.dynamics.effects.shared_slung_load:CarriedLoad": "SharedSlungLoad",
     "lapwing.dynamics.effects._foot_contact:Footing": "FootContact",
     "lapwing.dynamics.effects._vehicle_interaction:Presence": "NeighbourState",
     "lapwing.dynamics.integrators._step_doubling:Controlled": "StepDoubling",
@@ -73,6 +89,16 @@ CLASSES = {
     "lapwing.services.autopilot.mixer:Demands": "VirtualControls",
     "lapwing.services.common.ports:BatteryGauge": "BatteryReading",
     "lapwing.services.plant.service_config:Others": "FleetCoupling",
+}
+FIELDS = {  # renamed fields, by the present name of their class
+    "lapwing.dynamics.effects._contact_parameters:GroundContact": {"square_stick_velocity": "square_stiction_velocity"},
+    "lapwing.dynamics.effects.battery:Battery": {"charge": "initial_charge", "cut_off": "cutoff_voltage"},
+    "lapwing.dynamics.effects.battery_thevenin:BatteryThevenin": {
+        "charge": "initial_charge",
+        "cut_off": "cutoff_voltage",
+    },
+    "lapwing.dynamics.effects.rotor_damage:RotorDamage": {"torque_left": "remaining_torque"},
+    "lapwing.services.trajectory.service:TrajectorySetup": {"follow": "leader"},
 }
 
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.class_aliases import present_name
+from lapwing.cosim.config.class_aliases import FIELDS, present_name
 from lapwing.messages.former_names import current_fields
 
 TAG = "$"
@@ -169,6 +169,8 @@ def _listed(dtype: Any, allowed: Collection[str]) -> str:
 
 def _record(cls: type, name: str, members: dict[str, Any]) -> Any:
     members = current_fields(f"{cls.__module__}:{cls.__qualname__}", members)
+    renamed = FIELDS.get(f"{cls.__module__}:{cls.__qualname__}", {})
+    members = {renamed.get(key, key): value for key, value in members.items()}
     if set(members) != set(_fields(cls)):
         raise ValueError(f"{name}: has the fields {', '.join(_fields(cls))}, got {', '.join(members)}")
     return cls(**members)
