@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Processes start half a second faster with byte code on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test test-all check stability compatibility fuzz bench docs wheel release sbom audit docker-build docker-test clean
+.PHONY: mission test test-all check stability compatibility fuzz bench portability docs wheel release sbom audit docker-build docker-test clean
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints.
@@ -65,6 +65,10 @@ $(VENV)/.bench: $(VENV)/.installed
 
 bench: $(VENV)/.bench
 	$(BIN)/python -m benchmarks
+
+# Digests under other C libraries and processor features; SCENES and FLAGS narrow it down (see --help of the script).
+portability: $(VENV)/.installed
+	$(BIN)/python deploy/portability/compare.py $(FLAGS) $(SCENES)
 
 # The site, into build/site; a broken link or reference fails.
 $(VENV)/.docs: $(VENV)/.installed

@@ -3,12 +3,11 @@
 ISO 2533:1975; theory.md, eqs. (2.3) and (3.8).
 """
 
-import math
 from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 GRAVITY = 9.80665  # [m/s^2] g_0
 EARTH_RADIUS = 6_356_766.0  # [m] by which geometric altitude becomes geopotential
@@ -18,6 +17,13 @@ LAPSE_RATE = 0.0065  # [K/m] up to the tropopause, none above it
 TROPOPAUSE = 11_000.0  # [m] geopotential
 EXPONENT = GRAVITY / (GAS_CONSTANT * LAPSE_RATE)  # 5.2559
 FREEZING = 273.15  # [K] at 0 degC
+# ((1 - u)**EXPONENT - 1) / u for -0.1 <= u <= 0.32, from 4 km below the sea to the tropopause: minimax polynomial of
+# relative error 3e-16, faster than `pow` (recomputed in tests/dynamics/test_atmosphere.py)
+LAPSE_POLYNOMIAL = (
+    -5.255879812716677, 11.184196396503008, -12.138133089610943, 6.845542350230893, -1.7194356889414584,
+    0.07332814684628898, 0.007794992951589544, 0.0016994459544154605, 0.0005180868469204319,
+    0.0001933830602118856, 8.976930648030865e-05, 1.928633569001961e-05, 5.133379122576114e-05,
+)  # fmt: skip
 
 
 class Atmosphere(NamedTuple):
@@ -39,10 +45,21 @@ def temperature(a, altitude):
 
 
 @always_inline
+def _lapse_factor(u):
+    """(1 - u)**EXPONENT."""
+    c, z = LAPSE_POLYNOMIAL, u * u
+    low = (c[0] + c[1] * u) + z * (c[2] + c[3] * u)
+    middle = (c[4] + c[5] * u) + z * (c[6] + c[7] * u)
+    high = (c[8] + c[9] * u) + z * (c[10] + c[11] * u)
+    fourth = z * z
+    return 1.0 + u * (low + fourth * (middle + fourth * (high + fourth * c[12])))
+
+
+@always_inline
 def pressure(a, altitude):
     """[Pa] at an altitude [m] above the sea."""
     height, ground = _geopotential(altitude), SEA_LEVEL_TEMPERATURE + a.temperature_offset
-    found = a.sea_level_pressure * (1.0 - LAPSE_RATE * min(height, TROPOPAUSE) / ground) ** EXPONENT
+    found = a.sea_level_pressure * _lapse_factor(LAPSE_RATE * min(height, TROPOPAUSE) / ground)
     if height > TROPOPAUSE:
         kelvin = ground - LAPSE_RATE * TROPOPAUSE
         found = found * math.exp((TROPOPAUSE - height) * GRAVITY / (GAS_CONSTANT * kelvin))
@@ -67,9 +84,9 @@ def density_slope(a, altitude):
 def pressure_altitude(a, pressure_now):
     """Altitude [m] above the sea at which `pressure` gives this pressure [Pa]."""
     ground = SEA_LEVEL_TEMPERATURE + a.temperature_offset
-    height = ground * (1.0 - (pressure_now / a.sea_level_pressure) ** (1.0 / EXPONENT)) / LAPSE_RATE
+    height = ground * (1.0 - math.pow(pressure_now / a.sea_level_pressure, 1.0 / EXPONENT)) / LAPSE_RATE
     if height > TROPOPAUSE:
         kelvin = ground - LAPSE_RATE * TROPOPAUSE
-        at_tropopause = a.sea_level_pressure * (kelvin / ground) ** EXPONENT
+        at_tropopause = a.sea_level_pressure * math.pow(kelvin / ground, EXPONENT)
         height = TROPOPAUSE + math.log(at_tropopause / pressure_now) * GAS_CONSTANT * kelvin / GRAVITY
     return EARTH_RADIUS * height / (EARTH_RADIUS - height)

@@ -3,12 +3,11 @@
 WGS 84: NIMA TR8350.2. Conversions: theory.md, eqs. (3.4) to (3.7).
 """
 
-import math
 from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 
 SEMI_MAJOR = 6378137.0  # [m]
 FLATTENING = 1.0 / 298.257223563
@@ -29,7 +28,7 @@ class Home(NamedTuple):
 def geodetic_to_ecef(latitude_deg, longitude_deg, height):
     """Earth-centred, Earth-fixed coordinates [m] of a point (theory.md, eq. (3.4))."""
     latitude, longitude = math.radians(latitude_deg), math.radians(longitude_deg)
-    s, c = math.sin(latitude), math.cos(latitude)
+    s, c = math.sincos(latitude)
     n = SEMI_MAJOR / math.sqrt(1.0 - _E2 * s * s)
     return (
         (n + height) * c * math.cos(longitude),
@@ -49,8 +48,8 @@ def ecef_to_geodetic(r):
         length = math.hypot(tangent_s, tangent_c)
         s, c = tangent_s / length, tangent_c / length
         latitude = math.atan2(r[2] + _EP2 * _SEMI_MINOR * s * s * s, rho - _E2 * SEMI_MAJOR * c * c * c)
-        tangent_s, tangent_c = (1.0 - FLATTENING) * math.sin(latitude), math.cos(latitude)
-    s, c = math.sin(latitude), math.cos(latitude)
+        s, c = math.sincos(latitude)
+        tangent_s, tangent_c = (1.0 - FLATTENING) * s, c
     height = rho * c + r[2] * s - SEMI_MAJOR * math.sqrt(1.0 - _E2 * s * s)
     return math.degrees(latitude), math.degrees(math.atan2(r[1], r[0])), height
 
@@ -58,7 +57,7 @@ def ecef_to_geodetic(r):
 @always_inline
 def _axes(home):
     latitude, longitude = math.radians(home.latitude_deg), math.radians(home.longitude_deg)
-    return math.sin(latitude), math.cos(latitude), math.sin(longitude), math.cos(longitude)
+    return math.sincos(latitude) + math.sincos(longitude)
 
 
 @kernel
@@ -84,5 +83,5 @@ def geodetic_to_enu(home, latitude_deg, longitude_deg, height):
 
 def normal_gravity(latitude_deg: float) -> float:
     """Gravity [m/s^2] on the ellipsoid (theory.md, eq. (2.29)); NIMA TR8350.2, eq. (4-1)."""
-    square = math.sin(math.radians(latitude_deg)) ** 2
+    square = math.square(math.sin(math.radians(latitude_deg)))
     return 9.7803253359 * (1.0 + 0.00193185265241 * square) / math.sqrt(1.0 - _E2 * square)

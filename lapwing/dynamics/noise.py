@@ -7,11 +7,10 @@ mode of a run, whatever mathematics library is installed (theory.md, section 3.1
 """
 
 import hashlib
-import math
 
 import numpy as np
 
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 
 Key = tuple[int, int]  # two words of 32 bits
 

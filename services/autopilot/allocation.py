@@ -8,7 +8,9 @@ includes the losses in the wakes of other rotors.
 import numpy as np
 
 from lapwing.dynamics.effects._types import WakeSlopes
+from lapwing.dynamics.small_matrices import inverse, product, symmetric_eigenvalues
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 from lapwing.services.autopilot.interface import PerRotor
 from lapwing.services.autopilot.mixer import Share, Shares
 
@@ -52,7 +54,7 @@ def in_wakes(still: np.ndarray, turning: np.ndarray, torque_per_thrust: float, w
         wakes: slopes with a row and a column per rotor.
     """
     thrust, torque = np.array(wakes.thrust), np.array(wakes.torque)
-    return still @ thrust + turning @ (torque_per_thrust * np.eye(len(thrust)) + torque)
+    return product(still, thrust) + product(turning, torque_per_thrust * np.eye(len(thrust)) + torque)
 
 
 def demand_effects(B: np.ndarray) -> np.ndarray:
@@ -61,7 +63,7 @@ def demand_effects(B: np.ndarray) -> np.ndarray:
     Args:
         B: `effectiveness` of the rotors, shape (4, rotors).
     """
-    return np.array([sum(abs(float(v)) for v in row) for row in B])
+    return np.array([math.total(abs(float(v)) for v in row) for row in B])
 
 
 def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None) -> Shares | None:
@@ -82,11 +84,12 @@ def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None)
     left = [k for k in range(scaled.shape[1]) if k != failed - 1]
     for rows in ([0, 1, 2, YAW], [0, 1, 2]) if failed else ([0, 1, 2, YAW],):
         some = scaled[np.ix_(rows, left)]
-        gram = some @ some.T
-        if np.linalg.cond(gram) > WORST_CONDITION**2:
+        gram = product(some, some.T)
+        smallest, *_, largest = symmetric_eigenvalues(gram)
+        if not smallest * math.square(WORST_CONDITION) >= largest:
             continue
         shares = np.zeros((scaled.shape[1], 4))
-        shares[np.ix_(left, rows)] = some.T @ np.linalg.inv(gram) / root[left, None]
+        shares[np.ix_(left, rows)] = product(some.T, inverse(gram)) / root[left, None]
         if shares[left, 0].min() >= LEAST_LIFT:
             return tuple(_share(row) for row in shares)
     return None

@@ -1,9 +1,8 @@
 """Smoothed angle reference of the inner loop with rate and acceleration (theory.md, eqs. (4.14)-(4.16))."""
 
-import math
 from typing import NamedTuple
 
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 
 class Smoothing(NamedTuple):

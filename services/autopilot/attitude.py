@@ -1,10 +1,8 @@
 """Attitude error and its rate about the body axes, by Euler angles or on SO(3)."""
 
-import math
-
 from lapwing.dynamics.lie.quaternion import Quaternion, conjugate, from_roll_pitch_yaw, log, multiply, rotate
 from lapwing.dynamics.vector import Vec3, subtract
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 
 @always_inline
@@ -16,7 +14,7 @@ def wrap(angle: float) -> float:
 @always_inline
 def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
     """Return the rates of roll, pitch and yaw [rad/s] from body rates (theory.md, eq. (4.17)); singular at +-pi/2."""
-    s, c = math.sin(roll), math.cos(roll)
+    s, c = math.sincos(roll)
     turn = (s * omega_body[1] + c * omega_body[2]) / math.cos(pitch)
     return (omega_body[0] + math.sin(pitch) * turn, c * omega_body[1] - s * omega_body[2], turn)
 
@@ -24,7 +22,7 @@ def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
 @always_inline
 def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
     """Return omega_body of the rates of roll, pitch and yaw, the inverse of `angle_rates`."""
-    s, c = math.sin(roll), math.cos(roll)
+    s, c = math.sincos(roll)
     turn = math.cos(pitch) * rates[2]
     return (rates[0] - math.sin(pitch) * rates[2], c * rates[1] + s * turn, c * turn - s * rates[1])
 

@@ -4,12 +4,12 @@ It runs at every tick while it generates setpoints. Along the scene's trajectory
 output may change (`commander.wakeup_conditions`).
 """
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
+from lapwing.kernels import math
 from lapwing.kernels.cell import Cell, write
 from lapwing.messages import CommandAcks, header
 from lapwing.messages import topics as topic
@@ -193,7 +193,7 @@ class CommanderBlock:
         """Return the last thrust command over the hover thrust; 1 without gravity."""
         if not self._weight > 0.0:
             return 1.0
-        asked = sum(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
+        asked = math.total(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
         return asked * self._lift / self._weight
 
     def _commands(self, tick: int) -> tuple[Any, ...]:

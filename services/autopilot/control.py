@@ -1,12 +1,11 @@
 """Cascaded PID controller with saturation, from setpoint to motor voltages (theory.md, section 4.2)."""
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO, Vec3, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.autopilot.angle_reference import AT_REST, Angle, Smoothing, advance
 from lapwing.services.autopilot.attitude import error_by_angle, error_on_so3
 from lapwing.services.autopilot.interface import Command, Estimate, Setpoint
@@ -70,7 +69,7 @@ def sign(x: float) -> float:
 @always_inline
 def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
     """Return the components of a world vector along the heading and to its left (theory.md, eq. (4.11))."""
-    s, c = math.sin(yaw), math.cos(yaw)
+    s, c = math.sincos(yaw)
     return (c * v_world[0] + s * v_world[1], c * v_world[1] - s * v_world[0])
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics.effects._types import WakeSlopes
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import python_function
+from lapwing.kernels import math, python_function
 from lapwing.services.autopilot.allocation import demand_effects, effectiveness, in_wakes, tables, tilted_effectiveness
 from lapwing.services.autopilot.angle_reference import Smoothing
 from lapwing.services.autopilot.control import Parameters
@@ -94,7 +94,7 @@ def hover_thrust(airframe: Airframe) -> float:
 
 def hover_torque(airframe: Airframe) -> float:
     """Return the hover torque [N m] of the most loaded rotor."""
-    gained = max((sum(row) for row in airframe.wakes.torque), default=0.0)
+    gained = max((math.total(row) for row in airframe.wakes.torque), default=0.0)
     return hover_thrust(airframe) * (airframe.torque_per_thrust + max(gained, 0.0))
 
 

@@ -4,11 +4,10 @@ An observer estimates the angular acceleration about body x and y that the comma
 causes one along its own arm. ArduPilot's thrust-loss check detects the same failure by saturation.
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.controller_parameters import Airframe, lift, rotor_effectiveness
 from lapwing.services.autopilot.interface import PerRotor

@@ -1,6 +1,5 @@
 """The `[autopilot]` table of a scene: gains, estimator, controller, operator."""
 
-import math
 from typing import Any, ClassVar, Literal
 
 from pydantic import Field
@@ -8,6 +7,7 @@ from pydantic import Field
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import laid_over, named
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.kernels import math
 from lapwing.services.autopilot import motor_limits
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import FOLDER, GainSet

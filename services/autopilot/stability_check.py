@@ -1,8 +1,7 @@
 """Warning about gains that make a loop unstable in hover."""
 
-import math
-
 from lapwing.cosim.scene import Scene
+from lapwing.kernels import math
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import excess, open_loops
@@ -29,5 +28,5 @@ def unstable_loops(scene: Scene) -> list[str]:
 def _by(factor: float) -> str:
     if math.isnan(factor):
         return " at any gain"
-    decibels = 20.0 * math.log10(factor)
+    decibels = 20.0 * math.log(factor) / math.log(10.0)
     return f", gain margin {-abs(decibels):.1f} dB: its gain is too {'high' if decibels > 0.0 else 'low'}"

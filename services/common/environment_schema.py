@@ -194,7 +194,8 @@ def _points(grid: Grid, key: str) -> int:
     points = int(grid.reach / grid.spacing)
     if points < 1:
         raise ConfigError(f"{key}.reach", f"got {grid.reach:g}", f"at least the spacing of {grid.spacing:g} m")
-    if (2 * points + 1) ** 2 > height_file.MOST:
+    side = 2 * points + 1
+    if side * side > height_file.MOST:
         expected = f"at most {height_file.MOST} points: a shorter reach or a wider spacing"
         raise ConfigError(f"{key}.spacing", f"got {grid.spacing:g} over a reach of {grid.reach:g} m", expected)
     return points

@@ -1,6 +1,5 @@
 """Scene tables of the vehicle, its airframe and its effects, and quantities derived from them."""
 
-import math
 from typing import Any, ClassVar, NamedTuple
 
 from pydantic import ConfigDict, Field
@@ -21,7 +20,7 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.ground_equilibrium import Pose, resting_pose
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
-from lapwing.kernels import python_function
+from lapwing.kernels import math, python_function
 from lapwing.services.common import mesh_schema
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.named_tables import NamedTables

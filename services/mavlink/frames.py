@@ -4,9 +4,8 @@ NED is (north, east, down): C = [[0, 1, 0], [1, 0, 0], [0, 0, -1]] of ENU; FRD i
 half turns, so the same functions lead there and back.
 """
 
-import math
-
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 
 Quaternion = tuple[float, float, float, float]  # w, x, y, z
 _S = math.sqrt(0.5)

@@ -16,6 +16,7 @@ from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import ZERO, Vec3, add, norm, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, frequency
+from lapwing.kernels import math
 from lapwing.services.common import ports
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
@@ -98,7 +99,7 @@ def _load(
                 message = f"got {theirs:g}, and {owner} has {ours:g}: they carry the same load"
                 raise ConfigError(f"{keys[name]}effects.shared_slung_load.{key}", message, f"{ours:g}")
     hooks_world = {name: _hook(shares[name], sling) for name, sling in carriers.items()}
-    x, y = (sum(hook[i] for hook in hooks_world.values()) / len(carriers) for i in (0, 1))
+    x, y = (math.total(hook[i] for hook in hooks_world.values()) / len(carriers) for i in (0, 1))
     start = LoadMotion((x, y, surface(first.terrain, x, y)[0]), ZERO)
     for name, sling in carriers.items():
         key, away = f"{keys[name]}effects.shared_slung_load", norm(subtract(hooks_world[name], start.load_position))

@@ -4,12 +4,10 @@ Densities are one-sided: a density n [u/sqrt(Hz)] sampled at f [Hz] gives the st
 Allan deviation n / sqrt(2 tau).
 """
 
-import math
-
 import numpy as np
 
 from lapwing.dynamics.vector import Mat3, Vec3, add, scale
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2], the unit g of data sheets
 

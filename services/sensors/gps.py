@@ -1,6 +1,5 @@
 """Satellite receiver: position on WGS 84 and velocity, late (theory.md, section 3.2)."""
 
-import math
 from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -10,7 +9,7 @@ from lapwing.dynamics.geodesy import enu_to_geodetic
 from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cross, multiply, scale
-from lapwing.kernels import always_inline, kernel, python_function
+from lapwing.kernels import always_inline, kernel, math, python_function
 from lapwing.services.common.ports import GpsReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
@@ -113,7 +112,9 @@ def check(p: Gps) -> None:
     """KeyedError where the satellites in view do not give a position."""
     if p.sky is None:
         return
-    dilution = math.sqrt(sum(x * x for x in python_function(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
+    dilution = (
+        math.sqrt(math.total(x * x for x in python_function(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
+    )
     if not dilution < WORST:
         said = f"got {len(p.sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
         raise ConfigError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")

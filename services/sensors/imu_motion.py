@@ -1,13 +1,12 @@
 """What an inertial measurement unit is exposed to: rates and specific force where it is mounted, means, vibration."""
 
-import math
 from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.lie.quaternion import conjugate, log, multiply, rotate, rotate_back
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.services.sensors.triad import MG
 

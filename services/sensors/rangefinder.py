@@ -1,6 +1,5 @@
 """Laser rangefinder: the distance along one ray, in any direction of the body (theory.md, eq. (3.40))."""
 
-import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -13,7 +12,7 @@ from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray
 from lapwing.dynamics.vector import ZERO, Vec3, add
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import overload_for
 from lapwing.messages import Range, header
 from lapwing.messages import topics as topic

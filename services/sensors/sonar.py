@@ -1,6 +1,5 @@
 """Sonar: an ultrasonic rangefinder that looks down (theory.md, section 3.2)."""
 
-import math
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray, surface
 from lapwing.dynamics.vector import add, apply, dot, scale
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import overload_for
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors.delay_line import DEPTH, Fault

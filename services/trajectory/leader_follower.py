@@ -1,11 +1,10 @@
 """Compiled trajectory block of a vehicle relative to a leader's trajectory."""
 
-import math
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.services.common.ports import Reference
 from lapwing.services.trajectory import polynomial_piece
 from lapwing.services.trajectory.block import TrajectoryPath
@@ -26,7 +25,7 @@ def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, 
     `heading` has angle, rate and acceleration of the frame [rad], [rad/s], [rad/s^2].
     """
     angle, rate, acceleration = heading
-    s, c = math.sin(angle), math.cos(angle)
+    s, c = math.sincos(angle)
     (x, y, z), (vx, vy, vz), (ax, ay, az) = way.position_world, way.velocity_world, way.acceleration_world
     vx, vy, ax, ay = (  # by Coriolis' theorem
         vx - rate * y,

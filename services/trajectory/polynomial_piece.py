@@ -1,12 +1,11 @@
 """Polynomial pieces, the primitive of all segments, and their compiled evaluation (theory.md, eq. (4.1))."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 
 WIDTH = 9  # columns of a coefficient row: six of the quintic, then amplitude, frequency, sweep
 

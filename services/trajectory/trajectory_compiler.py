@@ -6,6 +6,7 @@ import numpy as np
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.kernels import math
 from lapwing.services.trajectory.phases import Phase, Phases
 from lapwing.services.trajectory.polynomial_piece import Channel, Parameters, Piece
 
@@ -36,7 +37,7 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
         starts.append(now)
         key = f"trajectory.phase.{index}"
         moved = {channel: _pieces(phase, key, channel, value) for channel in CHANNELS}
-        length = {channel: sum(piece.duration for piece in pieces) for channel, pieces in moved.items()}
+        length = {channel: math.total(piece.duration for piece in pieces) for channel, pieces in moved.items()}
         end = now + _phase_duration(phase, key, max(length.values()))
         for channel, pieces in moved.items():
             time = now

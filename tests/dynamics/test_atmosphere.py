@@ -1,8 +1,11 @@
 """The atmosphere against published tables, and against the hydrostatic balance that it is."""
 
 import pytest
+from mpmath import mp, mpf
 
+from lapwing.dynamics import atmosphere
 from lapwing.dynamics.atmosphere import Atmosphere, density, density_slope, pressure, pressure_altitude, temperature
+from lapwing.kernels.math.coefficients import remez
 
 STANDARD, WARM = Atmosphere(), Atmosphere(99_000.0, 20.0)
 
@@ -48,3 +51,25 @@ def test_altitude_from_pressure_and_back(air, altitude):
 def test_a_warm_day_is_thin_and_a_high_pressure_dense():
     assert density(WARM, 0.0) == pytest.approx(99_000.0 / (287.05287 * 308.15), rel=1e-12)
     assert temperature(WARM, 15_000.0) == pytest.approx(236.65)
+
+
+def test_polynomial_of_lapse_is_minimax():
+    with mp.workprec(300):
+        exponent = mpf(atmosphere.EXPONENT)
+
+        def function(u):
+            return ((1 - u) ** exponent - 1) / u if abs(u) > mpf("1e-30") else -exponent
+
+        assert tuple(remez(function, 13, mpf("-0.1"), mpf("0.32"))) == atmosphere.LAPSE_POLYNOMIAL
+
+
+@pytest.mark.parametrize("altitude", [-4000.0, -400.0, 0.0, 1e-9, 35.0, 1500.0, 8848.0, 11_000.0])
+@pytest.mark.parametrize("offset", [-60.0, 0.0, 60.0])
+def test_pressure_of_troposphere_is_power_of_temperature(altitude, offset):
+    air = Atmosphere(temperature_offset=offset)
+    with mp.workprec(200):
+        radius = mpf(atmosphere.EARTH_RADIUS)
+        height = radius * mpf(altitude) / (radius + mpf(altitude))
+        ratio = 1 - mpf(atmosphere.LAPSE_RATE) * height / (mpf(atmosphere.SEA_LEVEL_TEMPERATURE) + mpf(offset))
+        expected = mpf(air.sea_level_pressure) * ratio ** mpf(atmosphere.EXPONENT)
+    assert pressure(air, altitude) == pytest.approx(float(expected), rel=1e-15)

@@ -8,13 +8,13 @@ from lapwing.cosim.executors.single_process import PAGE
 from lapwing.services.process_table import create_all
 from tests.cosim.memory_log import MemoryLog
 from tests.golden import digests, thinned_log
-from tests.golden.cases import CASES
+from tests.golden.cases import CASES, Case
 from tests.golden.digests import BEGINNING, Golden
 
 
-def fly(name: str) -> tuple[MemoryLog, str]:
+def fly(case: Case) -> tuple[MemoryLog, str]:
     """The whole flight of a case, and the digest of its beginning."""
-    setup = CASES[name].resolve()
+    setup = case.resolve()
     log, graph, beginning = MemoryLog(setup), BlockDiagram(setup, create_all(setup), PAGE), ""
     stops = [round(BEGINNING * setup.rate) + 1, *range(PAGE, setup.last_tick + 1 + PAGE, PAGE)]
     for stop in sorted(stops):
@@ -47,7 +47,7 @@ def main() -> int:
 
 def _check(name: str, update: bool, reason: str) -> bool:
     known = digests.read() if digests.FILE.exists() else {}
-    log, beginning = fly(name)
+    log, beginning = fly(CASES[name])
     digest, path = log.digest, digests.sample_file(name)
     if name in known and known[name][:2] == (digest, beginning) and path.exists():
         print(f"{name}: {digest}", flush=True)

@@ -1,6 +1,5 @@
 """What a scene says about the contact with the ground, and the two effects that come of it."""
 
-import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le
@@ -10,6 +9,7 @@ from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, upright
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -75,7 +75,7 @@ class GroundContact(NamedTuple):
         rate = _rate_bound(
             airframe, points.feet, (given.stiffness, given.tangential_stiffness), (given.damping, given.damping)
         )
-        return cls(*common, given.tangential_stiffness, given.stiction_velocity**2, rate)
+        return cls(*common, given.tangential_stiffness, given.stiction_velocity * given.stiction_velocity, rate)
 
     def in_environment(self, environment: Environment) -> "GroundContact":
         """On the ground that is there."""
@@ -130,7 +130,7 @@ def _reach(feet: tuple[Vec3, ...], terrain: Any = LEVEL) -> float:
 
 def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:
     inertia = airframe.mass.inertia
-    arm = max(point[0] ** 2 + point[1] ** 2 + point[2] ** 2 for point in points)
+    arm = max(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] for point in points)
     return 1.0 / airframe.mass.total + arm / min(inertia)
 
 
@@ -140,7 +140,7 @@ def _rate_bound(
     """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it; of a stronger
     damper the frequency that asks for steps as short. Stiffness and damping: normal, tangential."""
     mass = airframe.mass
-    xx, yy, zz = (sum(foot[i] ** 2 for foot in feet) for i in range(3))
+    xx, yy, zz = (math.total(foot[i] * foot[i] for foot in feet) for i in range(3))
 
     def highest(normal: float, tangential: float) -> float:
         heave = len(feet) * normal / mass.total

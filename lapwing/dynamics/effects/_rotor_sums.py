@@ -7,7 +7,8 @@ from lapwing.kernels.codegen import compile_source, overload_for
 
 def total(a: PerRotor) -> float:
     """Sum of a tuple, added in pairs: a shorter chain of dependent additions."""
-    return sum(a)
+    half = len(a) // 2
+    return a[0] if len(a) == 1 else total(a[:half]) + total(a[half:])
 
 
 @overload_for(total, inline=True)

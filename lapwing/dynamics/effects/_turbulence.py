@@ -1,6 +1,5 @@
 """What turbulence near the ground has in common: how strong, how large and how fast it passes (MIL-F-8785C)."""
 
-import math
 from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
@@ -8,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.terrain import LEVEL, surface
 from lapwing.dynamics.vector import Vec3, norm, subtract
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 KIND = "turbulence"
 FOOT = 0.3048  # [m]
@@ -50,7 +49,7 @@ def intensity(wind_speed, altitude):
     feet = altitude / FOOT
     base = 0.177 + 0.000823 * feet
     vertical = 0.1 * wind_speed
-    horizontal, scale = vertical / base**0.4, FOOT * feet / base**1.2
+    horizontal, scale = vertical / math.pow(base, 0.4), FOOT * feet / math.pow(base, 1.2)
     return (horizontal, horizontal, vertical), (scale, scale, altitude)
 
 

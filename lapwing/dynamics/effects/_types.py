@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.dynamics import small_matrices
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import Mat3, Vec3
 
@@ -54,12 +55,12 @@ AnyMassProperties = MassProperties | FullMassProperties | OffsetMassProperties
 
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
     """What a mass [kg] at an arm [m] adds to an inertia matrix [kg m^2], shape (3, 3): the parallel axis theorem."""
-    return mass * (np.dot(arm, arm) * np.eye(3) - np.outer(arm, arm))
+    return mass * (small_matrices.dot(arm, arm) * np.eye(3) - np.multiply.outer(arm, arm))
 
 
 def offset_body(mass: float, inertia: np.ndarray, centre_body: np.ndarray) -> OffsetMassProperties:
     """Mass properties about a centre of mass [m] off the motion's position; inertia [kg m^2], shape (3, 3)."""
-    matrix, inverse = (tuple(m.ravel().tolist()) for m in (inertia, np.linalg.inv(inertia)))
+    matrix, inverse = (tuple(m.ravel().tolist()) for m in (inertia, small_matrices.inverse(inertia)))
     return OffsetMassProperties(mass, 1.0 / mass, matrix, inverse, tuple(np.asarray(centre_body, float).tolist()))
 
 
@@ -95,7 +96,7 @@ def principal_moments(inertia: Vec3, products: Vec3) -> tuple[float, ...]:
     if not any(products):
         return tuple(sorted(inertia))
     (x, y, z), (xy, xz, yz) = inertia, products
-    return tuple(map(float, np.linalg.eigvalsh([[x, xy, xz], [xy, y, yz], [xz, yz, z]])))
+    return tuple(small_matrices.symmetric_eigenvalues([[x, xy, xz], [xy, y, yz], [xz, yz, z]]))
 
 
 class Air(NamedTuple):

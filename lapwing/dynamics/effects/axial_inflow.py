@@ -1,6 +1,5 @@
 """Correction of the rotors' thrust and torque for air that comes along their axis."""
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import axial_speeds
@@ -9,7 +8,7 @@ from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -43,10 +42,10 @@ class AxialInflow(NamedTuple):
         if propeller.zero_lift_angle != 0.0:
             reject("the propeller's zero_lift_angle must be 0: the correction is derived for that")
         profile, induced = drag_coefficients(propeller)
-        square = (2.0 * math.pi) ** 2
+        square = math.square(2.0 * math.pi)
         return cls(
-            thrust_coefficient(propeller) * propeller.diameter**4 / square,
-            torque_coefficient(propeller) * induced / (profile + induced) * propeller.diameter**5 / square,
+            thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / square,
+            torque_coefficient(propeller) * induced / (profile + induced) * math.pow(propeller.diameter, 5) / square,
             2.0 * math.pi / propeller.pitch,
         )
 

@@ -1,6 +1,5 @@
 """A battery that empties and sags under load."""
 
-import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
@@ -8,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
-from lapwing.kernels import always_inline, python_function
+from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic

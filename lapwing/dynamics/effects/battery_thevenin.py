@@ -1,6 +1,5 @@
 """A battery that also recovers slowly after a load, warms up, and is switched on again once it has recovered."""
 
-import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
@@ -12,6 +11,7 @@ from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supp
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects.battery import KIND, at_most, open_circuit_voltage
 from lapwing.dynamics.environment import Environment
+from lapwing.kernels import math
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic

@@ -1,11 +1,11 @@
 """Rotors that stand in the wake of another one above them."""
 
-import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from lapwing.dynamics import small_matrices
 from lapwing.dynamics.effects._axes import hub_speeds
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
@@ -13,7 +13,7 @@ from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
-from lapwing.kernels import always_inline, python_function
+from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -55,7 +55,7 @@ class CoaxialInterference(NamedTuple):
         if all(number < 0 for number, _ in uppers):
             most = f"{ASIDE * radius:.3g} m aside and {FARTHEST * radius:.3g} m below"
             reject(f"no rotor stands under another one (by at most {most})")
-        static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
+        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
         flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         if flow >= pitch:
             reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
@@ -119,9 +119,13 @@ def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
     axes = np.array(airframe.rotors.tilted_axis or [(0.0, 0.0, 1.0)] * len(places))
     found = []
     for j, arm in enumerate(places - places[k]):
-        height = float(arm @ axes[k])
-        aside = float(np.linalg.norm(arm - height * axes[k]))
-        if 0.0 < height <= FARTHEST * radius and aside <= ASIDE * radius and axes[j] @ axes[k] >= PARALLEL:
+        height = small_matrices.dot(arm, axes[k])
+        aside = small_matrices.length(arm - height * axes[k])
+        if (
+            0.0 < height <= FARTHEST * radius
+            and aside <= ASIDE * radius
+            and small_matrices.dot(axes[j], axes[k]) >= PARALLEL
+        ):
             found.append((height, j))
     distance, number = min(found, default=(0.0, -1))
     return number, distance

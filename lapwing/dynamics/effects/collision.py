@@ -1,6 +1,5 @@
 """Vehicles of a fleet that touch one another."""
 
-import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
@@ -9,6 +8,7 @@ from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import NOTHING, ZERO, add, dot, norm, scale, subtract
+from lapwing.kernels import math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe

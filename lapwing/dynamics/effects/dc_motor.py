@@ -51,7 +51,7 @@ class DcMotor(NamedTuple):
             engine.no_load_current,
             airframe.motor_current_limit,
             engine.power_limit,
-            1.0 / (airframe.rotors.inertia + engine.inertia / engine.gear_ratio**2),
+            1.0 / (airframe.rotors.inertia + engine.inertia / (engine.gear_ratio * engine.gear_ratio)),
             engine.belt_efficiency,
             1.0 / engine.esc_efficiency,
         )

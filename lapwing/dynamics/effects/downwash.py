@@ -1,6 +1,5 @@
 """The air that vehicles of a fleet blow down on those below."""
 
-import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
@@ -10,6 +9,7 @@ from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import ZERO, add, dot, norm, scale, subtract
+from lapwing.kernels import math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe

@@ -1,6 +1,5 @@
 """Thrust and torque of rotors whose own flow grows and fades: climb, descent, and translational lift."""
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import hub_speeds
@@ -11,7 +10,7 @@ from lapwing.dynamics.effects.axial_inflow import KIND
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -52,7 +51,7 @@ class DynamicInflow(NamedTuple):
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
-        static = thrust_coefficient(propeller) * propeller.diameter**4 / (2.0 * math.pi) ** 2
+        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
         area = math.pi * radius * radius
         hover = math.sqrt(0.5 * static / area)
         if hover > LARGEST_SHARE * pitch:
@@ -60,7 +59,7 @@ class DynamicInflow(NamedTuple):
             reject(
                 f"the propeller's pitch must be at least {least:.3g} m for its static thrust: got {propeller.pitch:g} m"
             )
-        mass = APPARENT_MASS * 4.0 / 3.0 * math.pi * radius**3
+        mass = APPARENT_MASS * 4.0 / 3.0 * math.pi * (radius * radius * radius)
         return cls(static / (pitch - hover), static, pitch, hover, area, mass, (0.0,) * len(airframe.rotors.position))
 
     def initial_discrete_state(self) -> tuple[float, ...]:

@@ -1,6 +1,5 @@
 """More thrust close to the ground."""
 
-import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from lapwing.dynamics.effects._from_scene import checked, reject
@@ -8,7 +7,7 @@ from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, over_plane, summit, surface, upright
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic

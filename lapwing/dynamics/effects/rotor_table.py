@@ -1,7 +1,6 @@
 """Rotors whose thrust and torque are measured: coefficients over the advance ratio, and over the angle of the air."""
 
 import itertools
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
@@ -16,7 +15,7 @@ from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._propeller_data import parsed
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -66,9 +65,9 @@ class RotorTable(NamedTuple):
             propeller = airframe.propeller or reject("needs the key diameter: the vehicle has no [propeller]")
             diameter = propeller.diameter
         _check(given)
-        thrust = np.array(given.thrust) * diameter**4
-        torque = np.array(given.power) * diameter**5 / (2.0 * math.pi)
-        at_rest, square = given.advance.index(0.0), (2.0 * math.pi) ** 2
+        thrust = np.array(given.thrust) * math.pow(diameter, 4)
+        torque = np.array(given.power) * math.pow(diameter, 5) / (2.0 * math.pi)
+        at_rest, square = given.advance.index(0.0), math.square(2.0 * math.pi)
         return cls(
             np.array(given.advance), np.radians(given.angle_deg), thrust, torque, diameter,
             float(thrust[0, at_rest]) / square, float(torque[0, at_rest]) / square,

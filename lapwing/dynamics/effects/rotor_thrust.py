@@ -1,13 +1,12 @@
 """Static thrust and torque of the rotors from the propeller's geometry."""
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -35,10 +34,10 @@ class RotorThrust(NamedTuple):
         """From the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]; name rotor_quadratic instead")
-        square = (2.0 * math.pi) ** 2
+        square = math.square(2.0 * math.pi)
         return cls(
-            thrust_coefficient(propeller) * propeller.diameter**4 / square,
-            torque_coefficient(propeller) * propeller.diameter**5 / square,
+            thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / square,
+            torque_coefficient(propeller) * math.pow(propeller.diameter, 5) / square,
         )
 
 

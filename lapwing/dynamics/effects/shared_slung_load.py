@@ -11,6 +11,7 @@ from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable
+from lapwing.kernels import math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -44,7 +45,7 @@ class SharedSlungLoad(NamedTuple):
         """With the damping for the airframe's mass."""
         given = checked(Settings, table)
         reduced = 1.0 / (1.0 / given.mass + 1.0 / airframe.mass.total)
-        damping = 2.0 * given.damping_ratio * (given.stiffness * reduced) ** 0.5
+        damping = 2.0 * given.damping_ratio * math.sqrt(given.stiffness * reduced)
         hook = subtract(given.hook, airframe.mass.centre)
         return cls(Sling(given.mass, given.length, given.stiffness, damping, hook, given.drag_area, LEVEL))
 

@@ -1,6 +1,5 @@
 """Dryden turbulence at low altitude whose air also turns: angular gusts."""
 
-import math
 import zlib
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -27,7 +26,7 @@ from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -138,7 +137,7 @@ def draw(e, memory, s, rotors, key, tick, interval):
     up1, up2 = second_order(up1, up2, rate[2] * time, first[2], second[1])
     v, w = transverse(across1, across2), transverse(up1, up2)
     wind = in_world(e.conditions, sigma[0] * along, sigma[1] * v, sigma[2] * w)
-    p = sigma[2] * math.pi * math.sqrt(0.1 * (per_span * scale[2]) ** (1.0 / 3.0) / (e.span * scale[2])) * roll
+    p = sigma[2] * math.pi * math.sqrt(0.1 * math.cbrt(per_span * scale[2]) / (e.span * scale[2])) * roll
     q, r = per_span * sigma[2] * (w - pitch), -4.0 / 3.0 * per_span * sigma[1] * (v - yaw)
     turning = in_world(e.conditions, p, q, r)
     return (along, across1, across2, up1, up2, 1.0), wind, (roll, pitch, yaw), turning

@@ -1,6 +1,5 @@
 """One discrete gust."""
 
-import math
 from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
@@ -8,6 +7,7 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.vector import add, scale
+from lapwing.kernels import math
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 

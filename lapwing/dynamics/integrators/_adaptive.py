@@ -1,10 +1,8 @@
 """Adaptive run of the Munthe-Kaas 5(4) pair: PI step controller, and output at given times without shortening steps."""
 
-import math
-
 from lapwing.dynamics.integrators._fixed_step import rate
 from lapwing.dynamics.integrators.rkmk54 import between, stages
-from lapwing.kernels import kernel
+from lapwing.kernels import kernel, math
 from lapwing.kernels.state_tree import error_ratio, finite, flatten, largest, scale
 
 DONE, STEP_TOO_SMALL, NOT_FINITE = 0, 1, 2
@@ -35,7 +33,7 @@ def integrate_adaptive(p, x, times, tolerance, out):
         ratio = error_ratio(x, e) / tolerance if finite(e) else math.inf
         if ratio > 1.0:
             rejected += 1
-            h *= max(SHRINK, SAFETY / ratio**0.2) if ratio < 1e300 else SHRINK
+            h *= max(SHRINK, SAFETY / math.pow(ratio, 0.2)) if ratio < 1e300 else SHRINK
             continue
         arrival = end if last_step else t + h
         while row < len(times) and times[row] <= arrival:
@@ -43,7 +41,7 @@ def integrate_adaptive(p, x, times, tolerance, out):
             for i in range(len(numbers)):
                 out[row, i] = numbers[i]
             row += 1
-        factor = SAFETY * previous**BETA / max(ratio, 1e-10) ** (0.2 - 0.75 * BETA)
+        factor = SAFETY * math.pow(previous, BETA) / math.pow(max(ratio, 1e-10), 0.2 - 0.75 * BETA)
         previous = max(ratio, 1e-4)
         x, f = after, scale(1.0 / h, last)
         t = arrival

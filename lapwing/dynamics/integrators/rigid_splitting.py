@@ -6,13 +6,12 @@ by the nine stages of Kahan and Li, Math. Comp. 66 (1997) 1089. The momentum of 
 is kept to round-off in the world, and the energy error stays bounded for all times (theory.md, section 6.6).
 """
 
-import math
 from typing import Any
 
 from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.dynamics.lie.quaternion import Quaternion, normalise
 from lapwing.dynamics.vector import add, cross, divide, multiply, scale
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.state_tree import flatten, unflatten
 
 ORDER = 6
@@ -21,7 +20,7 @@ ON_MANIFOLD = True
 Method = method_token(__name__)
 
 _HALF = (0.39216144400731413928, 0.33259913678935943860, -0.70624617255763935981, 0.08221359629355080023)
-STAGES = (*_HALF, 1.0 - 2.0 * sum(_HALF), *_HALF[::-1])
+STAGES = (*_HALF, 1.0 - 2.0 * math.total(_HALF), *_HALF[::-1])
 
 
 def incompatibility(p: Any, x: Any) -> str:
@@ -38,7 +37,7 @@ def incompatibility(p: Any, x: Any) -> str:
 @always_inline
 def _spin(w, a, b, c, momentum_b, momentum_c, angle):
     """Turn by `angle` about the body axis a: quaternion (w, a, b, c with a, b, c cyclic) and the other momenta."""
-    cosine, sine = math.cos(0.5 * angle), math.sin(0.5 * angle)
+    sine, cosine = math.sincos(0.5 * angle)
     cc, ss = 1.0 - 2.0 * sine * sine, 2.0 * sine * cosine
     return (
         cosine * w - sine * a,

@@ -4,10 +4,9 @@ The tangent at an attitude is the angular velocity in body coordinates, omega_bo
 q' = q * (0, omega_body) / 2 (theory.md, eq. (5.12)); q and -q are the same attitude.
 """
 
-import math
 from typing import NamedTuple
 
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -78,8 +77,8 @@ def exp(v):
         c = 1.0 + square * (-0.125 + square * (1.0 / 384.0 - square / 46080.0))
     else:
         angle = math.sqrt(square)
-        s = math.sin(0.5 * angle) / angle
-        c = math.cos(0.5 * angle)
+        sine, c = math.sincos(0.5 * angle)
+        s = sine / angle
     return Quaternion(c, s * v[0], s * v[1], s * v[2])
 
 
@@ -115,9 +114,9 @@ def from_matrix(m):
 def from_roll_pitch_yaw(roll, pitch, yaw):
     """Attitude turned by yaw about z, then pitch about the new y, then roll about the new x [rad]; in FLU
     a positive pitch is nose down."""
-    cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
-    cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
-    cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
+    sr, cr = math.sincos(0.5 * roll)
+    sp, cp = math.sincos(0.5 * pitch)
+    sy, cy = math.sincos(0.5 * yaw)
     return Quaternion(
         cy * cp * cr + sy * sp * sr,
         cy * cp * sr - sy * sp * cr,

@@ -3,9 +3,7 @@
 Near zero, where the closed forms divide zero by zero or cancel, each is its Taylor series (theory.md, eq. (5.5)).
 """
 
-import math
-
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(6))
 COSINE = tuple((-1) ** k / math.factorial(2 * k + 2) for k in range(9))
@@ -86,7 +84,7 @@ def half_angle(v):
     pa, ea = _two_product(a, a)
     rest = 0.5 * ((s2 - pa) - ea + (e1 + e2 + ex + ey + ez)) / a  # |v| = a + rest
     half = 0.5 * a
-    sine, cosine = math.sin(half), math.cos(half)
+    sine, cosine = math.sincos(half)
     return half, sine + 0.5 * rest * cosine, cosine - 0.5 * rest * sine
 
 

@@ -4,12 +4,11 @@ The tangent at a direction q is an angular velocity omega [rad/s] in the frame o
 q' = omega x q (theory.md, eq. (5.14)).
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.lie.so3 import turn
 from lapwing.dynamics.vector import cross, dot, norm, scale
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 

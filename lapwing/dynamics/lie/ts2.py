@@ -9,7 +9,7 @@ from typing import NamedTuple
 from lapwing.dynamics.lie import so3
 from lapwing.dynamics.lie.se3 import adjoint, commutator, exp
 from lapwing.dynamics.vector import Vec3, add, cross, dot, scale, subtract
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -58,7 +58,7 @@ def embed(x, mu):
 @always_inline
 def normalise(x):
     """Direction to unit length, angular velocity orthogonal to it."""
-    q = scale(1.0 / dot(x[0], x[0]) ** 0.5, x[0])
+    q = scale(1.0 / math.sqrt(dot(x[0], x[0])), x[0])
     return Swing(q, subtract(x[1], scale(dot(q, x[1]), q)))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody import cardan_angles
 from lapwing.dynamics.vector import IDENTITY, ZERO, apply
-from lapwing.kernels import kernel, noinline
+from lapwing.kernels import kernel, math, noinline
 
 
 class BodyKinematics(NamedTuple):
@@ -66,7 +66,7 @@ def place(configuration, velocity):
             put(p.rate_matrix, i, IDENTITY)
         else:
             angles = (configuration[i, 3], configuration[i, 4], configuration[i, 5])
-            if abs(np.cos(angles[1])) < cardan_angles.SINGULAR:
+            if abs(math.cos(angles[1])) < cardan_angles.SINGULAR:
                 singular = i
             G = cardan_angles.rate_matrix(angles)
             put(p.rotation, i, cardan_angles.rotation(angles))

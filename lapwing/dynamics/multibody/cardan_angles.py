@@ -3,10 +3,8 @@
 Angles are (roll, pitch, yaw) [rad]; A takes body coordinates to world; matrices are nine floats in row order.
 """
 
-import math
-
 from lapwing.dynamics.vector import add, apply, apply_transposed, cross, matmul, transpose
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 SINGULAR = 1e-6  # |cos(pitch)| below which the angles are called singular: their rates lose six of sixteen digits
 
@@ -14,9 +12,9 @@ SINGULAR = 1e-6  # |cos(pitch)| below which the angles are called singular: thei
 @always_inline
 def rotation(angles):
     """A of shape (3, 3), body to world (theory.md, eq. (8.1))."""
-    cx, sx = math.cos(angles[0]), math.sin(angles[0])
-    cy, sy = math.cos(angles[1]), math.sin(angles[1])
-    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    sx, cx = math.sincos(angles[0])
+    sy, cy = math.sincos(angles[1])
+    sz, cz = math.sincos(angles[2])
     return (
         cy * cz, -cy * sz, sy,
         cx * sz + sx * sy * cz, cx * cz - sx * sy * sz, -sx * cy,
@@ -27,16 +25,16 @@ def rotation(angles):
 @always_inline
 def rate_matrix(angles):
     """G-bar: omega_body = G-bar d(angles)/dt (theory.md, eq. (8.2)); its determinant is cos(pitch)."""
-    cy, sy = math.cos(angles[1]), math.sin(angles[1])
-    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    sy, cy = math.sincos(angles[1])
+    sz, cz = math.sincos(angles[2])
     return (cy * cz, sz, 0.0, -cy * sz, cz, 0.0, sy, 0.0, 1.0)
 
 
 @always_inline
 def rate_matrix_derivative(angles, rates):
     """d(G-bar)/dt for angle rates [rad/s] (theory.md, eq. (8.3))."""
-    cy, sy = math.cos(angles[1]), math.sin(angles[1])
-    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    sy, cy = math.sincos(angles[1])
+    sz, cz = math.sincos(angles[2])
     dy, dz = rates[1], rates[2]
     return (
         -sy * cz * dy - cy * sz * dz, cz * dz, 0.0,
@@ -68,7 +66,7 @@ def angles_of(R):
 @always_inline
 def rates_of(angles, omega_body):
     """d(angles)/dt [rad/s] of an angular velocity; divides by cos(pitch) (theory.md, eq. (8.4))."""
-    cy, sy = math.cos(angles[1]), math.sin(angles[1])
-    cz, sz = math.cos(angles[2]), math.sin(angles[2])
+    sy, cy = math.sincos(angles[1])
+    sz, cz = math.sincos(angles[2])
     roll = (cz * omega_body[0] - sz * omega_body[1]) / cy
     return (roll, sz * omega_body[0] + cz * omega_body[1], omega_body[2] - sy * roll)

@@ -3,7 +3,6 @@
 No constraint can drift; the multibody system is solved on the fast path at every call. Built from numbers passed in.
 """
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,7 +11,7 @@ from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate
 from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, multiply, scale, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.simd import deinterleave, interleave, unpack4
 
 Four = tuple[float, ...]

@@ -1,13 +1,11 @@
 """Keeping the five bodies together on the fast path: projection, coordinate partitioning, and the constraint defect."""
 
-import math
-
 from lapwing.dynamics.integrators import step
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody.arrowhead_solver import Core, HingedBody, eliminate, reflected_inertia
 from lapwing.dynamics.multibody.five_bodies import UP, BodyState, FiveBodies, column, free_turn, from_chassis
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.simd import deinterleave, interleave, select, select_vector, sqrt
 
 NONE, PARTITION, PROJECTION = 0, 1, 2

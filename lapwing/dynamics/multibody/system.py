@@ -10,6 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from lapwing.dynamics import small_matrices
+
 GROUND = -1
 
 
@@ -93,10 +95,10 @@ class System:
 
 def triad(axis: ArrayLike) -> np.ndarray:
     """Right-handed unit vectors v1, v2, v3 as rows, shape (3, 3), with v3 along `axis` (theory.md, eq. (8.11))."""
-    v3 = np.asarray(axis, float) / np.linalg.norm(axis)
+    v3 = np.asarray(axis, float) / small_matrices.length(axis)
     # the coordinate axis furthest from v3 keeps the cross product far from zero
     v1 = np.cross(np.eye(3)[np.argmin(np.abs(v3))], v3)
-    v1 /= np.linalg.norm(v1)
+    v1 /= small_matrices.length(v1)
     return np.array([v1, np.cross(v3, v1), v3])
 
 
@@ -125,7 +127,7 @@ def assemble(
             raise ValueError(f"{constraint.name}: connects body {constraint.body_i} with itself")
         for key in ("axis_i", "axis_j"):
             axis = getattr(constraint, key, (1.0, 0.0, 0.0))
-            if not (np.all(np.isfinite(axis)) and np.linalg.norm(axis) > 0.0):
+            if not (np.all(np.isfinite(axis)) and small_matrices.length(axis) > 0.0):
                 raise ValueError(f"{constraint.name}: {key} must be a direction, not {axis}")
     names = [body.name for body in bodies] + [constraint.name for constraint in constraints]
     if len(set(names)) < len(names):
@@ -141,7 +143,7 @@ def assemble(
         pack(((j.point_i, j.point_j) for j in joints), (-1, 2, 3)),
         pack(((triad(j.axis_i), triad(j.axis_j)) for j in joints), (-1, 2, 3, 3)),
         pack(((d.body_i, d.body_j) for d in drives), (-1, 2), np.int64),
-        pack((np.asarray(d.axis_j, float) / np.linalg.norm(d.axis_j) for d in drives), (-1, 3)),
+        pack((np.asarray(d.axis_j, float) / small_matrices.length(d.axis_j) for d in drives), (-1, 3)),
         np.asarray(gravity, float),
     )
     return System(bodies, joints, drives, arrays)
@@ -160,7 +162,7 @@ def _check_body(body: Body) -> None:
         raise ValueError(
             f"{body.name}: inertia must be three principal moments or a symmetric 3x3 matrix, not {body.inertia}"
         )
-    moments = np.linalg.eigvalsh(inertia)
+    moments = small_matrices.symmetric_eigenvalues(inertia)
     if moments[0] <= 0.0:
         raise ValueError(f"{body.name}: inertia must be positive definite, principal moments are {moments}")
     if moments[0] + moments[1] < moments[2] * (1.0 - 1e-9):

@@ -1,11 +1,10 @@
 """A relief: a height over each point of the horizontal plane, and bodies with level tops that stand on it."""
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.kernels import kernel
+from lapwing.kernels import kernel, math
 
 UP = (-0.0, -0.0, 1.0)  # normal of level ground
 
@@ -48,7 +47,8 @@ def field(t, x, y):
     height = t.base + a * x + b * y
     if t.bump_height != 0.0:
         h, k = t.bump_height, t.bump_wavenumber
-        sx, cx, sy, cy = math.sin(k * x), math.cos(k * x), math.sin(k * y), math.cos(k * y)
+        sx, cx = math.sincos(k * x)
+        sy, cy = math.sincos(k * y)
         height, a, b = height + h * sx * sy, a + h * k * cx * sy, b + h * k * sx * cy
     if t.grid.size > 0:
         more, rise_x, rise_y = _between(t, x, y)

@@ -1,6 +1,5 @@
 """From a description of the ground to what kernels are given."""
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -8,6 +7,7 @@ import numpy as np
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.terrain.heightfield import Relief, field
 from lapwing.dynamics.terrain.terrain_queries import LEVEL, Level
+from lapwing.kernels import math
 
 FAR = 1e5  # [m] how far a step goes on where nothing ends it
 STEEPEST = 1.0  # tangent of 45 degrees
@@ -52,7 +52,7 @@ def relief(
         raise ConfigError(key, f"ground steeper than 45 degrees, tangent {steep:.2f}", "a tangent of at most 1")
     base, treads = _treads(steps, step_heading)
     rows = [_row(box) for box in boxes] + treads
-    plane = [[corner @ np.array(slope) for corner in _corners(row)] for row in rows]
+    plane = [[u * slope[0] + v * slope[1] for u, v in _corners(row)] for row in rows]
     over = [row[6] - min(z) for row, z in zip(rows, plane, strict=True)]
     over += [z - slope[0] * x - slope[1] * y + radius * math.hypot(*slope) for x, y, radius, z in cylinders]
     summit = max([base + bump_height + (float(heights.max()) if heights.size else 0.0), *over])

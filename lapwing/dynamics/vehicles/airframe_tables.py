@@ -1,6 +1,5 @@
 """The tables of an airframe's file: mass, rotors, propeller, motor, battery, contact, drag, published figures."""
 
-import math
 from typing import Annotated, Literal
 
 import numpy as np
@@ -9,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import principal_moments
+from lapwing.kernels import math
 
 Positive = Annotated[float, Gt(0)]
 NotNegative = Annotated[float, Ge(0)]

@@ -1,13 +1,13 @@
 """How a vehicle stands on the ground: on which feet, and at rest on their springs before anything moves."""
 
 import itertools
-import math
 from collections.abc import Sequence
 from types import ModuleType
 from typing import Any
 
 import numpy as np
 
+from lapwing.dynamics import small_matrices
 from lapwing.dynamics.effects._contact_parameters import NOWHERE, STICKING, GroundContact, GroundContactSmooth
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
@@ -15,7 +15,7 @@ from lapwing.dynamics.terrain import LEVEL, Level, Relief, surface
 from lapwing.dynamics.vector import Mat3, Vec3
 from lapwing.dynamics.vector import apply as compiled_apply
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
-from lapwing.kernels import python_function
+from lapwing.kernels import math, python_function
 
 ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three are enough
 CONVERGED = 1e-12  # change of the slope between two iterations
@@ -92,10 +92,10 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
             break
         growth = np.array([_springs(e, weight, x + change, place) - residual for change in NUDGE * np.eye(3)]).T / NUDGE
         try:
-            step = np.linalg.solve(growth, -residual)
-        except np.linalg.LinAlgError:  # fewer than three feet press
+            step = small_matrices.solve(growth, -residual[:, None])[:, 0]
+        except small_matrices.SingularMatrixError:  # fewer than three feet press
             return position, attitude
-        shares = 0.5 ** np.arange(20.0)
+        shares = [math.ldexp(1.0, -k) for k in range(20)]
         for trial in (x + share * step for share in shares):
             found = _springs(e, weight, trial, place)
             if (nearer := _norm(found)) < left:
@@ -180,7 +180,7 @@ def _carrying(points: Sequence[Vec3]) -> tuple[float, float] | None:
         if twice_area == 0.0:
             continue
         shares = [(s[0] * t[1] - s[1] * t[0]) / twice_area for s, t in ((q, r), (r, p), (p, q))]
-        height = sum(share * point[2] for share, point in zip(shares, (p, q, r), strict=True))
+        height = math.total(share * point[2] for share, point in zip(shares, (p, q, r), strict=True))
         if min(shares) < -1e-9 or (best is not None and height <= best[0]):
             continue
         dq, dr = q[2] - p[2], r[2] - p[2]

@@ -4,7 +4,6 @@ Lagrange-d'Alembert on SO(3) gives theory.md, eq. (7.7); after Ge and Lin, J. So
 have minutes for seconds. Rotors at rest, no damping, no feedback: the three simpler cases, with zeros for numbers.
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.integrators import RATES
@@ -12,7 +11,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion, conjugate, log, multiply
 from lapwing.dynamics.vector import Vec3, add, cross, scale
 from lapwing.dynamics.vector import multiply as multiply_each
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 
 class GyrostatParameters(NamedTuple):
@@ -41,8 +40,9 @@ class GyrostatParameters(NamedTuple):
 def rotor_momentum(p, t):
     """Momentum of the rotors and its derivative, both in the body (theory.md, eq. (7.6))."""
     h, w = p.rotor_momentum, p.forcing_frequency
-    momentum = (h[0], h[1], h[2] * (1.0 + p.forcing_amplitude * math.cos(w * t)))
-    return momentum, (0.0, 0.0, -h[2] * p.forcing_amplitude * w * math.sin(w * t))
+    sine, cosine = math.sincos(w * t)
+    momentum = (h[0], h[1], h[2] * (1.0 + p.forcing_amplitude * cosine))
+    return momentum, (0.0, 0.0, -h[2] * p.forcing_amplitude * w * sine)
 
 
 @always_inline

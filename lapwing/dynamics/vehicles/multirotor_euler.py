@@ -4,7 +4,6 @@ A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is 
 pitches through 90 degrees: there its pitch becomes infinite, which `singular` finds.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -19,7 +18,7 @@ from lapwing.dynamics.vector import ZERO, Vec3, apply
 from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles import multirotor_multibody_equations as on_se3
 from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorParameters, MultirotorState, StateForm
-from lapwing.kernels import always_inline, kernel, noinline
+from lapwing.kernels import always_inline, kernel, math, noinline
 
 NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
 

@@ -1,7 +1,8 @@
 """Thrust and torque coefficients of a propeller from its geometry (theory.md, eq. (1.9) to (1.11))."""
 
-import math
 from typing import TYPE_CHECKING
+
+from lapwing.kernels import math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe_tables import Propeller
@@ -17,14 +18,14 @@ def blade_angle(propeller: "Propeller") -> float:
 def thrust_coefficient(propeller: "Propeller") -> float:
     """C_T: thrust over density times (revolutions per second)^2 times diameter^4 (theory.md, eq. (1.9))."""
     lift = propeller.lift_curve_slope * blade_angle(propeller) / propeller.aspect_ratio
-    blades = propeller.lift_correction * propeller.radius_weight**2 * propeller.blades
-    return 0.25 * math.pi**2 * blades * lift
+    blades = propeller.lift_correction * math.square(propeller.radius_weight) * propeller.blades
+    return 0.25 * math.square(math.pi) * blades * lift
 
 
 def drag_coefficients(propeller: "Propeller") -> tuple[float, float]:
     """Of the blade section: (zero-lift part, part induced by lift) (theory.md, eq. (1.11))."""
     lift = propeller.lift_curve_slope * blade_angle(propeller)
-    induced = lift**2 / (math.pi * propeller.aspect_ratio * propeller.oswald_factor)
+    induced = lift * lift / (math.pi * propeller.aspect_ratio * propeller.oswald_factor)
     return propeller.zero_lift_drag, induced
 
 
@@ -45,9 +46,10 @@ def from_stand(
     """
     n = speed / (2.0 * math.pi)
     full = propeller.model_copy(update={"lift_correction": 1.0})
-    lift_correction = thrust / (density * n**2 * propeller.diameter**4) / thrust_coefficient(full)
-    weight = lift_correction * propeller.radius_weight**2 * propeller.blades**2
-    drag = 8.0 * propeller.aspect_ratio * torque / (density * n**2 * propeller.diameter**5) / (math.pi**2 * weight)
+    lift_correction = thrust / (density * (n * n) * math.pow(propeller.diameter, 4)) / thrust_coefficient(full)
+    weight = lift_correction * math.square(propeller.radius_weight * propeller.blades)
+    power = density * (n * n) * math.pow(propeller.diameter, 5)
+    drag = 8.0 * propeller.aspect_ratio * torque / power / (math.square(math.pi) * weight)
     zero_lift_drag = drag - drag_coefficients(propeller)[1]
     if lift_correction > 1.0:
         most = thrust / lift_correction
@@ -68,10 +70,10 @@ def h_force_coefficient(propeller: "Propeller") -> float:
     """[m^3/rad] of the drag across the axis over density, rotor speed and velocity (theory.md, eq. (2.11))."""
     radius = 0.5 * propeller.diameter
     blade_area = propeller.blades * radius * propeller.diameter / propeller.aspect_ratio
-    return blade_area * sum(drag_coefficients(propeller)) * radius / 4.0
+    return blade_area * math.total(drag_coefficients(propeller)) * radius / 4.0
 
 
 def torque_coefficient(propeller: "Propeller") -> float:
     """C_M: torque over density times (revolutions per second)^2 times diameter^5 (theory.md, eq. (1.10))."""
-    blades = propeller.lift_correction * propeller.radius_weight**2 * propeller.blades**2
-    return math.pi**2 * blades * sum(drag_coefficients(propeller)) / (8.0 * propeller.aspect_ratio)
+    blades = propeller.lift_correction * math.square(propeller.radius_weight * propeller.blades)
+    return math.square(math.pi) * blades * math.total(drag_coefficients(propeller)) / (8.0 * propeller.aspect_ratio)

@@ -5,14 +5,13 @@ hinge is the origin of the crate's frame: x outward along the tilted floor, y al
 The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which gives the spring; the sizes are ours.
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vector import Vec3, add, apply_transposed, cross, divide, dot, multiply, scale, subtract
 from lapwing.dynamics.vehicles.unloading_contact_points import CORNERS, ROLLERS, SIDES, Y, contacts, frames
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_index
 
 LIFT_SPEED, GRIP = 0.5, 0.02  # [m/s] at which somebody takes the pack up, [s] in which he gets it moving
@@ -134,7 +133,7 @@ RATES[UnloadingParameters] = rate
 def initial_state(p: UnloadingParameters, gap: float = 0.01) -> UnloadingState:
     """At rest on the rollers, its front `gap` [m] behind the shut door."""
     none = (0.0, 0.0, 0.0)
-    c, s = math.cos(p.tilt), math.sin(p.tilt)
+    s, c = math.sincos(p.tilt)
     back, up = gap + p.pack_half[0], 2.0 * p.roller_radius + p.pack_half[2]
     position = (up * s - back * c, 0.0, p.floor_height + back * s + up * c)
     return UnloadingState(

@@ -5,11 +5,10 @@ Astrom and Lischinsky (IEEE Trans. Autom. Control 40 (1995) 419), whose bristles
 (theory.md, eqs. (9.4) to (9.6)).
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3, add, dot, norm, scale, subtract
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 
 STRIBECK_SPEED = 0.01  # [m/s] where friction falls from static to dynamic
 BRISTLE = 5.0e3  # [1/m] stiffness over the normal force: bristles bend 0.1 mm before they slide

@@ -3,13 +3,12 @@
 `p` is a UnloadingParameters, `x` a UnloadingState.
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import Vec3, add, apply, apply_transposed, cross, dot, multiply, norm, scale, subtract
 from lapwing.dynamics.vehicles.unloading_contact import Touch, touch
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_index
 
 ROLLERS, CORNERS = 4, 8
@@ -40,9 +39,9 @@ def roller_speed(p, t):
 @always_inline
 def frames(p, t, x):
     """The frames of crate, door and pack at time t (theory.md, eqs. (9.1) and (9.2))."""
-    c, s = math.cos(p.tilt), math.sin(p.tilt)
+    s, c = math.sincos(p.tilt)
     forward, upward = (c, 0.0, -s), (s, 0.0, c)
-    opened, shut = math.sin(x.door[0]), math.cos(x.door[0])
+    opened, shut = math.sincos(x.door[0])
     along = add(scale(shut, upward), scale(opened, forward))
     inward = add(scale(opened, upward), scale(-shut, forward))
     pack = rotation_matrix(x.attitude)

@@ -38,7 +38,7 @@ from math import (
 
 from lapwing.kernels.math import exponential, inverse_trigonometric, logarithm, roots, trigonometric
 from lapwing.kernels.math._export import exported
-from lapwing.kernels.math.lengths import dist, hypot
+from lapwing.kernels.math.sums import dist, hypot, total
 
 sin = exported(trigonometric.sin)
 cos = exported(trigonometric.cos)
@@ -48,18 +48,18 @@ asin = exported(inverse_trigonometric.asin)
 acos = exported(inverse_trigonometric.acos)
 atan = exported(inverse_trigonometric.atan)
 atan2 = exported(inverse_trigonometric.atan2)
-exp = exported(exponential.exp)
+exp = exported(exponential.exp, inline=True)
 expm1 = exported(exponential.expm1)
 tanh = exported(exponential.tanh)
-log = exported(logarithm.log)
+log = exported(logarithm.log, inline=True)
 log1p = exported(logarithm.log1p)
-pow = exported(logarithm.pow)
+pow = exported(logarithm.pow, inline=True)
 cbrt = exported(roots.cbrt)
-square = exported(roots.square)
+square = exported(roots.square, inline=True)
 
 __all__ = [
     "acos", "asin", "atan", "atan2", "cbrt", "ceil", "copysign", "cos", "degrees", "dist", "e", "exp", "expm1", "fabs",
     "factorial", "floor", "fmod", "frexp", "hypot", "inf", "isfinite", "isinf", "isnan", "isqrt", "ldexp", "log",
     "log1p", "nan", "nextafter", "pi", "pow", "radians", "remainder", "sin", "sincos", "sqrt", "square", "tan", "tanh",
-    "tau", "trunc", "ulp",
+    "tau", "total", "trunc", "ulp",
 ]  # fmt: skip

@@ -38,19 +38,30 @@ def from_bits(i: int) -> float:
     return struct.unpack("<d", struct.pack("<q", i))[0]
 
 
-def _implement(function: Callable, returns: Any, argument: Any, lower: Callable[[Any, Any], Any]) -> None:
-    """Let a function of one argument be `lower(builder, value)` in compiled code."""
+def select(flag: bool, a: float, b: float) -> float:
+    """Return a if flag, else b, without a branch: both are computed, and loops can be vectorised."""
+    return a if flag else b
+
+
+def _implement(function: Callable, returns: Any, arguments: tuple, lower: Callable[..., Any]) -> None:
+    """Let a function be `lower(builder, *values)` in compiled code."""
 
     class Template(ConcreteTemplate):
         key = function
-        cases = [signature(returns, argument)]  # noqa: RUF012
+        cases = [signature(returns, *arguments)]  # noqa: RUF012
 
     infer_global(function, types.Function(Template))
-    lower_builtin(function, argument)(lambda context, builder, sig, args: lower(builder, args[0]))
+    lower_builtin(function, *arguments)(lambda context, builder, sig, args: lower(builder, *args))
 
 
-_implement(bits, types.int64, types.float64, lambda builder, x: builder.bitcast(x, _INTEGER))
-_implement(from_bits, types.float64, types.int64, lambda builder, i: builder.bitcast(i, _DOUBLE))
+_implement(bits, types.int64, (types.float64,), lambda builder, x: builder.bitcast(x, _INTEGER))
+_implement(from_bits, types.float64, (types.int64,), lambda builder, i: builder.bitcast(i, _DOUBLE))
+_implement(
+    select,
+    types.float64,
+    (types.boolean, types.float64, types.float64),
+    lambda builder, flag, a, b: builder.select(flag, a, b),
+)
 
 
 def table(name: str, values: tuple) -> Callable[[int], Any]:
@@ -75,7 +86,7 @@ def table(name: str, values: tuple) -> Callable[[int], Any]:
         return values[index]
 
     look_up.__name__ = look_up.__qualname__ = name
-    _implement(look_up, number, types.int64, lower)
+    _implement(look_up, number, (types.int64,), lower)
     return look_up
 
 

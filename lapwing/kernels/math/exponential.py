@@ -4,13 +4,14 @@ exp(x) = 2**(k/64) exp(r) with |r| <= ln(2) / 128, by a table and a polynomial (
 the exponential function in IEEE floating-point arithmetic", ACM TOMS 15(2), 1989; of expm1, TOMS 18(2), 1992).
 """
 
-from lapwing.kernels.compiler.decorators import always_inline, noinline
+from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import (
     ROUNDER,
     bits,
     from_bits,
     quick_two_sum,
     quotient,
+    select,
     split,
     table,
     two_sum,
@@ -45,7 +46,7 @@ def exp_parts(x, x_low):
         x: any double.
         x_low: rest, at most 2**-40.
     """
-    clipped = 710.0 if x > 710.0 else (-760.0 if x < -760.0 else x)
+    clipped = select(x > 710.0, 710.0, select(x > -760.0, x, -760.0))
     k, r, r_low = _reduced(clipped)
     r_low += x_low
     t1, t2 = _powers(2 * (k & 63)), _powers(2 * (k & 63) + 1)
@@ -68,13 +69,11 @@ def scaled(value, n):
     return value * _two_to(half) * _two_to(n - half)
 
 
-@noinline
+@always_inline
 def exp(x):
     """Return the exponential function."""
-    if x != x:
-        return x
     first, rest, n = exp_parts(x, 0.0)
-    return scaled(first + rest, n)
+    return select(x != x, x, scaled(first + rest, n))
 
 
 @always_inline
@@ -98,7 +97,7 @@ def expm1_parts(x):
     return b, ((base_low + a_low) + b_low) + (rest + t * growth)
 
 
-@noinline
+@always_inline
 def expm1(x):
     """Return exp(x) - 1, precise for small x."""
     if x != x or x == 0.0:
@@ -112,7 +111,7 @@ def expm1(x):
     return first + rest
 
 
-@noinline
+@always_inline
 def tanh(x):
     """Return the hyperbolic tangent."""
     if x != x or x == 0.0:

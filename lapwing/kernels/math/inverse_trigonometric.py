@@ -7,7 +7,7 @@ cosine are arc tangents of x and sqrt(1 - x**2), whose square is exact as the su
 
 import math
 
-from lapwing.kernels.compiler.decorators import always_inline, noinline
+from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import (
     ROUNDER,
     bits,
@@ -83,7 +83,7 @@ def _direction(y, y_low, x, x_low, back, unscaled):
     return _placed(base, base_low, 1.0 if steep == back else -1.0, t, t_low, first, rest)
 
 
-@noinline
+@always_inline
 def atan2(y, x):
     """Return the angle of the point (x, y) [rad] in [-pi, pi]; zeros and infinities as of C."""
     if x != x or y != y:
@@ -99,7 +99,7 @@ def atan2(y, x):
     return with_sign(_direction(b * scale, 0.0, a * scale, 0.0, is_negative(x), ratio), y)
 
 
-@noinline
+@always_inline
 def atan(x):
     """Return the arc tangent [rad]."""
     size = abs(x)
@@ -121,7 +121,7 @@ def _other_leg(x):
     return root, 0.5 * (((w - q) - q_low) + w_low) / (root if root > 0.0 else 1.0)
 
 
-@noinline
+@always_inline
 def asin(x):
     """Return the arc sine [rad]; NaN beyond [-1, 1]."""
     size = abs(x)
@@ -132,7 +132,7 @@ def asin(x):
     return with_sign(_direction(size, 0.0, leg, leg_low, False, ratio), x)
 
 
-@noinline
+@always_inline
 def acos(x):
     """Return the arc cosine [rad] in [0, pi]; NaN beyond [-1, 1]."""
     size = abs(x)

@@ -7,12 +7,13 @@ TOMS 16(4), 1990). The logarithm has about 70 bits, so that x**y = exp(y log(x))
 
 import math
 
-from lapwing.kernels.compiler.decorators import always_inline, noinline
+from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import (
     bits,
     from_bits,
     product,
     quick_two_sum,
+    select,
     split,
     table,
     two_sum,
@@ -37,11 +38,11 @@ def _parts(x, x_low, has_low):
         has_low: False for a constant x_low of 0, which then costs nothing.
     """
     small = x < 2.2250738585072014e-308
-    i = bits(x * 18014398509481984.0 if small else x)
+    i = bits(select(small, x * 18014398509481984.0, x))
     e = (i - _START) >> 52
     j = 3 * (((i - _START) >> 45) & 127)
     m = from_bits(i - (e << 52))
-    exponent = float(e - 54 if small else e)
+    exponent = select(small, float(e - 54), float(e))
     c = _logs(j)
     m1 = split(m)
     f, f_low = two_sum(m1 * c - 1.0, (m - m1) * c)
@@ -59,18 +60,15 @@ def _parts(x, x_low, has_low):
     return b, (a_low + b_low) + (rest + series)
 
 
-@noinline
+@always_inline
 def log(x):
     """Return the natural logarithm; -inf of 0, NaN of what is below."""
-    if not x > 0.0:
-        return -math.inf if x == 0.0 else math.nan
-    if x == math.inf:
-        return x
     first, rest = _parts(x, 0.0, False)
-    return first + rest
+    result = select(x == math.inf, x, first + rest)
+    return select(x > 0.0, result, select(x == 0.0, -math.inf, math.nan))
 
 
-@noinline
+@always_inline
 def log1p(x):
     """Return log(1 + x), precise for small x; -inf of -1, NaN of what is below."""
     if not x > -1.0:
@@ -82,35 +80,30 @@ def log1p(x):
     return first + rest
 
 
-@noinline
+@always_inline
 def pow(x, y):
     """Return x to the power y; special cases as of IEEE 754-2019, section 9.2.1 (no error is raised)."""
-    if y == 0.0 or x == 1.0:
-        return 1.0
-    if x != x or y != y:
-        return x + y
     size, order = abs(x), abs(y)
-    odd = False
-    if x < 0.0 or x == 0.0 or size == math.inf:
-        half = 0.5 * order
-        odd = half < 4503599627370496.0 and _is_integer(order) and not _is_integer(half)
-    if size == 0.0 or size == math.inf:
-        result = math.inf if (size == 0.0) == (y < 0.0) else 0.0
-        return -result if odd and bits(x) < 0 else result
-    if order == math.inf:
-        return 1.0 if size == 1.0 else (math.inf if (size > 1.0) == (y > 0.0) else 0.0)
-    if x < 0.0 and not _is_integer(order):
-        return math.nan
     first, rest = _parts(size, 0.0, False)
     height, height_low = quick_two_sum(first, rest)
-    clipped = with_sign(1e20, y) if order > 1e20 else y  # beyond, the result is 0, infinite or 1
+    clipped = select(order > 1e20, with_sign(1e20, y), y)  # beyond, the result is 0, infinite or 1
     p, p_low = product(clipped, height)
-    a, b, n = exp_parts(p, p_low + clipped * height_low if abs(p) < 800.0 else 0.0)
+    a, b, n = exp_parts(p, select(abs(p) < 800.0, p_low + clipped * height_low, 0.0))
     result = scaled(a + b, n)
-    return -result if odd else result
+    is_zero, is_infinite, reaches = size == 0.0, size == math.inf, order == math.inf
+    result = select(is_zero | is_infinite, select(is_zero == (y < 0.0), math.inf, 0.0), result)
+    limit = select(size == 1.0, 1.0, select((size > 1.0) == (y > 0.0), math.inf, 0.0))
+    result = select(reaches, limit, result)
+    half = 0.5 * order
+    whole = _is_integer(order)
+    odd = (half < 4503599627370496.0) & whole & (not _is_integer(half))
+    result = select(odd & (bits(x) < 0), -result, result)
+    result = select((x < 0.0) & (not whole) & (not is_infinite) & (not reaches), math.nan, result)
+    result = select((x != x) | (y != y), x + y, result)
+    return select((y == 0.0) | (x == 1.0), 1.0, result)
 
 
 @always_inline
 def _is_integer(x):
-    """Return True if a positive number is an integer."""
-    return x >= 4503599627370496.0 or (x + 4503599627370496.0) - 4503599627370496.0 == x
+    """Return True if a number that is not negative is an integer."""
+    return (x >= 4503599627370496.0) | ((x + 4503599627370496.0) - 4503599627370496.0 == x)

@@ -7,7 +7,7 @@ no double is below 2**-62 of a step, so that its relative error is below 2**-64 
 edition, section 11.3.2).
 """
 
-from lapwing.kernels.compiler.decorators import always_inline, noinline
+from lapwing.kernels.compiler.decorators import always_inline, kernel
 from lapwing.kernels.math._primitives import (
     MAGNITUDE,
     MANTISSA,
@@ -45,7 +45,7 @@ def reduced(x):
     return bits(shifted) & 127, r, r_low
 
 
-@noinline
+@kernel
 def reduced_large(x):
     """Return what `reduced` returns, for a magnitude of at least 2**15 (Payne and Hanek)."""
     if x - x != 0.0:

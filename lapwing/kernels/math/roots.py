@@ -6,7 +6,7 @@ cube root follows from a guess of 17 bits, whose cube is exact, by a series in w
 
 import math
 
-from lapwing.kernels.compiler.decorators import always_inline, noinline
+from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import MANTISSA, bits, exact_square, from_bits, quick_two_sum, with_sign
 from lapwing.kernels.math._tables import CUBE_ROOT
 
@@ -14,7 +14,7 @@ _Q0, _Q1, _Q2, _Q3, _Q4, _Q5 = CUBE_ROOT
 _ROUNDER_17 = 103079215104.0  # 1.5 * 2**36: rounds numbers between 1 and 2 to 17 bits
 
 
-@noinline
+@always_inline
 def hypot(x, y):
     """Return sqrt(x**2 + y**2) without overflow; inf if either is infinite."""
     a, b = abs(x), abs(y)
@@ -36,7 +36,7 @@ def hypot(x, y):
     return (root + 0.5 * (((w - u) - u_low) + w_low) / (root if root > 0.0 else 1.0)) * back
 
 
-@noinline
+@always_inline
 def cbrt(x):
     """Return the cube root."""
     if x - x != 0.0 or x == 0.0:

@@ -6,7 +6,7 @@ functions and their error analysis", ARITH 10, 1991). The largest terms are exac
 sum has about 65 correct bits before its one rounding.
 """
 
-from lapwing.kernels.compiler.decorators import always_inline, noinline
+from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import quotient, split, table
 from lapwing.kernels.math._tables import COSINE, SINE, SINES
 from lapwing.kernels.math.reduction import reduced
@@ -37,28 +37,28 @@ def _parts(x):
     return first_s, rest_s, first_c, rest_c
 
 
-@noinline
+@always_inline
 def sin(x):
     """Return the sine of an angle [rad]."""
     s, s_low, _, _ = _parts(x)
     return s + s_low if x != 0.0 else x
 
 
-@noinline
+@always_inline
 def cos(x):
     """Return the cosine of an angle [rad]."""
     _, _, c, c_low = _parts(x)
     return c + c_low
 
 
-@noinline
+@always_inline
 def sincos(x):
     """Return sine and cosine of an angle [rad], bit-for-bit those of `sin` and `cos`."""
     s, s_low, c, c_low = _parts(x)
     return (s + s_low if x != 0.0 else x), c + c_low
 
 
-@noinline
+@always_inline
 def tan(x):
     """Return the tangent of an angle [rad]."""
     s, s_low, c, c_low = _parts(x)

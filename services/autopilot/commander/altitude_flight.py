@@ -1,7 +1,6 @@
 """Setpoints of altitude, heading and tilts, for flight without a position."""
 
-import math
-
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
@@ -43,7 +42,7 @@ class AltitudeFlight:
         s.move_at((0.0, 0.0, climb_rate), limits, view.dt)
         s.turn_at(yaw_rate, limits, view.dt)
         forward, left = (constants.gravity * tilt for tilt in tilts)
-        sin, cos = math.sin(s.yaw), math.cos(s.yaw)
+        sin, cos = math.sincos(s.yaw)
         position = (*e.position_world[:2], s.position[2])
         velocity = (*e.velocity_world[:2], s.velocity[2])
         acceleration = (cos * forward - sin * left, sin * forward + cos * left, s.acceleration[2])

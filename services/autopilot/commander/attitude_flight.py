@@ -1,9 +1,8 @@
 """Setpoints of attitude and thrust, expressed as feed-forward accelerations."""
 
-import math
-
 from lapwing.dynamics.lie.quaternion import Quaternion, from_roll_pitch_yaw, retract, to_roll_pitch_yaw
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.interface import Setpoint
@@ -59,7 +58,7 @@ class AttitudeFlight:
         """
         e, g = view.estimate, constants.gravity
         (x, y, z), (vx, vy, vz) = e.position_world, e.velocity_world
-        s, c = math.sin(self.yaw), math.cos(self.yaw)
+        s, c = math.sincos(self.yaw)
         forward, left = g * self.pitch, -g * self.roll
         if thrust > constants.hover_thrust or climb_rate > 0.0:  # makes a vehicle on the ground take off
             z, vz = max(z, constants.resting_height + CUT_HEIGHT), max(vz, _RISING)

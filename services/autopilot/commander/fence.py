@@ -1,8 +1,9 @@
 """Geofence of inclusion and exclusion polygons and circles; rally points."""
 
-import math
 from collections.abc import Sequence
 from typing import Any
+
+from lapwing.kernels import math
 
 _POLYGONS, _CIRCLES = ("fence_inclusion", "fence_exclusion"), ("fence_circle_in", "fence_circle_out")
 

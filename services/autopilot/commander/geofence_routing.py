@@ -1,9 +1,9 @@
 """Shortest path within the geofence, over the corners of its shapes (A*)."""
 
 import heapq
-import math
 from collections.abc import Iterator, Sequence
 
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.fence import Fence
 
 MARGIN = 2.0  # [m] kept from the fence

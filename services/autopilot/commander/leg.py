@@ -1,9 +1,9 @@
 """Flight along a straight leg: passing speed and heading."""
 
-import math
 from collections.abc import Sequence
 
 from lapwing.dynamics.vector import ZERO, Vec3, dot, norm, subtract
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import Limits, braking_speed, stopping_distance, wrap_angle
 

@@ -1,7 +1,6 @@
 """Pre-arm checks."""
 
-import math
-
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput
 from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.estimator import SOURCES

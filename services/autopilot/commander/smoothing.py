@@ -1,9 +1,9 @@
 """Position smoothing: a setpoint with limited jerk, acceleration and speed, independent of the estimate."""
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import ZERO, Vec3, add, dot, norm, scale, subtract
+from lapwing.kernels import math
 from lapwing.services.autopilot.interface import Setpoint
 
 _POSITION_GAIN = 1.0  # [1/s] speed over distance in the last metre

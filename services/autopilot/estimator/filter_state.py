@@ -3,14 +3,13 @@
 The error state has 24 components. Its attitude part is a world rotation vector: R = exp(theta) R_estimated.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, from_matrix, multiply, normalise, rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, dot, norm, scale, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.common.ports import StateEstimate
 
@@ -122,17 +121,17 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     covariance = m.covariance
     covariance[:] = 0.0
     for i in range(3):
-        covariance[THETA + i, THETA + i] = p.attitude_std**2
-        covariance[VELOCITY + i, VELOCITY + i] = 0.1**2
-        covariance[POSITION + i, POSITION + i] = p.start_std**2
-        covariance[GYRO + i, GYRO + i] = p.gyro_bias_std**2
-        covariance[ACCELEROMETER + i, ACCELEROMETER + i] = p.accelerometer_bias_std**2
-        covariance[WANDER + i, WANDER + i] = p.gps_wander_horizontal**2
-        covariance[IRON + i, IRON + i] = p.magnetometer_bias_std**2
-    covariance[WANDER + 2, WANDER + 2] = p.gps_wander_vertical**2
-    covariance[HEADING, HEADING] = p.heading_std**2
-    covariance[BAROMETER, BAROMETER] = 50.0**2
-    covariance[SCALE, SCALE] = p.sonar_scale_std**2
+        covariance[THETA + i, THETA + i] = p.attitude_std * p.attitude_std
+        covariance[VELOCITY + i, VELOCITY + i] = 0.1 * 0.1
+        covariance[POSITION + i, POSITION + i] = p.start_std * p.start_std
+        covariance[GYRO + i, GYRO + i] = p.gyro_bias_std * p.gyro_bias_std
+        covariance[ACCELEROMETER + i, ACCELEROMETER + i] = p.accelerometer_bias_std * p.accelerometer_bias_std
+        covariance[WANDER + i, WANDER + i] = p.gps_wander_horizontal * p.gps_wander_horizontal
+        covariance[IRON + i, IRON + i] = p.magnetometer_bias_std * p.magnetometer_bias_std
+    covariance[WANDER + 2, WANDER + 2] = p.gps_wander_vertical * p.gps_wander_vertical
+    covariance[HEADING, HEADING] = p.heading_std * p.heading_std
+    covariance[BAROMETER, BAROMETER] = 50.0 * 50.0
+    covariance[SCALE, SCALE] = p.sonar_scale_std * p.sonar_scale_std
     m.correction[:] = m.row[:] = m.product[:] = 0.0
     m.history[:] = 0.0
     m.since[:] = NEVER

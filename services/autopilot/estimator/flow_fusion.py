@@ -1,10 +1,8 @@
 """Fusion of optical flow as a replacement of GPS velocity (theory.md, eq. (3.45))."""
 
-import math
-
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import Mat3, Vec3, cross, dot
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
     FLOW,
@@ -68,13 +66,15 @@ def update_flow(
     r, velocity = rotation_matrix(s.nominal.attitude), s.nominal.velocity_world
     passing = (flow[0] - rate[0], flow[1] - rate[1])
     expected = math.hypot(flow_row(m, r, velocity, 0, distance), flow_row(m, r, velocity, 1, distance))
-    noise = variance + _ALIKE * (p.flow_scale_std * expected) ** 2  # of the expected flow, to keep the gate effective
+    noise = variance + _ALIKE * math.square(
+        p.flow_scale_std * expected
+    )  # of the expected flow, to keep the gate effective
     nis, accepted = 0.0, True
     for axis in range(2):
         innovation = passing[axis] - flow_row(m, r, velocity, axis, distance)
         ratio = innovation * innovation / innovation_variance(m, noise)
         nis += ratio
-        accepted = accepted and ratio < p.gate**2
+        accepted = accepted and ratio < p.gate * p.gate
     if accepted:
         for axis in range(2):
             fuse(m, passing[axis] - flow_row(m, r, velocity, axis, distance), noise)

@@ -3,7 +3,7 @@
 from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.autopilot.estimator.covariance_inflation import doubt
 from lapwing.services.autopilot.estimator.delayed_measurements import (
     Noise,
@@ -51,8 +51,8 @@ def _noise_since(p: Estimator, s: State, age: int) -> Noise:
         q, turned = history[(tick - k) % HISTORY, 6], history[(tick - k) % HISTORY, 7]
         v += q
         vp += q * (k * p.interval)
-        pp += q * (k * p.interval) ** 2
-        before = ((age - k) * p.interval) ** 2  # [s^2] of the delay, before this tick
+        pp += q * math.square(k * p.interval)
+        before = math.square((age - k) * p.interval)  # [s^2] of the delay, before this tick
         av += turned * before
         ap += turned * before * before / 4.0
     return Noise(v, vp, pp, av, ap)
@@ -60,7 +60,7 @@ def _noise_since(p: Estimator, s: State, age: int) -> Noise:
 
 @always_inline
 def _wander_variance(p: Estimator, axis: int) -> float:
-    return (p.gps_wander_vertical if axis == 2 else p.gps_wander_horizontal) ** 2
+    return math.square(p.gps_wander_vertical if axis == 2 else p.gps_wander_horizontal)
 
 
 @kernel
@@ -101,9 +101,9 @@ def update_gps(
         late_position_row(m, force, r, axis, delay)
         white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
         _, largest = late_innovation_variances(m, axis, since, white, force)
-        ratio = innovation[axis] ** 2 / largest
+        ratio = innovation[axis] * innovation[axis] / largest
         nis += ratio
-        accepted = accepted and ratio < p.gate**2
+        accepted = accepted and ratio < p.gate * p.gate
     if accepted:
         nis = 0.0
         for axis in range(3):
@@ -142,9 +142,9 @@ def update_gps_velocity(p: Estimator, s: State, velocity_world: Vec3, variance: 
     for axis in range(3):
         late_velocity_row(m, force, r, axis, delay)
         _, largest = late_innovation_variances(m, axis, since, variance, force)
-        ratio = innovation[axis] ** 2 / largest
+        ratio = innovation[axis] * innovation[axis] / largest
         nis += ratio
-        accepted = accepted and ratio < p.gate**2
+        accepted = accepted and ratio < p.gate * p.gate
     if accepted:
         nis = 0.0
         for axis in range(3):

@@ -1,10 +1,8 @@
 """Fusion of the magnetometer's heading (theory.md, eq. (3.33))."""
 
-import math
-
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, apply, subtract
-from lapwing.kernels import kernel
+from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.covariance_inflation import doubt
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import HEADING, IRON, MAG, THETA, State, corrected
@@ -40,8 +38,8 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
         m.row[IRON + i] = (by * r[i] - bx * r[3 + i]) / horizontal
     m.row[HEADING] = 1.0
     innovation = turn - s.nominal.heading_bias
-    nis = innovation**2 / innovation_variance(m, variance / horizontal)
-    accepted = nis < p.gate**2
+    nis = innovation * innovation / innovation_variance(m, variance / horizontal)
+    accepted = nis < p.gate * p.gate
     if accepted:
         fuse(m, innovation, variance / horizontal)
     judge(m, MAG, accepted, nis)

@@ -1,11 +1,9 @@
 """Fusion of sonar near the ground and barometer (theory.md, eqs. (3.31), (3.32) and (3.39))."""
 
-import math
-
 from lapwing.dynamics.atmosphere import pressure_altitude
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO
-from lapwing.kernels import kernel
+from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.covariance_inflation import doubt
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import BARO, BAROMETER, POSITION, SCALE, SONAR, State, corrected
@@ -19,8 +17,8 @@ _GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] variation of the ground 
 def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: float) -> State:
     """Gate and fuse the row."""
     m = s.memory
-    nis = innovation**2 / innovation_variance(m, variance)
-    accepted = nis < p.gate**2
+    nis = innovation * innovation / innovation_variance(m, variance)
+    accepted = nis < p.gate * p.gate
     if accepted:
         fuse(m, innovation, variance)
     judge(m, source, accepted, nis)
@@ -96,7 +94,7 @@ def follow_ground(p: Estimator, s: State) -> None:
     c = s.memory.covariance
     vx, vy, _ = s.nominal.velocity_world
     dt = max(s.memory.since[SONAR], 1) * p.interval
-    variance = (_GROUND_GRADIENT**2 * (vx * vx + vy * vy) + _GROUND_RATE**2) * dt * dt
+    variance = (_GROUND_GRADIENT * _GROUND_GRADIENT * (vx * vx + vy * vy) + _GROUND_RATE * _GROUND_RATE) * dt * dt
     z = POSITION + 2
     c[z, z] += variance
     c[BAROMETER, BAROMETER] += variance

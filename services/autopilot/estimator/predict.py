@@ -1,13 +1,12 @@
 """Prediction by IMU readings (theory.md, eqs. (3.21) to (3.24))."""
 
-import math
 from typing import Any
 
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
 from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, norm, scale, subtract
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.simd import load, store
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
@@ -156,15 +155,15 @@ def predict(
     rate = norm(omega_mean)
     jolt = norm(subtract(specific_force_body, i.force))
     twist = norm(subtract(omega_body, i.omega))
-    q_theta = dt * dt * omega_variance + dt * rate * p.gyro_scale_std**2
+    q_theta = dt * dt * omega_variance + dt * rate * (p.gyro_scale_std * p.gyro_scale_std)
     q_velocity = dt * dt * specific_force_variance
     if not first:  # error of the trapezoidal rule between distant readings
-        q_theta += (dt * max(twist - _STRAIGHT * p.jolt_rate, 0.0) / 6.0) ** 2
-        q_velocity += (dt * max(jolt - _STRAIGHT * p.jolt_force, 0.0) / 6.0) ** 2
+        q_theta += math.square(dt * max(twist - _STRAIGHT * p.jolt_rate, 0.0) / 6.0)
+        q_velocity += math.square(dt * max(jolt - _STRAIGHT * p.jolt_force, 0.0) / 6.0)
     if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
-        q_velocity += max(0.5 * dt * jolt, _IMPACT) ** 2
+        q_velocity += math.square(max(0.5 * dt * jolt, _IMPACT))
     if not first and (twist > p.jolt_rate or spike):
-        q_theta += (0.5 * dt * twist) ** 2
+        q_theta += math.square(0.5 * dt * twist)
     if not valid or frozen:  # old readings are wrong by as much as a manoeuvre changes them
         q_velocity += dt * 1.0
         q_theta += dt * 0.1
@@ -173,12 +172,12 @@ def predict(
     for k in range(3):
         c[THETA + k, THETA + k] += q_theta
         c[VELOCITY + k, VELOCITY + k] += q_velocity
-        c[GYRO + k, GYRO + k] += dt * p.gyro_bias_walk**2
-        c[ACCELEROMETER + k, ACCELEROMETER + k] += dt * p.accelerometer_bias_walk**2
+        c[GYRO + k, GYRO + k] += dt * (p.gyro_bias_walk * p.gyro_bias_walk)
+        c[ACCELEROMETER + k, ACCELEROMETER + k] += dt * (p.accelerometer_bias_walk * p.accelerometer_bias_walk)
         deviation = p.gps_wander_vertical if k == 2 else p.gps_wander_horizontal
-        c[WANDER + k, WANDER + k] += (1.0 - keep * keep) * deviation**2
-        c[IRON + k, IRON + k] += dt * p.magnetometer_bias_walk**2
-    c[BAROMETER, BAROMETER] += dt * p.barometer_walk**2
+        c[WANDER + k, WANDER + k] += (1.0 - keep * keep) * (deviation * deviation)
+        c[IRON + k, IRON + k] += dt * (p.magnetometer_bias_walk * p.magnetometer_bias_walk)
+    c[BAROMETER, BAROMETER] += dt * (p.barometer_walk * p.barometer_walk)
 
     for k in range(WATCHED):
         if m.since[k] >= 0:

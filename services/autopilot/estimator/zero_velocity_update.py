@@ -6,9 +6,9 @@ from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import GYRO, VELOCITY, State, corrected
 from lapwing.services.autopilot.estimator.fuse import acceleration_row, clear, fuse
 
-_VELOCITY_VARIANCE = 0.01**2  # [(m/s)^2] compliance of the feet
-_OMEGA_VARIANCE = 1e-3**2  # [(rad/s)^2]
-_ACCELERATION_VARIANCE = 0.02**2  # [(m/s^2)^2]
+_VELOCITY_VARIANCE = 0.01 * 0.01  # [(m/s)^2] compliance of the feet
+_OMEGA_VARIANCE = 1e-3 * 1e-3  # [(rad/s)^2]
+_ACCELERATION_VARIANCE = 0.02 * 0.02  # [(m/s^2)^2]
 
 
 @kernel

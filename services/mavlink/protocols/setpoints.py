@@ -1,9 +1,9 @@
 """Setpoints of offboard flight, and sticks: streams of messages that nobody acknowledges; what is refused is said."""
 
-import math
 from typing import Any
 
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
 from lapwing.services.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_local, from_world, to_world

@@ -1,8 +1,8 @@
 """Where the vehicle started, and how well it knows where it is."""
 
-import math
 from typing import Any
 
+from lapwing.kernels import math
 from lapwing.messages.topics import ESTIMATE
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import saturated

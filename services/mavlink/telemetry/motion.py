@@ -1,8 +1,8 @@
 """Where the vehicle is, how it moves, how it is turned."""
 
-import math
 from typing import Any
 
+from lapwing.kernels import math
 from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.frames import compass, saturated
 from lapwing.services.mavlink.telemetry.external_sensors import indicated_airspeed

@@ -1,8 +1,8 @@
 """What the sensors read, or would read where the vehicle flies on the truth."""
 
-import math
 from typing import Any
 
+from lapwing.kernels import math
 from lapwing.messages import NavSatStatus
 from lapwing.messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
 from lapwing.services.mavlink.dialect import mavlink

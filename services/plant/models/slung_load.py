@@ -11,6 +11,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles import multirotor_slung
 from lapwing.dynamics.vehicles.multirotor_slung import Sling
+from lapwing.kernels import math
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import (
     Vehicle,
@@ -61,7 +62,7 @@ def _check_weight(scene: Scene) -> None:
     fastest = frame.motor.max_voltage / frame.motor.rotor_constant
     shares = wake_slopes(scene).thrust
     count = sum(map(sum, shares)) if shares else len(frame.rotors.position)
-    lift = count * thrust_coefficient(scene) * fastest**2
+    lift = count * thrust_coefficient(scene) * (fastest * fastest)
     weight = (frame.mass.total + load) * gravity(scene)
     if lift <= weight:
         message = f"got {load:g}: the rotors lift at most {lift:.0f} N, vehicle and load weigh {weight:.0f} N"
@@ -71,7 +72,7 @@ def _check_weight(scene: Scene) -> None:
 def _sling(scene: Scene) -> Sling:
     s = scene[SlungLoad]
     reduced_mass = 1.0 / (1.0 / s.mass + 1.0 / airframe(scene).mass.total)
-    damping = 2.0 * s.damping_ratio * (s.stiffness * reduced_mass) ** 0.5
+    damping = 2.0 * s.damping_ratio * math.sqrt(s.stiffness * reduced_mass)
     hook = tuple(a - b for a, b in zip(s.hook, scene[VehicleAirframe].loaded.mass.centre, strict=True))
     return Sling(s.mass, s.length, s.stiffness, damping, hook, s.drag_area, environment(scene).terrain)  # type: ignore[arg-type]
 

@@ -92,7 +92,8 @@ def system(scene: Scene) -> tuple[UnloadingParameters, UnloadingState]:
     c = scene[Unloading]
     length, width, height = c.pack_size
     m = c.pack_mass / 12.0
-    inertia = (m * (width**2 + height**2), m * (length**2 + height**2), m * (length**2 + width**2))
+    xx, yy, zz = length * length, width * width, height * height
+    inertia = (m * (yy + zz), m * (xx + zz), m * (xx + yy))
     p = UnloadingParameters(
         c.pack_mass, (0.5 * length, 0.5 * width, 0.5 * height), inertia, math.radians(c.tilt_deg), c.floor_height,
         c.depth, 0.5 * c.width, c.roller_radius, c.roller_spacing, c.roller_rpm * RPM, c.ramp_start, c.ramp_duration,

@@ -1,8 +1,8 @@
 """Linear chirp, for identifying a loop's response from a recorded flight."""
 
-import math
 from typing import Literal
 
+from lapwing.kernels import math
 from lapwing.services.trajectory.polynomial_piece import Piece
 from lapwing.services.trajectory.segments.segment import Finite, Positive, Segment
 

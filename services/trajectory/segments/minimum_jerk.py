@@ -16,4 +16,6 @@ class MinimumJerk(Segment):
     def pieces(self, start: float) -> list[Piece]:
         """Return one quintic piece."""
         change, T = self.to - start, self.duration
-        return [Piece(T, (start, 0.0, 0.0, 10.0 * change / T**3, -15.0 * change / T**4, 6.0 * change / T**5))]
+        cube, square = T * T * T, T * T
+        jerk, snap, crackle = 10.0 * change / cube, -15.0 * change / (square * square), 6.0 * change / (cube * square)
+        return [Piece(T, (start, 0.0, 0.0, jerk, snap, crackle))]

@@ -1,8 +1,8 @@
 """Sine about the value reached."""
 
-import math
 from typing import Literal
 
+from lapwing.kernels import math
 from lapwing.services.trajectory.polynomial_piece import Piece
 from lapwing.services.trajectory.segments.segment import Finite, Positive, Segment
 

@@ -16,4 +16,4 @@ class Smoothstep(Segment):
     def pieces(self, start: float) -> list[Piece]:
         """Return one cubic piece."""
         change, T = self.to - start, self.duration
-        return [Piece(T, (start, 0.0, 3.0 * change / T**2, -2.0 * change / T**3))]
+        return [Piece(T, (start, 0.0, 3.0 * change / (T * T), -2.0 * change / (T * T * T)))]

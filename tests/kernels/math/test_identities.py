@@ -10,6 +10,7 @@ from importlib import import_module
 import pytest
 from numba import types
 
+from lapwing.kernels import kernel
 from lapwing.kernels import math as functions
 from lapwing.kernels.math import coefficients
 from lapwing.kernels.math.accuracy import samples
@@ -82,6 +83,27 @@ def test_machine_code_has_no_fma_and_no_library_call(name):
     assert not re.search(r"\bv?f(n?m(add|sub)|ma)\w*\b", text)
     called = set(re.findall(r"(?m)^\s*(?:callq?|jmp|bl|movabsq)[ \t]+\$?([A-Za-z_]\w*)", text))
     assert not {symbol for symbol in called if not symbol.startswith(("_ZN", "Py", "_Py", "NRT_", "numba_"))}
+
+
+def test_length_of_any_number_of_coordinates():
+    assert functions.hypot() == 0.0
+    assert functions.hypot(-3.0) == 3.0
+    assert functions.hypot(2.0, 3.0, 6.0) == 7.0
+    assert functions.dist((1.0, 2.0), (4.0, 6.0)) == 5.0
+    assert functions.hypot(math.nan, math.inf) == math.inf
+
+
+def test_total_adds_in_order():
+    assert functions.total(iter((1e16, 1.0, -1e16))) == 0.0
+    assert functions.total([]) == 0.0
+
+
+def test_functions_called_in_kernels_are_kernels():
+    @kernel
+    def length(x, y):
+        return math.sqrt(functions.square(functions.hypot(x, 2)) + functions.square(functions.sin(y)))
+
+    assert length(1.5, 0.5) == math.sqrt(2.5 * 2.5 + functions.sin(0.5) * functions.sin(0.5))
 
 
 def test_tables_are_those_that_script_computes():

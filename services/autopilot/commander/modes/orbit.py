@@ -1,8 +1,7 @@
 """Circular flight around a position, as in PX4."""
 
-import math
-
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance

@@ -1,8 +1,7 @@
 """Manual flight by velocities along the heading."""
 
-import math
-
 from lapwing.dynamics.vector import ZERO, Vec3, norm
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
@@ -27,7 +26,7 @@ class Mode(FlightMode):
         if not guidance.flying:
             return
         smoothing, limits = guidance.smoothing, guidance.manual_limits
-        s, c = math.sin(smoothing.yaw), math.cos(smoothing.yaw)
+        s, c = math.sincos(smoothing.yaw)
         vertical = up * (limits.up if up > 0.0 else limits.down)
         full = limits.horizontal
         velocity = (full * (c * forward - s * left), full * (s * forward + c * left), vertical)

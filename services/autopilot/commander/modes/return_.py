@@ -1,8 +1,7 @@
 """Return home, to a rally point or to the mission's landing, by RTL_TYPE and within the geofence."""
 
-import math
-
 from lapwing.dynamics.vector import norm, subtract
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.geofence_routing import Point, way_round

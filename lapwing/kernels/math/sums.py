@@ -1,4 +1,4 @@
-"""Lengths of vectors of any number of coordinates, in place of `math.hypot` and `math.dist`."""
+"""Sums, and lengths of vectors of any number of coordinates, in place of `sum`, `math.hypot` and `math.dist`."""
 
 from collections.abc import Iterable
 
@@ -21,6 +21,17 @@ def hypot(*coordinates: float) -> float:
 
 
 compiled_as(hypot, roots.hypot)
+
+
+def total(values: Iterable[float]) -> float:
+    """Return the sum, added one after the other; not in compiled code.
+
+    Python's `sum` of floats compensates rounding errors from version 3.12 on, and has other bits before.
+    """
+    result = 0.0
+    for value in values:
+        result += value
+    return result
 
 
 def dist(p: Iterable[float], q: Iterable[float]) -> float:

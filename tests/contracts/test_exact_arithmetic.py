@@ -1,0 +1,105 @@
+"""Same bits on every machine: the C library, BLAS, LAPACK and numpy's SIMD loops compute no number of a digest.
+
+Object code of kernels imports no function of the C library that rounds. Sources of the engine, of the dynamics and of
+the services in lock step, which also compute parameters in plain Python, call none either.
+"""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.services.process_table import create_all
+from tests.contracts.object_code import imported_by_kernels
+from tests.golden.cases import CASES
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = (
+    "lapwing/cosim/config",
+    "lapwing/cosim/diagram",
+    "lapwing/cosim/executors",
+    "lapwing/dynamics",
+    "lapwing/kernels",
+    "messages",
+    "services",
+)
+EXEMPT = {
+    "lapwing/dynamics/multibody/simulation.py": "energies of the accuracy study",
+    "lapwing/dynamics/vehicles/performance.py": "performance card",
+    "lapwing/kernels/math": "the functions themselves, and the script of their coefficients",
+    "services/autopilot/margins.py": "stability margins: gain design, and a warning before the flight",
+    "services/mavlink": "beside the lock step",
+}
+ROUNDED_BY_LIBRARY = {
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cbrt", "cos", "cosh", "dist", "erf", "erfc", "exp",
+    "exp2", "expm1", "fma", "fsum", "gamma", "hypot", "lgamma", "log", "log10", "log1p", "log2", "pow", "sin", "sinh",
+    "sumprod", "tan", "tanh",
+}  # fmt: skip
+ROUNDED_BY_NUMPY = ROUNDED_BY_LIBRARY | {
+    "arccos", "arccosh", "arcsin", "arcsinh", "arctan", "arctan2", "arctanh", "dot", "einsum", "geomspace", "inner",
+    "linalg", "logspace", "matmul", "polyfit", "power", "tensordot", "vdot",
+}  # fmt: skip
+PREFIXES = ("NRT_", "Py", "_Py", "numba_", "mem", "_ZN")
+EXACT = {"ceil", "floor", "fmod", "nearbyint", "rint", "trunc"}  # without SSE 4.1 the processor has no instruction
+
+
+def _sources():
+    names = [path.relative_to(ROOT).as_posix() for folder in FOLDERS for path in (ROOT / folder).rglob("*.py")]
+    return sorted(name for name in names if not name.startswith(tuple(EXEMPT)))
+
+
+def _modules(tree):
+    """Names by which a source calls Python's math and numpy."""
+    names = {}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names |= {alias.asname or alias.name: alias.name for alias in node.names}
+    return names
+
+
+def _is_exact_power(base):
+    return (isinstance(base, ast.Constant) and base.value in (2, 2.0, 10)) or isinstance(base, ast.UnaryOp)
+
+
+def _is_integer_sum(call):
+    element = getattr(call.args[0], "elt", call.args[0])
+    return isinstance(element, ast.Compare | ast.Constant) or (
+        isinstance(element, ast.Call) and getattr(element.func, "id", "") in ("len", "map")
+    )
+
+
+def _offence(node, modules):
+    match node:
+        case ast.Attribute(value=ast.Name(id=name), attr=attribute) if modules.get(name) in ("math", "numpy"):
+            known = ROUNDED_BY_LIBRARY if modules[name] == "math" else ROUNDED_BY_NUMPY
+            return f"{name}.{attribute}" if attribute in known else None
+        case ast.ImportFrom(module="math"):
+            return "from math import"
+        case ast.ImportFrom(module=str(module)) if module.partition(".")[0] == "scipy":
+            return "scipy"
+        case ast.BinOp(op=ast.MatMult()):
+            return "@"
+        case ast.BinOp(left=base, op=ast.Pow()):
+            return None if _is_exact_power(base) else "**"
+        case ast.Call(func=ast.Name(id="sum")):
+            return None if _is_integer_sum(node) else "sum"
+    return None
+
+
+@pytest.mark.parametrize("name", _sources())
+def test_sources_call_no_function_that_rounds_differently(name):
+    tree = ast.parse((ROOT / name).read_text())
+    modules = _modules(tree)
+    found = [f"line {node.lineno}: {text}" for node in ast.walk(tree) if (text := _offence(node, modules))]
+    assert not found, "use lapwing.kernels.math or lapwing.dynamics.small_matrices"
+
+
+@pytest.mark.long
+def test_object_code_imports_no_function_that_rounds():
+    for case in CASES.values():
+        config = case.resolve()
+        BlockDiagram(config, create_all(config), 16).advance(2)
+    imported = imported_by_kernels()
+    foreign = {name: kernels for name, kernels in imported.items() if not name.startswith(PREFIXES)}
+    assert not {name: kernels for name, kernels in foreign.items() if name not in EXACT}
