@@ -127,7 +127,7 @@ def test_says_the_whole_range_whatever_is_wrong_with_a_number():
 def test_unknown_effect_lists_the_choices():
     with pytest.raises(
         ValueError,
-        match=r"unknown effect 'gravitation'; did you mean gravity_altitude\? expected one of air_density, axial_inflow",
+        match=r"unknown effect 'gravitation'; did you mean gravity_altitude\? expected one of air_density",
     ):
         effects.from_scene({"gravitation": {}}, DRONE)
 
