@@ -32,7 +32,7 @@ WHY = "a step of the grid of intervals, of 1.25 to 1.28 where it matters: the lo
 
 def scene(rate: int) -> Scene:
     """The hover with a push, at a rate of exchange."""
-    slow = [f"rates.{name}=1" for name in ("pose", "estimate", "status", "battery", "bodies", "operator")]
+    slow = [f"rates.{name}=1" for name in ("pose", "estimate", "status", "battery", "body_states", "commands")]
     return load("hover", [f"communication.rate={rate}", f"solver.step={1.0 / rate / -(-1000 // rate)!r}", *slow, *PUSH])
 
 

@@ -40,7 +40,7 @@ def drawn(seed: int) -> list[str]:
         "effects.random_wind_force.mean": [float(v) for v in rng.normal(0.0, 15.0, 3)],
         "effects.random_wind_force.sigma": decades(0.01, 10.0),
     }
-    slow = {f"rates.{name}": 10 for name in ("pose", "estimate", "status", "battery", "bodies", "operator")}
+    slow = {f"rates.{name}": 10 for name in ("pose", "estimate", "status", "battery", "body_states", "commands")}
     return [f"{key}={value}" for key, value in {**found, **slow}.items()]
 
 

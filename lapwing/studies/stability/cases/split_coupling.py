@@ -31,7 +31,7 @@ def together(steps: int) -> np.ndarray:
 @cache
 def apart(rate: int, coupling: str) -> np.ndarray:
     """Return the positions with plant and control in two processes that exchange at a rate [Hz]; NaN after the end."""
-    slow = [f"rates.{name}=10" for name in ("pose", "estimate", "status", "battery", "operator")]
+    slow = [f"rates.{name}=10" for name in ("pose", "estimate", "status", "battery", "commands")]
     interval = 1.0 / rate
     solver = f"solver.step={interval / round(interval / STEP)!r}"
     truth = flown(
