@@ -34,7 +34,7 @@ def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):
         "pose.orientation": turned,
         "motor_power": (power,),
     }
-    return flight(len(x), rate, failure, truth=truth)
+    return flight(len(x), rate, failure, ground_truth=truth)
 
 
 def differences(a, b, topics):

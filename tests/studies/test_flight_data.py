@@ -55,7 +55,7 @@ def test_a_log_and_memory_say_the_same(recorded, in_memory):
 def test_only_what_is_wanted_is_kept(run):
     found = fly(run, (TRUTH, SETPOINT))
     assert found.topics == ["ground_truth", "setpoint"]
-    with pytest.raises(ValueError, match="hover: has no topic status; it has setpoint, truth"):
+    with pytest.raises(ValueError, match="hover: has no topic status; it has ground_truth, setpoint"):
         found.status  # noqa: B018
 
 
@@ -91,7 +91,7 @@ def ended(**truth):
         "velocity": (0.0, 0.0, 0.0),
         "ground_contact": True,
     }
-    return synthetic_flights.flight(10, truth=columns | truth, status={"finished": True, "landed": True})
+    return synthetic_flights.flight(10, ground_truth=columns | truth, status={"finished": True, "landed": True})
 
 
 def test_landed_means_upright_slow_and_in_contact():
@@ -108,9 +108,9 @@ def test_landed_means_upright_slow_and_in_contact():
 def test_landed_needs_the_autopilots_word():
     truth = {"pose.position": (0.0, 0.0, 0.0), "pose.orientation": synthetic_flights.LEVEL, "velocity": (0.0, 0.0, 0.0),
              "ground_contact": True}  # fmt: skip
-    assert not synthetic_flights.flight(10, truth=truth).landed
-    assert not synthetic_flights.flight(10, truth=truth, status={"finished": False, "landed": True}).landed
-    assert not synthetic_flights.flight(10, truth=truth, status={"finished": True, "landed": False}).landed
+    assert not synthetic_flights.flight(10, ground_truth=truth).landed
+    assert not synthetic_flights.flight(10, ground_truth=truth, status={"finished": False, "landed": True}).landed
+    assert not synthetic_flights.flight(10, ground_truth=truth, status={"finished": True, "landed": False}).landed
 
 
 def test_a_flight_lands(in_memory):

@@ -41,7 +41,7 @@ def flown(voltage=None):
     setpoint = {"phase": np.where(T < 2.0, "climb", "hover"), "position": (0.0, 0.0, 0.0), "yaw": 0.0}
     actuators = {"armed": flying, "attitude_reference": (0.0, 0.0, 0.0)}
     return synthetic_flights.flight(
-        TICKS, RATE, scene=SCENE, truth=truth, status=status, setpoint=setpoint, actuators=actuators
+        TICKS, RATE, scene=SCENE, ground_truth=truth, status=status, setpoint=setpoint, actuators=actuators
     )
 
 

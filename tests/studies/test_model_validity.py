@@ -23,7 +23,7 @@ def flown(velocity, turned=synthetic_flights.LEVEL, scene=SCENE, wind=(0.0, 0.0,
         "ground_contact": False,
     }
     return synthetic_flights.flight(
-        400, 100, scene=scene, truth=truth, status={"armed": True}, actuators={"armed": True}
+        400, 100, scene=scene, ground_truth=truth, status={"armed": True}, actuators={"armed": True}
     )
 
 

@@ -47,7 +47,7 @@ def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
         "ground_contact": np.zeros(ticks, bool),
     }
     told = {"vehicle": {"model": model}, **({"airframe": AIRFRAME} if scene is None else scene)}
-    return synthetic_flights.flight(ticks, RATE, scene=told, truth=truth, **topics)
+    return synthetic_flights.flight(ticks, RATE, scene=told, ground_truth=truth, **topics)
 
 
 def numbers(text, kind="<f4"):
@@ -137,7 +137,7 @@ def test_bodies_move_each_by_itself_and_have_their_forces():
         "pose": np.concatenate([place, np.tile(synthetic_flights.LEVEL, (TICKS, 5, 1))], axis=2),
         "force": place,
     }
-    (table,) = json.loads(motion_3d.to_json([flight("multibody", bodies=bodies)]))["flights"]
+    (table,) = json.loads(motion_3d.to_json([flight("multibody", body_states=bodies)]))["flights"]
     assert len(table["bodies"]) == 5
     assert [len(body["rotors"]) for body in table["bodies"]] == [0, 1, 1, 1, 1]
     assert numbers(table["bodies"][2]["f"]).reshape(-1, 3)[:, 2] == pytest.approx(T)
@@ -157,7 +157,7 @@ def slung():
         "pose": np.concatenate([place, np.tile(synthetic_flights.LEVEL, (TICKS, 1, 1))], axis=2),
         "force": force,
     }
-    return flight("slung_load", scene={"airframe": OFF, "slung_load": SLING}, bodies=load)
+    return flight("slung_load", scene={"airframe": OFF, "slung_load": SLING}, body_states=load)
 
 
 def test_a_load_hangs_by_a_cable_from_the_hook_and_all_places_are_from_the_centre_of_mass():

@@ -25,7 +25,7 @@ def fly(mission=None, finished=True, landed=True, failure="", diverged=False, st
     }
     last = {"finished": finished & (T > 4.5), "landed": landed & contact, "armed": ~contact}
     modes = {"mode": "mission", "phase": np.where(T < 3.0, "hover", "land")}
-    flight = synthetic_flights.flight(TICKS, RATE, truth=columns | truth, status=last | modes | (status or {}))
+    flight = synthetic_flights.flight(TICKS, RATE, ground_truth=columns | truth, status=last | modes | (status or {}))
     return classify(flight.truth, flight.status, failure, diverged, mission)
 
 

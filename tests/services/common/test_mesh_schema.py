@@ -112,7 +112,7 @@ def test_run_configuration_stores_the_mesh(tmp_path):
     (tmp_path / "own.stl").unlink()
     assert from_resolved(setup.resolved).resolved == loaded.resolved
     truth = {"pose.position": (0.0, 0.0, 1.0), "pose.orientation": synthetic_flights.LEVEL, "rotor_speed": (0.0,) * 4}
-    flight = synthetic_flights.flight(3, truth=truth, scene=Origin.of_setup(setup).scene)
+    flight = synthetic_flights.flight(3, ground_truth=truth, scene=Origin.of_setup(setup).scene)
     (body,) = motion_3d.motion(flight).bodies
     assert body.surface.vertices.min(axis=0) == pytest.approx([-0.1, 0.0, 0.0])  # from the centre of mass
     assert body.surface.vertices.max(axis=0) == pytest.approx([0.3, 0.3, 0.2])

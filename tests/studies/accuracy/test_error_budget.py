@@ -19,7 +19,7 @@ def turned(angle):
 
 def flight(rate, position, orientation):
     truth = {"pose.position": position, "pose.orientation": orientation}
-    return synthetic_flights.flight(len(position), rate, truth=truth)
+    return synthetic_flights.flight(len(position), rate, ground_truth=truth)
 
 
 def test_difference_at_common_ticks():
