@@ -46,10 +46,11 @@ def __getattr__(name: str) -> Any:
         return getattr(importlib.import_module(_MODULE_OF[name]), name)
     if not name.startswith("_"):
         hooks = importlib.import_module(_HOOKS)
-        if name in hooks.HOOKS:
+        if name in hooks.HOOKS and hasattr(hooks, name):
             return getattr(hooks, name)
     raise AttributeError(f"module 'lapwing.plugins' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    return sorted([*_MODULE_OF, *importlib.import_module(_HOOKS).HOOKS])
+    hooks = importlib.import_module(_HOOKS)
+    return sorted({*_MODULE_OF, *(name for name in hooks.HOOKS if hasattr(hooks, name))})

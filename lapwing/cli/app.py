@@ -8,8 +8,8 @@ from typer.core import TyperGroup
 GROUPS = {  # in the order of a workflow
     "Fly": ("scenes", "check", "run", "service"),
     "Look": ("report", "view", "parameters"),
-    "Study": ("performance", "effects", "accuracy", "stability", "tune", "validate", "campaign", "compare"),
-    "Logs": ("info", "verify", "recover", "export", "replay", "resimulate"),
+    "Study": ("performance", "effects", "accuracy", "stability", "tune", "campaign", "compare", "validate", "identify"),
+    "Logs": ("import", "info", "verify", "recover", "export", "replay", "resimulate"),
     "Set up": ("new", "precompile", "certificates", "protocol", "schema"),
 }
 

@@ -112,7 +112,7 @@ def import_(
     out: Annotated[Path, typer.Option(metavar="FILE", help="the log to write (.mcap)")],
     mapping: MappingName = None,
 ) -> None:
-    """Convert a recorded flight into a log for info, report, view, export, validate and identify."""
+    """Convert a recorded flight from an autopilot into a log."""
     from lapwing.studies.flight_import.open_flight import open_flight
     from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
     from lapwing.studies.flight_import.write_log import write_log

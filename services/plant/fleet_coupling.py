@@ -61,7 +61,7 @@ def effects_of(given: ServiceConfig) -> tuple:
 
 
 def _check_apart(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> None:
-    """Refuse vehicles that would be in one another's collision sphere from the beginning."""
+    """Reject vehicles whose collision spheres touch at the start."""
     spheres = {
         name: (e.radius, given.parameters.start.vehicle.motion.position_world)
         for name, given in shares.items()
@@ -72,7 +72,7 @@ def _check_apart(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -
         away = norm(subtract(position, other_position))
         if away < r + other_r:
             message = f"got a place {away:.3g} m from {one}: their collision spheres touch"
-            raise ConfigError(f"{keys[other]}start", message, f"at least {r + other_r:.3g} m between them")
+            raise ConfigError(f"{keys[other]}initial_position", message, f"at least {r + other_r:.3g} m between them")
 
 
 def _sling(given: ServiceConfig) -> Sling | None:

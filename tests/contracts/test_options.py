@@ -33,7 +33,13 @@ COMMANDS = {  # run here, in this order, in one folder
     "stability": "stability exact_time --json stability.json --report stability.html",
     "new vehicle": "new vehicle my_quad --set mass=2.0",
 }
+IDENTIFY = "tests/studies/identification/test_output_error.py::test_command_writes_airframe_with_provenance"
+IMPORT = "tests/studies/flight_import/test_import.py::test_command_writes_log_that_other_commands_read"
 ELSEWHERE = {  # other tests by option; a test's file contains the option
+    "identify": dict.fromkeys(
+        ("--free", "--json", "--mapping", "--out", "--set", "--windows", "--trim-force", "--trim-torque"), IDENTIFY
+    ),
+    "import": {"--mapping": IMPORT, "--out": IMPORT},
     "run": {
         "--plan": "tests/lapwing/test_environment_faults.py::test_broken_plan_is_rejected",
         "--key-prefix": "tests/lapwing/test_output_lock.py::test_run_rejects_a_log_that_is_being_written",
@@ -120,6 +126,7 @@ def untested():
 UNTESTED = {  # options that no test uses in a process; remove an entry with the test that does
     *((command, "--set") for command in ("accuracy", "effects", "tune", "validate")),
     *((command, option) for command in ("accuracy", "effects") for option in ("--json", "--plot")),
+    ("identify", "--seed"),
     *(("accuracy", "--target"), ("effects", "--tolerance"), ("protocol", "--plot"), ("replay", "--mavlink")),
     *(("service", option) for option in ("--mavlink", "--mavlink-key", "--plan", "--speed")),
     *(("stability", option) for option in ("--slow", "--sweep")),

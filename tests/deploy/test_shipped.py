@@ -15,5 +15,5 @@ def test_every_lock_of_an_image_that_ships_is_read(target):
     command = ["make", "--dry-run", "--no-print-directory", target]
     said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     locks = {f"deploy/{path.name}" for path in (ROOT / "deploy").glob("requirements*.lock")}
-    reads = said.splitlines()[-1] if target == "audit" else next(line for line in said.splitlines() if "cat " in line)
+    reads = next(line for line in reversed(said.splitlines()) if "--require-hashes" in line and "--requirement" in line)
     assert {word for word in reads.split() if word in locks} == locks - {"deploy/requirements-tests.lock"}

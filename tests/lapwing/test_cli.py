@@ -207,7 +207,7 @@ def test_check_tells_what_flies(lapwing):
         "  vehicle   drone1, delivery_drone",
         "  effects   gravity, ground_contact, rotor_thrust",
         "  sensors   none",
-        "  services  plant, trajectory, autopilot; 250 Hz, sequential",
+        "  services  plant, trajectory, autopilot; 250 Hz, gauss_seidel",
     ]
 
 

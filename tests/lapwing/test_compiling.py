@@ -102,7 +102,7 @@ def test_a_terminal_has_a_bar_and_anything_else_a_line():
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_scenes_are_compiled_ahead_with_a_bar_or_a_line_each(setup, folder, monkeypatch, terminal):
-    monkeypatch.setattr(precompile, "Graph", Compiling)
+    monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     compile_ahead({"one": setup, "two": setup}, console)
     said = console.file.getvalue()
@@ -116,7 +116,7 @@ def test_one_broken_scene_of_a_folder_stops_no_other(tmp_path, monkeypatch):
     monkeypatch.setattr("lapwing.runs.precompile.compile_ahead", lambda setups, console: compiled.extend(setups))
     for name in ("a", "c"):
         (tmp_path / f"{name}.toml").write_text("[run")
-    (tmp_path / "b.toml").write_bytes(Path("scenes/hover.toml").read_bytes())
+    (tmp_path / "b.toml").write_bytes(Path("lapwing/scenes/hover.toml").read_bytes())
     result = CliRunner().invoke(app, ["precompile", str(tmp_path)])
     assert (result.exit_code, compiled) == (2, [str(tmp_path / "b.toml")])
     assert [line.partition(": not valid TOML")[0] for line in result.output.splitlines()] == [

@@ -23,7 +23,7 @@ def test_the_page_is_written_and_opened(lapwing, log, monkeypatch, there):
     code, out, err = lapwing("view", log)
     page = log.with_suffix(".html")
     assert (code, err, opened) == (0, "", [page.as_uri()])
-    assert out.splitlines() == [*([] if there else ["no browser was found; open the page yourself:"]), str(page)]
+    assert out.splitlines() == [*([] if there else ["no browser found; open this page:"]), str(page)]
     assert 'id="motion"' in page.read_text(encoding="utf-8")
 
 

@@ -41,8 +41,12 @@ def flight(thrust):
     place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.6], [0.0, 0.0, 0.8]])
     bodies = {"pose": np.broadcast_to(np.hstack([place, np.tile(synthetic_flights.LEVEL, (3, 1))]), (100, 3, 7))}
     bodies["velocity"] = np.zeros((100, 3, 3))
-    return synthetic_flights.flight(100, scene={"cooperative_load": LOAD}, ground_truth={"pose.position": (0.0, 0.0, 0.0)},
-                          body_states=bodies, rotor_wrench={"thrust": thrust})  # fmt: skip
+    topics = {
+        "ground_truth": {"pose.position": (0.0, 0.0, 0.0)},
+        "body_states": bodies,
+        "rotor_wrench": {"thrust": thrust},
+    }
+    return synthetic_flights.flight(100, scene={"cooperative_load": LOAD}, **topics)
 
 
 def hover(t):

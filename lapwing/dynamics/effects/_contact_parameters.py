@@ -22,9 +22,7 @@ Slip = Annotated[float, Ge(1e-6), Le(10)]
 class Settings(NamedTuple):
     """What a scene says."""
 
-    friction: Literal["stick_slip", "regularised"] = (
-        "stick_slip"  # a spring to where the foot stands, or a function of its slip
-    )
+    friction: Literal["stick_slip", "regularised"] = "stick_slip"  # spring to an anchor, or function of slip speed
     stiffness: Stiffness = 1.0e6  # [N/m] of one foot
     damping: Annotated[float, Ge(0), Le(1e6)] = 1.0e3  # [N s/m] of one foot
     transition_width: Annotated[float, Ge(1e-7), Le(0.1)] = 1.0e-4  # [m] depth over which the normal force sets in

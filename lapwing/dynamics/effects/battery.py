@@ -20,9 +20,7 @@ class Settings(NamedTuple):
     """What a scene says."""
 
     initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
-    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = (
-        3.0  # [V] of one cell, below which the controllers stop for good
-    )
+    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] per cell; the motors stop for good below it
 
 
 class Battery(NamedTuple):

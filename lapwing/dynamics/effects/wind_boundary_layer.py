@@ -19,9 +19,7 @@ class Settings(NamedTuple):
     """What a scene says."""
 
     speed: Annotated[float, Gt(0), Le(60)]  # [m/s] at the reference height
-    direction_to: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = (
-        0.0  # [rad] in which the air goes, 0 to the east
-    )
+    direction_to: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = 0.0  # [rad] of the air's motion, from east
     height: Annotated[float, Ge(1), Le(200)] = 10.0  # [m] over the ground, of reference
     roughness: Annotated[float, Ge(1e-5), Le(3)] = 0.03  # [m] length: sea 0.0002, mown grass 0.01, crops 0.1, town 1
 

@@ -40,7 +40,7 @@ z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
 
 def fleet_of(n, tmp_path):
     """n vehicles of one type, 2 m apart."""
-    entries = [f'[[vehicle]]\nairframe = "delivery_drone"\nstart = [0.0, {2.0 * i}]\n' for i in range(n)]
+    entries = [f'[[vehicle]]\nairframe = "delivery_drone"\ninitial_position = [0.0, {2.0 * i}]\n' for i in range(n)]
     return parse(tmp_path / "many.toml", COMMON + "".join(entries))
 
 
@@ -153,7 +153,7 @@ def test_topics_of_a_vehicle_of_a_fleet():
 WRONG = {
     "vehicle.7.name=x": "--set vehicle.7.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
     "vehicle.left.initial_position=[0,0]": (
-        "--set vehicle.left.initial_position=[0,0]: which vehicle? expected vehicle.N.start, N from 0 to 2"
+        "--set vehicle.left.initial_position=[0,0]: which vehicle? expected vehicle.N.initial_position, N from 0 to 2"
     ),
     "vehicle.left.airframe.mass.total=3": (
         "--set vehicle.left.airframe.mass.total=3: which vehicle? expected vehicle.N.airframe.mass.total, N from 0 to 2"

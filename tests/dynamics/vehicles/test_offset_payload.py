@@ -75,7 +75,7 @@ def momenta(mass, inertia, centre, motion):
 
 def test_when_it_goes_both_keep_their_momentum():
     """In free space: the vehicle's is constant after the release, and with the box's the one before."""
-    p, state = flying({"payload": {}})
+    p, state = flying({"payload_release": {}})
     (effect,) = p.effects
     for tick in range(200):
         state = multirotor.advance(RK4, p, KEY, tick, state, (0.0,) * 4, STEP, 1)
@@ -94,7 +94,7 @@ def test_when_it_goes_both_keep_their_momentum():
 
 
 def test_while_it_is_carried_it_is_a_plain_body():
-    p, state = flying({"payload": {}, "gravity": {}, "rotor_thrust": {}})
+    p, state = flying({"payload_release": {}, "gravity": {}, "rotor_thrust": {}})
     plain, other = flying({"gravity": {}, "rotor_thrust": {}})
     m = FRAME.loaded.mass
     plain = plain._replace(body=body_of(m.total, m.inertia, m.products))
@@ -108,7 +108,7 @@ def test_while_it_is_carried_it_is_a_plain_body():
 def test_an_empty_vehicle_is_the_vehicle_described_without_the_box():
     """After the release it flies as the bare airframe does whose state is that of its own centre of mass."""
     tables = {"gravity": {}, "rotor_thrust": {}, "h_force": {"coefficient": 1e-4}, "gyroscopic_torque": {}}
-    p, state = flying({**tables, "payload": {}})
+    p, state = flying({**tables, "payload_release": {}})
     state = released(state)
     bare = DRONE.model_copy(update={"mass": BARE}).about_centre
     q = multirotor.parameters(bare, effects.from_scene(tables, bare))
@@ -173,7 +173,7 @@ def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
 @pytest.mark.parametrize(
     ("overrides", "message"),
     [
-        ({"vehicle.mass": 9.0}, r"vehicle\.mass: airframe\.payload is part of it"),
+        ({"vehicle.mass": 9.0}, r"vehicle\.mass: conflicts with airframe\.payload"),
         ({"vehicle.model": "multibody"}, "payload: the five bodies have no place for one"),
     ],
 )
@@ -202,7 +202,7 @@ def test_refused(tmp_path, mass, payload, table, message):
     whole["mass"] |= mass
     whole["payload"] |= payload
     with pytest.raises(ValueError) as caught:
-        effects.from_scene({"payload": table}, Airframe.model_validate(whole).loaded.about_centre)
+        effects.from_scene({"payload_release": table}, Airframe.model_validate(whole).loaded.about_centre)
     error = caught.value
     text = str(fault(error, Airframe) if hasattr(error, "errors") else error)
     assert text.startswith(message)

@@ -20,7 +20,7 @@ def test_delivery_plan_has_the_mission_items():
     assert tuple(found[4].position) == pytest.approx((10.0, 10.0, 10.0), abs=1e-3)
     assert found[4].yaw == pytest.approx(0.0)  # heading east
     assert found[5].yaw == pytest.approx(math.pi / 2)  # heading north
-    assert found[5].hold == 5.0
+    assert found[5].hold_time == 5.0
 
 
 def test_plan_altitudes_start_at_the_resting_height():

@@ -78,4 +78,4 @@ def test_final_parameters_of_a_run_are_saved(tmp_path):
 def test_scene_without_autopilot_has_no_parameters(tmp_path):
     result = lapwing("parameters", "lapwing/scenes/os4_motors.toml")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
-    assert "nobody steers there" in result.stderr
+    assert "no autopilot" in result.stderr

@@ -116,12 +116,15 @@ def test_a_set_up_survives_text(setup):
 @pytest.mark.parametrize(
     ("override", "message"),
     [
-        ("vehicle.1.effects.shared_slung_load.mass=3.0", r"vehicle\.1\.effects\.carried_load\.mass: .*the same load"),
+        (
+            "vehicle.1.effects.shared_slung_load.mass=3.0",
+            r"vehicle\.1\.effects\.shared_slung_load\.mass: .*the same load",
+        ),
         (
             "vehicle.1.initial_position=[0.0, -6.0]",
-            r"effects\.carried_load\.length: .*m away, in the middle of its carriers",
+            r"effects\.shared_slung_load\.length: .*m away, in the middle of its carriers",
         ),
-        ("effects.shared_slung_load.stiffness=1e5", r"effects\.carried_load\.stiffness: .*softer cable"),
+        ("effects.shared_slung_load.stiffness=1e5", r"effects\.shared_slung_load\.stiffness: .*softer cable"),
         ("vehicle.0.vehicle.model=multibody", "tells of bodies of its own"),
     ],
 )

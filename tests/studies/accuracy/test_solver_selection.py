@@ -93,7 +93,7 @@ def test_what_cannot_be_met_and_what_nobody_chose_is_said(measured, tmp_path):
 def test_measured_in_earnest_on_a_scene(monkeypatch, tmp_path):
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path)
     few = ["lie_euler", "erk4m", "rkmk4"]  # each is compiled
-    monkeypatch.setattr(integrate.integrators, "fitting", lambda p, x: few)
+    monkeypatch.setattr(integrate.integrators, "compatible_methods", lambda p, x: few)
     path = scene(tmp_path, "accuracy = 1e-6")
     found = solver_selection.overrides(load(path), lambda text: None)
     points = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())

@@ -76,7 +76,7 @@ def test_what_is_wrong_is_one_line(scene):
         ConfigError, match=r"autopilot.estimator_options: TypeError: .* unexpected keyword argument 'x'"
     ):
         resolve(scene(DEAD_RECKONING, "DeadReckoning", "autopilot.estimator_options.x=1.0"))
-    with pytest.raises(ConfigError, match="unknown estimator 'sensor'; did you mean sensors"):
+    with pytest.raises(ConfigError, match="unknown estimator 'sensor'; expected one of ground_truth, kalman"):
         load("hover", ["autopilot.estimator=sensor"])
     text = DEAD_RECKONING.replace("        x, y", "        if time > 1.0: 1 / 0\n        x, y")
     said = "estimator own_estimator:DeadReckoning: ZeroDivisionError: division by zero"
