@@ -112,7 +112,7 @@ def test_a_signal_ends_a_loop_at_once(log):
         (["LOG", "--topics", "/imu"], "the log has no topic /imu; it has /clock, /other"),
         (["LOG", "--speed", "0"], "--speed 0"),
         (["LOG", "--record", "/proc/none/x.mcap"], "/proc/none/x.mcap"),
-        (["LOG", "--record", "LOG"], "the log that is replayed"),
+        (["LOG", "--record", "LOG"], "is the replayed log"),
         (["LOG", "--listen", "nonsense"], "nonsense"),
     ],
 )

@@ -137,7 +137,7 @@ WRONG = {
     "a direction of nothing": (
         LOAD,
         "formation.link_direction=[[0, 0, 0], [1, 0, 0]]",
-        "2 directions that are not zero",
+        "2 non-zero directions",
     ),
     "too few directions": (LOAD, "formation.link_direction=[[1, 0, 0]]", "formation.link_direction: expected 2"),
     "a pack that does not fit": (CRATE, "unloading.depth=0.15", "unloading.pack_size: expected a pack that fits"),

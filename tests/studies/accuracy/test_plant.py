@@ -16,7 +16,7 @@ HOVER = Path(__file__).parents[3] / "lapwing/scenes/hover.toml"
 
 
 def test_five_bodies_are_integrated_in_steps_that_their_scene_accepts(monkeypatch):
-    monkeypatch.setattr(plant.integrators, "fitting", lambda p, x: ["rk4_renormalised"])
+    monkeypatch.setattr(plant.integrators, "compatible_methods", lambda p, x: ["rk4_renormalised"])
     scene = load(HOVER, ["vehicle.model=multibody", "solver.accuracy=1e-4"])
     problem = scenes.problem(scene)
     (way,) = problem.ways

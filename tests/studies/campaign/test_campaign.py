@@ -132,7 +132,7 @@ def test_a_part_counts_its_own_runs(flown, tmp_path):
     assert (code, "2 of 2 flights" in said, "3 shards missing" in said) == (0, True, True)
     again = ["run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process"]
     told = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
-    assert f"run 0 of {tmp_path / 'c'}: it has not been flown there yet" in told[0]
+    assert f"run 0 of {tmp_path / 'c'}: not flown there yet" in told[0]
     assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in told[1]
     code, said = lapwing(*words)
     assert (code, "3 of 3 flights" in said) == (0, True)
@@ -298,7 +298,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
         (["hover", "--set", "run.seed=4"], "--set run.seed: every run has a seed of its own; expected --seed"),
         (
             ["hover", "--vary", "vehicle.mass=normal(10,1)", "--vary", "vehicle.mass=uniform(9,10)"],
-            "--vary vehicle.mass=uniform(9,10): vehicle.mass has a distribution already",
+            "--vary vehicle.mass=uniform(9,10): vehicle.mass already has a distribution",
         ),
         (["hover", "--sweep", "{}.csv"], "lapwing: --sweep: column vehicle.mas: unknown key 'mas'"),
         (["gyrostat_blocked"], "expected a scene whose autopilot follows a [trajectory]"),
