@@ -16,7 +16,7 @@ import lapwing
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 
 TARGET = Path(__file__).with_name("flight.gif")
-FRAMES, RATE = 90, 15  # pictures, and pictures per second
+FRAMES, RATE = 72, 12  # pictures, and pictures per second
 ARM = 1.4  # [m] half the drawn length of an arm: several times the real one, to be seen
 ANGLES = np.deg2rad([45.0, 135.0, 225.0, 315.0])
 TIPS = ARM * np.stack([np.cos(ANGLES), np.sin(ANGLES), np.zeros(4)])
@@ -33,7 +33,7 @@ def main() -> None:
     error = np.linalg.norm(path - desired, axis=1)
     picks = np.linspace(0, len(times) - 1, FRAMES).astype(int)
 
-    figure = plt.figure(figsize=(8.0, 4.2), dpi=80)
+    figure = plt.figure(figsize=(8.0, 4.2), dpi=70)
     space = figure.add_axes((0.0, 0.02, 0.53, 0.98), projection="3d")
     plot = figure.add_axes((0.66, 0.15, 0.32, 0.78))
     space.plot(*desired.T, color=GREY, linewidth=1.0, linestyle="--", label="desired")
