@@ -11,7 +11,7 @@ from pathlib import Path
 UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compilers
 # pymavlink needs lxml to make dialects, not to speak them; plotly needs narwhals, but only its script is read; dateutil
 # and pydantic need tzdata for time zones by name, which Lapwing does not use.
-NOT_IMPORTED = ("lxml", "narwhals", "tzdata", "dask/array", "dask/dataframe", "numpy/distutils", "numpy/f2py")
+NOT_IMPORTED = ("lxml", "narwhals", "tzdata", "dask/array", "dask/dataframe", "numpy/distutils")
 PLOTLY_SCRIPT = Path("package_data", "plotly.min.js")
 # The modules of these folders that are imported: the dialects that the link speaks and pymavlink takes by default; the
 # language of tracebacks.
