@@ -8,7 +8,7 @@ import struct
 import sys
 from pathlib import Path
 
-UNUSED = {".pyi", ".pxd", ".h", ".hpp", ".a"}  # for type checkers and C compilers
+UNUSED = {".pyi", ".pxd", ".pyx", ".c", ".h", ".hpp", ".a"}  # for type checkers and C compilers
 # pymavlink needs lxml to make dialects, not to speak them; plotly needs narwhals, but only its script is read; dateutil
 # and pydantic need tzdata for time zones by name, which Lapwing does not use.
 NOT_IMPORTED = ("lxml", "narwhals", "tzdata", "dask/array", "dask/dataframe", "numpy/distutils")
