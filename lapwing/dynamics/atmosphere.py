@@ -40,13 +40,13 @@ def _geopotential(altitude):
 
 @always_inline
 def temperature(a, altitude):
-    """[K] at an altitude [m] above the sea."""
+    """Return the temperature [K] at an altitude [m] above sea level."""
     return SEA_LEVEL_TEMPERATURE + a.temperature_offset - LAPSE_RATE * min(_geopotential(altitude), TROPOPAUSE)
 
 
 @always_inline
 def _lapse_factor(u):
-    """(1 - u)**EXPONENT."""
+    """Return (1 - u)**EXPONENT."""
     c, z = LAPSE_POLYNOMIAL, u * u
     low = (c[0] + c[1] * u) + z * (c[2] + c[3] * u)
     middle = (c[4] + c[5] * u) + z * (c[6] + c[7] * u)
@@ -57,18 +57,18 @@ def _lapse_factor(u):
 
 @always_inline
 def pressure(a, altitude):
-    """[Pa] at an altitude [m] above the sea."""
+    """Return the pressure [Pa] at an altitude [m] above sea level."""
     height, ground = _geopotential(altitude), SEA_LEVEL_TEMPERATURE + a.temperature_offset
-    found = a.sea_level_pressure * _lapse_factor(LAPSE_RATE * min(height, TROPOPAUSE) / ground)
+    result = a.sea_level_pressure * _lapse_factor(LAPSE_RATE * min(height, TROPOPAUSE) / ground)
     if height > TROPOPAUSE:
         kelvin = ground - LAPSE_RATE * TROPOPAUSE
-        found = found * math.exp((TROPOPAUSE - height) * GRAVITY / (GAS_CONSTANT * kelvin))
-    return found
+        result = result * math.exp((TROPOPAUSE - height) * GRAVITY / (GAS_CONSTANT * kelvin))
+    return result
 
 
 @always_inline
 def density(a, altitude):
-    """[kg/m^3] at an altitude [m] above the sea."""
+    """Return the density [kg/m^3] at an altitude [m] above sea level."""
     return pressure(a, altitude) / (GAS_CONSTANT * temperature(a, altitude))
 
 
@@ -82,7 +82,7 @@ def density_slope(a, altitude):
 
 @always_inline
 def pressure_altitude(a, pressure_now):
-    """Altitude [m] above the sea at which `pressure` gives this pressure [Pa]."""
+    """Return the altitude [m] above sea level with this pressure [Pa]; inverse of `pressure`."""
     ground = SEA_LEVEL_TEMPERATURE + a.temperature_offset
     height = ground * (1.0 - math.pow(pressure_now / a.sea_level_pressure, 1.0 / EXPONENT)) / LAPSE_RATE
     if height > TROPOPAUSE:

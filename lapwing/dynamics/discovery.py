@@ -12,35 +12,35 @@ T = TypeVar("T")
 
 
 def names(package: ModuleType | str) -> list[str]:
-    """Names of the modules of a package, sorted; those that begin with _ are left out. Imports none of them."""
+    """Return the sorted names of a package's modules without a leading _, without importing them."""
     return list(_names(_dotted(package)))
 
 
 def modules(package: ModuleType | str) -> dict[str, ModuleType]:
-    """The modules of a package by name, sorted; those that begin with _ are left out. Imports all of them."""
+    """Import a package's modules without a leading _. Return them by name, sorted."""
     return {name: _module(_dotted(package), name) for name in names(package)}
 
 
 def get(package: ModuleType | str, name: str, what: str) -> ModuleType:
-    """One module of a package; imports no other.
+    """Return a module of a package, importing no other.
 
     Args:
         package: the package, or its dotted name.
-        name: of the module.
-        what: what such a module is called in an error message, in the singular: "effect".
+        name: name of the module.
+        what: kind of the module in error messages, in the singular: "effect".
 
     Raises:
         ValueError: "unknown effect 'gravty'; did you mean gravity? (effects: ...)".
     """
-    found = names(package)
-    return _module(_dotted(package), choose(dict(zip(found, found, strict=True)), name, what))
+    result = names(package)
+    return _module(_dotted(package), choose(dict(zip(result, result, strict=True)), name, what))
 
 
 def choose(choices: Mapping[str, T], name: str, what: str) -> T:
-    """The entry of that name.
+    """Return the entry of a name.
 
     Raises:
-        ValueError: there is none; the message has the form that `get` gives.
+        ValueError: it does not exist; the message has the form of `get`.
     """
     if name in choices:
         return choices[name]

@@ -1,4 +1,4 @@
-"""Where and when a vehicle flies: the place on the Earth, the air, gravity, the magnetic field and the ground."""
+"""Environment of a flight: place, atmosphere, gravity, magnetic field and terrain."""
 
 import datetime
 from typing import Any, NamedTuple
@@ -15,7 +15,7 @@ DIGITS = 10  # of a field in tesla: a tenth of a nanotesla, as the model's table
 
 
 class Environment(NamedTuple):
-    """What all services of a run agree on; the defaults are those of a scene that says nothing."""
+    """Environment shared by all services of a run; the defaults are those of a scene without `[environment]`."""
 
     home: Home = Home()
     atmosphere: Atmosphere = Atmosphere()
@@ -25,10 +25,10 @@ class Environment(NamedTuple):
 
 
 def magnetic_field(home: Home, date: datetime.date) -> Vec3:
-    """The Earth's field at home [T], east, north, up, by the World Magnetic Model of that time.
+    """Return the Earth's field at home [T], east, north, up, by the World Magnetic Model.
 
     Args:
-        home: a place on the Earth.
+        home: place on the Earth.
         date: from FIRST_YEAR to LAST_YEAR.
     """
     from pygeomag import GeoMag
@@ -36,8 +36,8 @@ def magnetic_field(home: Home, date: datetime.date) -> Vec3:
     first = datetime.date(date.year, 1, 1)
     year = date.year + (date - first).days / (datetime.date(date.year + 1, 1, 1) - first).days
     model = GeoMag(base_year=date.year)
-    found = model.calculate(home.latitude_deg, home.longitude_deg, home.height / 1000.0, year)
-    return round(found.y * TESLA, DIGITS), round(found.x * TESLA, DIGITS), round(-found.z * TESLA, DIGITS)
+    result = model.calculate(home.latitude_deg, home.longitude_deg, home.height / 1000.0, year)
+    return round(result.y * TESLA, DIGITS), round(result.x * TESLA, DIGITS), round(-result.z * TESLA, DIGITS)
 
 
 STANDARD = Environment()

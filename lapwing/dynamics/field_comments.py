@@ -1,6 +1,6 @@
-"""What the class that declares a table says of its keys in comments.
+"""Units and descriptions of a table's keys from the comments of its class.
 
-The unit and the meaning of a key stand in the comment behind its field (`# [m] of one foot`), and nowhere else.
+The comment behind a field (`# [m] of one foot`) is their only source.
 """
 
 import ast
@@ -16,30 +16,30 @@ _UNITS = re.compile(r"\[[^\]]+\](, \[[^\]]+\])*")
 
 
 def comments(cls: type) -> dict[str, str]:
-    """The comment behind each field of a class, those of its bases included, without the #."""
-    found: dict[str, str] = {}
+    """Return the comment behind each field of a class and its bases, without the #."""
+    result: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         if base.__module__ not in ("builtins", "pydantic.main"):
-            found |= _in_module(sys.modules[base.__module__]).get(base.__name__, {})
-    return found
+            result |= _in_module(sys.modules[base.__module__]).get(base.__name__, {})
+    return result
 
 
 @cache
 def _in_module(module: ModuleType) -> dict[str, dict[str, str]]:
-    """The comments of every class of a module by its name, by field."""
+    """Return the comments of all classes of a module by class name and field."""
     source = inspect.getsource(module)
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     lines = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
-    found: dict[str, dict[str, str]] = {}
+    result: dict[str, dict[str, str]] = {}
     for node in ast.parse(source).body:
         if isinstance(node, ast.ClassDef):
             fields = [f for f in node.body if isinstance(f, ast.AnnAssign) and isinstance(f.target, ast.Name)]
-            found[node.name] = {f.target.id: lines[f.end_lineno] for f in fields if f.end_lineno in lines}  # type: ignore
-    return found
+            result[node.name] = {f.target.id: lines[f.end_lineno] for f in fields if f.end_lineno in lines}  # type: ignore
+    return result
 
 
 def split(comment: str) -> tuple[str, str]:
-    """The unit and the meaning that a comment states; the unit comes first in it."""
+    """Return unit and description of a comment, which starts with the unit."""
     first = _UNITS.match(comment)
     if not first:
         return "", comment

@@ -24,12 +24,12 @@ _LN_2 = math.log(2.0)
 
 
 def stream_key(seed: int, vehicle: str, stream: str) -> Key:
-    """Key of one stream of random numbers: the first 64 bits of BLAKE2b over the three names.
+    """Return the key of a stream of random numbers: the first 64 bits of BLAKE2b over the three names.
 
     Args:
-        seed: of the scene, any integer.
-        vehicle: name of the vehicle, or "" for what all vehicles share.
-        stream: who draws, e.g. "imu" or "wind".
+        seed: any integer, from the scene.
+        vehicle: name of the vehicle, or "" for streams shared by all vehicles.
+        stream: name of the stream, e.g. "imu" or "wind".
     """
     # The separator cannot be mistaken for a part of a name: ("a", "bc") and ("ab", "c") differ.
     text = "\0".join((str(int(seed)), vehicle, stream))
@@ -39,7 +39,7 @@ def stream_key(seed: int, vehicle: str, stream: str) -> Key:
 
 @always_inline
 def philox(c0, c1, c2, c3, k0, k1):
-    """Philox 4x32-10: four random words of 32 bits from a counter of four and a key of two (all as uint64)."""
+    """Return four random words of 32 bits by Philox 4x32-10, from a counter of four and a key of two, all uint64."""
     for _ in range(10):
         p0 = _MULTIPLIER_0 * c0
         p1 = _MULTIPLIER_1 * c2
@@ -51,33 +51,33 @@ def philox(c0, c1, c2, c3, k0, k1):
 
 @always_inline
 def words(key, tick, lane):
-    """The four random words of 32 bits at (tick, lane), as uint64."""
+    """Return the four random words of 32 bits at (tick, lane), as uint64."""
     t = np.uint64(tick)
     return philox(t & _MASK, t >> _SHIFT, np.uint64(lane), np.uint64(0), np.uint64(key[0]), np.uint64(key[1]))
 
 
 @always_inline
 def _unit(word):
-    """Centre of the word's cell in (0, 1): symmetric about 1/2, never 0 or 1."""
+    """Return the centre of the word's cell in (0, 1): symmetric about 1/2, never 0 or 1."""
     return (np.float64(word) + 0.5) * _TWO_TO_MINUS_32
 
 
 @kernel
 def uniform4(key, tick, lane):
-    """Four independent draws from the uniform distribution on (0, 1)."""
+    """Return four independent draws from the uniform distribution on (0, 1)."""
     w = words(key, tick, lane)
     return _unit(w[0]), _unit(w[1]), _unit(w[2]), _unit(w[3])
 
 
 @kernel
 def uniform(key, tick, lane):
-    """One draw from the uniform distribution on (0, 1)."""
+    """Return one draw from the uniform distribution on (0, 1)."""
     return _unit(words(key, tick, lane)[0])
 
 
 @always_inline
 def _log(x):
-    """Natural logarithm of a positive normal number: exponent and mantissa, then 2 artanh((m - 1)/(m + 1))."""
+    """Return natural logarithm of a positive normal number: exponent and mantissa, then 2 artanh((m - 1)/(m + 1))."""
     m, e = math.frexp(x)  # m in [1/2, 1)
     if m < 0.7071067811865476:
         m *= 2.0
@@ -121,7 +121,7 @@ _TAIL = (
 
 @kernel
 def normal_quantile(p):
-    """Inverse of the standard normal distribution function for p in (0, 1) (AS 241)."""
+    """Return the inverse of the standard normal distribution function for p in (0, 1) (AS 241)."""
     q = p - 0.5
     if abs(q) <= 0.425:
         r = 0.180625 - q * q
@@ -138,12 +138,12 @@ def normal_quantile(p):
 
 @kernel
 def normal(key, tick, lane):
-    """One draw from the standard normal distribution."""
+    """Return one draw from the standard normal distribution."""
     return normal_quantile(_unit(words(key, tick, lane)[0]))
 
 
 @kernel
 def normal3(key, tick, lane):
-    """Three independent draws from the standard normal distribution, as a vector."""
+    """Return three independent draws from the standard normal distribution, as a vector."""
     w = words(key, tick, lane)
     return normal_quantile(_unit(w[0])), normal_quantile(_unit(w[1])), normal_quantile(_unit(w[2]))

@@ -17,15 +17,17 @@ from numba.core import types
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
+from lapwing.dynamics import rate_control, vector
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import AnyMassProperties, PerRotor
 from lapwing.dynamics.vehicles import multirotor_stepper
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState, seen
-from lapwing.kernels import always_inline, kernel, vectorise_loops
+from lapwing.kernels import always_inline, kernel, math, vectorise_loops
 from lapwing.kernels.codegen import compile_source, map_index, overload_for
 from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
 
 WIDTH = 16  # members in a block
+LARGEST_TURN = 0.25  # [rad] in a step, beyond which no method keeps its accuracy
 
 
 class Member(NamedTuple):
@@ -33,20 +35,20 @@ class Member(NamedTuple):
 
     motion: Any
     memory: tuple
-    body: AnyMassProperties  # of this exchange interval
+    body: AnyMassProperties  # of this communication step
     voltage: PerRotor  # [V]
-    start: float  # [s] of this exchange interval
+    start: float  # [s] of this communication step
     parameters: MultirotorParameters
 
 
 def member(parameters: MultirotorParameters, state: MultirotorState) -> Member:
-    """A member before its first step."""
+    """Return a member before its first step."""
     off = (0.0,) * len(parameters.layout.x_body)
     return Member(state.motion, state.memory, parameters.body, off, 0.0, parameters)
 
 
 def blocks(members: int, like: Member) -> np.ndarray:
-    """Memory for so many members, shape (blocks, columns, WIDTH)."""
+    """Return memory for a number of members, shape (blocks, columns, WIDTH)."""
     return np.zeros((-(-members // WIDTH), row_width(like), WIDTH))
 
 
@@ -56,8 +58,8 @@ def put(memory: np.ndarray, index: int, value: Member) -> None:
 
 
 @vectorise_loops
-def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count):
-    """Advance the members of the blocks `first` to before `last` by `count` exchange intervals.
+def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count, rates=None, setpoints=None):
+    """Advance the members of the blocks `first` to before `last` by `count` communication steps.
 
     Args:
         method: `Method()` of an integrator's module.
@@ -68,16 +70,20 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
         ticks: of each member's exchange, shape (members,); advanced.
         commands: [V] of each motor, shape (members, rotors).
         h: [s] step.
-        n: steps in an exchange interval.
+        n: steps in a communication step.
         first: block.
         last: block after the last.
-        count: exchange intervals.
+        count: communication steps.
+        rates: a RateController that overwrites the commands at each communication step; None: there is none.
+        setpoints: of it, thrust [N] and body rates [rad/s], shape (members, 4).
     """
     for block in range(first, last):
         base = block * columns * WIDTH
         for _ in range(count):
             for lane in range(WIDTH):
                 m = block * WIDTH + lane
+                if rates is not None:
+                    rate_control.command(rates, memory, base + lane, WIDTH, setpoints, commands, m)
                 _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
                 ticks[m] += 1
             split, alike = _parts(like, memory, base, h), True
@@ -91,6 +97,54 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
             for lane in range(WIDTH if i < n * split else 0):
                 split = _parts(like, memory, base + lane, h)
                 _finish(method, like, memory, base + lane, n * h, h / split, i, n * split)
+
+
+@kernel
+def mark_invalid(memory, columns, motion, step, valid, first, last):
+    """Clear `valid` of members of the blocks `first` to before `last` that are not finite, or turn too fast for a step.
+
+    Args:
+        memory: of `blocks`, flat.
+        columns: of a block.
+        motion: columns of the motion.
+        step: [s] of the integrator.
+        valid: shape (members,) of bool, changed.
+        first: block.
+        last: block after the last.
+    """
+    for m in range(first * WIDTH, last * WIDTH):
+        at = (m // WIDTH) * columns * WIDTH + m % WIDTH
+        finite = True
+        for k in range(motion):
+            finite = finite and math.isfinite(memory[at + k * WIDTH])
+        turn = rate_control.omega_body(memory, at, WIDTH)
+        if not (finite and vector.norm(turn) * step <= LARGEST_TURN):
+            valid[m] = False
+
+
+@kernel
+def advance_along(method, like, memory, columns, keys, ticks, commands, motions, trace, h, n, first, last):
+    """Advance the members of the blocks `first` to before `last` under commands that change each exchange interval.
+
+    See `advance` for the other arguments.
+
+    Args:
+        commands: [V] of each motor, shape (intervals, members, rotors).
+        motions: first columns of each member to set before each interval, shape (intervals, members, width); shape
+            (0, 0, 0) to leave them alone.
+        trace: first columns of each member after each interval, shape (intervals, members, width); written.
+    """
+    for block in range(first, last):
+        base = block * columns * WIDTH
+        for k in range(len(commands)):
+            if len(motions) > 0:
+                for column in range(motions.shape[2]):
+                    for lane in range(WIDTH):
+                        memory[base + column * WIDTH + lane] = motions[k, block * WIDTH + lane, column]
+            advance(method, like, memory, columns, keys, ticks, commands[k], h, n, block, block + 1, 1)
+            for column in range(trace.shape[2]):
+                for lane in range(WIDTH):
+                    trace[k, block * WIDTH + lane, column] = memory[base + column * WIDTH + lane]
 
 
 @always_inline
@@ -113,7 +167,7 @@ def _begin(like, memory, at, key, tick, commands, member, interval):
 
 @always_inline
 def _all_asleep(like, memory, base, h):
-    """Can no member of a block be reached by an effect that sleeps?"""
+    """Return True if no sleeping effect can reach a member of a block."""
     awake = 0
     for lane in range(WIDTH):
         m = take(like, memory, base + lane)
@@ -131,7 +185,7 @@ def _airborne_step(method, like, memory, at, i, h):
 
 @kernel
 def _finish(method, like, memory, at, interval, h, first, n):
-    """The rest of an exchange interval of one member, by itself."""
+    """Integrate the rest of a communication step of one member alone."""
     m = take(like, memory, at)
     drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
     give(multirotor_stepper.steps(method, drive, m.motion, m.start, m.start + interval, h, first, n), memory, at)
@@ -139,7 +193,7 @@ def _finish(method, like, memory, at, interval, h, first, n):
 
 @intrinsic
 def _peek(context, array, index):
-    """array[index] without a look whether the index is negative."""
+    """Return array[index] without a check for a negative index."""
 
     def loaded(context, builder, sig, args):
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
@@ -160,7 +214,7 @@ def _poke(context, array, index, value):
 
 
 def take(like: Any, memory: np.ndarray, at: int) -> Any:
-    """The tree of the type of `like` whose numbers stand `WIDTH` apart from `at` on."""
+    """Return a tree with the type of `like` from numbers `WIDTH` apart, starting at `at`."""
     raise NotImplementedError("compiled code only")
 
 

@@ -1,4 +1,4 @@
-"""What pydantic finds wrong with a table, as a `ConfigError` in the words of a user."""
+"""Conversion of pydantic's validation errors into `ConfigError`."""
 
 import types
 from collections.abc import Sequence
@@ -20,14 +20,14 @@ LONGEST = 60  # characters of a wrong value that are shown
 
 
 def fault(error: ValidationError, model: type) -> ConfigError:
-    """The most telling of the faults that pydantic found.
+    """Return the most informative of pydantic's errors.
 
     Args:
-        error: of validating a table as `model`.
-        model: a pydantic model, or a NamedTuple.
+        error: error of validating a table as `model`.
+        model: pydantic model or NamedTuple.
 
     Returns:
-        The fault, its key relative to the table.
+        The error, with a key relative to the table.
     """
     # A misspelt key also leaves another one missing: name the misspelling.
     first: Any = min(error.errors(), key=lambda e: e["type"] not in UNKNOWN_KEY)
@@ -47,7 +47,7 @@ def fault(error: ValidationError, model: type) -> ConfigError:
 
 
 def _unit(model: type, location: Sequence[str | int]) -> str:
-    """ " [m/s]" where the class that declares the key at a location states its unit; "" where it does not."""
+    """Return " [m/s]" for the unit in the comment of the key at a location; "" without one."""
     path = list(location)
     while path and isinstance(path[-1], int):  # of a list the unit is that of all its numbers
         path.pop()
@@ -81,7 +81,7 @@ def _short(value: Any) -> str:
 
 
 def keys(hint: Any) -> list[str]:
-    """The keys of the table that an annotation stands for, as far as it is one."""
+    """Return the keys of the table of an annotation."""
     for member in _members(hint):
         if isinstance(member, type) and issubclass(member, BaseModel):
             return list(member.model_fields)
@@ -91,7 +91,7 @@ def keys(hint: Any) -> list[str]:
 
 
 def follow(hint: Any, location: Sequence[str | int]) -> Any:
-    """The annotation at a location within what `hint` stands for, None where it cannot be followed."""
+    """Return the annotation at a location within `hint`. Return None if there is none."""
     if not location:
         return hint
     part, *rest = location
@@ -119,14 +119,14 @@ def _inner(hint: Any, part: str | int) -> Any:
 
 
 def _annotation(field: FieldInfo | None) -> Any:
-    """A field's annotation with its bounds."""
+    """Return a field's annotation with its bounds."""
     if field is None or not field.metadata:
         return field and field.annotation
     return Annotated[(field.annotation, *field.metadata)]  # type: ignore[return-value]
 
 
 def _members(hint: Any) -> list[Any]:
-    """What a value may be: the members of a union, or the annotation itself; without bounds and None."""
+    """Return the possible types: the members of a union, or the annotation itself, without bounds and None."""
     if get_origin(hint) is Annotated:
         return _members(get_args(hint)[0])
     if get_origin(hint) in (Union, types.UnionType):
@@ -135,7 +135,7 @@ def _members(hint: Any) -> list[Any]:
 
 
 def describe(hint: Any) -> str:
-    """What an annotation asks for, in words, for example "a number above 0 and at most 1"."""
+    """Describe the values of an annotation, for example "a number above 0 and at most 1"."""
     bounds: list[str] = []
     if get_origin(hint) is Annotated:
         hint, *metadata = get_args(hint)

@@ -17,55 +17,55 @@ IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @always_inline
 def add(a, b):
-    """a + b."""
+    """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @always_inline
 def subtract(a, b):
-    """a - b."""
+    """Return a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @always_inline
 def scale(s, a):
-    """s a for a scalar s."""
+    """Return s a for a scalar s."""
     return (s * a[0], s * a[1], s * a[2])
 
 
 @always_inline
 def multiply(a, b):
-    """Element by element."""
+    """Multiply element by element."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
 @always_inline
 def divide(a, b):
-    """Element by element."""
+    """Divide element by element."""
     return (a[0] / b[0], a[1] / b[1], a[2] / b[2])
 
 
 @always_inline
 def dot(a, b):
-    """a . b."""
+    """Return a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @always_inline
 def cross(a, b):
-    """a x b."""
+    """Return a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @always_inline
 def norm(a):
-    """Euclidean length."""
+    """Return the Euclidean length."""
     return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
 
 
 @always_inline
 def apply(m, a):
-    """m a for a 3x3 matrix m in row order."""
+    """Return m a for a 3x3 matrix m in row order."""
     return (
         m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
         m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
@@ -75,7 +75,7 @@ def apply(m, a):
 
 @always_inline
 def apply_transposed(m, a):
-    """transpose(m) a for a 3x3 matrix m in row order."""
+    """Return the transpose(m) a for a 3x3 matrix m in row order."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
         m[1] * a[0] + m[4] * a[1] + m[7] * a[2],
@@ -85,7 +85,7 @@ def apply_transposed(m, a):
 
 @always_inline
 def matmul(m, n):
-    """m n for 3x3 matrices in row order."""
+    """Return m n for 3x3 matrices in row order."""
     return (
         m[0] * n[0] + m[1] * n[3] + m[2] * n[6],
         m[0] * n[1] + m[1] * n[4] + m[2] * n[7],
@@ -101,11 +101,11 @@ def matmul(m, n):
 
 @always_inline
 def transpose(m):
-    """Transpose of a 3x3 matrix in row order."""
+    """Return the transpose of a 3x3 matrix in row order."""
     return (m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8])
 
 
 @always_inline
 def pair(_, a, b):
-    """(a, b), for `each` of two tuples."""
+    """Return (a, b), for `map_tuple` of two tuples."""
     return a, b

@@ -1,7 +1,7 @@
-"""Cells keep a state tree on the compiled side, so that Python does not take it apart and rebuild it at every call.
+"""Cells: mutable boxes that keep a state tree on the compiled side, so that Python does not rebuild it at every call.
 
-Handing a NamedTuple of a hundred numbers to a compiled function costs ten microseconds, a cell less than one. Cells are
-made, read and written without compiling anything (`lapwing.kernels.native_memory`).
+Passing a NamedTuple of a hundred numbers to a compiled function takes ten microseconds, a cell less than one. Cells are
+created, read and written without compilation (`lapwing.kernels.native_memory`).
 """
 
 from collections.abc import Hashable, Sequence
@@ -19,24 +19,24 @@ from lapwing.kernels.type_fingerprint import UnknownError, structure
 
 @structref.register
 class CellType(types.StructRef):
-    """Numba's type of a cell."""
+    """The numba type of a cell."""
 
     def preprocess_fields(self, fields):
-        """Literal types would make a cell of one value a type of its own."""
+        """Remove literal types, which would create a separate cell type for every constant."""
         return tuple((name, types.unliteral(of)) for name, of in fields)
 
     @property
     def key(self) -> Any:
-        """Numba's own is text in which two classes of one name and fields are the same."""
+        """Key of the type. Numba's own key is text that is equal for two classes with equal names and fields."""
         return self._fields
 
     def __hash__(self) -> int:
-        if self._hash is None:  # a type of hundreds of numbers is looked up again and again
+        if self._hash is None:  # types of hundreds of numbers are looked up often
             self._hash = super().__hash__()
         return self._hash
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without the hash, which is another one in every process."""
+        """Return the state without the hash, which differs between processes."""
         return {name: value for name, value in vars(self).items() if name != "_hash"}
 
     _hash: int | None = None
@@ -49,15 +49,15 @@ class _Form:
     kind: types.Type  # of the value
     cell: CellType
     layout: Layout
-    flattener: Flattener | None = None  # once there is more than one such cell: it is written for them
+    flattener: Flattener | None = None  # generated when a second cell of the structure is created
 
 
 _forms: dict[Hashable, _Form] = {}  # by structure
-_by_classes: dict[Hashable, list[_Form]] = {}  # by the classes at the top, which are found at once
+_by_classes: dict[Hashable, list[_Form]] = {}  # by the top-level classes, for a fast lookup
 
 
 def _form(value: Any) -> tuple[_Form, Sequence[Any]]:
-    """Return the form of a cell of this value, and the leaves of the value."""
+    """Return the form of a cell for this value, and the leaves of the value."""
     top: Any = (type(value), *map(type, value)) if isinstance(value, tuple) else type(value)
     for form in _by_classes.get(top, ()):
         assert form.flattener is not None
@@ -83,14 +83,14 @@ class Cell(structref.StructRefProxy):
     """A mutable box around one value: `cell.value` in compiled code.
 
     Attributes:
-        memory: where compiled code has it.
+        memory: the native memory of the value.
     """
 
     memory: Memory
 
     def __new__(cls, value: Any) -> "Cell":
         """Return a cell that holds `value`: a number, array or cell, or a tuple or NamedTuple of these."""
-        # numba's own constructor would be compiled in every process, and for every type of value
+        # numba's constructor would be compiled in every process for every type of value
         form, parts = _form(value)
         memory = Memory(form.kind, parts, form.layout)
         cell = cls._numba_box_(form.cell, memory.count)
@@ -107,9 +107,9 @@ def read(cell: Cell) -> Any:
 
 
 def write(cell: Cell, value: Any) -> None:
-    """Give a cell another value, of the type of the one that it holds.
+    """Store a value of the same type in a cell.
 
     Raises:
-        TypeError: it is of another type.
+        TypeError: the value has another type.
     """
     cell.memory.write(value)

@@ -1,7 +1,7 @@
-"""Functions whose source is written for the types of their arguments: straight-line code instead of loops over tuples.
+"""Functions whose source is generated for the types of their arguments: straight-line code instead of tuple loops.
 
-A kernel can neither index a tuple of unlike members by a variable nor choose a function by a class; such calls are
-written out as text when it is compiled, and cost nothing when it runs. All text that `dynamics` runs as code is here.
+A kernel can neither index a tuple of mixed types by a variable nor select a function by a class. The source of such
+calls is generated at compile time and has no cost at run time. All generated source of `dynamics` is compiled here.
 """
 
 import inspect
@@ -17,12 +17,12 @@ from lapwing.kernels import uncached
 
 
 def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
-    """A function from source text.
+    """Compile a function from source text.
 
     Args:
         signature: "name(arguments)".
-        names: what the body may refer to.
-        lines: of the body.
+        names: objects that the body may refer to.
+        lines: statements of the body.
     """
     scope = dict(names)
     exec("\n    ".join([f"def {signature}:", *lines]), scope)
@@ -32,15 +32,15 @@ def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Cal
 def generated_overload(
     signature: str, generate: Callable[..., Callable], doc: str, *, inline: bool = False
 ) -> Callable:
-    """A function for compiled code that `generate` makes anew for every combination of argument types.
+    """Return a function for compiled code that `generate` creates for every combination of argument types.
 
-    Called from Python, the same generated code runs uncompiled: slow, for tests and set-up.
+    Called from Python, the generated code runs uncompiled, which is slow: use it in tests and configuration only.
 
     Args:
         signature: "name(arguments)".
-        generate: takes the numba types of the arguments, returns a function of that signature.
-        doc: its docstring.
-        inline: always into its caller.
+        generate: maps the numba types of the arguments to a function of that signature.
+        doc: docstring of the function.
+        inline: True to inline the function into every caller.
     """
     name = signature.partition("(")[0]
 
@@ -54,13 +54,14 @@ def generated_overload(
 
 
 def overload_for(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:
-    """Decorates what takes the numba types of a function's arguments and gives its implementation in compiled code.
+    """Return a decorator that registers a generator as the implementation of `function` in compiled code.
 
-    That is a function of the same arguments, or better, where there is one, a kernel: nothing more to compile.
+    The generator maps the numba types of the arguments to a function of the same arguments. Return an existing kernel
+    where there is one: it needs no further compilation.
 
     Args:
-        function: what stands in the source of kernels; it is not called in them.
-        inline: always into its caller, where a kernel does not say itself whether it is.
+        function: placeholder that kernels name in their source; compiled code never calls it.
+        inline: True to inline the implementation into every caller, unless a kernel declares this itself.
     """
 
     def decorate(choose: Callable[..., Callable]) -> Callable:
@@ -96,7 +97,7 @@ def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> 
 
 
 def map_tuple(function: Callable, common: Any, a: tuple, b: tuple) -> tuple:
-    """(function(common, a[0], b[0]), function(common, a[1], b[1]), ...) for tuples of equal length."""
+    """Return (function(common, a[0], b[0]), function(common, a[1], b[1]), ...) for tuples of equal length."""
     return tuple(function(common, x, y) for x, y in zip(a, b, strict=True))
 
 
@@ -107,7 +108,7 @@ def _map_tuple(function, common, a, b):
 
 
 def reduce_tuple(function: Callable, common: Any, value: Any, a: tuple, b: tuple) -> Any:
-    """The value after value = function(common, value, a[0], b[0]), then with a[1] and b[1], and so on."""
+    """Return the result of value = function(common, value, a[i], b[i]) for i = 0, 1, ... in order."""
     for x, y in zip(a, b, strict=True):
         value = function(common, value, x, y)
     return value
@@ -132,7 +133,7 @@ def _any_in_tuple(found):
 
 
 def map_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
-    """(function(*arguments, 0), function(*arguments, 1), ...), one for each entry of the tuple `count`."""
+    """Return (function(*arguments, 0), function(*arguments, 1), ...), one entry for each entry of the tuple `count`."""
     return tuple(function(*arguments, i) for i in range(len(count)))
 
 

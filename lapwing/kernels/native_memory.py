@@ -1,7 +1,7 @@
 """Values in the memory layout of compiled code, written and read by Python without compilation.
 
-Compiled code counts references to the memory of cells and arrays. So memory here belongs to a reference count (numba's
-`MemInfo`) and holds one reference to each array and cell in it.
+Compiled code counts references to the memory of cells and arrays. Therefore each block of memory has a reference count
+(numba's `MemInfo`) and holds one reference to each array and cell in it.
 """
 
 # numba.core.types fills itself at import
@@ -22,26 +22,26 @@ from numba.np.numpy_support import as_dtype
 
 from lapwing.kernels.tree_flatten import leaves
 
-ARRAY, CELL = "PPqqP", "P"  # of an array before its shape and strides: count, owner, items, size of one, place; a count
+ARRAY, CELL = "PPqqP", "P"  # fields of an array before shape and strides: count, owner, items, item size, address
 
 
 class Layout(NamedTuple):
     """Memory layout of the values of a type."""
 
-    format: str  # of the module `struct`
+    format: str  # format of the module `struct`
     alignment: int  # [bytes]
-    counted: tuple[int, ...]  # of the values in the format, those that are pointers to counts
-    values: int  # how many there are
+    counted: tuple[int, ...]  # indices of the values in the format that point to reference counts
+    values: int  # number of values
     leaves: int  # of the value
-    others: tuple[int, ...]  # of the leaves, those that are no numbers
+    others: tuple[int, ...]  # indices of the leaves that are not numbers
 
 
 @cache
 def layout(kind: types.Type) -> Layout:
-    """The layout of a numba type.
+    """Return the layout of a numba type.
 
     Raises:
-        TypeError: Python cannot put such a value there.
+        TypeError: Python cannot write such a value.
     """
     if isinstance(kind, types.Boolean):
         return Layout("?", 1, (), 1, 1, ())
@@ -57,7 +57,7 @@ def layout(kind: types.Type) -> Layout:
     if isinstance(kind, types.Array):
         return Layout(f"{ARRAY}{2 * kind.ndim}q", 8, (0,), len(ARRAY) + 2 * kind.ndim, 1, (0,))
     if not isinstance(kind, types.BaseTuple):
-        raise TypeError(f"compiled code is handed numbers, arrays, tuples and NamedTuples only, not {kind}")
+        raise TypeError(f"expected numbers, arrays, tuples or NamedTuples for compiled code, got {kind}")
     parts = [layout(part) for part in kind]
     alignment = max((part.alignment for part in parts), default=1)
     align = {1: "", 2: "0h", 4: "0i", 8: "0q"}[alignment]
@@ -81,8 +81,8 @@ class Memory:
     """The memory of one value of a numba type.
 
     Attributes:
-        pointer: to the count of its users, which is what stands for it in compiled code.
-        count: the same for numba; as long as it is there, the memory is.
+        pointer: address of the reference count; compiled code identifies the memory by it.
+        count: numba's object for the reference count, which keeps the memory alive.
     """
 
     def __init__(self, kind: types.Type, leaves: Sequence[Any], lies: Layout):
@@ -93,14 +93,14 @@ class Memory:
         self.count = counted._MemInfo(self.pointer)
 
     def read(self) -> Any:
-        """The value, its arrays as copies."""
+        """Return the value with copies of its arrays."""
         return _read(self._block.kind, iter(self._block.numbers()))
 
     def write(self, value: Any) -> None:
-        """Put another value of the same type.
+        """Store another value of the same type.
 
         Raises:
-            TypeError: it is of another type.
+            TypeError: the value has another type.
         """
         if numba.typeof(value) != self._block.kind:
             raise TypeError(f"expected a value of type {self._block.kind}, got {numba.typeof(value)}")
@@ -109,7 +109,7 @@ class Memory:
 
 
 class _Block:
-    """Memory of one value; releases its arrays and cells when compiled code releases it."""
+    """Memory of one value, which releases its arrays and cells when compiled code releases the memory."""
 
     def __init__(self, kind: types.Type, lies: Layout, leaves: Sequence[Any]):
         self.kind, self._layout = kind, lies
@@ -126,7 +126,7 @@ class _Block:
         self._struct.pack_into(self._place, 0, *numbers)
 
     def numbers(self) -> tuple:
-        """Return the present contents, flat."""
+        """Return the current contents as a flat tuple."""
         return self._struct.unpack_from(self._place)
 
     def release(self) -> None:
@@ -135,7 +135,7 @@ class _Block:
             numbers = self.numbers()
             for i in self._layout.counted:
                 if numbers[i]:
-                    counted._MemInfo(numbers[i])  # takes the count over, and ends
+                    counted._MemInfo(numbers[i])  # takes over the reference count and then ends
             self._place[:] = [0] * len(self._place)
 
     def __del__(self) -> None:
@@ -165,5 +165,5 @@ def _read(kind: types.Type, numbers: Iterator[Any]) -> Any:
         return np.ndarray(shape, as_dtype(kind.dtype), place, strides=strides).copy()
     number = next(numbers)
     if isinstance(kind, types.StructRef):
-        raise TypeError("a cell is not read through another one")
+        raise TypeError("a cell inside a cell cannot be read; read the inner cell instead")
     return None if isinstance(kind, types.NoneType) else number

@@ -1,8 +1,8 @@
-"""Trees of numbers as rows of a float64 array: how compiled code hands NamedTuples to others.
+"""Trees of numbers packed into rows of a float64 array, the form in which compiled code exchanges NamedTuples.
 
 A tree is a tuple or NamedTuple of floats, integers, booleans and further trees. Every number takes one column, in
-order; booleans are 0 or 1, integers are exact up to 2^53. Functions are compiled from the type of the tree, so that a
-row costs as much as the numbers that are used of it.
+order; booleans are 0 or 1, integers are exact up to 2^53. Functions are generated from the type of the tree, so that
+reading a row costs only the numbers that the caller uses.
 """
 
 # numba.core.types fills itself at import
@@ -24,12 +24,12 @@ from lapwing.kernels.codegen import compile_source
 
 
 def row_width(tree: Any) -> int:
-    """Columns that a tree takes."""
+    """Return the number of columns of a tree."""
     return sum(map(row_width, tree)) if isinstance(tree, tuple) else 1
 
 
 def pack_row(tree: Any) -> np.ndarray:
-    """The numbers of a tree, shape (width,)."""
+    """Return the numbers of a tree as an array of shape (width,)."""
     flat: list[float] = []
 
     def walk(part: Any) -> None:
@@ -44,21 +44,21 @@ def pack_row(tree: Any) -> np.ndarray:
 
 
 def row_unpacker(like: Any) -> Callable[[np.ndarray], Any]:
-    """A function from a row (width,) to the tree of the shape and types of `like` whose numbers stand in it."""
+    """Return a function that unpacks a row (width,) into a tree with the shape and types of `like`."""
     result, names = construction(numba.typeof(like), lambda column: f"numbers[{column}]")
     read = compile_source("read(numbers)", names, f"return {result}")
     return lambda row: read(row.tolist())
 
 
 def columns(like: Any, rows: np.ndarray) -> Any:
-    """The tree of columns of `rows` (n, width): a number becomes (n,), a flat tuple of numbers (n, k)."""
+    """Return the tree of columns of `rows` (n, width): a number becomes (n,), a flat tuple of k numbers (n, k)."""
     return _columns(like, rows, iter(range(rows.shape[1])))
 
 
 def _columns(part: Any, rows: np.ndarray, left: Iterator[int]) -> Any:
-    """Columns of `rows` that belong to this part of the tree, from the next one on.
+    """Return the columns of `rows` for this part of the tree, starting at the next one.
 
-    No inner function: its cycle of references would keep the rows.
+    This is no inner function, because its reference cycle would keep the rows alive.
     """
     if not isinstance(part, tuple):
         return rows[:, next(left)]
@@ -81,18 +81,18 @@ def _kind(tree: types.Type) -> str:
         return "int({})"
     if isinstance(tree, types.Float):
         return "{}"
-    raise TypingError(f"a row holds numbers, tuples and NamedTuples only, not {tree}")
+    raise TypingError(f"expected numbers, tuples or NamedTuples in a row, got {tree}")
 
 
 def construction(tree: types.Type, number: Callable[[int], str]) -> tuple[str, dict[str, Any]]:
-    """Source text that makes a tree of this type from its numbers, and the classes that it names.
+    """Return source text that builds a tree of this type from its numbers, and the classes that it names.
 
     Args:
-        tree: of tuples, NamedTuples and numbers.
-        number: the source text of the number of a column.
+        tree: numba type of tuples, NamedTuples and numbers.
+        number: maps a column to the source text of its number.
 
     Raises:
-        TypingError: something else is in it.
+        TypingError: the tree contains another type.
     """
     names: dict[str, Any] = {}
     column = 0
@@ -113,10 +113,10 @@ def construction(tree: types.Type, number: Callable[[int], str]) -> tuple[str, d
 
 
 def leaves(tree: types.Type, path: str) -> list[str]:
-    """Source text of each number of a tree of this type, which is at `path`, in the order of its columns.
+    """Return the source text of each number of a tree of this type at `path`, in the order of the columns.
 
     Raises:
-        TypingError: something else than tuples, NamedTuples and numbers is in it.
+        TypingError: the tree contains a type other than tuples, NamedTuples and numbers.
     """
     if isinstance(tree, types.BaseTuple):
         return [leaf for k, item in enumerate(tree.types) for leaf in leaves(item, f"{path}[{k}]")]
@@ -125,7 +125,7 @@ def leaves(tree: types.Type, path: str) -> list[str]:
 
 
 def _made(tree: types.Type) -> types.Type:
-    """The type of a tree that is made of the numbers of a row."""
+    """Return the type of a tree that is built from the numbers of a row."""
     if not isinstance(tree, types.BaseTuple):
         _kind(tree)
         return types.int64 if isinstance(tree, types.Integer) else tree
@@ -134,7 +134,7 @@ def _made(tree: types.Type) -> types.Type:
 
 
 def _first(context: Any, builder: Any, signature: Any, row: int, arguments: Sequence[Any]) -> Any:
-    """Return the address of a row: argument `row` is the array, the next one the row number."""
+    """Return the address of a row: argument `row` is the array, the following argument the row index."""
     array = context.make_array(signature.args[row])(context, builder, arguments[row])
     width = cgutils.unpack_tuple(builder, array.shape)[1]
     return builder.gep(array.data, [builder.mul(arguments[row + 1], width)])
@@ -142,8 +142,8 @@ def _first(context: Any, builder: Any, signature: Any, row: int, arguments: Sequ
 
 @intrinsic
 def load(typing_context: Any, like: types.Type, rows: types.Type, i: types.Type) -> tuple[Any, Callable]:
-    """The tree of the type of `like` in row i of `rows` (n, width), contiguous; i is not negative."""
-    # a line of source for each number took a seventh of the time to compile a scene
+    """Return row i >= 0 of `rows` (n, width), contiguous, as a tree of the type of `like`."""
+    # one source line for each number would take a seventh of the compile time of a scene
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Sequence[Any]) -> Any:
         first, column = _first(context, builder, signature, 1, arguments), itertools.count()
@@ -161,7 +161,7 @@ def load(typing_context: Any, like: types.Type, rows: types.Type, i: types.Type)
 
 @intrinsic
 def store(typing_context: Any, tree: types.Type, rows: types.Type, i: types.Type) -> tuple[Any, Callable]:
-    """Put a tree into row i of `rows` (n, width), contiguous; i is not negative."""
+    """Write a tree into row i >= 0 of `rows` (n, width), contiguous."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Sequence[Any]) -> Any:
         first, column = _first(context, builder, signature, 1, arguments), itertools.count()
@@ -177,5 +177,5 @@ def store(typing_context: Any, tree: types.Type, rows: types.Type, i: types.Type
         put(signature.args[0], arguments[0])
         return context.get_dummy_value()
 
-    leaves(tree, "tree")  # of numbers only
+    leaves(tree, "tree")  # numbers only
     return types.none(tree, rows, types.intp), generate

@@ -1,8 +1,8 @@
-"""Four numbers side by side in one vector register: what is the same for four propellers is computed once for them all.
+"""SIMD vectors of four float64, which evaluate equal expressions for four propellers with one instruction each.
 
-Lanes exist in compiled code only. They add, subtract, multiply, divide and negate among themselves and with floats,
-lane by lane and rounded as floats are, so all of `lapwing.dynamics.vector` and the arithmetic of
-`lapwing.dynamics.lie` take them.
+Vectors exist in compiled code only. Sums, differences, products, quotients and negation work lane by lane between
+vectors and with floats, and round like float64. All functions of `lapwing.dynamics.vector` and the arithmetic of
+`lapwing.dynamics.lie` accept them.
 """
 
 # numba.core.types fills itself at import
@@ -26,7 +26,7 @@ VECTOR = ir.VectorType(FLOAT, 4)
 
 
 class Float64x4Type(types.Type):
-    """The numba type of four floats side by side."""
+    """The numba type of a vector of four float64."""
 
     def __init__(self) -> None:
         super().__init__(name="Lanes")
@@ -43,7 +43,7 @@ class _Model(models.PrimitiveModel):
 
 
 def _splat(builder: Any, value: Any) -> Any:
-    """The vector that holds a float in every lane; a vector as it is."""
+    """Return a vector with a float in every lane, or a vector unchanged."""
     if value.type == VECTOR:
         return value
     one = builder.insert_element(ir.Constant(VECTOR, ir.Undefined), value, INDEX(0))
@@ -84,7 +84,7 @@ def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 
 @intrinsic
 def pack4(context, a, b, c, d):
-    """Four floats side by side."""
+    """Return a vector of four floats."""
 
     def made(context, builder, sig, args):
         vector = ir.Constant(VECTOR, ir.Undefined)
@@ -97,13 +97,13 @@ def pack4(context, a, b, c, d):
 
 @intrinsic
 def splat(context, x):
-    """One float in every lane."""
+    """Return a vector with one float in every lane."""
     return signature(LANES, types.float64), lambda context, builder, sig, args: _splat(builder, args[0])
 
 
 @intrinsic
 def unpack4(context, x):
-    """The four floats of x as a tuple."""
+    """Return the four floats of x as a tuple."""
 
     def taken(context, builder, sig, args):
         parts = [builder.extract_element(args[0], INDEX(k)) for k in range(4)]
@@ -114,7 +114,7 @@ def unpack4(context, x):
 
 @intrinsic
 def sqrt(context, x):
-    """The square root of every lane."""
+    """Return the square root of every lane."""
 
     def taken(context, builder, sig, args):
         kind = ir.FunctionType(VECTOR, (VECTOR,))
@@ -125,7 +125,7 @@ def sqrt(context, x):
 
 @intrinsic
 def select(context, flag, a, b):
-    """Lane by lane a where flag is above zero, else b; a and b lanes or floats."""
+    """Return a where flag > 0, else b, lane by lane; a and b are vectors or floats."""
 
     def chosen(context, builder, sig, args):
         zero = ir.Constant(VECTOR, [0.0] * 4)
@@ -136,13 +136,13 @@ def select(context, flag, a, b):
 
 @always_inline
 def select_vector(flag, a, b):
-    """The vector a where flag is above zero, else b."""
+    """Return the vector a if the scalar flag > 0, else the vector b."""
     return (select(flag, a[0], b[0]), select(flag, a[1], b[1]), select(flag, a[2], b[2]))
 
 
 @intrinsic
 def any_above(context, x):
-    """Is any lane above zero?"""
+    """Return True if any lane is above zero."""
 
     def asked(context, builder, sig, args):
         above = builder.fcmp_ordered(">", args[0], ir.Constant(VECTOR, [0.0] * 4))
@@ -159,7 +159,7 @@ def _place(context: Any, builder: Any, array: Any, value: Any, start: Any) -> An
 
 @intrinsic
 def load(context, array, start):
-    """The four numbers of a contiguous array of floats from the `start`-th on, in memory order; not checked."""
+    """Return four consecutive floats of a contiguous array from index `start`, without bounds check."""
 
     def taken(context, builder, sig, args):
         return builder.load(_place(context, builder, sig.args[0], *args), align=8)
@@ -169,7 +169,7 @@ def load(context, array, start):
 
 @intrinsic
 def store(context, array, start, x):
-    """Put x where `load` would take it from."""
+    """Write x to the four floats that `load` would read."""
 
     def put(context, builder, sig, args):
         builder.store(args[2], _place(context, builder, sig.args[0], *args[:2]), align=8)
@@ -180,7 +180,7 @@ def store(context, array, start, x):
 
 @always_inline
 def horizontal_sum(x):
-    """The sum of the four lanes."""
+    """Return the sum of the four lanes."""
     a, b, c, d = unpack4(x)
     return (a + b) + (c + d)
 
@@ -194,7 +194,7 @@ def _interleave(four: Any) -> Callable:
 interleave = generated_overload(
     "interleave(four)",
     _interleave,
-    "The tree of lanes whose lane k holds the numbers of the k-th of four trees of one shape.",
+    "Return the tree of vectors whose lane k holds the numbers of the k-th of four trees of equal shape.",
     inline=True,
 )
 
@@ -211,6 +211,6 @@ def _deinterleave(tree: Any) -> Callable:
 deinterleave = generated_overload(
     "deinterleave(tree)",
     _deinterleave,
-    "The four trees of one lane each of a tree of lanes, as a tuple; the inverse of `interleave`.",
+    "Return the four trees of the lanes of a tree of vectors, as a tuple; the inverse of `interleave`.",
     inline=True,
 )

@@ -1,4 +1,4 @@
-"""Any number of things in groups of four, for the lanes of `lapwing.kernels.simd`."""
+"""Tuples split into chunks of four, for the vectors of `lapwing.kernels.simd`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ def _chunk4(values: Any, filling: Any) -> Callable:
 chunk4 = generated_overload(
     "chunk4(values, filling)",
     _chunk4,
-    "The members of a tuple as a tuple of groups of four, the last one filled up.",
+    "Return the members of a tuple as a tuple of chunks of four; the last chunk is padded.",
     inline=True,
 )
 
@@ -29,6 +29,6 @@ def _unchunk4(groups: Any, values: Any) -> Callable:
 unchunk4 = generated_overload(
     "unchunk4(groups, values)",
     _unchunk4,
-    "The members of groups of four, without the filling, as many as there are `values`; the inverse of `chunk4`.",
+    "Return the members of chunks of four without padding, as many as `values` has; the inverse of `chunk4`.",
     inline=True,
 )

@@ -1,9 +1,9 @@
-"""Operations on states of any shape, written once: a state is a tree of tuples and NamedTuples.
+"""Generic operations on states, which are trees of tuples and NamedTuples of any shape.
 
 A leaf is a float, or an instance of a registered manifold class (`Quaternion`, `Direction`, ...). A tangent has the
 shape of the state with every manifold leaf replaced by the tuple of its tangent coordinates. Each operation is compiled
-from the *type* of the state: the tree is unrolled into straight-line code, so that it costs nothing at run time and is
-kept in the disk cache. Called from Python the same generated code runs uncompiled (slow; for tests and set-up).
+from the *type* of the state: the tree is unrolled into straight-line code, which has no run-time cost and is stored in
+the disk cache. Called from Python, the generated code runs uncompiled (slow; use it in tests and configuration only).
 """
 
 # numba.core.types fills itself at import
@@ -37,7 +37,7 @@ class Manifold(NamedTuple):
 
 MANIFOLDS = DispatchTable()
 NUMBERS: list[type] = [types.Float]
-"""The numba types that are numbers in a tree."""
+"""Return True if a numba type is a number of a tree."""
 
 
 def _leaf_class(tree: types.Type) -> type | None:
@@ -46,9 +46,9 @@ def _leaf_class(tree: types.Type) -> type | None:
 
 
 def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict[str, Any]) -> str:
-    """Source of the tree whose leaves are `rule(leaf class or None for a float, paths, names)`.
+    """Return the source of the tree whose leaves are `rule(leaf class or None for a float, paths, names)`.
 
-    A rule that gives None for a manifold class is asked for each of the numbers stored in it instead.
+    If a rule returns None for a manifold class, it is called for each stored number of that leaf instead.
     """
     if isinstance(tree, tuple(NUMBERS)):
         return rule(None, paths, names)
@@ -58,7 +58,7 @@ def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict
     if isinstance(tree, types.NoneType):
         return "None"
     if not isinstance(tree, types.BaseTuple):
-        raise TypingError(f"a state holds floats, tuples and manifold leaves only, not {tree}")
+        raise TypingError(f"expected floats, tuples or manifold leaves in a state, got {tree}")
     parts = [unroll(part, tuple(f"{a}[{i}]" for a in paths), rule, names) for i, part in enumerate(tree.types)]
     if isinstance(tree, types.BaseNamedTuple):
         name = f"Node{len(names)}"
@@ -68,7 +68,7 @@ def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict
 
 
 def _operation(signature: str, shape: str, body: Callable, doc: str) -> Callable:
-    """The generic function `signature`: its source is `body(type of the argument shape, names)`, one expression."""
+    """Return the generic function `signature` with the source `body(type of the argument shape, names)`."""
     position = signature.rstrip(")").partition("(")[2].split(", ").index(shape)
 
     def generate(*argument_types):
@@ -80,7 +80,7 @@ def _operation(signature: str, shape: str, body: Callable, doc: str) -> Callable
 
 
 def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float: str) -> Callable:
-    """Body that maps a `Manifold` operation over the leaves, and the template `on_float` over the floats."""
+    """Return a body that maps a `Manifold` operation over the leaves and the template `on_float` over the floats."""
 
     def rule(leaf, paths, names):
         if leaf is None:
@@ -93,12 +93,12 @@ def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float:
 
 
 def _of_numbers(paths: tuple[str, ...], template: str) -> Callable:
-    """Body that maps a template over every stored number."""
+    """Return a body that maps a template over every stored number."""
     return lambda tree, names: unroll(tree, paths, lambda leaf, p, _: None if leaf else template.format(*p), names)
 
 
 def _number_paths(tree: types.Type, path: str) -> list[str]:
-    """Expressions of all stored numbers of a tree, in order."""
+    """Return the expressions of all stored numbers of a tree, in order."""
     found: list[str] = []
 
     def rule(leaf, paths, _):
@@ -138,7 +138,7 @@ def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
 def _relative_difference(tree: types.Type, names: dict[str, Any]) -> str:
     names["of_part"] = relative_difference
     found = []
-    for i, part in enumerate(tree.types):  # calls for tuples: the same ones come again and again
+    for i, part in enumerate(tree.types):  # types of tuples are requested often
         if isinstance(part, types.BaseTuple):
             found.append(f"of_part(x[{i}], y[{i}])")
         else:
@@ -153,41 +153,41 @@ def _unflatten(tree: types.Type, names: dict[str, Any]) -> str:
 
 retract = _operation(
     "retract(x, v)", "x", _of_manifold("retract", ("x", "v"), slice(0, 2), "{0} + {1}"),
-    "The state reached from x along the tangent v: group exponential on manifold leaves, x + v on floats.",
+    "Return the state reached from x along the tangent v: group exponential on manifold leaves, x + v on floats.",
 )  # fmt: skip
 embed = _operation(
     "embed(x, v)", "x", _of_manifold("embed", ("x", "v"), slice(0, 2), "{1}"),
-    "Time derivative of the stored numbers of the state x that moves with tangent v.",
+    "Return the time derivative of the stored numbers of the state x that moves with tangent v.",
 )  # fmt: skip
 normalise = _operation(
     "normalise(x)", "x", _of_manifold("normalise", ("x",), slice(0, 1), "{0}"),
-    "The state with every manifold leaf brought back onto its manifold.",
+    "Return the state with every manifold leaf projected onto its manifold.",
 )  # fmt: skip
 bracket = _operation(
     "bracket(x, u, v)", "x", _of_manifold("bracket", ("x", "u", "v"), slice(1, 3), "0.0"),
-    "Lie bracket [u, v] of two tangents at x, signed as `Manifold.bracket`; zero on floats.",
+    "Return the Lie bracket [u, v] of two tangents at x, signed as `Manifold.bracket`; zero on floats.",
 )  # fmt: skip
 transport = _operation(
     "transport(x, u, v)", "x", _of_manifold("transport", ("x", "u", "v"), slice(1, 3), "{2}"),
-    "The tangent v at retract(x, u), parallel-transported back to x.",
+    "Return the tangent v at retract(x, u), parallel-transported back to x.",
 )  # fmt: skip
 axpy = _operation(
     "axpy(a, v, y)", "y", _of_numbers(("v", "y"), "{1} + a * {0}"),
-    "y + a v number by number, for a scalar a; y a tangent, or a state with v its embedded derivative.",
+    "Return y + a v number by number for a scalar a; y is a tangent, or a state with embedded derivative v.",
 )  # fmt: skip
-scale = _operation("scale(a, v)", "v", _of_numbers(("v",), "a * {0}"), "a v for a scalar a and a tangent v.")
-flatten = _operation("flatten(x)", "x", _flatten, "Every stored number of a state or tangent, as one flat tuple.")
-largest = _operation("largest(v)", "v", _largest, "The largest absolute number of a state or tangent.")
+scale = _operation("scale(a, v)", "v", _of_numbers(("v",), "a * {0}"), "Return a v for a scalar a and a tangent v.")
+flatten = _operation("flatten(x)", "x", _flatten, "Return every stored number of a state or tangent as one flat tuple.")
+largest = _operation("largest(v)", "v", _largest, "Return the largest absolute number of a state or tangent.")
 error_ratio = _operation(
     "error_ratio(x, e)", "x", _error_ratio,
-    "Largest component of a tangent e at x, floats relative to 1 + |x|, manifold leaves absolute (rad, rad/s).",
+    "Return the largest component of a tangent e at x, relative to 1 + |x| for floats, absolute for manifold leaves.",
 )  # fmt: skip
 relative_difference = _operation(
     "relative_difference(x, y)", "x", _relative_difference,
-    "The largest difference between stored numbers of two states, relative to 1 + |x|; not of those that are NaN.",
+    "Return the largest difference of stored numbers of two states, relative to 1 + |x|; NaN is ignored.",
 )  # fmt: skip
-finite = _operation("finite(x)", "x", _finite, "True if no number of a state or tangent is NaN or infinite.")
+finite = _operation("finite(x)", "x", _finite, "Return True if all numbers of a state or tangent are finite.")
 unflatten = _operation(
     "unflatten(x, numbers)", "x", _unflatten,
-    "The state of the shape of x that holds `numbers` (a flat tuple or a row of an array); inverse of `flatten`.",
+    "Return the state of the shape of x that holds `numbers` (flat tuple or array row); inverse of `flatten`.",
 )  # fmt: skip

@@ -1,22 +1,22 @@
-"""Fingerprints of Python values: equal fingerprints mean equal numba types, and are found many times faster."""
+"""Fingerprints of Python values: equal fingerprints mean equal numba types, and are faster to compute."""
 
 from typing import Any
 
 import numpy as np
 
 _PLAIN = frozenset({float, bool, type(None), np.float64, np.float32, np.int64, np.int32, np.bool_})
-LONG = 63  # bits; numba may take a longer whole number for another type
+LONG = 63  # [bits] numba may give longer integers another type
 
 
 class UnknownError(TypeError):
-    """A value of which only numba can tell the type."""
+    """Error for a value whose type only numba can determine."""
 
 
 def structure(value: Any) -> Any:
-    """The structure, which can be hashed, of a number, an array, a cell, or a tuple or NamedTuple of such.
+    """Return the hashable structure of a number, an array, a cell, or a tuple or NamedTuple of these.
 
     Raises:
-        UnknownError: it is something else.
+        UnknownError: the value has another type.
     """
     of = type(value)
     if of in _PLAIN:

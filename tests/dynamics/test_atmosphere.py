@@ -33,7 +33,7 @@ def test_published_table(altitude, kelvin, pascal, rho):
 
 @pytest.mark.parametrize("air", [STANDARD, WARM])
 @pytest.mark.parametrize("altitude", [0.0, 280.0, 5000.0, 15_000.0])
-def test_pressure_carries_the_air_above(air, altitude):
+def test_pressure_carries_air_above(air, altitude):
     """dp/dz = -rho g, whatever the day."""
     slope = (pressure(air, altitude + 1.0) - pressure(air, altitude - 1.0)) / 2.0
     gravity = 9.80665 * (6_356_766.0 / (6_356_766.0 + altitude)) ** 2
@@ -48,7 +48,7 @@ def test_altitude_from_pressure_and_back(air, altitude):
     assert density_slope(air, altitude) == pytest.approx(slope, rel=1e-6)
 
 
-def test_a_warm_day_is_thin_and_a_high_pressure_dense():
+def test_warm_day_is_thin_and_high_pressure_dense():
     assert density(WARM, 0.0) == pytest.approx(99_000.0 / (287.05287 * 308.15), rel=1e-12)
     assert temperature(WARM, 15_000.0) == pytest.approx(236.65)
 

@@ -20,13 +20,13 @@ from lapwing.dynamics.config_error import ConfigError
          "a: unknown effect 'x'; expected one of rain, wind"),
     ],
 )  # fmt: skip
-def test_the_line(error, text):
+def test_line(error, text):
     assert str(error) == text
     assert isinstance(error, ValueError)
     assert str(pickle.loads(pickle.dumps(error))) == text
 
 
-def test_a_fault_seen_from_the_table_around_it():
+def test_error_key_gets_prefix_of_its_table():
     inner = ConfigError("rate", "got -1", "a number above 0")
     assert inner.with_prefix("sensors.imu").key == "sensors.imu.rate"
     assert ConfigError("", "excludes b").with_prefix("effects.a").key == "effects.a"

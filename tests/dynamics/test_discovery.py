@@ -30,19 +30,19 @@ def test_names_are_sorted_and_private_modules_left_out(package):
     assert discovery.names(package) == ["broken", "first", "second"]
 
 
-def test_one_module_is_imported_without_the_others(package):
+def test_one_module_is_imported_without_others(package):
     assert discovery.get(package, "first", "thing").VALUE == 1
     assert "discovered.second" not in sys.modules
 
 
 def test_all_modules_come_by_name(package, tmp_path):
     (tmp_path / package / "broken.py").write_text("VALUE = 0")
-    found = discovery.modules(package)
-    assert [(name, m.VALUE) for name, m in found.items()] == [("broken", 0), ("first", 1), ("second", 2)]
-    assert discovery.modules(sys.modules[package]) == found
+    result = discovery.modules(package)
+    assert [(name, m.VALUE) for name, m in result.items()] == [("broken", 0), ("first", 1), ("second", 2)]
+    assert discovery.modules(sys.modules[package]) == result
 
 
-def test_a_module_that_cannot_be_imported_says_so(package):
+def test_failed_import_names_module(package):
     with pytest.raises(ImportError, match="nothing_of_that_name"):
         discovery.modules(package)
 
@@ -55,13 +55,13 @@ def test_a_module_that_cannot_be_imported_says_so(package):
         ("_private", "unknown thing '_private' (things: broken, first, second)"),
     ],
 )
-def test_an_unknown_name_lists_the_choices(package, name, message):
+def test_unknown_name_lists_choices(package, name, message):
     with pytest.raises(ValueError) as raised:
         discovery.get(package, name, "thing")
     assert str(raised.value) == message
 
 
-def test_a_mapping_is_chosen_from_alike():
+def test_mapping_is_chosen_from_alike():
     assert discovery.choose({"a": 1}, "a", "preset") == 1
     with pytest.raises(ValueError, match=r"unknown preset 'b' \(presets: a\)"):
         discovery.choose({"a": 1}, "b", "preset")

@@ -23,10 +23,10 @@ TABLE = [
 @pytest.mark.parametrize(("year", "height", "latitude", "longitude", "north", "east", "down"), TABLE)
 def test_published_values(year, height, latitude, longitude, north, east, down):
     day = datetime.date(int(year), 7, 2) if year % 1.0 else datetime.date(int(year), 1, 1)
-    found = magnetic_field(Home(latitude, longitude, 1000.0 * height), day)
+    result = magnetic_field(Home(latitude, longitude, 1000.0 * height), day)
     # the middle of a year falls between two days: a change of 80 nT a year makes 0.2 nT of half a day
-    assert found == pytest.approx((1e-9 * east, 1e-9 * north, -1e-9 * down), abs=0.3e-9)
+    assert result == pytest.approx((1e-9 * east, 1e-9 * north, -1e-9 * down), abs=0.3e-9)
 
 
-def test_the_default_is_the_field_of_the_default_place_and_day():
+def test_default_is_field_of_default_place_and_day():
     assert magnetic_field(STANDARD.home, datetime.date(2025, 7, 1)) == pytest.approx(STANDARD.magnetic_field_world)

@@ -25,7 +25,7 @@ def test_philox_known_answers(counter, key, expected):
     assert [int(word) for word in result] == [int(word) for word in hexadecimal(expected)]
 
 
-def test_the_tick_fills_64_bits_and_the_lane_the_third_word():
+def test_tick_fills_64_bits_and_lane_third_word():
     key = (0xA4093822, 0x299F31D0)
     tick = 0x85A308D3_243F6A88 - 2**64  # as a signed integer
     expected = noise.philox(*hexadecimal("243f6a88 85a308d3 00000007 00000000"), *hexadecimal("a4093822 299f31d0"))
@@ -73,7 +73,7 @@ def test_streams_are_independent_across_seeds_vehicles_and_names():
     assert np.abs(correlation).max() < 4.5 / np.sqrt(n)
 
 
-def test_keys_are_stable_and_do_not_collide_at_the_seams():
+def test_keys_are_stable_and_do_not_collide_at_seams():
     assert noise.stream_key(1, "drone1", "imu") == noise.stream_key(1, "drone1", "imu")
     assert noise.stream_key(1, "a", "bc") != noise.stream_key(1, "ab", "c")
     assert noise.stream_key(1, "1", "") != noise.stream_key(11, "", "")
@@ -81,7 +81,7 @@ def test_keys_are_stable_and_do_not_collide_at_the_seams():
     assert len(keys) == 400
 
 
-def test_golden_values_pin_the_bits():
+def test_golden_values_pin_bits():
     """Golden, beside the published vectors above: a scene's noise must never change unseen."""
     key = noise.stream_key(42, "drone1", "imu")
     uniform = (0.11378459015395492, 0.6023793310159817, 0.15549789380747825, 0.7433139720233157)

@@ -21,7 +21,7 @@ STAIR = relief(steps=[(1.0, 0.2), (2.0, 0.2), (3.0, -0.9)], step_heading=math.pi
 
 
 @pytest.mark.parametrize("ground", SMOOTH.values(), ids=SMOOTH)
-def test_the_normal_is_that_of_the_gradient(ground):
+def test_normal_is_that_of_gradient(ground):
     h = 1e-6
     for x, y in np.random.default_rng(2).uniform(-3.4, 3.4, (40, 2)):
         rise = [(surface(ground, x + h * a, y + h * b)[0] - surface(ground, x - h * a, y - h * b)[0]) / (2.0 * h)
@@ -36,13 +36,13 @@ def test_the_normal_is_that_of_the_gradient(ground):
 
 
 @pytest.mark.parametrize("ground", [*SMOOTH.values(), BOX, STAIR], ids=[*SMOOTH, "box", "stair"])
-def test_a_place_that_is_no_number_is_under_nothing(ground):
+def test_nan_position_has_no_obstacle(ground):
     nowhere = (math.nan, math.nan, math.nan)
     assert not touch(ground, nowhere)[0] > 0.0
     assert not over_plane(ground, nowhere) <= 0.0
 
 
-def test_a_grid_goes_through_its_points_and_counts_from_home():
+def test_grid_goes_through_its_points_and_counts_from_home():
     heights, ground = GRID["grid"], SMOOTH["grid"]
     assert surface(ground, 0.0, 0.0)[0] == 0.0
     for row, column in ((0, 0), (3, 7), (8, 10)):
@@ -51,7 +51,7 @@ def test_a_grid_goes_through_its_points_and_counts_from_home():
     assert surface(ground, 99.0, 99.0)[1] == pytest.approx((0.0, 0.0, 1.0))
 
 
-def test_the_nearest_face_of_a_box_pushes():
+def test_nearest_face_of_box_pushes():
     c, s = math.cos(0.5), math.sin(0.5)
 
     def at(along, across, z):
@@ -65,14 +65,14 @@ def test_the_nearest_face_of_a_box_pushes():
         at(0.2, -0.45, 0.3): (0.05, (s, -c, 0.0)),
     }
     for place, (depth, normal) in cases.items():
-        found = touch(BOX, place)
-        assert found[0] == pytest.approx(depth)
-        assert found[1] == pytest.approx(normal)
+        result = touch(BOX, place)
+        assert result[0] == pytest.approx(depth)
+        assert result[1] == pytest.approx(normal)
     assert touch(BOX, at(1.01, 0.0, 0.3))[0] < 0.0
     assert touch(BOX, at(0.0, 0.0, 0.71))[0] < 0.0
 
 
-def test_a_cylinder_pushes_out_of_its_wall_and_up():
+def test_cylinder_pushes_out_of_its_wall_and_up():
     pillar = relief(cylinders=[(0.0, 3.0, 0.5, 2.0)])
     depth, normal = touch(pillar, (0.3, 3.4 - 0.01 * 0.8, 1.0))
     assert depth == pytest.approx(0.5 - math.hypot(0.3, 0.392))
@@ -83,7 +83,7 @@ def test_a_cylinder_pushes_out_of_its_wall_and_up():
     assert surface(pillar, 0.0, 3.51)[0] == 0.0
 
 
-def test_a_stair_up_and_down():
+def test_stair_up_and_down():
     heights = [surface(STAIR, x, y)[0] for x, y in ((7.0, 0.5), (0.0, 1.5), (-50.0, 2.5), (0.0, 3.5), (0.0, 500.0))]
     assert heights == pytest.approx([0.0, 0.2, 0.4, -0.5, -0.5])
     for place, outward in (((0.0, 1.01, 0.1), -1.0), ((0.0, 2.99, -0.2), 1.0)):
@@ -93,7 +93,7 @@ def test_a_stair_up_and_down():
 
 
 @pytest.mark.parametrize("ground", [*SMOOTH.values(), BOX, STAIR])
-def test_a_ray_ends_on_the_ground(ground):
+def test_ray_ends_on_ground(ground):
     rng = np.random.default_rng(3)
     for x, y in rng.uniform(-3.0, 3.0, (20, 2)):
         direction = np.array((*rng.normal(0.0, 0.2, 2), -1.0))
@@ -104,14 +104,14 @@ def test_a_ray_ends_on_the_ground(ground):
         assert before[2] > surface(ground, before[0], before[1])[0]
 
 
-def test_a_ray_down_a_slope_in_closed_form():
+def test_ray_down_slope_in_closed_form():
     slope = SMOOTH["slope"]
     assert ray(slope, (1.0, 1.0, 4.0), (0.0, 0.0, -1.0), 100.0) == pytest.approx(4.1)
     assert ray(slope, (0.0, 0.0, 2.0), (0.6, 0.0, -0.8), 100.0) == pytest.approx(2.0 / (0.8 + 0.2 * 0.6))
     assert ray(slope, (0.0, 0.0, 2.0), (0.0, 0.0, -1.0), 1.9) == math.inf
 
 
-def test_nothing_makes_level_ground():
+def test_empty_terrain_is_level_ground():
     assert relief() is LEVEL
     assert surface(LEVEL, 3.0, 4.0) == (0.0, (0.0, 0.0, 1.0))
     assert touch(LEVEL, (1.0, 2.0, -0.5)) == (0.5, (0.0, 0.0, 1.0))

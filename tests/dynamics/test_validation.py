@@ -1,4 +1,4 @@
-"""What pydantic finds, in the words of a user."""
+"""Texts of pydantic's validation errors."""
 
 from typing import Annotated, Literal, NamedTuple
 
@@ -66,7 +66,7 @@ class Tuple(NamedTuple):
         ({"inner": {"share": float("nan")}}, "inner.share: expected a finite number, got nan"),
     ],
 )
-def test_a_model(table, text):
+def test_model(table, text):
     with pytest.raises(ValidationError) as caught:
         Outer.model_validate(table)
     assert str(fault(caught.value, Outer)) == text
@@ -85,13 +85,13 @@ def test_a_model(table, text):
         ({"chrge": 0.5}, f"chrge: unknown key 'chrge'; did you mean charge? expected one of {KEYS}"),
     ],
 )
-def test_a_named_tuple(table, text):
+def test_named_tuple(table, text):
     with pytest.raises(ValidationError) as caught:
         TypeAdapter(Tuple, config=ConfigDict(strict=True)).validate_python(table)
     assert str(fault(caught.value, Tuple)) == text
 
 
-def test_a_long_value_is_cut():
+def test_long_value_is_cut():
     with pytest.raises(ValidationError) as caught:
         Outer.model_validate({"name": list(range(1000))})
     assert len(str(fault(caught.value, Outer))) < 120

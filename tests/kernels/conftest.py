@@ -156,11 +156,11 @@ class Package:
         return subprocess.Popen(command, env=settings, cwd=self.folder, stdout=pipe, stderr=pipe, text=True)
 
     def run(self, statements: str, **environment: str) -> dict[str, Any]:
-        """What such a process says at its end: values, names that it compiled, how many it compiled and loaded."""
+        """Run such a process. Return its values, compiled names, and numbers of compiled and loaded kernels."""
         return self.end(self.start(statements, **environment))
 
     def end(self, process: subprocess.Popen) -> dict[str, Any]:
-        """The same of one that was started."""
+        """Wait for a started process. Return its results as `run` does."""
         out, errors = process.communicate()
         assert (process.returncode, errors) == (0, "")
         return json.loads(out)

@@ -37,7 +37,7 @@ class Right:
 
 
 @pytest.mark.parametrize("value", [2.5, (1, 2.0), Left.Pair(1.0, (2, np.inf)), (), None])
-def test_gives_back_what_it_was_given(value):
+def test_cell_returns_stored_value(value):
     assert read(Cell(value)) == value
 
 
@@ -47,17 +47,17 @@ def test_takes_another_value():
     assert read(cell) == Left.Pair(4.0, (5, 6.0))
 
 
-def test_holds_what_it_is_given_and_not_another_of_its_class_name():
+def test_cell_distinguishes_classes_of_equal_name():
     for value in (Left.Pair(1.0, (2, 3.0)), Right.Pair(4.0, (5, 6.0))):
         assert type(read(Cell(value))) is type(value)
 
 
-def test_types_tell_classes_of_one_name_apart():
+def test_cell_types_differ_for_classes_of_equal_name():
     left, right = (types.NamedTuple((types.float64, types.float64), cls) for cls in (Left.Pair, Right.Pair))
     assert CellType([("value", left)]) == CellType([("value", left)]) != CellType([("value", right)])
 
 
-def test_a_type_takes_no_hash_of_this_process_to_another():
+def test_type_takes_no_hash_of_this_process_to_another():
     kind = CellType([("value", types.float64)])
     assert hash(kind) == hash(kind)
     assert hash(kind) not in kind.__getstate__().values()
@@ -81,7 +81,7 @@ def mixed(rows):
     return Mixed(True, (2.5, False), True, -7, rows, None, (), Left.Pair(1.0, (2, 3.0)), True)
 
 
-def test_memory_is_laid_out_as_the_compiler_does():
+def test_memory_is_laid_out_as_compiler_does():
     kind = typeof(mixed(np.zeros((2, 3))))
     context = cpu_target.target_context
     assert struct.calcsize(layout(kind).format) == context.get_abi_sizeof(context.get_value_type(kind))
@@ -97,14 +97,14 @@ def change(cell):
     )
 
 
-def test_compiled_code_finds_and_changes_what_is_in_it():
+def test_compiled_code_reads_and_writes_cell():
     rows = np.arange(6.0).reshape(2, 3)
     cell = Cell(mixed(rows))
     change(cell)
     assert rows[1, 2] == 8.0
-    found = read(cell)
-    assert (found.rows == rows).all()
-    assert found._replace(rows=None) == mixed(None)._replace(flag=False, inside=(5.0, False), count=-6)
+    result = read(cell)
+    assert (result.rows == rows).all()
+    assert result._replace(rows=None) == mixed(None)._replace(flag=False, inside=(5.0, False), count=-6)
 
 
 class Holder(NamedTuple):
@@ -123,7 +123,7 @@ def with_new_rows(cell):
     cell.value = np.ones(1000)
 
 
-def test_arrays_and_cells_live_as_long_as_somebody_holds_them():
+def test_arrays_and_cells_live_while_referenced():
     rows = np.zeros(1000)
     gone = weakref.ref(rows)
     cell = Cell(rows)

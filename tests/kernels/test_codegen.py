@@ -28,11 +28,11 @@ def all_of(x, y):
     return map_tuple(weighted, 2.0, x, y), map_index(taken, x, x, y), first(x), first(x[1])
 
 
-def test_defines_a_function_of_several_lines():
+def test_defines_function_of_several_lines():
     assert compile_source("f(a, b)", {"one": 1}, "c = a + one", "return c * b")(2, 3) == 9
 
 
-def test_compiled_and_uncompiled_are_the_same():
+def test_compiled_and_uncompiled_are_same():
     x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
     assert (first.__name__, first.__doc__) == ("first", "The first number.")
@@ -48,9 +48,9 @@ def above(_, x, y):
     return x > y
 
 
-def test_any_of_a_tuple():
-    for y, found in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
-        assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == found
+def test_any_of_tuple():
+    for y, result in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
+        assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == result
     assert not any_in_tuple(())
 
 

@@ -1,4 +1,4 @@
-"""What the kernel cache relies on: an implementation stands beside its function, which its users import."""
+"""Assumption of the kernel cache: implementations are in the module of their function, which users import."""
 
 import ast
 from pathlib import Path
@@ -11,7 +11,7 @@ FOUND = [path for path in FILES if "@overload_for(" in path.read_text(encoding="
 
 
 @pytest.mark.parametrize("path", FOUND, ids=lambda path: str(path.relative_to(ROOT)))
-def test_an_implementation_is_in_the_module_of_its_function(path):
+def test_implementation_is_in_module_of_its_function(path):
     tree = ast.parse(path.read_text(encoding="utf-8"))
     functions = [node for node in tree.body if isinstance(node, ast.FunctionDef)]
     calls = [

@@ -1,4 +1,4 @@
-"""What is kept of compiled kernels: found again, never stale, never trusted when damaged, nobody else's business."""
+"""Kernel cache: hits, staleness, damaged entries, isolation."""
 
 import os
 import shutil
@@ -23,7 +23,7 @@ def files(package):
     return sorted(path for path in package.cache.rglob("*") if path.is_file())
 
 
-def test_a_second_process_compiles_nothing(package):
+def test_second_process_compiles_no_kernel(package):
     first, second = package.run(ALL), package.run(ALL)
     assert first["values"] == second["values"] == VALUES
     assert first["compiled"] == len(first["compiling"]) > 0
@@ -44,7 +44,7 @@ def test_a_second_process_compiles_nothing(package):
         (PRODUCT, "plant/inner.py", "GAIN * x", "GAIN - x", {"product": [2.0, 5.0]}),
     ],
 )  # fmt: skip
-def test_an_edit_of_whatever_a_kernel_reaches_compiles_it_anew(package, statements, file, old, new, after):
+def test_edit_of_reachable_source_recompiles(package, statements, file, old, new, after):
     package.run(statements)
     package.edit(file, old, new)
     edited = package.run(statements)
@@ -54,14 +54,14 @@ def test_an_edit_of_whatever_a_kernel_reaches_compiles_it_anew(package, statemen
     assert package.run(statements)["compiled"] == 0  # both versions are kept
 
 
-def test_an_edit_of_what_a_kernel_cannot_reach_compiles_nothing(package):
+def test_edit_of_unreachable_source_compiles_no_kernel(package):
     package.run(OUTER)
     package.edit("plant/law.py", "10.0", "20.0")
     package.edit("plant/factory.py", "n * inner", "n + inner")
     assert package.run(OUTER)["compiled"] == 0
 
 
-def test_what_comes_from_the_disk_brings_the_functions_apart_that_it_calls(package):
+def test_loaded_kernel_contains_its_noinline_functions(package):
     run = """
 from plant.outermost import outermost
 try:
@@ -77,14 +77,14 @@ values["outermost"] = outermost(3.0)
     assert edited["compiling"] == ["plant.outermost.outermost"]
 
 
-def test_a_constant_set_from_outside_counts_as_an_edit(package):
+def test_constant_set_from_outside_counts_as_edit(package):
     package.run(OUTER)
     other = package.run(f"import plant.inner; plant.inner.GAIN = 100.0\n{OUTER}")
     assert other["values"] == {"outer": 301.0}
     assert package.run(OUTER)["values"] == {"outer": 7.0}
 
 
-def test_an_implementation_registered_elsewhere_counts_as_an_edit(package):
+def test_implementation_registered_elsewhere_counts_as_edit(package):
     package.run(TOTAL)
     (package.folder / "other.py").write_text(
         "import plant.law\nfrom lapwing.kernels import always_inline\n\n"
@@ -95,14 +95,14 @@ def test_an_implementation_registered_elsewhere_counts_as_an_edit(package):
     assert package.run(TOTAL)["values"] == {"total": 30.0}
 
 
-def test_a_source_that_changes_while_it_runs_is_not_kept_under_its_new_state(package):
+def test_source_changed_during_run_is_not_stored(package):
     edit = "import plant.outer; open('plant/constants.py', 'w').write('GAIN = 5.0')"
     running = package.run(f"{edit}\n{OUTER}")
     assert running["values"] == {"outer": 7.0}  # it had read the old one
     assert package.run(OUTER)["values"] == {"outer": 16.0}
 
 
-def test_damage_in_any_file_costs_a_compilation(package):
+def test_damage_in_any_file_costs_compilation(package):
     package.run(ALL)
     whole = {path: path.read_bytes() for path in files(package)}
     assert len(whole) > 8
@@ -123,7 +123,7 @@ def test_damage_in_any_file_costs_a_compilation(package):
         assert package.run(ALL)["compiled"] == 0  # it has been mended
 
 
-def test_one_version_that_names_what_is_gone_spoils_no_other(package):
+def test_version_with_missing_name_does_not_affect_others(package):
     (package.folder / "gone.py").write_text("from typing import NamedTuple\n\nclass Gone(NamedTuple):\n    x: float\n")
     read = "from lapwing.kernels.cell import Cell, read; values['read'] = read(Cell(2.0))"
     package.run(f"{read}; import gone; values['gone'] = read(Cell(gone.Gone(1.0)))[0]")
@@ -162,7 +162,7 @@ def compiling(package):
     process.communicate()
 
 
-def test_whoever_compiles_is_waited_for_as_long_as_he_lives(package, compiling):
+def test_compiling_process_is_waited_for(package, compiling):
     other = package.start(SLOW)
     with pytest.raises(subprocess.TimeoutExpired):
         other.wait(5.0)
@@ -171,13 +171,13 @@ def test_whoever_compiles_is_waited_for_as_long_as_he_lives(package, compiling):
     assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
 
 
-def test_whoever_is_stopped_while_he_compiles_is_not_waited_for_long(package, compiling):
+def test_suspended_compiling_process_is_not_waited_for(package, compiling):
     compiling.send_signal(signal.SIGSTOP)
     ended = package.run(f"from lapwing.kernels.compiler import file_locks; file_locks.PATIENCE = 0.1; {SLOW}")
     assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
 
 
-def test_where_nothing_can_be_written_all_is_compiled(package):
+def test_read_only_cache_compiles_all_kernels(package):
     package.cache.write_text("a file where the folder should be")
     assert package.run(OUTER)["values"] == {"outer": 7.0}
     elsewhere = package.run(OUTER, LAPWING_CACHE="", HOME="/dev/null/none")
@@ -186,13 +186,13 @@ def test_where_nothing_can_be_written_all_is_compiled(package):
     assert package.run(homeless + OUTER, LAPWING_CACHE="")["values"] == {"outer": 7.0}
 
 
-def test_others_cannot_read_or_write_it(package):
+def test_cache_is_private_to_user(package):
     package.run(OUTER)
     folders = [package.cache, *(path for path in package.cache.rglob("*") if path.is_dir())]
     assert {stat.S_IMODE(path.stat().st_mode) for path in folders} == {0o700}
 
 
-def test_what_others_could_have_written_is_not_run(package):
+def test_entry_writable_for_others_is_not_executed(package):
     package.run(ALL)
     for path in files(package):
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
@@ -205,7 +205,7 @@ def test_what_others_could_have_written_is_not_run(package):
         assert package.run(ALL)["loaded"] == 0
 
 
-def test_only_the_last_versions_are_kept(package):
+def test_only_last_versions_are_kept(package):
     for gain in range(7):
         package.edit("plant/constants.py", f"GAIN = {2 + gain}.0", f"GAIN = {3 + gain}.0")
         assert package.run(OUTER)["values"] == {"outer": 3.0 * (3 + gain) + 1.0}
@@ -224,7 +224,7 @@ def test_numbas_own_cache_is_left_alone(package):
     assert not list(package.cache.rglob("*own*"))
 
 
-def test_what_a_script_defines_itself_is_compiled_each_time(package):
+def test_kernel_of_script_is_compiled_in_every_process(package):
     inside = "from lapwing.kernels import kernel; from typing import NamedTuple\n"
     inside += "class Here(NamedTuple):\n    x: float\n\n@kernel\ndef here(x):\n    return x.x * 2.0\n"
     inside += "values['here'] = here(Here(2.0))"
@@ -233,7 +233,7 @@ def test_what_a_script_defines_itself_is_compiled_each_time(package):
     assert second["compiled"] == first["compiled"] == 1
 
 
-def test_a_copy_of_the_sources_elsewhere_shares_what_is_kept(package, tmp_path_factory):
+def test_copied_sources_share_cache(package, tmp_path_factory):
     package.run(OUTER)
     other = tmp_path_factory.mktemp("copy")
     shutil.copytree(package.folder, other, dirs_exist_ok=True)
@@ -241,7 +241,7 @@ def test_a_copy_of_the_sources_elsewhere_shares_what_is_kept(package, tmp_path_f
     assert package.run(OUTER, LAPWING_CACHE=str(kept))["compiled"] == 0
 
 
-def test_what_a_wheel_carries_is_read_where_nothing_is_kept(package, tmp_path):
+def test_kernels_of_wheel_are_loaded_with_empty_cache(package, tmp_path):
     package.run(ALL)
     shipped = package.cache.rename(tmp_path / "shipped")
     placed = (

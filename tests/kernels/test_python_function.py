@@ -20,7 +20,7 @@ def outer(x):
     return raised(x) * doubled(x)
 
 
-def test_nothing_is_compiled_for_it():
+def test_python_function_compiles_no_kernel():
     python = python_function(outer)
     assert python(3.0) == 42.0
     np.testing.assert_array_equal(python(np.array([0.0, 3.0])), [0.0, 42.0])
@@ -28,5 +28,5 @@ def test_nothing_is_compiled_for_it():
     assert python_function(outer) is python
 
 
-def test_it_gives_what_the_compiled_one_gives():
+def test_python_function_equals_compiled_function():
     assert outer(0.1) == python_function(outer)(0.1)

@@ -30,19 +30,19 @@ class Tree(NamedTuple):
 LIKE = Tree(1.0, Quaternion(1.0, 0.0, 0.0, 0.0), Inner((2.0, 3.0, 4.0), True), ((5.0, 6.0), (7.0, 8.0)))
 
 
-def test_columns_are_the_numbers_of_each_part():
+def test_columns_are_numbers_of_each_part():
     rows = np.stack([pack_row(LIKE), 10.0 * pack_row(LIKE)])
     assert rows.shape == (2, row_width(LIKE))
-    found = columns(LIKE, rows)
-    assert found.time.tolist() == [1.0, 10.0]
-    assert found.attitude.shape == (2, 4)
-    assert found.inner.place[1].tolist() == [20.0, 30.0, 40.0]
-    assert found.inner.on.tolist() == [1.0, 10.0]
-    assert [part.tolist() for part in found.several] == [[[5.0, 6.0], [50.0, 60.0]], [[7.0, 8.0], [70.0, 80.0]]]
-    assert found.none.shape == (2, 0)
+    result = columns(LIKE, rows)
+    assert result.time.tolist() == [1.0, 10.0]
+    assert result.attitude.shape == (2, 4)
+    assert result.inner.place[1].tolist() == [20.0, 30.0, 40.0]
+    assert result.inner.on.tolist() == [1.0, 10.0]
+    assert [part.tolist() for part in result.several] == [[[5.0, 6.0], [50.0, 60.0]], [[7.0, 8.0], [70.0, 80.0]]]
+    assert result.none.shape == (2, 0)
 
 
-def test_a_row_is_read_as_the_tree_that_it_was_made_of():
+def test_row_restores_its_tree():
     tree = LIKE._replace(time=0.1, inner=Inner((1e-300, -0.0, math.inf), False))
     read = row_unpacker(LIKE)(pack_row(tree))
     assert repr(read) == repr(tree)
@@ -53,9 +53,9 @@ def test_a_row_is_read_as_the_tree_that_it_was_made_of():
 
 @kernel
 def _copied(like, rows, i, j):
-    found = load(like, rows, i)
-    store(found, rows, j)
-    return found
+    result = load(like, rows, i)
+    store(result, rows, j)
+    return result
 
 
 class Counted(NamedTuple):
@@ -64,16 +64,16 @@ class Counted(NamedTuple):
 
 
 @pytest.mark.parametrize("tree", [Counted(-7, LIKE), Counted(2**53, LIKE._replace(time=-0.0)), (2.5, (True, 3), ())])
-def test_compiled_code_reads_and_writes_the_same_rows(tree):
+def test_compiled_code_reads_and_writes_same_rows(tree):
     rows = np.stack([np.full(row_width(tree), math.nan), pack_row(tree), np.full(row_width(tree), 9.0)])
-    found = _copied(tree, rows, 1, 2)
-    assert repr(found) == repr(tree)
+    result = _copied(tree, rows, 1, 2)
+    assert repr(result) == repr(tree)
     assert rows[2].tobytes() == rows[1].tobytes()
     assert np.isnan(rows[0]).all()
 
 
-def test_only_numbers_stand_in_rows():
-    with pytest.raises(TypingError, match="a row holds numbers, tuples and NamedTuples only"):
+def test_rows_accept_numbers_only():
+    with pytest.raises(TypingError, match="in a row"):
         _copied((1.0, "text"), np.zeros((2, 2)), 0, 1)
 
 
@@ -83,8 +83,8 @@ def test_rows_are_let_go_with_their_columns():
     gone = weakref.ref(rows)
     gc.disable()
     try:
-        found = columns(LIKE, rows)
-        del rows, found
+        result = columns(LIKE, rows)
+        del rows, result
         assert gone() is None
     finally:
         gc.enable()

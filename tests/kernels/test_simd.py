@@ -76,7 +76,7 @@ def vectors(flag, a, b):
     return deinterleave(select_vector(f, interleave(a), b)), any_above(f)
 
 
-def test_choice_of_vectors_and_whether_any_is_chosen():
+def test_vector_selection_and_any_predicate():
     a, b = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0), (10.0, 11.0, 12.0)), (0.0, -1.0, -2.0)
     assert vectors((0.0, 1.0, -1.0, math.nan), a, b) == ((b, a[1], b, b), True)
     assert vectors((0.0, -0.0, -1.0, math.nan), a, b) == ((b, b, b, b), False)

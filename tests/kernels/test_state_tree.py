@@ -42,7 +42,7 @@ def test_retract_adds_on_floats_and_turns_attitudes():
     assert type(y.attitude) is Quaternion
 
 
-def test_embed_is_the_derivative_of_retract():
+def test_embed_is_derivative_of_retract():
     h = 1e-6
     forward, backward = state_tree.retract(X, state_tree.scale(h, V)), state_tree.retract(X, state_tree.scale(-h, V))
     difference = state_tree.scale(0.5 / h, state_tree.axpy(-1.0, backward, forward))
@@ -51,7 +51,7 @@ def test_embed_is_the_derivative_of_retract():
     assert difference.rotors[1] == pytest.approx(derivative.rotors[1], abs=1e-9)
 
 
-def test_axpy_steps_over_stored_numbers_and_keeps_the_class():
+def test_axpy_steps_over_stored_numbers_and_keeps_class():
     y = state_tree.axpy(0.5, state_tree.embed(X, V), X)
     assert type(y.attitude) is Quaternion
     assert y.attitude.z == X.attitude.z + 0.5 * quaternion.embed(X.attitude, V.attitude)[3]
@@ -60,7 +60,7 @@ def test_axpy_steps_over_stored_numbers_and_keeps_the_class():
     )
 
 
-def test_bracket_and_transport_do_nothing_on_floats():
+def test_bracket_and_transport_are_trivial_on_floats():
     assert state_tree.bracket(X, U, V).position == (0.0, 0.0, 0.0)
     assert state_tree.bracket(X, U, V).attitude == quaternion.bracket(U.attitude, V.attitude)
     assert state_tree.transport(X, U, V).position == V.position
@@ -81,16 +81,16 @@ def everything(x, u, v):
     ), state_tree.flatten(y)
 
 
-def test_compiled_and_uncompiled_give_the_same_bits():
+def test_compiled_and_uncompiled_code_agree_bit_for_bit():
     assert everything(X, U, V) == everything.py_func(X, U, V)
 
 
-def test_a_state_of_something_else_is_refused():
-    with pytest.raises(numba.TypingError, match="floats, tuples and manifold leaves"):
+def test_state_of_invalid_type_is_rejected():
+    with pytest.raises(numba.TypingError, match="manifold leaves in a state"):
         state_tree.retract((1.0, "text"), (1.0, 1.0))
 
 
-def test_apart_is_the_largest_difference_relative_to_size():
+def test_relative_difference_is_relative_to_size():
     y = X._replace(rotors=(X.rotors[0] + 0.3, X.rotors[1]), one=(X.one[0] - 0.01,))
     assert state_tree.relative_difference(X, y) == pytest.approx(0.3 / (1.0 + X.rotors[0]))
     assert state_tree.relative_difference(X, X) == state_tree.relative_difference((), ()) == 0.0

@@ -12,21 +12,21 @@ from tests.kernels.test_type_fingerprint import VALUES
 NESTED = [(a, (b, (), a)) for a, b in itertools.product(VALUES, VALUES)]
 
 
-def test_flattens_what_has_the_structure_and_nothing_else():
+def test_flatten_accepts_its_structure_only():
     for a, b in itertools.product(VALUES, VALUES):
-        found = Flattener(a).leaves(b)
-        assert (found is not None) == (structure(a) == structure(b))
-        assert found is None or all(map(same, found, leaves(b)))
+        result = Flattener(a).leaves(b)
+        assert (result is not None) == (structure(a) == structure(b))
+        assert result is None or all(map(same, result, leaves(b)))
 
 
 def test_flattens_trees():
     for value in NESTED:
-        found, expected = Flattener(value).leaves(value), leaves(value)
-        assert len(found) == len(expected)
-        assert all(map(same, found, expected))
+        result, expected = Flattener(value).leaves(value), leaves(value)
+        assert len(result) == len(expected)
+        assert all(map(same, result, expected))
 
 
-def test_a_whole_number_of_more_bits_is_another_type():
+def test_whole_number_of_more_bits_is_another_type():
     assert Flattener((1, 2.0)).leaves((2**62, 2.0)) == (2**62, 2.0)
     assert Flattener((1, 2.0)).leaves((2**63, 2.0)) is None
     assert Flattener((1, 2.0)).leaves(("text", 2.0)) is None

@@ -47,12 +47,12 @@ def test_another_type_is_another_structure():
 
 
 @pytest.mark.parametrize("value", ["text", [1.0], 2**63, object(), (1.0, ["list"])])
-def test_leaves_the_rest_to_numba(value):
+def test_leaves_rest_to_numba(value):
     with pytest.raises(UnknownError):
         structure(value)
 
 
-def test_a_whole_number_beyond_64_bits_signed_is_no_int64():
+def test_whole_number_beyond_64_bits_signed_is_no_int64():
     assert numba.typeof(2**63) == numba.types.uint64
     for number in (1, 2, 2**63):  # the second is flattened by a function of its own
         assert Cell(number).memory.read() == number

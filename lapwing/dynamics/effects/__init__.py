@@ -39,16 +39,16 @@ _ORDER = {
 
 
 def names() -> list[str]:
-    """Every effect's name: its file name."""
+    """Return the names of all effects: their file names."""
     return discovery.names(__name__)
 
 
 def get(name: str, module: str | None = None) -> ModuleType:
-    """The module of an effect; KeyedError that lists the choices if there is none.
+    """Return the module of an effect. Raise ConfigError with the choices if there is none.
 
     Args:
-        name: of the effect.
-        module: name of a module that Python finds, of an effect that is none of this folder.
+        name: name of the effect.
+        module: importable module of a user's effect.
     """
     if module is not None:
         if name in names():
@@ -62,12 +62,12 @@ def get(name: str, module: str | None = None) -> ModuleType:
 
 
 def class_name(name: str) -> str:
-    """What the parameter NamedTuple of an effect is called: "BodyDrag" for "body_drag"."""
+    """Return the name of an effect's parameter class: "BodyDrag" for "body_drag"."""
     return "".join(word.capitalize() for word in name.split("_"))
 
 
 def parameter_class(name: str, module: str | None = None) -> type:
-    """The parameter NamedTuple of an effect; arguments as of `get`."""
+    """Return the parameter class of an effect. See `get` for arguments."""
     found, wanted = get(name, module), class_name(name)
     if not hasattr(found, wanted):
         raise ConfigError(f"effects.{name}.module", f"{module} has no class {wanted}", "the effect's parameters there")

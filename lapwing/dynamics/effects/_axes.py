@@ -17,7 +17,7 @@ from lapwing.kernels.codegen import map_tuple, overload_for
 
 
 def by_axis(along_z: Callable, tilted: Callable, axis: tuple, given: Any) -> Any:
-    """`along_z(given)` where rotors have no axes of their own, otherwise `tilted(given)`; both compiled."""
+    """Call the compiled `along_z(given)` for an empty tuple `axis`, otherwise `tilted(given)`; chosen by type."""
     return python_function(tilted if axis else along_z)(given)
 
 
@@ -35,7 +35,7 @@ def _place(_, plan, height):
 
 @always_inline
 def places(layout):
-    """Position of each rotor [m], body coordinates."""
+    """Return the position of each rotor [m], body coordinates."""
     plan = map_tuple(pair, 0.0, layout.x_body, layout.y_body)
     return map_tuple(_place, 0.0, plan, layout.z_body)
 
@@ -57,7 +57,7 @@ def _thrust_along_z(given):
 
 @always_inline
 def _push(_, axis, load):
-    """(force [N], torque [N m]) of a rotor: r x T a + s Q a (theory.md, eq. (1.6b))."""
+    """Return (force [N], torque [N m]) of a rotor: r x T a + s Q a (theory.md, eq. (1.6b))."""
     place, thrust, reaction = load
     force = scale(thrust, axis)
     return force, add(cross(place, force), scale(reaction, axis))
@@ -78,15 +78,15 @@ def _thrust_tilted(given):
 
 @always_inline
 def thrust_wrench(layout, loads):
-    """(thrust, torque [N m]) of all rotors in body coordinates.
+    """Return (thrust, torque [N m]) of all rotors in body coordinates.
 
-    The thrust [N] is a number along body z, or a vector where the rotors have axes of their own.
+    The thrust [N] is a number along body z, or a vector if the rotors have axes of their own.
     """
     return by_axis(_thrust_along_z, _thrust_tilted, layout.axis, (layout, loads))
 
 
 def in_world(thrust: Any, R_world_body: tuple) -> tuple:
-    """The thrust of `thrust_wrench`, world coordinates [N]."""
+    """Return the thrust of `thrust_wrench`, world coordinates [N]."""
     if isinstance(thrust, tuple):
         return apply(R_world_body, thrust)
     return (thrust * R_world_body[2], thrust * R_world_body[5], thrust * R_world_body[8])
@@ -103,7 +103,7 @@ def _in_world(thrust, R_world_body):
 
 
 def beside(thrust: Any, force: tuple) -> tuple:
-    """The thrust of `thrust_wrench` added to a force, body coordinates [N]."""
+    """Return the thrust of `thrust_wrench` added to a force, body coordinates [N]."""
     return add(force, thrust) if isinstance(thrust, tuple) else (force[0], force[1], force[2] + thrust)
 
 
@@ -116,7 +116,7 @@ def _beside(thrust, force):
 
 @always_inline
 def air_body(s):
-    """(velocity [m/s], rate [rad/s]) of the body against the air around it, body coordinates."""
+    """Return (velocity [m/s], rate [rad/s]) of the body relative to the air, body coordinates."""
     air = apply_transposed(s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world))
     return air, subtract(s.motion.omega_body, s.air_rate_body)
 
@@ -146,7 +146,7 @@ def _axial_speeds_tilted(s):
 
 @always_inline
 def axial_speeds(s):
-    """Air speed of each hub along its rotor's axis [m/s], the body's turning included."""
+    """Return the air speed of each hub along its rotor's axis [m/s], including the rotation of the body."""
     return by_axis(_axial_speeds_along_z, _axial_speeds_tilted, s.layout.axis, s)
 
 
@@ -179,5 +179,5 @@ def _hubs_tilted(s):
 
 @always_inline
 def hub_speeds(s):
-    """(axial, across) air speed of each hub [m/s], the body's turning included."""
+    """Return (axial, transverse) air speed of each hub [m/s], including the rotation of the body."""
     return by_axis(_hubs_along_z, _hubs_tilted, s.layout.axis, s)

@@ -1,4 +1,4 @@
-"""What a scene says about the contact with the ground, and the two effects that come of it."""
+"""Scene table and parameters of the ground contact, with stick-slip or regularised friction."""
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 
@@ -8,7 +8,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, upright
-from lapwing.dynamics.vector import Vec3
+from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -20,26 +20,27 @@ Slip = Annotated[float, Ge(1e-6), Le(10)]
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
-    friction: Literal["stick_slip", "regularised"] = "stick_slip"  # spring to an anchor, or function of slip speed
+    friction: Literal["stick_slip", "regularised"] = "stick_slip"  # spring with slider, or function of slip speed
     stiffness: Stiffness = 1.0e6  # [N/m] of one foot
     damping: Annotated[float, Ge(0), Le(1e6)] = 1.0e3  # [N s/m] of one foot
     transition_width: Annotated[float, Ge(1e-7), Le(0.1)] = 1.0e-4  # [m] depth over which the normal force sets in
-    friction_static: Coefficient = 0.5  # coefficient of a foot that sticks
+    friction_static: Coefficient = 0.5  # coefficient of a foot at rest
     friction_dynamic: Coefficient = 0.3  # coefficient of a foot that slides
     tangential_stiffness: Stiffness = 2.0e5  # [N/m] of one foot that sticks; friction "stick_slip"
-    stiction_velocity: Slip = 0.15  # [m/s] slip below which a foot that slows down sticks; friction "stick_slip"
+    stiction_velocity: Slip = 0.15  # [m/s] slip at which the dynamic coefficient is reached; friction "stick_slip"
     critical_velocity: Slip = 1.0e-3  # [m/s] slip of the maximum friction; friction "regularised"
 
 
 class GroundContact(NamedTuple):
     """Feet that stick where they stand until the friction cone lets go (theory.md, eq. (2.12) to (2.16)).
 
-    The friction is a spring and damper between each foot and its anchor on the ground; the anchor is dragged along
-    when the force leaves the Coulomb cone. Source: Cundall and Strack, Geotechnique 29 (1979) 47, with a static
-    coefficient for feet at rest or coming to rest and a dynamic one for feet that break away. Valid for hard ground
-    and feet that are points; the ground is that of [environment].
+    The friction is a spring and damper in series with a Coulomb slider, whose coefficient falls from the static to the
+    dynamic one with the slip. Its deflection is a state under the integrator's error control: sticking, sliding and
+    reversal are not events, and the motion depends continuously on where it starts. Source: Cundall and Strack,
+    Geotechnique 29 (1979) 47, in its limit of short steps. Valid for hard ground and feet that are points; the ground
+    is that of [environment].
     """
 
     terrain: Any  # Level or Relief
@@ -51,12 +52,13 @@ class GroundContact(NamedTuple):
     static: float
     dynamic: float
     tangential_stiffness: float  # [N/m]
-    square_stiction_velocity: float  # [m^2/s^2]
+    tangential_damping: float  # [N s/m]
+    inverse_stiction: float  # [s/m]
     rate_bound: float  # [1/s] of the fastest mode in contact
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundContact | GroundContactSmooth":
-        """With the airframe's feet and mass."""
+        """Return the parameters with the airframe's feet and mass."""
         given = checked(Settings, table)
         if given.friction_dynamic > given.friction_static:
             expected = f"at most friction_static = {given.friction_static}"
@@ -70,18 +72,20 @@ class GroundContact(NamedTuple):
         if given.friction == "regularised":
             rate = _rate_bound(airframe, points.feet, (given.stiffness, 0.0), (given.damping, 0.0))
             return GroundContactSmooth(*common, 1.0 / given.critical_velocity, rate, _mobility(airframe, feet))
-        rate = _rate_bound(
-            airframe, points.feet, (given.stiffness, given.tangential_stiffness), (given.damping, given.damping)
-        )
-        return cls(*common, given.tangential_stiffness, given.stiction_velocity * given.stiction_velocity, rate)
+        stiffness = (given.stiffness, given.tangential_stiffness)
+        undamped = _rate_bound(airframe, points.feet, stiffness, (0.0, 0.0))
+        damping = max(given.damping, given.tangential_stiffness / (FASTEST_DEFLECTION * undamped))
+        rate = _rate_bound(airframe, points.feet, stiffness, (given.damping, damping))
+        rate = max(rate, given.tangential_stiffness / damping * STABLE / STABLE_DAMPER)
+        return cls(*common, given.tangential_stiffness, damping, 1.0 / given.stiction_velocity, rate)
 
     def in_environment(self, environment: Environment) -> "GroundContact":
         """On the ground that is there."""
         return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
 
-    def initial_discrete_state(self) -> tuple[tuple[float, float, float, float, float], ...]:
+    def initial_discrete_state(self) -> tuple[Vec3, ...]:
         """No foot is on the ground."""
-        return (NOWHERE,) * len(self.feet)
+        return (ZERO,) * len(self.feet)
 
 
 class GroundContactSmooth(NamedTuple):
@@ -113,9 +117,7 @@ class GroundContactSmooth(NamedTuple):
         return ((),) * len(self.feet)
 
 
-# A foot's memory: its anchor [m], one of these, and the square of its slip [m^2/s^2] after the last step.
-FREE, STICKING, SLIDING = 0.0, 1.0, 2.0
-NOWHERE = (0.0, 0.0, 0.0, FREE, 0.0)
+FASTEST_DEFLECTION = 10.0  # rate at which a deflection decays over the fastest undamped mode: the damper is no weaker
 STABLE = 1.25  # [rad] of the fastest oscillation in one step
 SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
 STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis

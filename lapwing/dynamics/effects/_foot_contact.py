@@ -1,4 +1,4 @@
-"""Where each foot is, how fast it slips and how hard it presses; four feet side by side (lapwing/kernels/simd.py)."""
+"""Position, slip and normal force of each foot; four feet in SIMD lanes (lapwing/kernels/simd.py)."""
 
 import math
 from typing import Any, NamedTuple
@@ -13,7 +13,7 @@ NO_FOOT = (math.nan, math.nan, math.nan)  # fills a group of four up: what is no
 
 
 class Stance(NamedTuple):
-    """What the feet have in common."""
+    """State shared by all feet."""
 
     over: float  # [m] of the centre of mass over the slope, less what stands on it
     upright_body: Vec3  # whose product with a foot's place is its height over the slope
@@ -25,7 +25,7 @@ class Stance(NamedTuple):
 
 @always_inline
 def stance_of(e, motion, R_world_body):
-    """Computed once for all feet."""
+    """Compute the state shared by all feet."""
     omega_world = apply(R_world_body, motion.omega_body)
     return Stance(
         over_plane(e.terrain, motion.position_world) - summit(e.terrain),
@@ -39,7 +39,7 @@ def stance_of(e, motion, R_world_body):
 
 @always_inline
 def in_reach(stance, feet_body):
-    """Above zero for feet that may touch: the cheap question that spares most of them the rest."""
+    """Return a positive number for feet that may touch: a cheap test that skips most of them."""
     return -(stance.over + dot(stance.upright_body, feet_body))
 
 
@@ -61,7 +61,7 @@ def _touch(terrain, place_world, _):
 
 
 def _touch_four(terrain: Any, places_world: Vec3) -> tuple[float, Vec3]:
-    """`touch` of four places side by side."""
+    """Evaluate `touch` at four positions in SIMD lanes."""
     raise NotImplementedError("compiled code only")
 
 
@@ -84,7 +84,7 @@ def _touch_four_on(terrain, places_world):
 
 @always_inline
 def footing(e, stance, feet_body):
-    """The footing of four feet (theory.md, eq. (2.12))."""
+    """Return the contact of four feet (theory.md, eq. (2.12))."""
     arm = apply(stance.R_world_body, feet_body)
     place = add(stance.position_world, arm)
     depth, normal = _touch_four(e.terrain, place)

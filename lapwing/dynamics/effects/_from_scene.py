@@ -20,10 +20,10 @@ def _adapter(cls: type) -> "TypeAdapter":
 
 
 def checked(cls: type[T], table: Mapping[str, Any]) -> T:
-    """The NamedTuple `cls` with the keys of a table.
+    """Return the NamedTuple `cls` with the keys of a table.
 
     Raises:
-        KeyedError: a key is missing, unknown, of the wrong type or out of range.
+        ConfigError: a key is missing, unknown, of the wrong type or out of range.
     """
     from pydantic import ValidationError
 
@@ -36,7 +36,7 @@ def checked(cls: type[T], table: Mapping[str, Any]) -> T:
 
 
 def _tuples(value: Any) -> Any:
-    """TOML's lists as tuples."""
+    """Convert TOML's lists to tuples."""
     if isinstance(value, Mapping):
         return {key: _tuples(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -45,5 +45,5 @@ def _tuples(value: Any) -> Any:
 
 
 def reject(reason: str) -> NoReturn:
-    """Refuse an effect that the vehicle cannot have."""
+    """Reject an effect that the vehicle cannot have."""
     raise ConfigError("", reason)

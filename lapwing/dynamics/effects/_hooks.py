@@ -26,14 +26,13 @@ Hooks between evaluations:
                          its first integrator step; s and rotors exclude effects that can sleep
     is_sleeping          (e, memory, motion, h) -> bool              True if the effect cannot act in the next step
     substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
-    post_step            (e, memory, motion, h) -> memory            after every step, when awake
-    discontinuity        (e, before, after) -> bool                  True if forces jumped between two discrete states
+    memory_rate          (e, memory, motion) -> rate of its memory   of a stiff effect, integrated with the motion
     contact              (e, memory, s) -> bool                      True if the vehicle touches the ground
     contact_forces       (e, memory, motion) -> ((place [m], force [N]) of each contact point), world
     wind                 (e, memory, wind) -> wind                   [m/s] world, for the log only
 
 While all effects that can sleep are sleeping, steps are taken without them. While a stiff one is awake, steps are taken
-under error control, which includes their discrete states (`lapwing.dynamics.vehicles.multirotor_stepper`).
+under error control, which includes memories that have a rate (`lapwing.dynamics.vehicles.multirotor_stepper`).
 
 The discrete state of an effect is a tuple of floats, at first `initial_discrete_state()` of its parameter class, or ().
 """
@@ -77,11 +76,10 @@ wrench_body = _hook("wrench_body")
 torque = _hook("torque")
 field = _hook("field")
 discrete_update = _hook("discrete_update")
-post_step = _hook("post_step")
+memory_rate = _hook("memory_rate")
 substeps = _hook("substeps")
 contact = _hook("contact")
 contact_forces = _hook("contact_forces")
-discontinuity = _hook("discontinuity")
 is_sleeping = _hook("is_sleeping")
 wind = _hook("wind")
 
@@ -94,10 +92,10 @@ def initial_discrete_state(e: Any) -> tuple:
 def _written_out(
     fold: str, hook: str, arguments: str, call: str, result: str, default: str = "", more: str = ""
 ) -> Callable:
-    """A function of (effects, memory, arguments) that calls `hook` for each effect that has it.
+    """Return a function of (effects, memory, arguments) that calls `hook` of each effect that has it.
 
-    `call` is the line for effect number {i}, with hook function f{i}, and `more` that for every one but the first
-    where it differs; `result` is the expression returned at the end; `default` that if no effect has the hook.
+    `call` is the line for effect number {i} with hook function f{i}; `more` replaces it after the first, if it differs.
+    `result` is the returned expression; `default` that if no effect has the hook.
     """
 
     signature = f"{fold}(effects, memory, {arguments})"
@@ -190,13 +188,6 @@ all_discrete_updates = _written_out(
     "m{i} = f{i}(effects[{i}], memory[{i}], s, rotors, key, tick, interval)",
     "memory",
 )
-all_post_steps = _written_out(
-    "all_post_steps",
-    "post_step",
-    "motion, h",
-    "m{i} = f{i}(effects[{i}], memory[{i}], motion, h)",
-    "memory",
-)
 all_substeps = _written_out(
     "all_substeps",
     "substeps",
@@ -205,15 +196,6 @@ all_substeps = _written_out(
     "n",
     default="1",
     more="n = max(n, f{i}(effects[{i}], memory[{i}], motion, h))",
-)
-any_discontinuity = _written_out(
-    "any_discontinuity",
-    "discontinuity",
-    "after",
-    "happened = f{i}(effects[{i}], memory[{i}], after[{i}])",
-    "happened",
-    default="False",
-    more="happened = happened or f{i}(effects[{i}], memory[{i}], after[{i}])",
 )
 all_contacts = _written_out(
     "all_contacts",
@@ -271,5 +253,46 @@ without_sleepers = generated_overload(
     "without_sleepers(effects, values)",
     _without_sleepers,
     "The members of `values`, one for each effect, that belong to effects that never sleep.",
+    inline=True,
+)
+
+
+def _with_rate(template: str) -> Callable:
+    """Return a generator of the tuple of `template` for each effect whose memory has a rate."""
+
+    def generate(effects: Any, *_rest: Any) -> Callable:
+        rates = HOOKS["memory_rate"]
+        active = [(i, e.instance_class) for i, e in enumerate(effects.types) if e.instance_class in rates]
+        names = {f"f{i}": rates[parameters] for i, parameters in active}
+        members = "".join(f"{template.format(i=i)}, " for i, _ in active)
+        return compile_source("integrated(effects, memory, motion)", names, f"return ({members})")
+
+    return generate
+
+
+all_memory_rates = generated_overload(
+    "all_memory_rates(effects, memory, motion)",
+    _with_rate("f{i}(effects[{i}], memory[{i}], motion)"),
+    "Rates of the memories that have one.",
+    inline=True,
+)
+all_integrated = generated_overload(
+    "all_integrated(effects, memory, motion)", _with_rate("memory[{i}]"), "Memories that have a rate.", inline=True
+)
+
+
+def _with_integrated(effects: Any, *_rest: Any) -> Callable:
+    integrated = [i for i, e in enumerate(effects.types) if e.instance_class in HOOKS["memory_rate"]]
+    members = [
+        f"integrated[{integrated.index(i)}]" if i in integrated else f"memory[{i}]" for i in range(len(effects.types))
+    ]
+    result = "".join(f"{member}, " for member in members)
+    return compile_source("with_integrated(effects, memory, integrated)", {}, f"return ({result})")
+
+
+with_integrated = generated_overload(
+    "with_integrated(effects, memory, integrated)",
+    _with_integrated,
+    "The memories of all effects, with those that have a rate from `integrated`.",
     inline=True,
 )

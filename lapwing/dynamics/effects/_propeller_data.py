@@ -16,14 +16,14 @@ NEEDED = {"j": "J", "ct": "CT", "cp": "CP or CQ"}
 
 
 def parsed(key: str, text: str) -> dict[str, Any]:
-    """The keys of `rotor_table` in a text.
+    """Return the keys of `rotor_table` in a text.
 
     Args:
-        key: whose value names the file, for errors.
-        text: of the file.
+        key: key whose value names the file, for errors.
+        text: text of the file.
 
     Raises:
-        KeyedError: a column is missing, a row has a hole, or angles have not the same J.
+        ConfigError: a column is missing, a row has a gap, or angles have different J.
     """
     lines = [(i, line.strip()) for i, line in enumerate(text.splitlines(), 1)]
     lines = [(i, line) for i, line in lines if line and not line.startswith(("#", "!"))]

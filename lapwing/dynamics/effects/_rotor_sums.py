@@ -6,7 +6,7 @@ from lapwing.kernels.codegen import compile_source, overload_for
 
 
 def total(a: PerRotor) -> float:
-    """Sum of a tuple, added in pairs: a shorter chain of dependent additions."""
+    """Return the sum of a tuple, added in pairs for a shorter chain of dependent additions."""
     half = len(a) // 2
     return a[0] if len(a) == 1 else total(a[:half]) + total(a[half:])
 
@@ -21,7 +21,7 @@ def _total(a):
 
 
 def total_vector(a: tuple[Vec3, ...]) -> Vec3:
-    """Sum of a tuple of vectors."""
+    """Return the sum of a tuple of vectors."""
     found = a[0]
     for more in a[1:]:
         found = add(found, more)
@@ -35,7 +35,7 @@ def _total_vector(a):
 
 
 def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
-    """Sum of a tuple of (force [N], torque [N m])."""
+    """Return the sum of a tuple of (force [N], torque [N m])."""
     force, torque = a[0]
     for more_force, more_torque in a[1:]:
         force, torque = add(force, more_force), add(torque, more_torque)

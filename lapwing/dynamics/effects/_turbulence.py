@@ -1,13 +1,17 @@
-"""What turbulence near the ground has in common: how strong, how large and how fast it passes (MIL-F-8785C)."""
+"""Low-altitude turbulence: intensities, scales and convection speed (MIL-F-8785C), and its draws as a sum of parts."""
 
 from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._rotor_sums import total
+from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.terrain import LEVEL, surface
-from lapwing.dynamics.vector import Vec3, norm, subtract
+from lapwing.dynamics.vector import ZERO, Vec3, add, multiply, norm, scale, subtract
 from lapwing.kernels import always_inline, math
+from lapwing.kernels.codegen import map_tuple
 
 KIND = "turbulence"
 FOOT = 0.3048  # [m]
@@ -17,7 +21,7 @@ LONG_AGO = 50.0  # correlation times before the first exchange at which the filt
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     wind_speed: Annotated[float, Gt(0), Le(30)]  # [m/s] mean wind 6 m (20 feet) above the ground
     airspeed: Annotated[float, Gt(0), Le(60)] | None = None  # [m/s] at which gusts pass; if left out, the vehicle's
@@ -26,7 +30,7 @@ class Settings(NamedTuple):
 
 
 class Conditions(NamedTuple):
-    """What scales and intensities follow from."""
+    """Conditions that determine scales and intensities."""
 
     wind_speed: float  # [m/s]
     airspeed: float  # [m/s], 0 for the vehicle's
@@ -36,8 +40,16 @@ class Conditions(NamedTuple):
     terrain: Any = LEVEL  # Level or Relief
 
 
+class Part(NamedTuple):
+    """A Dryden turbulence of which a turbulence is the sum."""
+
+    ratio: float  # scale of the whole over that of the part
+    share: float  # of the deviation
+    lanes: tuple[int, int]  # of its random numbers
+
+
 def conditions(table: dict) -> Conditions:
-    """From a scene's table. Raises KeyedError."""
+    """Return the conditions of a scene's table. Raise ConfigError if it is invalid."""
     given = checked(Settings, table)
     airspeed, altitude = given.airspeed or 0.0, given.altitude or 0.0
     return Conditions(given.wind_speed, airspeed, altitude, math.cos(given.direction_to), math.sin(given.direction_to))
@@ -45,7 +57,7 @@ def conditions(table: dict) -> Conditions:
 
 @always_inline
 def intensity(wind_speed, altitude):
-    """(standard deviations [m/s], scales [m]) along, across and vertical to the wind (theory.md, eq. (2.20))."""
+    """Return (standard deviations [m/s], scales [m]) along, across and vertical to the wind (theory.md, eq. (2.20))."""
     feet = altitude / FOOT
     base = 0.177 + 0.000823 * feet
     vertical = 0.1 * wind_speed
@@ -55,7 +67,7 @@ def intensity(wind_speed, altitude):
 
 @always_inline
 def surroundings(c: Conditions, s: Any) -> tuple[float, float]:
-    """(altitude over the ground [m], airspeed [m/s]) of a vehicle in a situation."""
+    """Return (altitude over the ground [m], airspeed [m/s]) of a vehicle in a situation."""
     x, y, z = s.motion.position_world
     altitude, airspeed = c.altitude, c.airspeed
     if altitude == 0.0:
@@ -67,7 +79,7 @@ def surroundings(c: Conditions, s: Any) -> tuple[float, float]:
 
 @always_inline
 def passing(c: Conditions, s: Any) -> tuple[Vec3, Vec3]:
-    """(standard deviations [m/s], airspeed over scale [1/s]) for a vehicle in a situation."""
+    """Return (standard deviations [m/s], airspeed over scale [1/s]) for a vehicle in a situation."""
     altitude, airspeed = surroundings(c, s)
     sigma, scale = intensity(c.wind_speed, altitude)
     return sigma, (airspeed / scale[0], airspeed / scale[1], airspeed / scale[2])
@@ -75,20 +87,20 @@ def passing(c: Conditions, s: Any) -> tuple[Vec3, Vec3]:
 
 @always_inline
 def in_world(c: Conditions, u: float, v: float, w: float) -> Vec3:
-    """Gusts along, across and vertical to the wind in world coordinates."""
+    """Return gusts along, across and vertical to the wind in world coordinates."""
     return (c.cosine * u - c.sine * v, c.sine * u + c.cosine * v, w)
 
 
 @always_inline
 def first_order(x, theta, n):
-    """State of the longitudinal filter `theta` correlation times later (theory.md, eq. (2.22))."""
+    """Return the state of the longitudinal filter `theta` correlation times later (theory.md, eq. (2.22))."""
     kept = math.exp(-theta)
     return kept * x + math.sqrt(1.0 - kept * kept) * n
 
 
 @always_inline
 def second_order(x1, x2, theta, n1, n2):
-    """The states of the transverse filter `theta` correlation times later (theory.md, eq. (2.23))."""
+    """Return the states of the transverse filter `theta` correlation times later (theory.md, eq. (2.23))."""
     kept = math.exp(-theta)
     square = kept * kept
     q11 = 0.5 * (1.0 - square)
@@ -101,6 +113,74 @@ def second_order(x1, x2, theta, n1, n2):
 
 
 @always_inline
+def elapsed(started, rate, interval):
+    """Return the time [s] since the last update: `LONG_AGO` before the first, at these rates [1/s] of the filters."""
+    return interval if started > 0.0 else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
+
+
+@always_inline
+def advance_filters(states, theta, first, second):
+    """Return the filter states `theta` correlation times (along, across, vertical) later, and gusts of unit deviation.
+
+    Args:
+        states: along, first and second state across, first and second vertical.
+        theta: times over the correlation times of the three filters.
+        first: normal draws of the three first states.
+        second: normal draws of the two second states.
+    """
+    along, across1, across2, up1, up2 = states
+    along = first_order(along, theta[0], first[0])
+    across1, across2 = second_order(across1, across2, theta[1], first[1], second[0])
+    up1, up2 = second_order(up1, up2, theta[2], first[2], second[1])
+    return (along, across1, across2, up1, up2), (along, transverse(across1, across2), transverse(up1, up2))
+
+
+@always_inline
 def transverse(x1, x2):
-    """Output of the transverse filter, with unit variance (theory.md, eq. (2.24))."""
+    """Return the output of the transverse filter, with unit variance (theory.md, eq. (2.24))."""
     return math.sqrt(3.0) * x1 + (1.0 - math.sqrt(3.0)) * x2
+
+
+def calm(parts: tuple[Part, ...]) -> tuple[tuple, Vec3, float]:
+    """Return (along, two states across, two vertical) of each part, the wind [m/s], and 1 once started."""
+    return ((0.0, 0.0, 0.0, 0.0, 0.0),) * len(parts), ZERO, 0.0
+
+
+@always_inline
+def _advanced(c, part, state):
+    """Return (states, gust for unit deviations) of a part, `theta` correlation times of the whole later."""
+    theta, key, tick = c
+    first, second = normal3(key, tick, part.lanes[0]), normal3(key, tick, part.lanes[1])
+    states, gust = advance_filters(state, scale(part.ratio, theta), first, second)
+    return states, scale(part.share, gust)
+
+
+@always_inline
+def _states(_, part, __):
+    return part[0]
+
+
+@always_inline
+def _gust(axis, part, _):
+    return part[1][axis]
+
+
+@always_inline
+def drawn(e, memory, s, key, tick, interval):
+    """Return the states of the parts, the wind [m/s, world] for the next interval, and 1: started."""
+    sigma, rate = passing(e.conditions, s)
+    theta = scale(elapsed(memory[2], rate, interval), rate)
+    parts = map_tuple(_advanced, (theta, key, tick), e.parts, memory[0])
+    gust = (
+        total(map_tuple(_gust, 0, parts, parts)),
+        total(map_tuple(_gust, 1, parts, parts)),
+        total(map_tuple(_gust, 2, parts, parts)),
+    )
+    u, v, w = multiply(sigma, gust)
+    return map_tuple(_states, 0, parts, parts), in_world(e.conditions, u, v, w), 1.0
+
+
+@always_inline
+def blown(memory, before):
+    """Add the turbulence to the air."""
+    return Air(before.density, add(before.wind_world, memory[1]))

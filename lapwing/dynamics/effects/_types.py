@@ -1,4 +1,4 @@
-"""What effects look at and give: plain NamedTuples of floats."""
+"""Inputs and outputs of effects: NamedTuples of floats."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ PerRotor = tuple[float, ...]
 
 
 class Motion(NamedTuple):
-    """What the integrator advances."""
+    """State that the integrator advances."""
 
     position_world: Vec3  # [m] of the centre of mass
     attitude: Quaternion  # takes body to world coordinates
@@ -54,18 +54,18 @@ AnyMassProperties = MassProperties | FullMassProperties | OffsetMassProperties
 
 
 def steiner(mass: float, arm: np.ndarray) -> np.ndarray:
-    """What a mass [kg] at an arm [m] adds to an inertia matrix [kg m^2], shape (3, 3): the parallel axis theorem."""
+    """Return the inertia matrix [kg m^2], shape (3, 3), of a point mass [kg] at an arm [m]: parallel axis theorem."""
     return mass * (small_matrices.dot(arm, arm) * np.eye(3) - np.multiply.outer(arm, arm))
 
 
 def offset_body(mass: float, inertia: np.ndarray, centre_body: np.ndarray) -> OffsetMassProperties:
-    """Mass properties about a centre of mass [m] off the motion's position; inertia [kg m^2], shape (3, 3)."""
+    """Return mass properties about a centre of mass [m] off the motion's position; inertia [kg m^2], shape (3, 3)."""
     matrix, inverse = (tuple(m.ravel().tolist()) for m in (inertia, small_matrices.inverse(inertia)))
     return OffsetMassProperties(mass, 1.0 / mass, matrix, inverse, tuple(np.asarray(centre_body, float).tolist()))
 
 
 def body_of(mass: float, inertia: Vec3, products: Vec3 = (0.0, 0.0, 0.0)) -> MassProperties | FullMassProperties:
-    """Mass properties with what the hot path needs of them.
+    """Return mass properties with the derived values of the hot path.
 
     Args:
         mass: [kg].
@@ -92,7 +92,7 @@ def body_of(mass: float, inertia: Vec3, products: Vec3 = (0.0, 0.0, 0.0)) -> Mas
 
 
 def principal_moments(inertia: Vec3, products: Vec3) -> tuple[float, ...]:
-    """Of an inertia matrix, in rising order [kg m^2]; arguments as of `body_of`."""
+    """Return the ascending principal moments of inertia [kg m^2]. See `body_of` for arguments."""
     if not any(products):
         return tuple(sorted(inertia))
     (x, y, z), (xy, xz, yz) = inertia, products
@@ -107,23 +107,24 @@ class Air(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """What multiplies each rotor's static loads."""
+    """Factors on each rotor's static loads."""
 
     thrust: PerRotor
     torque: PerRotor
 
 
 class Loads(NamedTuple):
-    """What the air does to each rotor."""
+    """Aerodynamic loads of each rotor."""
 
     thrust: PerRotor  # [N] along body z
     torque: PerRotor  # [N m] against its rotation
 
 
 class WakeSlopes(NamedTuple):
-    """How the loads of rotors hang together of which some stand in the wake of others; empty where none does.
+    """Coupling of the loads of rotors in the wakes of others; empty without any.
 
-    Row by row over the thrust that each rotor would have by itself, about one speed of all (theory.md, eq. (2.45)).
+    A row and a column per rotor, relative to the isolated thrust, about one speed of all rotors (theory.md, eq.
+    (2.45)).
     """
 
     thrust: tuple[PerRotor, ...] = ()  # of each rotor
@@ -142,7 +143,7 @@ class Rotors(NamedTuple):
 
 
 class EffectInputs(NamedTuple):
-    """What an effect may look at."""
+    """Inputs of an effect."""
 
     t: float  # [s] simulation time
     motion: Motion

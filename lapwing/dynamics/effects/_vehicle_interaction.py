@@ -1,24 +1,24 @@
-"""What vehicles of a fleet do to one another: the hook of effects that know of other vehicles, and what they know.
+"""Interaction of vehicles in a fleet: the hook of interacting effects, and the state that they share.
 
-At every tick each vehicle gives its `NeighbourState`. One tick later, before it steps, the hook
+At every tick each vehicle outputs its `NeighbourState`. One tick later, before it steps, the hook
 
     interact  (e, memory, own, others, interval) -> memory
 
-of each such effect makes of its own presence and of those of the others, both of the tick before, what the effect
-remembers for the coming exchange interval: a force, or a wind. Its other hooks (`_hooks`) act by that memory. A
-parameter class says with `presence()` which numbers of the `NeighbourState` are the effect's own.
+of each such effect computes its discrete state for the coming communication step, such as a force or a wind, from its
+own state and those of the others, both of the previous tick. Its other hooks (`_hooks`) use that discrete state. A
+parameter class defines with `presence()` which numbers of the `NeighbourState` are the effect's own.
 """
 
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects._hooks import HOOKS
-from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vector import ZERO, Mat3, Vec3
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import compile_source, generated_overload
 
 
 class NeighbourState(NamedTuple):
-    """What others of a fleet may know of a vehicle at a tick, or of the load that some carry together."""
+    """State of a vehicle, or of a shared load, for the other vehicles of a fleet at a tick."""
 
     position_world: Vec3 = ZERO  # [m] of the centre of mass
     velocity_world: Vec3 = ZERO  # [m/s]
@@ -35,6 +35,9 @@ class NeighbourState(NamedTuple):
     wind_world: Vec3 = ZERO  # [m/s]
     time: float = 0.0  # [s]
     is_load: bool = False
+    friction: float = 0.0  # coefficient of the sphere's surface
+    omega_world: Vec3 = ZERO  # [rad/s]
+    inverse_inertia_world: Mat3 = (0.0,) * 9  # [1/(kg m^2)] about the centre of mass
 
 
 INTERACTION = HOOKS.setdefault("interaction", DispatchTable())
@@ -51,12 +54,12 @@ def interaction(parameters: type) -> Any:
 
 
 def interacts(effects: tuple) -> bool:
-    """Whether one of these effects knows of other vehicles."""
+    """Return True if one of these effects interacts with other vehicles."""
     return any(type(e) in INTERACTION for e in effects)
 
 
 def presence(effects: tuple) -> NeighbourState:
-    """What the effects of a vehicle say of it; the rest is for its state to fill in."""
+    """Return the neighbour state with the effects' part; the vehicle's state fills in the rest."""
     given = [e.presence() for e in effects if type(e) in INTERACTION]
     return NeighbourState(**{key: value for table in given for key, value in table.items()})
 

@@ -29,16 +29,16 @@ class AirDensity(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "AirDensity":
-        """The standard's at sea level."""
+        """Return the standard atmosphere at sea level."""
         checked(Settings, table)
         return cls()
 
     def in_environment(self, environment: Environment) -> "AirDensity":
-        """That of the place and the day."""
+        """Return the atmosphere at the scene's place and time."""
         return AirDensity(environment.atmosphere, environment.home.height)
 
     def initial_discrete_state(self) -> tuple[float, float]:
-        """The tangent at home."""
+        """Return the tangent at home."""
         return python_function(_tangent)(self, 0.0)
 
 
@@ -51,7 +51,7 @@ def _tangent(e, height):
 
 @discrete_update(AirDensity)
 def tangent(e, memory, s, rotors, key, tick, interval):
-    """(density [kg/m^3], slope [kg/m^4]) of the tangent to the law at the vehicle's height, given at z = 0.
+    """Return (density [kg/m^3], slope [kg/m^4]) of the tangent at the vehicle's height, with the density at z = 0.
 
     Over an interval the height changes by centimetres: the tangent is within 1e-9 of the law, at a tenth of the cost.
     """
@@ -60,5 +60,5 @@ def tangent(e, memory, s, rotors, key, tick, interval):
 
 @air(AirDensity)
 def air_density(e, memory, s, before):
-    """Air at the vehicle's altitude."""
+    """Return the air at the vehicle's altitude."""
     return Air(memory[0] + memory[1] * s.motion.position_world[2], before.wind_world)

@@ -22,12 +22,12 @@ class Settings(NamedTuple):
 
 
 class AxialInflow(NamedTuple):
-    """What climb takes from, and descent adds to, the static loads of `rotor_thrust` (theory.md, eq. (2.5)).
+    """Change of the static loads of `rotor_thrust` by climb and descent (theory.md, eq. (2.5)).
 
-    The blade meets the air at an angle that falls with the advance per turn over the pitch: T = T_0 (1 - w / speed) and
-    the induced part of the torque with the square, where w = 2 pi V / pitch of each hub's own speed V along the axis,
-    so that rolling and pitching are damped. Source: the paper's blade section at the pitch minus the inflow angle, both
-    small. Valid for |w| below half the rotor speed, where it is held, outside the vortex ring state.
+    The angle of attack falls with the axial advance per turn over the pitch: T = T_0 (1 - w / speed), and the induced
+    torque with the square, where w = 2 pi V / pitch of each hub's own speed V along the axis, so that roll and pitch
+    are damped. Source: the paper's blade section at the pitch minus the inflow angle, both small. Valid for |w| below
+    half the rotor speed, to which it is clamped, outside the vortex ring state.
     """
 
     thrust_constant: float  # [m^4/rad^2]
@@ -36,7 +36,7 @@ class AxialInflow(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "AxialInflow":
-        """From the airframe's propeller."""
+        """Return the parameters of the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         if propeller.zero_lift_angle != 0.0:
@@ -52,7 +52,7 @@ class AxialInflow(NamedTuple):
 
 @always_inline
 def _advance(turn_per_metre, axial, speed):
-    """[rad/s] of a hub: its axial speed in turns over the pitch, held to where the model is valid."""
+    """Return the axial speed of a hub in turns over the pitch [rad/s], clamped to the valid range."""
     return min(max(turn_per_metre * axial, -0.5 * speed), 0.5 * speed)
 
 
@@ -73,7 +73,7 @@ def _product(_, a, b):
 
 @loads(AxialInflow)
 def axial_inflow(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`."""
+    """Add the loads of each rotor to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
     w = map_tuple(_advance, e.turn_per_metre, axial_speeds(s), speed)
     linear, square = map_tuple(_product, 0.0, speed, w), map_tuple(_square_change, 0.0, speed, w)

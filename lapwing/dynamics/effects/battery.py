@@ -17,7 +17,7 @@ KIND = "battery model"
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
     cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] per cell; the motors stop for good below it
@@ -27,7 +27,7 @@ class Battery(NamedTuple):
     """Lithium-polymer cells in series: open-circuit voltage by charge, less a resistance (theory.md, eq. (2.10)).
 
     The motors get the voltage they ask for as long as the battery has it. Charge and voltage are brought up to date
-    once an exchange interval. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
+    once a communication step. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
     curve; one ohmic resistance, the transient ones left out. Valid at room temperature, charge above a few per cent.
     """
 
@@ -39,7 +39,7 @@ class Battery(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
-        """From the airframe's battery."""
+        """Return the parameters of the airframe's battery."""
         given = checked(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")
         resistance = pack.cells * pack.cell_resistance
@@ -48,25 +48,25 @@ class Battery(NamedTuple):
         )
 
     def initial_discrete_state(self) -> tuple[float, float, float]:
-        """(charge, voltage [V] under load, current [A])."""
+        """Return (charge, voltage [V] under load, current [A])."""
         return (self.initial_charge, self.cells * python_function(open_circuit_voltage)(self.initial_charge), 0.0)
 
 
 @always_inline
 def open_circuit_voltage(charge):
-    """[V] of one cell at a charge between 0 and 1."""
+    """Return the voltage [V] of one cell at a charge between 0 and 1."""
     return -1.031 * math.exp(-35.0 * charge) + 3.685 + charge * (0.2156 + charge * (-0.1178 + charge * 0.3201))
 
 
 @always_inline
 def at_most(limit, voltage, _):
-    """A voltage, or the limit where that is lower."""
+    """Return the lower of voltage and limit."""
     return min(voltage, limit)
 
 
 @discrete_update(Battery)
 def discharge(e, memory, s, rotors, key, tick, interval):
-    """Memory after drawing the motors' power for an interval."""
+    """Return the discrete state after an interval at the motors' power."""
     charge, voltage, _ = memory
     if voltage == 0.0:
         return (charge, 0.0, 0.0)
@@ -78,11 +78,11 @@ def discharge(e, memory, s, rotors, key, tick, interval):
 
 @supply_voltage(Battery)
 def battery(e, memory, voltage):
-    """Voltage [V] that each motor gets."""
+    """Return the voltage [V] of each motor."""
     return map_tuple(at_most, memory[1], voltage, voltage)
 
 
 @battery_state(Battery)
 def read(e, memory):
-    """What a battery monitor shows: charge, voltage [V] under load, current [A]; no temperature."""
+    """Return charge, voltage [V] under load, current [A]; no temperature."""
     return memory[0], memory[1], memory[2], math.nan

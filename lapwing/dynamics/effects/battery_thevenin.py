@@ -28,7 +28,7 @@ Time = Annotated[float, Ge(0.1), Le(1e4)]
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
     cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] of one cell, below which the controllers stop
@@ -39,6 +39,7 @@ class Settings(NamedTuple):
     activation: Annotated[float, Ge(0), Le(1e4)] = 2400.0  # [K] resistances go with exp(activation / temperature)
     heat_capacity: Annotated[float, Gt(0), Le(1e6)] | None = None  # [J/K] of the pack; by its energy if left out
     cooling_time: Annotated[float, Ge(1), Le(1e6)] = 1800.0  # [s] in which it comes near the air's temperature
+    peukert_exponent: Annotated[float, Ge(1), Le(2)] = 1.0  # n: I above 1 C drains as I (I / 1 C)^(n - 1)
 
 
 class BatteryThevenin(NamedTuple):
@@ -46,8 +47,9 @@ class BatteryThevenin(NamedTuple):
 
     Resistances fall as the pack warms by its own losses. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
     (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one lump of heat.
-    The activation temperature, 20 kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to
-    60 degC. Brought up to date once an exchange interval, exactly for a constant current.
+    Currents above 1 C take more charge by Peukert's law, if its exponent is given. The activation temperature, 20
+    kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to 60 degC. Brought up to date once a
+    communication step, exactly for a constant current.
     """
 
     cells: float
@@ -64,12 +66,13 @@ class BatteryThevenin(NamedTuple):
     heat_capacity: float  # [J/K]
     cooling_time: float  # [s]
     temperature: float = REFERENCE  # [K] at the start
+    peukert_exponent: float = 1.0
     air_temperature: float = REFERENCE  # [K]
     given_temperature: bool = False  # whether the scene says that at the start
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
-        """From the airframe's battery."""
+        """Return the parameters of the airframe's battery."""
         given = checked(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")
         if given.restart is not None and given.restart <= given.cutoff_voltage:
@@ -83,16 +86,16 @@ class BatteryThevenin(NamedTuple):
         return cls(
             float(n), pack.capacity, n * ohmic, n * fast, n * slow, *given.transient_time, given.initial_charge,
             n * given.cutoff_voltage, restart, given.activation, heat, given.cooling_time,
-            given.temperature or REFERENCE, given_temperature=given.temperature is not None,
+            given.temperature or REFERENCE, given.peukert_exponent, given_temperature=given.temperature is not None,
         )  # fmt: skip
 
     def in_environment(self, environment: Environment) -> "BatteryThevenin":
-        """In the air at home."""
+        """Return the battery at the air temperature at home."""
         air = float(air_temperature(environment.atmosphere, environment.home.height))
         return self._replace(air_temperature=air, temperature=self.temperature if self.given_temperature else air)
 
     def initial_discrete_state(self) -> tuple[float, float, float, float, float, float, float]:
-        """(charge, voltage [V], current [A], temperature [K], voltage over each transient [V], 1 while switched on)."""
+        """Return (charge, voltage [V], current [A], temperature [K], voltage of each transient [V], 1: on)."""
         return (
             self.initial_charge,
             self.cells * open_circuit_voltage(self.initial_charge),
@@ -106,7 +109,7 @@ class BatteryThevenin(NamedTuple):
 
 @discrete_update(BatteryThevenin)
 def discharge(e, memory, s, rotors, key, tick, interval):
-    """Memory after drawing the motors' power for an interval."""
+    """Return the discrete state after an interval at the motors' power."""
     charge, voltage, _, temperature, fast, slow, on = memory
     current = total(rotors.power) / voltage if on > 0.0 else 0.0
     warmth = math.exp(e.activation * (1.0 / temperature - 1.0 / REFERENCE))
@@ -118,7 +121,11 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     # the transients' heat is taken for that of the current through them: in the mean of a load it is
     settled = e.air_temperature + (ohmic + fast + slow) * current * e.cooling_time / e.heat_capacity
     temperature = settled + cooled * (temperature - settled)
-    charge = max(charge - current * interval / e.capacity, 0.0)
+    taken = current
+    rated = e.capacity / 3600.0  # [A] 1 C
+    if e.peukert_exponent > 1.0 and current > rated:
+        taken = current * math.pow(current / rated, e.peukert_exponent - 1.0)
+    charge = max(charge - taken * interval / e.capacity, 0.0)
     voltage = e.cells * open_circuit_voltage(charge) - ohmic - fast - slow
     on = 1.0 if voltage > (e.cutoff_voltage if on > 0.0 else e.restart) else 0.0
     return (charge, max(voltage, 0.0), current, temperature, fast, slow, on)
@@ -126,11 +133,11 @@ def discharge(e, memory, s, rotors, key, tick, interval):
 
 @supply_voltage(BatteryThevenin)
 def battery_thevenin(e, memory, voltage):
-    """Voltage [V] that each motor gets."""
+    """Return the voltage [V] of each motor."""
     return map_tuple(at_most, memory[1] * memory[6], voltage, voltage)
 
 
 @battery_state(BatteryThevenin)
 def read(e, memory):
-    """What a battery monitor shows: charge, voltage [V] at its terminals, current [A], temperature [K]."""
+    """Return charge, terminal voltage [V], current [A], temperature [K]."""
     return memory[0], memory[1], memory[2], memory[3]

@@ -16,7 +16,7 @@ Triple = tuple[Coefficient, Coefficient, Coefficient]
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     area: Triple | None = None  # [m^2] drag coefficient times area along body x, y, z; the airframe's if left out
     linear: Triple = (0.0, 0.0, 0.0)  # [N s/m] along body x, y, z
@@ -34,7 +34,7 @@ class BodyDrag(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyDrag":
-        """With the airframe's areas unless the table has its own."""
+        """Return the parameters with the airframe's areas, unless the table has others."""
         given = checked(Settings, table)
         area = given.area
         if area is None:
@@ -45,7 +45,7 @@ class BodyDrag(NamedTuple):
 
 @wrench_body(BodyDrag)
 def body_drag(e, memory, s, rotors):
-    """Force [N] and torque [N m] in body coordinates."""
+    """Return the force [N] and torque [N m] in body coordinates."""
     v_body = apply_transposed(s.R_world_body, subtract(s.motion.velocity_world, s.air.wind_world))
     pressure = s.air.density * norm(v_body)
     coefficient = (

@@ -42,5 +42,5 @@ class BodyWrench(NamedTuple):
 
 @wrench_body(BodyWrench)
 def body_wrench(e, memory, s, rotors):
-    """Force [N] and torque [N m] in body coordinates."""
+    """Return the force [N] and torque [N m] in body coordinates."""
     return e.force, e.torque

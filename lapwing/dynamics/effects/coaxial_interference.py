@@ -31,11 +31,11 @@ class Settings(NamedTuple):
 
 
 class CoaxialInterference(NamedTuple):
-    """What the wake of the upper rotor takes from the static loads of the lower one (theory.md, eq. (2.43), (2.44)).
+    """Loss of static loads of a lower rotor in the wake of an upper one (theory.md, eq. (2.43), (2.44)).
 
-    Momentum theory of a lower rotor whose inner half meets twice the upper's induced velocity, for blades of one pitch.
-    Source: Leishman, Principles of Helicopter Aerodynamics, on coaxial rotors, the wake contracted at the lower disc.
-    Valid near hover; the wake of a vehicle that moves is carried away. The upper rotor is taken for one alone.
+    Momentum theory of a lower rotor whose inner half meets twice the upper's induced velocity, for blades of one
+    pitch. Source: Leishman, Principles of Helicopter Aerodynamics, on coaxial rotors, with the wake contracted at the
+    lower disc. Valid near hover; motion carries the wake away. The upper rotor is treated as isolated.
     """
 
     thrust_constant: float  # [m^4/rad^2]
@@ -47,7 +47,7 @@ class CoaxialInterference(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialInterference":
-        """For every rotor with another one above it."""
+        """Return the parameters of every rotor below another one."""
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
@@ -63,12 +63,12 @@ class CoaxialInterference(NamedTuple):
         return cls(static, pitch / flow, flow, radius, above, tuple(distance for _, distance in uppers))
 
     def changes(self, speed: float, axial: float = 0.0, across: float = 0.0) -> list[tuple[float, float]]:
-        """(thrust [N], torque [N m]) that each rotor gains at a density of 1, all at one speed in the same air.
+        """Return the change of (thrust [N], torque [N m]) of each rotor at a density of 1, all rotors at one speed.
 
         Args:
-            speed: of the rotors [rad/s].
-            axial: speed of the hubs through the air along their axes [m/s].
-            across: the same across them.
+            speed: rotor speed [rad/s].
+            axial: air speed of the hubs along their axes [m/s].
+            across: air speed across the axes [m/s].
         """
         change, wash = python_function(_change), self.flow * speed
         washes = [wash * any(above) for above in self.above]
@@ -78,7 +78,7 @@ class CoaxialInterference(NamedTuple):
         ]
 
     def slopes(self) -> WakeSlopes:
-        """Of thrusts and torques, all rotors at one speed at rest in the air (theory.md, eq. (2.45))."""
+        """Return the coupling of thrusts and torques, all rotors at one speed in still air (theory.md, eq. (2.45))."""
         q, count = self.pitch, len(self.above)
         t = python_function(inflow.thrust_in_wake)(q, 1.0)
         through = q - (q - 1.0) * t
@@ -95,7 +95,7 @@ class CoaxialInterference(NamedTuple):
 
 
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
-    """It changes the loads of `rotor_thrust`."""
+    """Check that the scene has `rotor_thrust`, whose loads this effect changes."""
     if "rotor_thrust" not in tables:
         reject("goes with effects.rotor_thrust, which the scene does not name")
     for name in NOT_BESIDE:
@@ -104,7 +104,7 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
 
 
 def stacked(airframe: "Airframe") -> bool:
-    """Whether a rotor stands in the wake of another one."""
+    """Return True if a rotor lies in the wake of another one."""
     propeller = airframe.propeller
     return propeller is not None and any(number >= 0 for number, _ in _uppers(airframe, 0.5 * propeller.diameter))
 
@@ -114,7 +114,7 @@ def _uppers(airframe: "Airframe", radius: float) -> list[tuple[int, float]]:
 
 
 def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
-    """(number from 0, distance [m]) of the nearest rotor in whose wake rotor k stands; (-1, 0) without one."""
+    """Return (index, distance [m]) of the nearest rotor whose wake reaches rotor k; (-1, 0) if none does."""
     places = np.array(airframe.rotors.position)
     axes = np.array(airframe.rotors.tilted_axis or [(0.0, 0.0, 1.0)] * len(places))
     found = []
@@ -138,7 +138,7 @@ def _square(_, speed, factor):
 
 @always_inline
 def _flow(c, above, _):
-    """[m/s] induced velocity of the rotor above."""
+    """Return the induced velocity [m/s] of the rotor above."""
     flow, squares = c
     square = 0.0
     for j in range(len(above)):
@@ -148,7 +148,7 @@ def _flow(c, above, _):
 
 @always_inline
 def _change(e, both, place):
-    """(change of thrust [N], change of torque [N m]) at a density of 1."""
+    """Return (change of thrust [N], change of torque [N m]) at a density of 1."""
     speed, wash = both
     (axial, across), distance = place
     along = axial + wash  # [m/s] at which the wake comes down
@@ -180,7 +180,7 @@ def _second(_, change, factor):
 
 @loads(CoaxialInterference)
 def coaxial_interference(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`."""
+    """Add the loads of each rotor to `before`."""
     speed = s.motion.rotor_speed
     squares = map_tuple(_square, 0.0, speed, factors.thrust)
     wash = map_tuple(_flow, (e.flow, squares), e.above, e.above)

@@ -7,56 +7,78 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
-from lapwing.dynamics.vector import NOTHING, ZERO, add, dot, norm, scale, subtract
-from lapwing.kernels import math
+from lapwing.dynamics.vector import (
+    NOTHING,
+    ZERO,
+    Vec3,
+    add,
+    apply,
+    apply_transposed,
+    cross,
+    dot,
+    norm,
+    scale,
+    subtract,
+)
+from lapwing.kernels import always_inline, math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-PUSH = 0.05  # of the depth that spheres are in one another, taken back in each exchange interval
+PUSH = 0.05  # of the depth that spheres are in one another, taken back in each communication step
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     radius: Annotated[float, Gt(0), Le(100)] | None = None  # [m] about the centre of mass; to the rotors' tips
     restitution: Annotated[float, Ge(0), Le(1)] = 0.3  # speed of parting over that of approach; of two the lower
+    friction: Annotated[float, Ge(0), Le(2)] = 0.0  # coefficient of friction; of two the lower
 
 
 class Collision(NamedTuple):
-    """Spheres without friction that bounce off one another (theory.md, eq. (2.60), (2.61)).
+    """Spheres that bounce off one another and rub (theory.md, eq. (2.60), (2.61), (2.77)).
 
-    An impulse along the line of centres, given as a force over one exchange interval and to both alike, so that
-    momentum is kept. Source: Newton's law of impact; depth taken back after Baumgarte. Valid while a vehicle moves by
-    little of its radius in an exchange interval; vehicles neither turn nor break by it.
+    An impulse along the line of centres and one of friction against the slip, given as a force and a torque over one
+    communication step and to both alike, so that momentum and angular momentum are kept. Source: Newton's law of
+    impact, Coulomb's of friction (Walton, 1993); depth taken back after Baumgarte. Valid while a vehicle moves by
+    little of its radius in a communication step; vehicles do not break by it.
     """
 
     radius: float  # [m]
     restitution: float
+    friction: float
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Collision":
-        """With a sphere around the rotors unless the table has its own."""
+        """Return the parameters with a sphere around the rotors, unless the table has its own."""
         given = checked(Settings, table)
         radius = given.radius
         if radius is None:
             propeller = airframe.propeller or reject("needs the key radius: the vehicle has no [propeller]")
             radius = max(math.hypot(*place) for place in airframe.rotors.position) + 0.5 * propeller.diameter
-        return cls(radius, given.restitution)
+        return cls(radius, given.restitution, given.friction)
 
-    def initial_discrete_state(self) -> tuple[float, float, float]:
-        """The force of others [N], world."""
-        return ZERO
+    def initial_discrete_state(self) -> tuple[Vec3, Vec3]:
+        """Return zero force [N] and torque [N m] of others, world."""
+        return ZERO, ZERO
 
     def presence(self) -> dict[str, float]:
-        """The sphere."""
-        return {"radius": self.radius, "restitution": self.restitution}
+        """Return the sphere."""
+        return {"radius": self.radius, "restitution": self.restitution, "friction": self.friction}
+
+
+@always_inline
+def _yielding(state, arm, normal, along):
+    """Return the change of speed along a unit vector at the contact, by an impulse of 1 N s along it [1/kg]."""
+    turning = scale(arm, cross(normal, along))
+    return 1.0 / state.mass + dot(turning, apply(state.inverse_inertia_world, turning))
 
 
 @interaction(Collision)
 def touch(e, memory, own, others, interval):
-    """The force of all that it touches, over the coming interval."""
-    force = (0.0, 0.0, 0.0)
+    """Return the force [N] and torque [N m] of all touching spheres for the coming interval, world."""
+    force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for other in others:
         apart = subtract(own.position_world, other.position_world)
         distance = norm(apart)
@@ -64,15 +86,36 @@ def touch(e, memory, own, others, interval):
         if depth <= 0.0 or distance == 0.0 or other.radius == 0.0:
             continue
         normal = scale(1.0 / distance, apart)
-        parting = dot(normal, subtract(own.velocity_world, other.velocity_world))
+        relative = subtract(own.velocity_world, other.velocity_world)
+        parting = dot(normal, relative)
         wanted = max(-min(own.restitution, other.restitution) * parting, PUSH * depth / interval)
-        if wanted > parting:
-            reduced = own.mass * other.mass / (own.mass + other.mass)
-            force = add(force, scale(reduced * (wanted - parting) / interval, normal))
-    return force
+        if wanted <= parting:
+            continue
+        reduced = own.mass * other.mass / (own.mass + other.mass)
+        push = reduced * (wanted - parting) / interval  # [N]
+        force = add(force, scale(push, normal))
+        rough = min(own.friction, other.friction)
+        if rough == 0.0:
+            continue
+        # the contact divides the distance in proportion to the radii, so that angular momentum is kept
+        arm = own.radius * distance / (own.radius + other.radius)
+        reach = other.radius * distance / (own.radius + other.radius)
+        turning = add(scale(arm, own.omega_world), scale(reach, other.omega_world))
+        slip = subtract(subtract(relative, scale(parting, normal)), cross(turning, normal))
+        speed = norm(slip)
+        if speed == 0.0:
+            continue
+        along = scale(1.0 / speed, slip)
+        stop = speed / (_yielding(own, arm, normal, along) + _yielding(other, reach, normal, along)) / interval  # [N]
+        rub = min(rough * push, stop)
+        force = subtract(force, scale(rub, along))
+        torque = add(torque, scale(arm * rub, cross(normal, along)))
+    return force, torque
 
 
 @wrench(Collision)
 def collision(e, memory, s, rotors):
-    """Force [N] in world coordinates at the centre of mass, no torque."""
-    return memory, NOTHING
+    """Return force [N] in world coordinates at the centre of mass, torque [N m] in body coordinates."""
+    if e.friction == 0.0:
+        return memory[0], NOTHING
+    return memory[0], apply_transposed(s.R_world_body, memory[1])

@@ -1,12 +1,17 @@
 """Motors with a winding, instead of a rotor speed that follows the voltage with a lag."""
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
+from annotated_types import Ge, Le
+
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import motor
+from lapwing.dynamics.effects._hooks import discrete_update, motor
 from lapwing.dynamics.vector import pair
 from lapwing.kernels import always_inline
+from lapwing.kernels import math as exact
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -14,58 +19,92 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 KIND = "motor model"
 FULL_FRICTION = 1.0  # [rad/s] above which the idle current is drawn in full
+LARGEST = 0.9  # of the inductance at which speed and current oscillate
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [motor] and [rotors] say it all."""
+    """Scene table; the rest is in the airframe's [motor] and [rotors]."""
+
+    braking_current: Annotated[float, Ge(0), Le(1e4)] = 0.0  # [A] up to which the controller brakes; 0: it does not
+    inductance: Annotated[float, Ge(0), Le(1)] = 0.0  # [H] of the winding, between two leads
 
 
 class DcMotor(NamedTuple):
-    """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9)).
+    """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9), (2.76)).
 
     The resistance is that of motor and controller, the inertia that of the rotor and, through the belt, of the motor.
-    The controller keeps the current between 0 (it does not brake) and the lowest of its own limit, the motor's peak
+    The controller keeps the current between minus its braking current and the lowest of its own limit, the motor's peak
     current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. Then it
-    gives less voltage than it is asked for, and takes the power of that, over its efficiency. Source: the usual steady
-    model of a brushless motor, from its speed constant, resistance and idle current; inductance neglected. Valid for
-    changes slower than about 1 ms.
+    gives less voltage than it is asked for, and takes the power of that, over its efficiency; while it brakes, it gives
+    power back. Source: the usual steady model of a brushless motor, from its speed constant, resistance and idle
+    current; with an inductance L I' = V - K w - R I, exactly for constant voltage and torque. Valid for changes slower
+    than about 1 ms.
     """
 
     motor_constant: float  # [N m/A] = [V s/rad] K at the rotor, behind the belt
     inverse_resistance: float  # [1/ohm]
     no_load_current: float  # [A]
+    least_current: float  # [A] not positive: minus the braking current
     current_limit: float  # [A]
     power_limit: float  # [W] taken by the motor
     inverse_inertia: float  # [1/(kg m^2)] of one rotor and its motor
     efficiency: float  # of the belt
     inverse_esc_efficiency: float
+    winding: tuple = ()  # (lag [A s^2/rad], effective inverse inertia [1/(kg m^2)], rate [1/s]) of a winding that lags
+    rotors: int = 0  # of the vehicle
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "DcMotor":
-        """From the airframe's motor."""
-        checked(Settings, table)
+        """Return the parameters of the airframe's motor."""
+        given = checked(Settings, table)
         engine = airframe.motor
+        inertia = airframe.rotors.inertia + engine.inertia / (engine.gear_ratio * engine.gear_ratio)
+        resistance = engine.resistance + engine.esc_resistance
+        winding = ()
+        if given.inductance:
+            winding = _winding(given.inductance, resistance, engine.rotor_constant, engine.belt_efficiency, inertia)
         return cls(
             engine.rotor_constant,
-            1.0 / (engine.resistance + engine.esc_resistance),
+            1.0 / resistance,
             engine.no_load_current,
+            0.0 - given.braking_current,
             airframe.motor_current_limit,
             engine.power_limit,
-            1.0 / (airframe.rotors.inertia + engine.inertia / (engine.gear_ratio * engine.gear_ratio)),
+            1.0 / inertia,
             engine.belt_efficiency,
             1.0 / engine.esc_efficiency,
+            winding,
+            len(airframe.rotors.position),
         )
 
+    def initial_discrete_state(self) -> tuple:
+        """Return () without inductance; else the time [s] and, of each rotor, (transient current [A], voltage [V])."""
+        return (0.0, ((0.0, 0.0),) * self.rotors) if self.winding else ()
+
+
+def _winding(inductance: float, resistance: float, constant: float, efficiency: float, inertia: float) -> tuple:
+    """Return (lag, effective inverse inertia, rate) from the roots of the linear motor (theory.md, eq. (2.76))."""
+    electrical = inductance / resistance
+    mechanical = inertia * resistance / (efficiency * constant * constant)
+    if 4.0 * electrical >= LARGEST * mechanical:
+        most = 0.25 * LARGEST * mechanical * resistance
+        raise ConfigError("inductance", f"got {inductance:g} H", f"at most {most:.2g} H for this motor")
+    root = math.sqrt(1.0 - 4.0 * electrical / mechanical)
+    slow, fast = 2.0 / (mechanical * (1.0 + root)), (1.0 + root) / (2.0 * electrical)  # [1/s]
+    lag = constant * inductance / (resistance * (resistance - inductance * slow))
+    return lag, 1.0 / (inertia - efficiency * constant * lag), fast
+
 
 @always_inline
-def _unlimited(e, speed, voltage):
-    """Current [A] without the controller's limits, but that it does not brake."""
-    return max(voltage * e.inverse_resistance - (e.motor_constant * e.inverse_resistance) * speed, 0.0)
+def _free(e, speed, voltage):
+    """Return the current [A] without limits and inductance."""
+    return voltage * e.inverse_resistance - (e.motor_constant * e.inverse_resistance) * speed
 
 
 @always_inline
-def _current(e, speed, voltage):
-    wanted = min(_unlimited(e, speed, voltage), e.current_limit)
+def _limited(e, speed, current):
+    """Return the current [A] that the controller allows."""
+    wanted = min(max(current, e.least_current), e.current_limit)
     # the power K w I + R I^2 is at its limit where I = 2 P / (K w + sqrt((K w)^2 + 4 R P))
     back = e.motor_constant * speed
     if wanted * (back + wanted / e.inverse_resistance) <= e.power_limit:
@@ -74,25 +113,114 @@ def _current(e, speed, voltage):
 
 
 @always_inline
-def _acceleration(e, torque, both):
-    speed, current = both
+def _acceleration(e, inverse_inertia, speed, current, torque):
     friction = e.no_load_current * min(speed * (1.0 / FULL_FRICTION), 1.0)
-    return (e.efficiency * e.motor_constant * e.inverse_inertia) * (current - friction) - torque * e.inverse_inertia
+    return (e.efficiency * e.motor_constant * inverse_inertia) * (current - friction) - torque * inverse_inertia
 
 
 @always_inline
-def _power(e, voltage, both):
-    """[W] at the controller: of the voltage asked for, or of the lower one that keeps the current in its limits."""
-    speed, current = both
-    if current < _unlimited(e, speed, voltage):
+def _power(e, speed, free, current, voltage):
+    """Return the power [W] at the controller, for the commanded voltage or another one within the current limits."""
+    if current != free:
         voltage = e.motor_constant * speed + current / e.inverse_resistance
-    return voltage * current * e.inverse_esc_efficiency
+    electrical = voltage * current
+    return electrical * e.inverse_esc_efficiency if current >= 0.0 else electrical / e.inverse_esc_efficiency
+
+
+@always_inline
+def _driven(e, speed, torque, free, voltage):
+    """Return (acceleration [rad/s^2], current [A], power [W]) of a rotor at a current before limits."""
+    current = _limited(e, speed, free)
+    acceleration = _acceleration(e, e.inverse_inertia, speed, current, torque)
+    return acceleration, current, _power(e, speed, free, current, voltage)
+
+
+@always_inline
+def _settled(e, speed, torque, voltage):
+    """Return the current [A] before limits once the transient of the winding is over."""
+    free = _free(e, speed, voltage)
+    lag, inverse_inertia, _ = e.winding
+    return free + lag * _acceleration(e, inverse_inertia, speed, free, torque)
+
+
+@always_inline
+def _without_lag(c, both, voltage):
+    speed, torque = both
+    return _driven(c[0], speed, torque, _free(c[0], speed, voltage), voltage)
+
+
+@always_inline
+def _lagging(c, both, more):
+    e, kept = c
+    speed, torque = both
+    voltage, (transient, _) = more
+    return _driven(e, speed, torque, _settled(e, speed, torque, voltage) + kept * transient, voltage)
+
+
+@always_inline
+def _all_without_lag(given):
+    e, _, __, both, voltage = given
+    return map_tuple(_without_lag, (e, 0.0), both, voltage)
+
+
+@always_inline
+def _all_lagging(given):
+    e, memory, t, both, voltage = given
+    kept = exact.exp(-e.winding[2] * (t - memory[0]))
+    return map_tuple(_lagging, (e, kept), both, map_tuple(pair, 0.0, voltage, memory[1]))
+
+
+@always_inline
+def _continued(c, both, more):
+    """Return (transient [A], voltage [V]) of a rotor whose current goes on from a step of the voltage."""
+    e, kept = c
+    speed, torque = both
+    voltage, (transient, before) = more
+    current = _limited(e, speed, _settled(e, speed, torque, before) + kept * transient)
+    return current - _settled(e, speed, torque, voltage), voltage
+
+
+@always_inline
+def _update_without_lag(given):
+    return ()
+
+
+@always_inline
+def _update_lagging(given):
+    e, memory, s, rotors = given
+    kept = exact.exp(-e.winding[2] * (s.t - memory[0]))
+    both = map_tuple(pair, 0.0, s.motion.rotor_speed, rotors.torque)
+    return s.t, map_tuple(_continued, (e, kept), both, map_tuple(pair, 0.0, rotors.voltage, memory[1]))
+
+
+@discrete_update(DcMotor)
+def continue_current(e, memory, s, rotors, key, tick, interval):
+    """Return the transient of each winding after the voltages have changed."""
+    return by_axis(_update_without_lag, _update_lagging, e.winding, (e, memory, s, rotors))
+
+
+@always_inline
+def _first(_, driven, __):
+    return driven[0]
+
+
+@always_inline
+def _second(_, driven, __):
+    return driven[1]
+
+
+@always_inline
+def _third(_, driven, __):
+    return driven[2]
 
 
 @motor(DcMotor)
 def dc_motor(e, memory, s, loads, voltage):
-    """(acceleration [rad/s^2], current [A], power [W]) of each rotor."""
-    speed = s.motion.rotor_speed
-    current = map_tuple(_current, e, speed, voltage)
-    both = map_tuple(pair, 0.0, speed, current)
-    return map_tuple(_acceleration, e, loads.torque, both), current, map_tuple(_power, e, voltage, both)
+    """Return (acceleration [rad/s^2], current [A], power [W]) of each rotor."""
+    both = map_tuple(pair, 0.0, s.motion.rotor_speed, loads.torque)
+    driven = by_axis(_all_without_lag, _all_lagging, e.winding, (e, memory, s.t, both, voltage))
+    return (
+        map_tuple(_first, 0.0, driven, driven),
+        map_tuple(_second, 0.0, driven, driven),
+        map_tuple(_third, 0.0, driven, driven),
+    )

@@ -16,9 +16,10 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     spread: Annotated[float, Ge(0), Le(1)] = 0.113  # m of the jet's radius, where it is e times slower, a metre of way
+    core: Annotated[float, Ge(0), Le(20)] = 0.0  # way before the jet spreads, over the distance of opposite rotors
 
 
 class Downwash(NamedTuple):
@@ -28,32 +29,37 @@ class Downwash(NamedTuple):
     has developed, a Gauss profile whose width grows with the way and whose momentum is the thrust. It acts through the
     effects that know the air's speed (body_drag, axial_inflow, dynamic_inflow). Source: Leishman, Principles of
     Helicopter Aerodynamics, on the wake in hover; Pope, Turbulent Flows, section 5.1, on the round jet, whose half
-    width grows by 0.094 m a metre. Valid near hover, below by more than the distance between rotors, where their jets
-    have joined; no wind carries the jet away, the ground does not turn it, and it is there at once.
+    width grows by 0.094 m a metre; Bauersfeld et al., IEEE Robotics and Automation Letters 10 (2025), who measured a
+    jet from 2.5 distances of opposite rotors below a quadrotor on (`core`). Valid near hover, below by more than the
+    distance between rotors, where their jets have joined; no wind carries the jet away, the ground does not turn it,
+    and it is there at once.
     """
 
     disc_radius: float  # [m] of one disc as large as all rotors' together
     spread: float
+    core: float  # [m] of way before the jet spreads
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":
-        """With the discs of the airframe's propellers."""
+        """Return the parameters with the discs of the airframe's propellers."""
         given = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
-        return cls(0.5 * propeller.diameter * math.sqrt(len(airframe.rotors.position)), given.spread)
+        places = airframe.rotors.position
+        opposite = 2.0 * max(math.hypot(x, y) for x, y, _ in places)
+        return cls(0.5 * propeller.diameter * math.sqrt(len(places)), given.spread, given.core * opposite)
 
     def initial_discrete_state(self) -> tuple[float, float, float]:
-        """The wind of others [m/s], world."""
+        """Return the wind of others [m/s], world."""
         return ZERO
 
     def presence(self) -> dict[str, float]:
-        """Whence its jet comes."""
+        """Return the origin of its jet."""
         return {"disc_radius": self.disc_radius}
 
 
 @interaction(Downwash)
 def blown(e, memory, own, others, interval):
-    """The wind of all other vehicles' jets where this one is, for the coming interval."""
+    """Return the wind of all other vehicles' jets at this vehicle, for the coming interval."""
     wind = (0.0, 0.0, 0.0)
     for other in others:
         thrust, R = norm(other.thrust_world), other.disc_radius
@@ -63,7 +69,7 @@ def blown(e, memory, own, others, interval):
         away = subtract(own.position_world, other.position_world)
         along = dot(away, down)
         across = subtract(away, scale(along, down))
-        width = R + e.spread * max(along, 0.0)
+        width = R + e.spread * max(along - e.core, 0.0)
         induced = math.sqrt(thrust / (2.0 * math.pi * other.air_density)) / R
         developed = 1.0 + along / math.sqrt(along * along + R * R)
         speed = induced * developed * R / width * math.exp(-dot(across, across) / (width * width))
@@ -73,5 +79,5 @@ def blown(e, memory, own, others, interval):
 
 @air(Downwash)
 def downwash(e, memory, s, before):
-    """Air with the wind of the others added."""
+    """Add the wind of the other vehicles to the air."""
     return Air(before.density, add(before.wind_world, memory))

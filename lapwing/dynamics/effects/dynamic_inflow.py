@@ -28,13 +28,13 @@ class Settings(NamedTuple):
 
 
 class DynamicInflow(NamedTuple):
-    """What the flow through a rotor changes of the static loads of `rotor_thrust` (theory.md, eq. (2.35), (2.36)).
+    """Change of the static loads of `rotor_thrust` by the flow through the rotor (theory.md, eq. (2.35), (2.36)).
 
-    The blades meet the air of the rotor's own speed along its axis and of the flow that it induces: momentum theory in
-    climb and forward flight (Glauert), its fit to measurements in descent. Source: Leishman, Principles of Helicopter
-    Aerodynamics, section 2.13; the time that the flow takes to follow: Carpenter and Fridovich, NACA TN 3044 (1953).
-    Valid for blades that do not stall; brought up to date once an exchange interval. In the vortex ring state the mean
-    of a flow that is rough.
+    The blades meet the axial air speed of the rotor plus the flow that it induces: momentum theory in climb and
+    forward flight (Glauert), its fit to measurements in descent, times the propeller's induced power factor. Sources:
+    Leishman, Principles of Helicopter Aerodynamics, section 2.13; time constant of the flow: Carpenter and Fridovich,
+    NACA TN 3044 (1953). Valid for blades that do not stall; updated once per communication step. In the vortex ring
+    state it is the mean of a rough flow; `vortex_ring` adds the rest.
     """
 
     slope: float  # [m^3/rad] -dT / (density speed dV)
@@ -43,59 +43,62 @@ class DynamicInflow(NamedTuple):
     hover: float  # [m/rad] induced velocity in hover over the rotor's speed
     area: float  # [m^2] of the disc
     mass: float  # [m^3] apparent mass over the density
+    kappa: float  # induced velocity in hover over the ideal one
     at_rest: tuple[float, ...]  # [m/s] a zero for each rotor
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "DynamicInflow":
-        """From the airframe's propeller."""
+        """Return the parameters of the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
         area = math.pi * radius * radius
-        hover = math.sqrt(0.5 * static / area)
+        kappa = propeller.induced_power_factor
+        hover = kappa * math.sqrt(0.5 * static / area)
         if hover > LARGEST_SHARE * pitch:
             least = 2.0 * math.pi * hover / LARGEST_SHARE
             reject(
                 f"the propeller's pitch must be at least {least:.3g} m for its static thrust: got {propeller.pitch:g} m"
             )
         mass = APPARENT_MASS * 4.0 / 3.0 * math.pi * (radius * radius * radius)
-        return cls(static / (pitch - hover), static, pitch, hover, area, mass, (0.0,) * len(airframe.rotors.position))
+        at_rest = (0.0,) * len(airframe.rotors.position)
+        return cls(static / (pitch - hover), static, pitch, hover, area, mass, kappa, at_rest)
 
     def initial_discrete_state(self) -> tuple[float, ...]:
-        """Induced velocity of each rotor [m/s]."""
+        """Return the induced velocity of each rotor [m/s]."""
         return self.at_rest
 
 
 @always_inline
 def _through(e, axial, speed, induced):
-    """[m/s] air through the disc, held to where blades neither stall nor brake hard."""
+    """Return the air speed through the disc [m/s], clamped to where blades neither stall nor brake hard."""
     blades = e.pitch * speed
     return min(max(axial + induced, -0.5 * blades), 1.5 * blades)
 
 
 @kernel
 def _followed(c, induced, both):
-    """Induced velocity an interval later: towards what momentum theory has for the thrust at present."""
+    """Return the induced velocity an interval later, on its way to that of momentum theory for the present thrust."""
     e, interval = c
     speed, (axial, across) = both
     square = 0.5 * e.slope / e.area * speed * (e.pitch * speed - _through(e, axial, speed, induced))
     hover = max(math.sqrt(max(square, 0.0)), SLOWEST)
-    steady = hover * inflow.induced_velocity(axial / hover, across / hover)
-    gain = 1.0 + 0.25 * e.slope * speed / (e.area * hover)  # the thrust falls as the flow grows
-    rate = 4.0 * e.area * hover / e.mass * gain
+    steady = hover * inflow.induced_velocity(axial / hover, across / hover, e.kappa)
+    gain = 1.0 + 0.25 * e.kappa * e.slope * speed / (e.area * hover)  # the thrust falls as the flow grows
+    rate = 4.0 * e.area * hover / (e.mass * e.kappa) * gain
     return induced + (1.0 - math.exp(-rate * interval)) / gain * (steady - induced)
 
 
 @discrete_update(DynamicInflow)
 def follow(e, memory, s, rotors, key, tick, interval):
-    """Induced velocity of each rotor for the next interval [m/s]."""
+    """Return the induced velocity of each rotor for the next interval [m/s]."""
     return map_tuple(_followed, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
 
 
 @always_inline
 def _change(e, both, hub):
-    """(change of thrust [N], change of torque [N m]) at a density of 1."""
+    """Return (change of thrust [N], change of torque [N m]) at a density of 1."""
     speed, induced = both
     through = _through(e, hub[0], speed, induced)
     thrust = e.slope * (e.pitch * speed - through)  # over the speed
@@ -117,7 +120,7 @@ def _more_torque(density, before, both):
 
 @loads(DynamicInflow)
 def dynamic_inflow(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`."""
+    """Add the loads of each rotor to `before`."""
     change = map_tuple(_change, e, map_tuple(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
     return Loads(
         map_tuple(_more_thrust, s.air.density, before.thrust, map_tuple(pair, 0.0, factors.thrust, change)),

@@ -28,12 +28,12 @@ class Gravity(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Gravity":
-        """The standard acceleration."""
+        """Return the standard acceleration."""
         checked(Settings, table)
         return cls()
 
     def in_environment(self, environment: Environment) -> "Gravity":
-        """That of the place."""
+        """Return the gravity at the scene's place."""
         return Gravity(environment.gravity)
 
     @property
@@ -44,11 +44,11 @@ class Gravity(NamedTuple):
 
 @field(Gravity)
 def gravity_field(e, memory):
-    """Acceleration [m/s^2] in world."""
+    """Return the acceleration [m/s^2] in world."""
     return (-0.0, -0.0, -e.acceleration)
 
 
 @wrench(Gravity)
 def gravity(e, memory, s, rotors):
-    """Force [N] in world, torque [N m] in body coordinates."""
+    """Return the force [N] in world, torque [N m] in body coordinates."""
     return (-0.0, -0.0, -e.acceleration * s.body.mass), NOTHING

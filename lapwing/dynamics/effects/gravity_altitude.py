@@ -31,12 +31,12 @@ class GravityAltitude(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GravityAltitude":
-        """The standard acceleration at sea level."""
+        """Return the standard acceleration at sea level."""
         checked(Settings, table)
         return cls()
 
     def in_environment(self, environment: Environment) -> "GravityAltitude":
-        """That of the place."""
+        """Return the gravity at the scene's place."""
         return GravityAltitude(environment.gravity, environment.home.height)
 
     @property
@@ -45,7 +45,7 @@ class GravityAltitude(NamedTuple):
         return _at(self, 0.0)
 
     def initial_discrete_state(self) -> tuple[float]:
-        """Acceleration at home [m/s^2]."""
+        """Return the acceleration at home [m/s^2]."""
         return (self.acceleration_at_home,)
 
 
@@ -57,17 +57,17 @@ def _at(e, height):
 
 @discrete_update(GravityAltitude)
 def weigh(e, memory, s, rotors, key, tick, interval):
-    """The acceleration [m/s^2] for the next interval: it changes by 3e-7 of itself a metre."""
+    """Return the acceleration [m/s^2] for the next interval; it changes by 3e-7 of its value per metre."""
     return (_at(e, s.motion.position_world[2]),)
 
 
 @field(GravityAltitude)
 def gravity_altitude_field(e, memory):
-    """Acceleration [m/s^2] in world."""
+    """Return the acceleration [m/s^2] in world."""
     return (-0.0, -0.0, -memory[0])
 
 
 @wrench(GravityAltitude)
 def gravity_altitude(e, memory, s, rotors):
-    """Force [N] in world, torque [N m] in body coordinates."""
+    """Return the force [N] in world, torque [N m] in body coordinates."""
     return (-0.0, -0.0, -memory[0] * s.body.mass), NOTHING

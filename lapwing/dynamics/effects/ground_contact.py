@@ -3,12 +3,8 @@
 import math
 
 from lapwing.dynamics.effects._contact_parameters import (
-    FREE,
-    NOWHERE,
-    SLIDING,
     STABLE,
     STABLE_REAL,
-    STICKING,
     SUDDEN,
     GroundContact,
     GroundContactSmooth,
@@ -17,9 +13,8 @@ from lapwing.dynamics.effects._foot_contact import NO_FOOT, footing, in_reach, s
 from lapwing.dynamics.effects._hooks import (
     contact,
     contact_forces,
-    discontinuity,
     is_sleeping,
-    post_step,
+    memory_rate,
     substeps,
     wrench,
 )
@@ -27,11 +22,12 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import over_plane, summit, surface
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, scale, subtract
 from lapwing.kernels import always_inline, kernel
-from lapwing.kernels.codegen import any_in_tuple, map_tuple, overload_for, reduce_tuple
+from lapwing.kernels.codegen import map_tuple, overload_for, reduce_tuple
 from lapwing.kernels.simd import any_above, deinterleave, interleave, select, select_vector, sqrt
 from lapwing.kernels.simd_chunks import chunk4, unchunk4
+from lapwing.kernels.state_tree import largest
 
-WALL = 0.5  # z of the normal of a face, below which it is a wall
+RELAXED = 1e-13  # [m] deflection of friction elements that may as well be zero
 
 
 @always_inline
@@ -44,21 +40,18 @@ def _far(e, motion, h):
 
 
 @always_inline
-def _spring(e, anchor, foot):
-    """Pull of the anchors on four feet, tangential [N]; none before a foot has touched."""
-    k = select(anchor[3], e.tangential_stiffness, 0.0)
-    pull, n = scale(k, subtract(anchor, foot.place)), foot.normal
-    # brought into the plane along z: by its normal, feet on a slope would step on at 1 ms
-    along_z = (pull[0], pull[1], -(n[0] * pull[0] + n[1] * pull[1]) / n[2])
-    return select_vector(n[2] - WALL, along_z, subtract(pull, scale(dot(n, pull), n)))
-
-
-@always_inline
-def _trial(e, anchor, foot):
-    """(force if the feet stick, maximum friction) [N]."""
-    sliding = anchor[3] - STICKING
-    limit = select(sliding, e.dynamic, select(anchor[3], e.static, e.dynamic)) * foot.press
-    return subtract(_spring(e, anchor, foot), scale(e.damping, foot.slip)), limit
+def _element(e, deflection, foot):
+    """Return (friction force [N], rate of the deflection [m/s]) of four feet (theory.md, eq. (2.13), (2.14))."""
+    k, n = e.tangential_stiffness, foot.normal
+    pull, slip = scale(k, deflection), foot.slip
+    stretched = add(subtract(pull, scale(dot(pull, n), n)), scale(e.tangential_damping, slip))
+    y = sqrt(dot(slip, slip)) * e.inverse_stiction
+    y = select(1.0 - y, y, 1.0)
+    limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * foot.press
+    square = dot(stretched, stretched)
+    over = square - limit * limit
+    held = select_vector(over, scale(limit / sqrt(square), stretched), stretched) if any_above(over) else stretched
+    return scale(-1.0, held), scale(1.0 / e.tangential_damping, subtract(held, pull))
 
 
 def _friction(e, memory, foot):
@@ -68,14 +61,7 @@ def _friction(e, memory, foot):
 @overload_for(_friction, inline=True)
 def _friction_by_law(e, memory, foot):
     if e.instance_class is GroundContact:
-
-        def anchored(e, memory, foot):
-            trial, limit = _trial(e, memory, foot)
-            square = dot(trial, trial)
-            over = square - limit * limit
-            return select_vector(over, scale(limit / sqrt(square), trial), trial) if any_above(over) else trial
-
-        return anchored
+        return lambda e, memory, foot: _element(e, memory, foot)[0]
 
     def smooth(e, memory, foot):
         speed = sqrt(dot(foot.slip, foot.slip))
@@ -164,8 +150,8 @@ def forces_smooth(e, memory, motion):
 
 @is_sleeping(GroundContact)
 def far(e, memory, motion, h):
-    """Well above the ground?"""
-    return _far(e, motion, h)
+    """Well above the ground, with friction elements that have relaxed?"""
+    return _far(e, motion, h) and largest(memory) < RELAXED
 
 
 @is_sleeping(GroundContactSmooth)
@@ -175,66 +161,35 @@ def far_smooth(e, memory, motion, h):
 
 
 @always_inline
-def _settled_four(c, feet, memory):
-    e, stance, h = c
-    feet_body = interleave(feet)
+def _stretching_four(c, feet, memory):
+    e, stance = c
+    feet_body, deflection = interleave(feet), interleave(memory)
+    relaxing = scale(-e.tangential_stiffness / e.tangential_damping, deflection)
     reached = in_reach(stance, feet_body)
     if not any_above(reached):
-        return (NOWHERE, NOWHERE, NOWHERE, NOWHERE)
+        return deinterleave(relaxing)
     foot = footing(e, stance, feet_body)
     pressing = select(reached, foot.press, 0.0)
-    x, y, z, how, before = interleave(memory)
-    square = dot(foot.slip, foot.slip)
-    since = foot.depth / foot.approach
-    since = select(foot.approach, select(h - since, since, h), h)  # [s] a foot has touched
-    place = select_vector(how, (x, y, z), subtract(foot.place, scale(since, foot.slip)))
-    how, before = select(how, how, SLIDING), select(how, before, square)
-    anchor = (place[0], place[1], place[2], how)
-    trial, limit = _trial(e, anchor, foot)
-    over = select(pressing, dot(trial, trial) - limit * limit, 0.0)
-    how = select(over, how, STICKING)
-    if any_above(over):
-        # a foot that is slowing down is held by the static coefficient, one that breaks away by the dynamic one
-        caught = select(before - e.square_stiction_velocity, e.square_stiction_velocity, before) - square
-        spring = _spring(e, anchor, foot)
-        pull, limit = sqrt(dot(spring, spring)), select(caught, e.static, e.dynamic) * foot.press
-        kept = select(pull - limit, limit / pull, 1.0)
-        place = select_vector(over, add(foot.place, scale(kept, subtract(place, foot.place))), place)
-        how = select(over, select(caught, STICKING, SLIDING), how)
-    # how high an anchor is counts on a wall only, and would else disturb the error control
-    place = (place[0], place[1], select(foot.normal[2] - WALL, 0.0, place[2]))
-    place = select_vector(pressing, place, ZERO)
-    return deinterleave((*place, select(pressing, how, FREE), select(pressing, square, 0.0)))
+    return deinterleave(select_vector(pressing, _element(e, deflection, foot)[1], relaxing))
 
 
-@post_step(GroundContact)
-def drag_anchors(e, memory, motion, h):
-    """Anchors after a step: kept by feet that stick, dragged along by feet that slide."""
+@memory_rate(GroundContact)
+def stretching(e, memory, motion):
+    """Rate [m/s] at which the friction elements stretch; in the air they relax."""
     stance = stance_of(e, motion, rotation_matrix(motion.attitude))
     feet, fours = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
-    return unchunk4(map_tuple(_settled_four, (e, stance, h), feet, fours), memory)
-
-
-@always_inline
-def _lets_go(_, before, after):
-    return before[3] + after[3] == STICKING + SLIDING
-
-
-@discontinuity(GroundContact)
-def lets_go(e, before, after):
-    """Has any foot begun to slide, or to stick?"""
-    return any_in_tuple(map_tuple(_lets_go, 0.0, before, after))
+    return unchunk4(map_tuple(_stretching_four, (e, stance), feet, fours), memory)
 
 
 @substeps(GroundContact)
 def split(e, memory, motion, h):
-    """As many as the stiffest mode needs to be stable; default stiffness and 1 ms need no split."""
+    """Return the substeps for stability of the stiffest mode; default stiffness and 1 ms need no split."""
     return math.ceil(h * e.rate_bound / STABLE)
 
 
 @substeps(GroundContactSmooth)
 def split_smooth(e, memory, motion, h):
-    """As many as the friction needs under the maximum normal force that the next step can bring."""
+    """Return the substeps for the friction at the maximum normal force of the next step."""
     R_world_body = rotation_matrix(motion.attitude)
     press = 0.0
     for i in range(len(e.feet)):

@@ -13,6 +13,7 @@ from lapwing.kernels.codegen import map_tuple
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
+KIND = "ground effect model"
 LOWEST = 0.5  # radii: nearer to the ground the law no longer holds, and the factor is kept
 FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.4 %, is faded out
 
@@ -34,7 +35,7 @@ class GroundEffect(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
-        """From the airframe's propeller."""
+        """Return the parameters of the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius = 0.5 * propeller.diameter
@@ -42,14 +43,14 @@ class GroundEffect(NamedTuple):
         return cls(1.0 / radius, FADE_TO * radius + reach)
 
     def in_environment(self, environment: Environment) -> "GroundEffect":
-        """Over the ground that is there."""
+        """Return the effect over the scene's terrain."""
         stretch = math.hypot(*upright(environment.terrain))
         return self._replace(highest=self.highest * stretch, terrain=environment.terrain)
 
 
 @always_inline
 def gain(height):
-    """Thrust over that far from the ground, at a height in radii."""
+    """Return the thrust over that far from the ground, at a height in radii."""
     z = max(height, LOWEST)
     square = 0.0625 / (z * z)
     fade = min(max((z - FADE_FROM) * (1.0 / (FADE_TO - FADE_FROM)), 0.0), 1.0)
@@ -71,13 +72,13 @@ def _gained(_, factor, height):
 
 @load_factors(GroundEffect)
 def ground_effect(e, memory, s, before):
-    """Factors on thrust; the torque stays."""
+    """Multiply the thrust factors; torque is unchanged."""
     heights = map_tuple(_height, (e, s), s.layout.x_body, s.layout.y_body)
     return Factors(map_tuple(_gained, 0.0, before.thrust, heights), before.torque)
 
 
 @is_sleeping(GroundEffect)
 def high(e, memory, motion, h):
-    """Too high for any rotor to feel the ground within a step?"""
+    """Return True if no rotor can reach the ground effect within a step."""
     over, climb = over_plane(e.terrain, motion.position_world), over_plane(e.terrain, motion.velocity_world)
     return over - summit(e.terrain) + 2.0 * h * min(climb, 0.0) > e.highest

@@ -29,7 +29,7 @@ class GyroscopicTorque(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GyroscopicTorque":
-        """From the airframe's rotors."""
+        """Return the parameters of the airframe's rotors."""
         checked(Settings, table)
         return cls(airframe.rotors.inertia)
 
@@ -56,7 +56,7 @@ def _scaled(_, value, axis):
 
 @always_inline
 def _sum_along(axis, sign, values):
-    """Sum of a value of each rotor along its axis, with the sign of its reaction."""
+    """Return the sum of a value of each rotor along its axis, with the sign of its reaction."""
     return total_vector(map_tuple(_scaled, 0.0, map_tuple(_signed, 0.0, sign, values), axis))
 
 
@@ -71,5 +71,5 @@ def _tilted(given):
 
 @torque(GyroscopicTorque)
 def gyroscopic_torque(e, memory, s, rotors):
-    """Torque [N m] in body coordinates."""
+    """Return the torque [N m] in body coordinates."""
     return by_axis(_along_z, _tilted, s.layout.axis, (e, s, rotors))

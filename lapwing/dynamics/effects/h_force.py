@@ -18,7 +18,7 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     coefficient: Annotated[float, Ge(0), Le(1)] | None = None  # [m^3/rad]; from the propeller if left out
 
@@ -38,7 +38,7 @@ class HForce(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "HForce":
-        """From the airframe's propeller unless the table has the coefficient."""
+        """Return the parameters of the airframe's propeller, unless the table has the coefficient."""
         given = checked(Settings, table)
         positions = airframe.rotors.position
         if len({z for _, _, z in positions}) > 1 and not airframe.rotors.tilted_axis:
@@ -91,5 +91,5 @@ def _tilted(given):
 
 @wrench_body(HForce)
 def h_force(e, memory, s, rotors):
-    """Force [N] and torque [N m] in body coordinates."""
+    """Return the force [N] and torque [N m] in body coordinates."""
     return by_axis(_along_z, _tilted, s.layout.axis, (e, s))

@@ -17,7 +17,7 @@ Length = Annotated[float, Gt(0), Le(10)]
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; never, unless told, if left out
     mass: Annotated[float, Gt(0)] | None = None  # [kg]; the airframe's payload if left out
@@ -39,7 +39,7 @@ class PayloadRelease(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "PayloadRelease":
-        """Mass properties with and without the box."""
+        """Return mass properties with and without the box."""
         given = checked(Settings, table)
         release = float("inf") if given.release_time is None else given.release_time
         if airframe.payload:
@@ -59,12 +59,12 @@ class PayloadRelease(NamedTuple):
         return cls(release, body_of(total, inertia, products), body_of(total - mass, rest, products))
 
     def initial_discrete_state(self) -> tuple[float]:
-        """1 once released."""
+        """Return 0: not released; 1 is released."""
         return (0.0,)
 
 
 def _with_and_without(airframe: "Airframe") -> tuple[AnyMassProperties, AnyMassProperties]:
-    """The loaded vehicle, whose positions are from its centre of mass, and the vehicle once its box is gone."""
+    """Return mass properties of the loaded vehicle, about its centre of mass, and of the vehicle without the box."""
     joint, box = airframe.mass, airframe.payload
     assert box is not None
     rest, place = joint.total - box.mass, np.array(box.position)
@@ -85,5 +85,5 @@ def release(e, memory, s, rotors, key, tick, interval):
 
 @mass_properties(PayloadRelease)
 def payload_release(e, memory, before):
-    """Mass properties with or without it."""
+    """Return the mass properties with or without the box."""
     return e.empty if memory[0] > 0.0 else e.loaded

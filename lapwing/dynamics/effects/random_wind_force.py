@@ -24,14 +24,14 @@ ROUNDING = 1e-6  # of an interval
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     mean: tuple[Speed, Speed, Speed] = (0.0, 0.0, 0.0)  # [m/s] world
     sigma: Annotated[float, Ge(0), Le(30)] = 1.0  # [m/s] of each axis
     area: Annotated[float, Gt(0), Le(100)] = 0.06  # [m^2] S
     density: Annotated[float, Gt(0), Le(5)] = 1.22  # [kg/m^3] rho, of the air
     shape_coefficient: Annotated[float, Gt(0), Le(10)] = 1.0  # C_s
-    interval: Annotated[float, Ge(1e-4), Le(10)] = 0.004  # [s] between two draws, whatever the exchange interval
+    interval: Annotated[float, Ge(1e-4), Le(10)] = 0.004  # [s] between two draws, whatever the communication step
     allow_body_drag: bool = False  # whether body_drag may act as well, though both are drag in this wind
 
 
@@ -39,7 +39,7 @@ class RandomWindForce(NamedTuple):
     """A random force 1/2 C_s S rho |v| v at the centre of mass, of a wind's speed v past the vehicle (theory.md, eq.
     (2.8)); the air that other effects feel stands still.
 
-    The wind is the mean plus one normal draw for each axis and interval; over an exchange interval the force is held at
+    The wind is the mean plus one normal draw per axis and interval; over a communication step the force is held at
     its mean. Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`):
     the draws are independent, so that the wind's spectrum is flat, sigma^2 times the interval, up to the interval's
     frequency. As it is drag already, it is refused beside `body_drag`.
@@ -52,17 +52,17 @@ class RandomWindForce(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RandomWindForce":
-        """What a scene says."""
+        """Return the parameters of a scene's table."""
         given = checked(Settings, table)
         return cls(given.mean, given.sigma, 0.5 * given.shape_coefficient * given.area * given.density, given.interval)
 
     def initial_discrete_state(self) -> tuple[Vec3, Vec3]:
-        """The force and the wind: none before the first exchange."""
+        """Return zero force and wind, before the first tick."""
         return ZERO, ZERO
 
 
 def check(table: Mapping, tables: Mapping) -> None:
-    """ConfigError beside `body_drag`, unless the table insists."""
+    """Raise ConfigError in combination with `body_drag`, unless the table allows it."""
     if "body_drag" in tables and not table.get("allow_body_drag"):
         message = "is drag already, and counts it twice beside effects.body_drag"
         expected = "wind_constant or wind_dryden with body_drag, or allow_body_drag = true"
@@ -71,7 +71,7 @@ def check(table: Mapping, tables: Mapping) -> None:
 
 @always_inline
 def _blow(e, key, number, velocity_world):
-    """(force [N], wind [m/s]) of one draw, world."""
+    """Return (force [N], wind [m/s]) of one draw, world."""
     drawn = add(e.mean, scale(e.sigma, normal3(key, number, LANE)))
     v = subtract(drawn, velocity_world)
     return scale(e.factor * norm(v), v), drawn
@@ -79,7 +79,7 @@ def _blow(e, key, number, velocity_world):
 
 @discrete_update(RandomWindForce)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """Mean force [N] and wind [m/s] of the next exchange interval, in world coordinates."""
+    """Return the mean force [N] and wind [m/s] of the next communication step, in world coordinates."""
     start, end = tick * interval / e.interval, (tick + 1) * interval / e.interval  # in draws
     first, last = math.floor(start + ROUNDING), math.ceil(end - ROUNDING) - 1
     if first >= last:
@@ -94,11 +94,11 @@ def draw(e, memory, s, rotors, key, tick, interval):
 
 @wrench(RandomWindForce)
 def random_wind_force(e, memory, s, rotors):
-    """Force [N] in world, torque [N m] in body coordinates."""
+    """Return the force [N] in world, torque [N m] in body coordinates."""
     return memory[0], NOTHING
 
 
 @wind(RandomWindForce)
 def told(e, memory, before):
-    """The wind [m/s] that the force is made of, added."""
+    """Add the wind [m/s] that causes the force to the air."""
     return add(before, memory[1])

@@ -38,5 +38,5 @@ class RotationalDrag(NamedTuple):
 
 @torque(RotationalDrag)
 def rotational_drag(e, memory, s, rotors):
-    """Torque [N m] in body coordinates."""
+    """Return the torque [N m] in body coordinates."""
     return scale(-1.0, multiply(e.linear, subtract(s.motion.omega_body, s.air_rate_body)))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     rotor: Annotated[int, Gt(0)]  # number of the rotor, from 1
     time: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
@@ -37,7 +37,7 @@ class RotorDamage(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
-        """For one of the airframe's rotors."""
+        """Return the parameters for one of the airframe's rotors."""
         given = checked(Settings, table)
         count = len(airframe.rotors.position)
         if given.rotor > count:
@@ -49,7 +49,7 @@ class RotorDamage(NamedTuple):
         return cls(given.time, only_this(given.remaining_thrust), only_this(given.remaining_torque))
 
     def initial_discrete_state(self) -> tuple[PerRotor, PerRotor]:
-        """Fractions of thrust and torque in force."""
+        """Return the current fractions of thrust and torque."""
         return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.remaining_torque)
 
 
@@ -60,13 +60,13 @@ def _product(_, a, b):
 
 @discrete_update(RotorDamage)
 def strike(e, memory, s, rotors, key, tick, interval):
-    """The fractions for the next interval."""
+    """Return the fractions for the next interval."""
     return (e.remaining_thrust, e.remaining_torque) if s.t >= e.time else memory
 
 
 @load_factors(RotorDamage)
 def rotor_damage(e, memory, s, before):
-    """Factors on the damaged rotor's loads."""
+    """Multiply the damaged rotor's load factors."""
     return Factors(
         map_tuple(_product, 0.0, before.thrust, memory[0]), map_tuple(_product, 0.0, before.torque, memory[1])
     )

@@ -22,7 +22,7 @@ SLOWEST = 1.0  # [rad/s] below which the tilt is that of this rotor speed
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     coefficient: Annotated[float, Ge(0), Le(2)] | None = None  # [rad] tilt over advance ratio; by the propeller
     stiffness: Annotated[float, Ge(0), Le(1e3)] = 0.0  # [N m/rad] of a hub against the tilt of its disc
@@ -42,7 +42,7 @@ class RotorFlapping(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorFlapping":
-        """From the airframe's propeller."""
+        """Return the parameters of the airframe's propeller."""
         given = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         coefficient, radius = given.coefficient, 0.5 * propeller.diameter
@@ -103,6 +103,6 @@ def _tilted(given):
 
 @wrench_body(RotorFlapping)
 def rotor_flapping(e, memory, s, rotors):
-    """Force [N] and torque [N m] in body coordinates."""
+    """Return the force [N] and torque [N m] in body coordinates."""
     states = map_tuple(pair, 0.0, rotors.thrust, s.motion.rotor_speed)
     return by_axis(_along_z, _tilted, s.layout.axis, (e, s, states))

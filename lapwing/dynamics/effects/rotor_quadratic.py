@@ -31,7 +31,7 @@ def _added(constant, speed, both):
 
 @loads(RotorQuadratic)
 def rotor_quadratic(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`."""
+    """Add the loads of each rotor to `before`."""
     speed = s.motion.rotor_speed
     return Loads(
         map_tuple(_added, e.thrust_constant, speed, map_tuple(pair, 0.0, before.thrust, factors.thrust)),

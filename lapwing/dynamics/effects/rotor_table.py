@@ -31,7 +31,7 @@ Curve = tuple[Coefficient, ...]
 
 
 class Settings(NamedTuple):
-    """What a scene says: a file, or what is in it."""
+    """Scene table: a file, or its contents."""
 
     file: str | None = None  # path of a table with the columns J, CT, CP relative to the scene; or these:
     advance: tuple[Ratio, ...] = ()  # J = V / (n D), growing, 0 among them
@@ -58,7 +58,7 @@ class RotorTable(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorTable":
-        """From the table, with the airframe's diameter."""
+        """Return the parameters of the table, with the airframe's diameter."""
         given = checked(Settings, table)
         diameter = given.diameter
         if diameter is None:
@@ -75,14 +75,14 @@ class RotorTable(NamedTuple):
 
 
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
-    """The table says all of a rotor's thrust and torque."""
+    """Check that no other effect defines the rotors' thrust and torque."""
     for name in INSTEAD_OF:
         if name in tables:
             reject(f"stands for effects.{name}: keep one of them")
 
 
 def embed(table: dict[str, Any], folder: Path) -> None:
-    """What the file of a scene's table says becomes part of it. Raises KeyedError."""
+    """Read the file of a scene's table into the table. Raise ConfigError if it is invalid."""
     if not isinstance(file := table.get("file"), str):
         return
     if given := {"advance", "angle_deg", "thrust", "power"} & set(table):
@@ -97,7 +97,7 @@ def embed(table: dict[str, Any], folder: Path) -> None:
 
 
 def _check(given: Settings) -> None:
-    """KeyedError where the table is not one that can be interpolated."""
+    """Raise ConfigError if the table cannot be interpolated."""
     j, angles = given.advance, given.angle_deg
     if not j:
         raise ConfigError("advance", "missing", "the advance ratios, or file = the path of a table of test data")
@@ -124,7 +124,7 @@ def _check(given: Settings) -> None:
 
 @always_inline
 def _place(points, x):
-    """(index, share of the next) of a value in a growing array, held within it."""
+    """Return (index, weight of the next point) of a value in an ascending array, clamped to it."""
     i = 0
     while i < points.shape[0] - 2 and x > points[i + 1]:
         i += 1
@@ -144,13 +144,13 @@ def _between(curves, k, i, b, a):
 
 @kernel
 def coefficients(e, axial, across, turns):
-    """(C_T D^4, C_Q D^5) of a rotor.
+    """Return (C_T D^4, C_Q D^5) of a rotor.
 
     Args:
         e: `RotorTable`.
         axial: air speed against its flow [m/s].
         across: air speed across its axis [m/s].
-        turns: a second [1/s].
+        turns: rotor speed in revolutions per second [1/s].
     """
     way = max(turns, LEAST_TURNS) * e.diameter
     if e.angle.shape[0] == 1:
@@ -183,7 +183,7 @@ def _torque(_, before, both):
 
 @loads(RotorTable)
 def rotor_table(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`."""
+    """Add the loads of each rotor to `before`."""
     found = map_tuple(_loads, (e, s.air.density), s.motion.rotor_speed, hub_speeds(s))
     return Loads(
         map_tuple(_thrust, 0.0, before.thrust, map_tuple(pair, 0.0, factors.thrust, found)),

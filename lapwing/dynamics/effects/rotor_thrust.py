@@ -31,7 +31,7 @@ class RotorThrust(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
-        """From the airframe's propeller."""
+        """Return the parameters of the airframe's propeller."""
         checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]; name rotor_quadratic instead")
         square = math.square(2.0 * math.pi)
@@ -48,7 +48,7 @@ def _times_square(constant, speed, factor):
 
 @loads(RotorThrust)
 def rotor_thrust(e, memory, s, factors, before):
-    """Loads of each rotor, added to `before`."""
+    """Add the loads of each rotor to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
     return Loads(
         map_tuple(

@@ -20,7 +20,7 @@ Offset = Annotated[float, Ge(-100), Le(100)]
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     mass: Annotated[float, Gt(0), Le(1e4)]  # [kg] of the load, no part of any vehicle's; the same for all
     length: Annotated[float, Gt(0), Le(1e3)]  # [m] of the vehicle's cable without tension
@@ -34,15 +34,15 @@ class SharedSlungLoad(NamedTuple):
     """The pull of the cable to the one load of all vehicles that name it (theory.md, eq. (1.20), (1.23)).
 
     Source: Newton's laws, Hooke's and a damper for a cable that can pull and not push. The load moves beside the
-    vehicles, and each looks ahead from where the other was at the beginning of the exchange interval, at its
-    acceleration then. Valid while the frequency of the cable times the exchange interval is below 0.5.
+    vehicles, and each looks ahead from where the other was at the beginning of the communication step, at its
+    acceleration then. Valid while the frequency of the cable times the communication step is below 0.5.
     """
 
     sling: Sling
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "SharedSlungLoad":
-        """With the damping for the airframe's mass."""
+        """Return the parameters with the damping for the airframe's mass."""
         given = checked(Settings, table)
         reduced = 1.0 / (1.0 / given.mass + 1.0 / airframe.mass.total)
         damping = 2.0 * given.damping_ratio * math.sqrt(given.stiffness * reduced)
@@ -50,21 +50,21 @@ class SharedSlungLoad(NamedTuple):
         return cls(Sling(given.mass, given.length, given.stiffness, damping, hook, given.drag_area, LEVEL))
 
     def in_environment(self, environment: Environment) -> "SharedSlungLoad":
-        """Over the ground that is there."""
+        """Return the effect over the scene's terrain."""
         return SharedSlungLoad(self.sling._replace(terrain=environment.terrain))
 
     def initial_discrete_state(self) -> tuple[Vec3, Vec3, Vec3, float]:
-        """Position, velocity and acceleration of the load at a time [s]; before 0 nothing is known of it."""
+        """Return the position, velocity and acceleration of the load at a time [s]; a negative time: unknown."""
         return ZERO, ZERO, ZERO, -1.0
 
     def presence(self) -> dict[str, Vec3]:
-        """Where its cable is fastened."""
+        """Return the attachment of its cable."""
         return {"hook_body": self.sling.hook_body}
 
 
 @interaction(SharedSlungLoad)
 def fastened(e, memory, own, others, interval):
-    """Where the load is and how it moves, at the beginning of the coming interval."""
+    """Return the position, velocity and acceleration of the load at the beginning of the coming interval."""
     for other in others:
         if other.is_load:
             return other.hook_world, other.hook_velocity, other.hook_acceleration, other.time
@@ -73,7 +73,7 @@ def fastened(e, memory, own, others, interval):
 
 @wrench(SharedSlungLoad)
 def shared_slung_load(e, memory, s, rotors):
-    """Force [N] of the cable in world coordinates and its torque [N m] in the body."""
+    """Return the force [N] of the cable in world coordinates and its torque [N m] in the body."""
     place, velocity, acceleration, time = memory
     if time < 0.0:
         return (0.0, 0.0, 0.0), NOTHING

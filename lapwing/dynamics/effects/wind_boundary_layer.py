@@ -16,7 +16,7 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     speed: Annotated[float, Gt(0), Le(60)]  # [m/s] at the reference height
     direction_to: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = 0.0  # [rad] of the air's motion, from east
@@ -37,19 +37,19 @@ class WindBoundaryLayer(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "WindBoundaryLayer":
-        """Over level ground."""
+        """Return the parameters over level ground."""
         given = checked(Settings, table)
         scale = given.speed / math.log1p(given.height / given.roughness)
         return cls((scale * math.cos(given.direction_to), scale * math.sin(given.direction_to)), 1.0 / given.roughness)
 
     def in_environment(self, environment: Environment) -> "WindBoundaryLayer":
-        """Over the ground that is there."""
+        """Return the effect over the scene's terrain."""
         return self._replace(terrain=environment.terrain)
 
 
 @air(WindBoundaryLayer)
 def wind_boundary_layer(e, memory, s, before):
-    """Air with this wind added."""
+    """Add this wind to the air."""
     x, y, z = s.motion.position_world
     height = max(z - surface(e.terrain, x, y)[0], 0.0)
     growth = math.log(1.0 + height * e.inverse_roughness)

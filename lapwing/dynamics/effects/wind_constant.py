@@ -12,7 +12,7 @@ Speed = Annotated[float, Ge(-60), Le(60)]
 
 
 class WindConstant(NamedTuple):
-    """The same wind everywhere (theory.md, eq. (2.18)); it acts through the effects that know the air's speed.
+    """Uniform constant wind (theory.md, eq. (2.18)); it acts through the effects that use the air's velocity.
 
     Valid well above the ground's boundary layer.
     """
@@ -22,5 +22,5 @@ class WindConstant(NamedTuple):
 
 @air(WindConstant)
 def wind_constant(e, memory, s, before):
-    """Air with this wind added."""
+    """Add this wind to the air."""
     return Air(before.density, add(before.wind_world, e.velocity))

@@ -4,29 +4,17 @@ import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._hooks import air, discrete_update
-from lapwing.dynamics.effects._turbulence import (
-    KIND,
-    LONG_AGO,
-    Conditions,
-    Settings,
-    conditions,
-    first_order,
-    in_world,
-    passing,
-    second_order,
-    transverse,
-)
-from lapwing.dynamics.effects._types import Air
+from lapwing.dynamics.effects._turbulence import KIND, Conditions, Part, Settings, blown, calm, conditions, drawn
 from lapwing.dynamics.environment import Environment
-from lapwing.dynamics.noise import normal3
-from lapwing.dynamics.vector import ZERO, Vec3, add
+from lapwing.dynamics.vector import Vec3
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "Settings", "WindDryden"]
 
-LANE_FIRST, LANE_SECOND = zlib.crc32(b"wind_dryden 1"), zlib.crc32(b"wind_dryden 2")
+LANES = zlib.crc32(b"wind_dryden 1"), zlib.crc32(b"wind_dryden 2")
+PARTS = (Part(1.0, 1.0, LANES),)
 
 
 class WindDryden(NamedTuple):
@@ -38,36 +26,29 @@ class WindDryden(NamedTuple):
     """
 
     conditions: Conditions
+    parts: tuple[Part, ...] = PARTS
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDryden":
-        """Over level ground."""
+        """Return the parameters over level ground."""
         return cls(conditions(table))
 
     def in_environment(self, environment: Environment) -> "WindDryden":
-        """Over the ground that is there."""
+        """Return the effect over the scene's terrain."""
         return WindDryden(self.conditions._replace(terrain=environment.terrain))
 
-    def initial_discrete_state(self) -> tuple[tuple[float, ...], Vec3]:
-        """(along, first and second state across, first and second vertical, 1 once started), then the wind."""
-        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO
+    def initial_discrete_state(self) -> tuple[tuple, Vec3, float]:
+        """Return the states of the parts, the wind, and 1 once started."""
+        return calm(self.parts)
 
 
 @discrete_update(WindDryden)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """States of the filters and the wind [m/s, world] for the next interval."""
-    along, across1, across2, up1, up2, started = memory[0]
-    sigma, rate = passing(e.conditions, s)
-    time = interval if started > 0.0 else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
-    first, second = normal3(key, tick, LANE_FIRST), normal3(key, tick, LANE_SECOND)
-    along = first_order(along, rate[0] * time, first[0])
-    across1, across2 = second_order(across1, across2, rate[1] * time, first[1], second[0])
-    up1, up2 = second_order(up1, up2, rate[2] * time, first[2], second[1])
-    u, v, w = sigma[0] * along, sigma[1] * transverse(across1, across2), sigma[2] * transverse(up1, up2)
-    return (along, across1, across2, up1, up2, 1.0), in_world(e.conditions, u, v, w)
+    """Return the states of the parts, the wind [m/s, world] for the next interval, and 1: started."""
+    return drawn(e, memory, s, key, tick, interval)
 
 
 @air(WindDryden)
 def wind_dryden(e, memory, s, before):
-    """Air with the turbulence added."""
-    return Air(before.density, add(before.wind_world, memory[1]))
+    """Add the turbulence to the air."""
+    return blown(memory, before)

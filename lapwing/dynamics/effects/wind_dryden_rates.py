@@ -10,22 +10,21 @@ from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import air, air_rate, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
-    LONG_AGO,
     Conditions,
+    advance_filters,
     conditions,
+    elapsed,
     first_order,
     in_world,
     intensity,
     passing,
-    second_order,
     surroundings,
-    transverse,
 )
 from lapwing.dynamics.effects._turbulence import Settings as Turbulence
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import normal3
-from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed
+from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed, scale
 from lapwing.kernels import always_inline, math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -34,12 +33,13 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 __all__ = ["KIND", "Settings", "WindDrydenRates"]
 
 LANE = zlib.crc32(b"wind_dryden_rates")
+FIRST, SECOND = wind_dryden.LANES
 ROOT3 = math.sqrt(3.0)
 APART = 1e-6  # least difference of the two filters' rates
 
 
 class Settings(NamedTuple):
-    """What a scene says."""
+    """Scene table."""
 
     wind_speed: Annotated[float, Gt(0), Le(30)]  # [m/s] mean wind 6 m (20 feet) above the ground
     airspeed: Annotated[float, Gt(0), Le(60)] | None = None  # [m/s] at which gusts pass; if left out, the vehicle's
@@ -49,7 +49,7 @@ class Settings(NamedTuple):
 
 
 class WindDrydenRates(NamedTuple):
-    """The gusts of `wind_dryden`, to the bit, and rates of the air with their spectra (theory.md, eq. (2.39)).
+    """The gusts of `wind_dryden`, bit-for-bit, and rates of the air with their spectra (theory.md, eq. (2.39)).
 
     Rotors feel the air's rate at their hubs. Source: MIL-F-8785C, section 3.7.5: p by a filter of its own, q and r from
     the gusts across as they pass. Valid as `wind_dryden`. Sampled exactly at each exchange, held over the interval.
@@ -60,7 +60,7 @@ class WindDrydenRates(NamedTuple):
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDrydenRates":
-        """Over level ground, the span from tip to tip of the outer rotors unless the table has one."""
+        """Return the parameters over level ground; the default span is from tip to tip of the outer rotors."""
         span = checked(Settings, table).span
         if span is None:
             reach = max(math.hypot(x, y) for x, y, _ in airframe.rotors.position)
@@ -68,27 +68,27 @@ class WindDrydenRates(NamedTuple):
         return cls(conditions({key: value for key, value in table.items() if key in Turbulence._fields}), span)
 
     def in_environment(self, environment: Environment) -> "WindDrydenRates":
-        """Over the ground that is there."""
+        """Return the effect over the scene's terrain."""
         return self._replace(conditions=self.conditions._replace(terrain=environment.terrain))
 
     def initial_discrete_state(self) -> tuple[tuple[float, ...], Vec3, tuple[float, float, float], Vec3]:
-        """Memory of `wind_dryden`, states of roll, pitch and yaw, and the air's rate [rad/s, world]."""
+        """Return the state of `wind_dryden`, states of roll, pitch and yaw, and the air's rate [rad/s, world]."""
         return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO, (0.0, 0.0, 0.0), ZERO
 
 
 @always_inline
 def passed(x1, x2, z, beta, theta, n1, n2, n3):
-    """The low-passed transverse gust z, `theta` of its correlation times later (theory.md, eq. (2.40)).
+    """Return the low-passed transverse gust z, `theta` gust correlation times later (theory.md, eq. (2.40)).
 
     Args:
-        x1: first state of the gust's filter, before.
-        x2: its second state.
-        z: before.
+        x1: previous first state of the gust's filter.
+        x2: previous second state.
+        z: previous value.
         beta: correlation time of the gust over that of the low-pass.
         theta: time over the correlation time of the gust.
         n1: draw of the gust's first state.
         n2: draw of its second state.
-        n3: draw of its own.
+        n3: draw of the low-pass.
     """
     k = beta - 1.0
     k = k if abs(k) > APART else APART
@@ -118,38 +118,35 @@ def passed(x1, x2, z, beta, theta, n1, n2, n3):
 
 @discrete_update(WindDrydenRates)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """States of the filters, the wind [m/s, world] and the air's rate [rad/s, world] for the next interval."""
+    """Return the filter states, the wind [m/s, world] and the air's rate [rad/s, world] for the next interval."""
     along, across1, across2, up1, up2, started = memory[0]
     roll, pitch, yaw = memory[2]
     sigma, rate = passing(e.conditions, s)
-    time = interval if started > 0.0 else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
-    first, second = normal3(key, tick, wind_dryden.LANE_FIRST), normal3(key, tick, wind_dryden.LANE_SECOND)
+    time = elapsed(started, rate, interval)
+    first, second = normal3(key, tick, FIRST), normal3(key, tick, SECOND)
     third = normal3(key, tick, LANE)
     altitude, airspeed = surroundings(e.conditions, s)
-    _, scale = intensity(e.conditions.wind_speed, altitude)
+    _, length = intensity(e.conditions.wind_speed, altitude)
     per_span = math.pi / (4.0 * e.span)  # [1/m] of roll and pitch; four thirds of it of yaw
-    beta_up, beta_across = per_span * scale[2], 4.0 / 3.0 * per_span * scale[1]
+    beta_up, beta_across = per_span * length[2], 4.0 / 3.0 * per_span * length[1]
     roll = first_order(roll, per_span * airspeed * time, third[0])
     pitch = passed(up1, up2, pitch, beta_up, rate[2] * time, first[2], second[1], third[1])
     yaw = passed(across1, across2, yaw, beta_across, rate[1] * time, first[1], second[0], third[2])
-    along = first_order(along, rate[0] * time, first[0])
-    across1, across2 = second_order(across1, across2, rate[1] * time, first[1], second[0])
-    up1, up2 = second_order(up1, up2, rate[2] * time, first[2], second[1])
-    v, w = transverse(across1, across2), transverse(up1, up2)
-    wind = in_world(e.conditions, sigma[0] * along, sigma[1] * v, sigma[2] * w)
-    p = sigma[2] * math.pi * math.sqrt(0.1 * math.cbrt(per_span * scale[2]) / (e.span * scale[2])) * roll
+    states, (u, v, w) = advance_filters((along, across1, across2, up1, up2), scale(time, rate), first, second)
+    wind = in_world(e.conditions, sigma[0] * u, sigma[1] * v, sigma[2] * w)
+    p = sigma[2] * math.pi * math.sqrt(0.1 * math.cbrt(per_span * length[2]) / (e.span * length[2])) * roll
     q, r = per_span * sigma[2] * (w - pitch), -4.0 / 3.0 * per_span * sigma[1] * (v - yaw)
     turning = in_world(e.conditions, p, q, r)
-    return (along, across1, across2, up1, up2, 1.0), wind, (roll, pitch, yaw), turning
+    return (states[0], states[1], states[2], states[3], states[4], 1.0), wind, (roll, pitch, yaw), turning
 
 
 @air(WindDrydenRates)
 def wind_dryden_rates(e, memory, s, before):
-    """Air with the turbulence added."""
+    """Add the turbulence to the air."""
     return Air(before.density, add(before.wind_world, memory[1]))
 
 
 @air_rate(WindDrydenRates)
 def turning(e, memory, s, before):
-    """Rate [rad/s] of the air with the turbulence's added, body coordinates."""
+    """Add the turbulence's rate to the air's rate [rad/s], body coordinates."""
     return add(before, apply_transposed(s.R_world_body, memory[3]))

@@ -26,7 +26,7 @@ class WindGust(NamedTuple):
 
 @air(WindGust)
 def wind_gust(e, memory, s, before):
-    """Air with the gust added."""
+    """Add the gust to the air."""
     since = s.t - e.start
     if since <= 0.0 or since >= e.duration:
         return before

@@ -40,21 +40,21 @@ __all__ = [
 
 
 def names() -> list[str]:
-    """Every method's name: its file name."""
+    """Return the names of all methods: their file names."""
     return discovery.names(__name__)
 
 
 def get(name: str) -> ModuleType:
-    """The module of a method; ValueError that lists the choices if there is none."""
+    """Return the module of a method. Raise ValueError with the choices if there is none."""
     return discovery.get(__name__, name, "integrator")
 
 
 def incompatibility(name: str, p: Any, x: Any) -> str:
-    """Why a method is not for the system with parameters p and states like x, "" if it is."""
+    """Return the reason why a method does not support parameters p and states like x; "" if it does."""
     module = get(name)
     return module.incompatibility(p, x) if hasattr(module, "incompatibility") else ""
 
 
 def compatible_methods(p: Any, x: Any) -> list[str]:
-    """Names of the methods for the system with parameters p and states like x."""
+    """Return the names of the methods that support parameters p and states like x."""
     return [name for name in names() if not incompatibility(name, p, x)]

@@ -17,14 +17,14 @@ RATES = DispatchTable()
 
 
 def method_token(module: str) -> type:
-    """The class that names a method in compiled code: empty, `Method` in the module, called as the module.
+    """Return the empty class that identifies a method in compiled code: `Method` of the module, named as the module.
 
-    The name matters: numba tells compiled versions of one function apart by the *names* of the argument types, and
-    takes two classes of the same name and fields for one (so a system's parameter class needs a name of its own).
+    The name matters: numba distinguishes compiled versions of a function by the *names* of the argument types, and
+    treats two classes of the same name and fields as one. A system's parameter class therefore needs a unique name.
     """
-    found = namedtuple(module.rpartition(".")[2], (), module=module)  # type: ignore[misc]
-    found.__qualname__ = "Method"
-    return found
+    result = namedtuple(module.rpartition(".")[2], (), module=module)  # type: ignore[misc]
+    result.__qualname__ = "Method"
+    return result
 
 
 def _rate(p, t, x):
@@ -38,12 +38,12 @@ def _rate_of(p, t, x):
 
 @always_inline
 def rate(p, t, x):
-    """The tangent at state x and time t of the system with parameters p."""
+    """Return the tangent at state x and time t of the system with parameters p."""
     return _rate(p, t, x)
 
 
 def step(method: Any, p: Any, t: float, x: Any, h: float) -> Any:
-    """The state at t + h: one step of `method` (an instance of its module's `Method`) on the system of parameters p."""
+    """Return the state at t + h: one step of `method` (an instance of its module's `Method`) with parameters p."""
     return sys.modules[type(method).__module__].step(rate, p, t, x, h)
 
 
@@ -55,7 +55,7 @@ def _step(method, p, t, x, h):
 
 @kernel
 def integrate_fixed(method, p, t, x, h, n):
-    """The state after n steps of h from time t (compiled loop; no checks)."""
+    """Return the state after n steps of h from time t, in a compiled loop without checks."""
     for i in range(n):
         x = step(method, p, t + i * h, x, h)
     return x
@@ -63,9 +63,9 @@ def integrate_fixed(method, p, t, x, h, n):
 
 @kernel
 def record(method, p, t, x, h, every, out):
-    """March and write every `every`-th state's numbers into the rows of `out`, the first being x itself.
+    """Integrate, and write every `every`-th state into the rows of `out`, starting with x itself.
 
-    Stops after a row that is not finite; returns how many rows are.
+    Stop after a non-finite row. Return the number of finite rows.
     """
     n = 0
     for row in range(out.shape[0]):

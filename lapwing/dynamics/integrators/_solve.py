@@ -16,7 +16,7 @@ SMALLEST_TOLERANCE = 1e-14
 
 
 def named_numbers(x: Any, name: str = "") -> Iterator[tuple[str, float]]:
-    """(path, value) of every number of a state, such as ("omega_body[2]", 0.1)."""
+    """Yield (path, value) of every number of a state, such as ("omega_body[2]", 0.1)."""
     if isinstance(x, tuple):
         fields = getattr(x, "_fields", None)
         for i, part in enumerate(x):
@@ -27,7 +27,7 @@ def named_numbers(x: Any, name: str = "") -> Iterator[tuple[str, float]]:
 
 
 def _leaves(x: Any, name: str = "") -> Iterator[tuple[str, Any]]:
-    """(path, leaf) of every manifold leaf."""
+    """Yield (path, leaf) of every manifold leaf."""
     if type(x) in MANIFOLDS:
         yield name or type(x).__name__, x
     elif isinstance(x, tuple):
@@ -41,26 +41,26 @@ def _system(p: Any) -> str:
 
 
 def not_finite(x: Any) -> str:
-    """Name and value of the first number of a state that is NaN or infinite."""
+    """Return name and value of the first number of a state that is NaN or infinite."""
     return next((f"{name} = {value}" for name, value in named_numbers(x) if not np.isfinite(value)), "its rate")
 
 
 def check_start(p: Any, x0: Any) -> None:
-    """ValueError if a number of the parameters or the initial state is not finite, or a leaf is off its manifold.
+    """Raise ValueError if a number of the parameters or the initial state is not finite, or a leaf is off its manifold.
 
-    A parameter class with a method `check(x0)` has that called as well.
+    A method `check(x0)` of the parameter class is also called.
     """
     for what, tree in (("parameter", p), ("initial", x0)):
         for name, value in named_numbers(tree):
             if not np.isfinite(value):
                 raise ValueError(f"{_system(p)}: {what} {name} = {value}: must be finite")
-    for name, found in _leaves(x0):
-        if type(found) is Rotation and determinant(found) < 0.0:
-            raise ValueError(f"{_system(p)}: initial {name} is no rotation: determinant {determinant(found):.3g}")
-        no = "no rotation, " if type(found) in (Quaternion, Rotation) else ""
-        if not np.isfinite(flatten(normalise(found))).all():
+    for name, result in _leaves(x0):
+        if type(result) is Rotation and determinant(result) < 0.0:
+            raise ValueError(f"{_system(p)}: initial {name} is no rotation: determinant {determinant(result):.3g}")
+        no = "no rotation, " if type(result) in (Quaternion, Rotation) else ""
+        if not np.isfinite(flatten(normalise(result))).all():
             raise ValueError(f"{_system(p)}: initial {name} is {no or 'no direction, '}all zero")
-        defect = max(abs(a - b) for a, b in zip(flatten(found), flatten(normalise(found)), strict=True))
+        defect = max(abs(a - b) for a, b in zip(flatten(result), flatten(normalise(result)), strict=True))
         if not defect <= UNIT_DEFECT:
             raise ValueError(f"{_system(p)}: initial {name} is {no}off its manifold by {defect:.3g}: normalise it")
     if hasattr(p, "check"):
@@ -68,10 +68,10 @@ def check_start(p: Any, x0: Any) -> None:
 
 
 def simulate(method: Any, p: Any, x0: Any, h: float, steps: int, every: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Fixed steps h from time 0: (times, states), one row of numbers (`unflatten` reads it) for each `every` steps.
+    """Integrate in fixed steps h from time 0. Return (times, states), one row (see `unflatten`) per `every` steps.
 
-    method: a method's module, from `get`. Raises ValueError for a step that is not positive, an initial state that is
-    not finite or off its manifold, and a run that stops being finite; it names time, system and value.
+    `method` is a method's module, from `get`. Raise ValueError for a step that is not positive, an invalid initial
+    state, or a state that becomes non-finite; the message names time, system and value.
     """
     if not (h > 0.0 and np.isfinite(h)):
         raise ValueError(f"{_system(p)}: step {h:g}: must be positive and finite")
@@ -88,10 +88,10 @@ def simulate(method: Any, p: Any, x0: Any, h: float, steps: int, every: int = 1)
 
 
 def solve(p: Any, x0: Any, times: np.ndarray, tolerance: float) -> tuple[np.ndarray, dict[str, int]]:
-    """Adaptive steps: (states at `times`, {"steps", "rejected"}), rows as in `simulate`; x0 is the state at times[0].
+    """Integrate adaptively. Return (states at `times`, {"steps", "rejected"}), rows as in `simulate`; x0 at times[0].
 
-    tolerance: error allowed per step, relative to 1 + |x| for floats, absolute on manifolds. Raises ValueError as
-    `simulate` does, and where the tolerance cannot be met; it names time, system and state.
+    `tolerance` is the error per step, relative to 1 + |x| for floats, absolute on manifolds. Raise ValueError as
+    `simulate`, and if the tolerance cannot be met; the message names time, system and state.
     """
     times = np.ascontiguousarray(times, dtype=float)
     if len(times) < 2 or not (np.diff(times) > 0.0).all():

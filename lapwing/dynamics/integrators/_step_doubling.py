@@ -20,7 +20,7 @@ class StepDoubling(NamedTuple):
 
 @always_inline
 def shorter(part, error, tolerance):
-    """What to try instead of a part that was too long (theory.md, eq. (2.33))."""
+    """Return the next substep after one with too large an error (theory.md, eq. (2.33))."""
     return part * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
 
 
@@ -32,7 +32,7 @@ def _once(method, p, t, x, h):
 
 @never_inlined
 def integrate_step_doubling(how, p, t, x, h, end):
-    """The state at time `end`, by parts of steps whose error is controlled; halves are kept, none longer than h."""
+    """Return the state at time `end` by step doubling; the result of the halves is kept, none longer than h."""
     allowed, part = how.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
     while True:

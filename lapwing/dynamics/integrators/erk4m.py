@@ -17,7 +17,7 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Classical tableau with retraction for addition, transport for comparison (theory.md, eq. (6.11))."""
+    """Take a step of the classical tableau with retraction for addition, transport for comparison (eq. (6.11))."""
     half = 0.5 * h
     k1 = rate(p, t, x)
     u = scale(half, k1)

@@ -24,10 +24,10 @@ STAGES = (*_HALF, 1.0 - 2.0 * math.total(_HALF), *_HALF[::-1])
 
 
 def incompatibility(p: Any, x: Any) -> str:
-    """Why a system with parameters p and states like x is not for this method, "" if it is.
+    """Return the reason why the method does not support parameters p and states like x; "" if it does.
 
-    The state must be (attitude, omega_body), the parameters have `inertia`, the principal moments [kg m^2], and
-    `torque_without_rate`, whether the torque is one of time and attitude only: else the kicks are of order 1.
+    The state must be (attitude, omega_body). The parameters need `inertia`, the principal moments [kg m^2], and
+    `torque_without_rate`, True if the torque depends on time and attitude only; otherwise the kicks have order 1.
     """
     if getattr(x, "_fields", ()) != ("attitude", "omega_body"):
         return "it is for states of attitude and omega_body"
@@ -51,7 +51,7 @@ def _spin(w, a, b, c, momentum_b, momentum_c, angle):
 
 @always_inline
 def free_flow(inertia, attitude, momentum_body, h):
-    """Strang composition of the three exact flows: x, y for half the time, z for all of it, and back (eq. (6.15))."""
+    """Return the Strang composition of three exact flows: x, y for half the time, z for all of it (eq. (6.15))."""
     w, x, y, z = attitude
     lx, ly, lz = momentum_body
     half = 0.5 * h
@@ -65,13 +65,13 @@ def free_flow(inertia, attitude, momentum_body, h):
 
 @always_inline
 def _torque(rate, p, t, x):
-    """What the rate has beyond the free body: I omega' + omega x I omega."""
+    """Return the torque beyond the free body: I omega' + omega x I omega."""
     return add(multiply(p.inertia, rate(p, t, x)[1]), cross(x[1], multiply(p.inertia, x[1])))
 
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Nine Strang steps of kick, free flow, kick, neighbouring kicks in one (theory.md, eq. (6.16))."""
+    """Take nine Strang steps of kick, free flow, kick, with adjacent kicks combined (theory.md, eq. (6.16))."""
     attitude, momentum = x[0], multiply(p.inertia, x[1])
     before = 0.0
     for stage in STAGES:

@@ -12,7 +12,7 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """One step of the classical tableau on the stored numbers (theory.md, eq. (6.3))."""
+    """Take a step of the classical tableau on the stored numbers (theory.md, eq. (6.3))."""
     half = 0.5 * h
     k1 = embed(x, rate(p, t, x))
     x2 = axpy(half, k1, x)

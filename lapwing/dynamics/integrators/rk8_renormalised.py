@@ -20,7 +20,7 @@ def _slope(rate, p, t, x):
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Twelve stages; the projection keeps the order (theory.md, eq. (6.4))."""
+    """Take a step of twelve stages; the projection preserves the order (theory.md, eq. (6.4))."""
     k1 = _slope(rate, p, t, x)
     y = axpy(0.05260015195876773 * h, k1, x)
     k2 = _slope(rate, p, t + 0.05260015195876773 * h, y)

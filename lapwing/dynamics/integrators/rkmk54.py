@@ -15,17 +15,17 @@ Method = method_token(__name__)
 
 @always_inline
 def _pulled_back(x, u, k):
-    """dexpinv(u, k) to the order of the method: k - [u, k]/2 + [u, [u, k]]/12 (theory.md, eq. (5.4))."""
+    """Return dexpinv(u, k) to the order of the method: k - [u, k]/2 + [u, [u, k]]/12 (theory.md, eq. (5.4))."""
     b = bracket(x, u, k)
     return axpy(1.0 / 12.0, bracket(x, u, b), axpy(-0.5, b, k))
 
 
 @always_inline
 def stages(rate, p, t, x, h, k1):
-    """(end, u, e, k, last): state at t + h, step u in the algebra and its error e (theory.md, eq. (6.9)).
+    """Return (end, u, e, k, last): state at t + h, step u in the algebra and its error e (theory.md, eq. (6.9)).
 
-    k is the tuple of pulled-back stages 1, 3, 4, 5, 6, 7 and last = h f(t + h, end): k1 = h f(t, x) is handed in, since
-    it is the last of the step before.
+    k is the tuple of pulled-back stages 1, 3, 4, 5, 6, 7 and last = h f(t + h, end). The argument k1 = h f(t, x) is
+    `last` of the previous step.
     """
     u = scale(1 / 5, k1)
     k2 = _pulled_back(x, u, scale(h, rate(p, t + h / 5, retract(x, u))))
@@ -48,7 +48,7 @@ def stages(rate, p, t, x, h, k1):
 
 @always_inline
 def between(x, u, k, s):
-    """State at the fraction s of the step from x by u with stages k: fourth order (theory.md, eq. (6.14))."""
+    """Return the state at the fraction s of the step from x by u with stages k, of fourth order (eq. (6.14))."""
     k1, k3, k4, k5, k6, k7 = k
     bend = axpy(-1.0, u, k1)
     twist = axpy(-1.0, bend, axpy(-1.0, k7, u))
@@ -61,5 +61,5 @@ def between(x, u, k, s):
 
 @always_inline
 def step(rate, p, t, x, h):
-    """One step of order 5."""
+    """Take a step of order 5."""
     return stages(rate, p, t, x, h, scale(h, rate(p, t, x)))[0]

@@ -24,7 +24,7 @@ NO_ROTATION = Quaternion(1.0, 0.0, 0.0, 0.0)
 
 @always_inline
 def multiply(p, q):
-    """Hamilton product p * q: first q, then p."""
+    """Return the Hamilton product p * q: first q, then p."""
     return Quaternion(
         p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
         p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
@@ -35,13 +35,13 @@ def multiply(p, q):
 
 @always_inline
 def conjugate(q):
-    """The opposite rotation."""
+    """Return the opposite rotation."""
     return Quaternion(q[0], -q[1], -q[2], -q[3])
 
 
 @always_inline
 def rotation_matrix(q):
-    """R_world_body of an attitude, nine floats in row order."""
+    """Return R_world_body of an attitude, nine floats in row order."""
     x2, y2, z2 = q[1] + q[1], q[2] + q[2], q[3] + q[3]
     xx, yy, zz = q[1] * x2, q[2] * y2, q[3] * z2
     xy, xz, yz = q[1] * y2, q[1] * z2, q[2] * z2
@@ -51,7 +51,7 @@ def rotation_matrix(q):
 
 @always_inline
 def rotate(q, v_body):
-    """v_world = R_world_body v_body. Several vectors: use `rotation_matrix` once and `vector.apply`."""
+    """Return R_world_body v_body. For several vectors use `rotation_matrix` once and `vector.apply`."""
     tx = 2.0 * (q[2] * v_body[2] - q[3] * v_body[1])
     ty = 2.0 * (q[3] * v_body[0] - q[1] * v_body[2])
     tz = 2.0 * (q[1] * v_body[1] - q[2] * v_body[0])
@@ -64,13 +64,13 @@ def rotate(q, v_body):
 
 @always_inline
 def rotate_back(q, v_world):
-    """v_body = transpose(R_world_body) v_world."""
+    """Return the transpose(R_world_body) v_world."""
     return rotate(conjugate(q), v_world)
 
 
 @always_inline
 def exp(v):
-    """Quaternion of the rotation vector v [rad] (theory.md, eq. (5.9))."""
+    """Return the quaternion of the rotation vector v [rad] (theory.md, eq. (5.9))."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < 2.5e-3:  # |v| < 0.05: the first dropped terms are below 1e-17
         s = 0.5 + square * (-1.0 / 48.0 + square * (1.0 / 3840.0 - square / 645120.0))
@@ -84,7 +84,7 @@ def exp(v):
 
 @always_inline
 def log(q):
-    """Rotation vector [rad] of a unit quaternion, the branch with angle at most pi (theory.md, eq. (5.10))."""
+    """Return the rotation vector [rad] of a unit quaternion, the branch with angle at most pi (eq. (5.10))."""
     sine = math.sqrt(q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     # atan2 keeps full relative accuracy both near the identity (sine -> 0) and near pi (w -> 0)
     half = math.atan2(sine, abs(q[0]))
@@ -95,7 +95,7 @@ def log(q):
 
 @always_inline
 def from_matrix(m):
-    """Quaternion (w >= 0) of a rotation matrix, by the largest of four candidates (theory.md, eq. (5.11))."""
+    """Return the quaternion (w >= 0) of a rotation matrix, by the largest of four candidates (eq. (5.11))."""
     trace = m[0] + m[4] + m[8]
     if trace >= m[0] and trace >= m[4] and trace >= m[8]:
         q = Quaternion(1.0 + trace, m[7] - m[5], m[2] - m[6], m[3] - m[1])
@@ -112,8 +112,10 @@ def from_matrix(m):
 
 @always_inline
 def from_roll_pitch_yaw(roll, pitch, yaw):
-    """Attitude turned by yaw about z, then pitch about the new y, then roll about the new x [rad]; in FLU
-    a positive pitch is nose down."""
+    """Return the attitude of yaw about z, then pitch about the new y, then roll about the new x [rad].
+
+    In FLU a positive pitch is nose down.
+    """
     sr, cr = math.sincos(0.5 * roll)
     sp, cp = math.sincos(0.5 * pitch)
     sy, cy = math.sincos(0.5 * yaw)
@@ -127,7 +129,7 @@ def from_roll_pitch_yaw(roll, pitch, yaw):
 
 @always_inline
 def to_roll_pitch_yaw(q):
-    """(roll, pitch, yaw) [rad], inverse of `from_roll_pitch_yaw`; pitch in [-pi/2, pi/2]."""
+    """Return (roll, pitch, yaw) [rad], inverse of `from_roll_pitch_yaw`; pitch in [-pi/2, pi/2]."""
     w, x, y, z = q[0], q[1], q[2], q[3]
     r21, r22 = 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
     r10, r00 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)
@@ -138,7 +140,7 @@ def to_roll_pitch_yaw(q):
 
 @always_inline
 def retract(q, v):
-    """q exp(v): turned by the rotation vector v, given in body coordinates [rad]."""
+    """Return q exp(v): q rotated by the rotation vector v in body coordinates [rad]."""
     r = multiply(q, exp(v))
     # first-order normalisation, else the rounding of many equal steps adds up in the length
     k = 1.5 - 0.5 * ((r[0] * r[0] + r[1] * r[1]) + (r[2] * r[2] + r[3] * r[3]))
@@ -147,7 +149,7 @@ def retract(q, v):
 
 @always_inline
 def embed(q, omega_body):
-    """Derivative of the four numbers: q * (0, omega_body) / 2."""
+    """Return the derivative of the four numbers: q * (0, omega_body) / 2."""
     x, y, z = 0.5 * omega_body[0], 0.5 * omega_body[1], 0.5 * omega_body[2]
     return (
         -q[1] * x - q[2] * y - q[3] * z,
@@ -159,7 +161,7 @@ def embed(q, omega_body):
 
 @always_inline
 def normalise(q):
-    """q / |q|; close to unit length the first-order term of the root is exact to round-off, and needs no division."""
+    """Return q / |q|; near unit length the first-order term of the root is exact to round-off and needs no division."""
     square = (q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3])
     excess = square - 1.0
     if abs(excess) < 1e-8:  # 3/8 excess^2 < 4e-17
@@ -171,13 +173,13 @@ def normalise(q):
 
 @always_inline
 def bracket(u, v):
-    """Signed for tangents on the right (theory.md, eq. (5.3)): -(u x v)."""
+    """Return the bracket with the sign for right tangents (theory.md, eq. (5.3)): -(u x v)."""
     return (u[2] * v[1] - u[1] * v[2], u[0] * v[2] - u[2] * v[0], u[1] * v[0] - u[0] * v[1])
 
 
 @always_inline
 def transport(u, v):
-    """From q exp(u) back to q: half the rotation (theory.md, eq. (5.20))."""
+    """Transport a tangent from q exp(u) back to q: half the rotation (theory.md, eq. (5.20))."""
     return rotate(exp((0.5 * u[0], 0.5 * u[1], 0.5 * u[2])), v)
 
 

@@ -19,7 +19,7 @@ COTANGENT_SLOPE = tuple(k * c for k, c in enumerate(COTANGENT))[1:]
 
 @always_inline
 def cosine_slope(square):
-    """d/d(a^2) of (1 - cos(a)) / a^2 (theory.md, eq. (5.18))."""
+    """Return d/d(a^2) of (1 - cos(a)) / a^2 (theory.md, eq. (5.18))."""
     if square < 1.0:
         return polynomial(COSINE_SLOPE, square)
     return (0.5 * sine_ratio(square) - cosine_ratio(square)) / square
@@ -27,7 +27,7 @@ def cosine_slope(square):
 
 @always_inline
 def cubic_slope(square):
-    """d/d(a^2) of (a - sin(a)) / a^3 (theory.md, eq. (5.18))."""
+    """Return d/d(a^2) of (a - sin(a)) / a^3 (theory.md, eq. (5.18))."""
     if square < 1.0:
         return polynomial(CUBIC_SLOPE, square)
     return 0.5 * (cosine_ratio(square) - 3.0 * cubic_ratio(square)) / square
@@ -35,7 +35,7 @@ def cubic_slope(square):
 
 @always_inline
 def cotangent_slope(v):
-    """d/d(a^2) of (1 - (a/2) cot(a/2)) / a^2 at a = |v|, with its double pole at 2 pi (theory.md, eq. (5.18))."""
+    """Return d/d(a^2) of (1 - (a/2) cot(a/2)) / a^2 at a = |v|, with its double pole at 2 pi (eq. (5.18))."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < 1.0:
         return polynomial(COTANGENT_SLOPE, square)

@@ -15,7 +15,7 @@ COTANGENT = tuple(b / math.factorial(2 * k + 2) for k, b in enumerate(_BERNOULLI
 
 @always_inline
 def polynomial(coefficients, x):
-    """coefficients[0] + coefficients[1] x + ..."""
+    """Return coefficients[0] + coefficients[1] x + ..."""
     value = 0.0
     for i in range(len(coefficients) - 1, -1, -1):
         value = value * x + coefficients[i]
@@ -24,7 +24,7 @@ def polynomial(coefficients, x):
 
 @always_inline
 def sine_ratio(square):
-    """sin(a) / a."""
+    """Return sin(a) / a."""
     if square < 0.0625:
         return polynomial(SINE, square)
     a = math.sqrt(square)
@@ -33,7 +33,7 @@ def sine_ratio(square):
 
 @always_inline
 def cosine_ratio(square):
-    """(1 - cos(a)) / a^2, as 2 sin^2(a/2) / a^2, which does not cancel."""
+    """Return (1 - cos(a)) / a^2, as 2 sin^2(a/2) / a^2, which does not cancel."""
     if square < 0.0625:
         return polynomial(COSINE, square)
     s = math.sin(0.5 * math.sqrt(square))
@@ -42,7 +42,7 @@ def cosine_ratio(square):
 
 @always_inline
 def cubic_ratio(square):
-    """(a - sin(a)) / a^3."""
+    """Return (a - sin(a)) / a^3."""
     if square < 1.0:
         return polynomial(CUBIC, square)
     a = math.sqrt(square)
@@ -51,7 +51,7 @@ def cubic_ratio(square):
 
 @always_inline
 def _two_product(a, b):
-    """a b as an unevaluated sum of two floats (Dekker's splitting)."""
+    """Return a b as an unevaluated sum of two floats (Dekker's splitting)."""
     p = a * b
     t = 134217729.0 * a
     a1 = t - (t - a)
@@ -70,7 +70,7 @@ def _two_sum(a, b):
 
 @always_inline
 def half_angle(v):
-    """(a/2, sin(a/2), cos(a/2)) of a = |v|, the two functions to full relative accuracy.
+    """Return (a/2, sin(a/2), cos(a/2)) of a = |v|, both functions to full relative accuracy.
 
     Near 2 pi the sine is as small as the distance to the pole, and the rounding of |v| alone would cost it seven digits
     at 2 pi - 1e-6: the length is carried with twice the digits.
@@ -90,7 +90,7 @@ def half_angle(v):
 
 @always_inline
 def cotangent_ratio(v):
-    """(1 - (a/2) cot(a/2)) / a^2 of a = |v|, with its pole at 2 pi."""
+    """Return (1 - (a/2) cot(a/2)) / a^2 of a = |v|, with its pole at 2 pi."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < 1.0:
         return polynomial(COTANGENT, square)

@@ -22,7 +22,7 @@ class Direction(NamedTuple):
 
 @always_inline
 def retract(q, v):
-    """exp(hat(v)) q: the direction turned by the rotation vector v [rad] (theory.md, eq. (5.15))."""
+    """Return exp(hat(v)) q: the direction rotated by the rotation vector v [rad] (theory.md, eq. (5.15))."""
     r = turn(v, q)
     # first-order normalisation, else the rounding of many equal steps adds up in the length
     return Direction(*scale(1.5 - 0.5 * dot(r, r), r))
@@ -30,7 +30,7 @@ def retract(q, v):
 
 @always_inline
 def log(q, r):
-    """Rotation vector orthogonal to q and r that takes q to r; zero for r = -q, where no axis stands out."""
+    """Return the rotation vector orthogonal to q and r that takes q to r; zero for r = -q, without a unique axis."""
     axis = cross(q, r)
     sine = norm(axis)
     k = 1.0 if sine < 1e-150 else math.atan2(sine, dot(q, r)) / sine
@@ -39,19 +39,19 @@ def log(q, r):
 
 @always_inline
 def normalise(q):
-    """q / |q|."""
+    """Return q / |q|."""
     return Direction(*scale(1.0 / norm(q), q))
 
 
 @always_inline
 def embed(q, omega):
-    """Derivative of the three numbers: omega x q."""
+    """Return the derivative of the three numbers: omega x q."""
     return cross(omega, q)
 
 
 @always_inline
 def transport(u, v):
-    """From exp(u) q back to q, u orthogonal to q: turned back by u (theory.md, eq. (5.21))."""
+    """Transport a tangent from exp(u) q back to q, with u orthogonal to q: rotate it back by u (eq. (5.21))."""
     return turn(scale(-1.0, u), v)
 
 

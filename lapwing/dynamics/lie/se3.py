@@ -23,39 +23,39 @@ class Pose(NamedTuple):
 
 @always_inline
 def exp(u):
-    """Rigid motion of u = (translation [m], rotation [rad]) (theory.md, eq. (5.16))."""
+    """Return the rigid motion of u = (translation [m], rotation [rad]) (theory.md, eq. (5.16))."""
     return Pose(so3.dexp(u[1], u[0]), quaternion.exp(u[1]))
 
 
 @always_inline
 def log(g):
-    """(translation, rotation) of a rigid motion, inverse of `exp` for rotations below pi."""
+    """Return (translation, rotation) of a rigid motion, inverse of `exp` for rotations below pi."""
     rotation = quaternion.log(g[1])
     return so3.dexpinv(rotation, g[0]), rotation
 
 
 @always_inline
 def compose(g, h):
-    """The product g h: first h, then g."""
+    """Return the product g h: first h, then g."""
     return Pose(add(g[0], rotate(g[1], h[0])), quaternion.multiply(g[1], h[1]))
 
 
 @always_inline
 def adjoint(g, u):
-    """Ad_g u: the element of se(3) seen from the other side of g (theory.md, eq. (5.17))."""
+    """Return Ad_g u: the element of se(3) on the other side of g (theory.md, eq. (5.17))."""
     rotation = rotate(g[1], u[1])
     return add(rotate(g[1], u[0]), cross(g[0], rotation)), rotation
 
 
 @always_inline
 def commutator(u, v):
-    """[u, v] in se(3): ad_u v."""
+    """Return [u, v] in se(3): ad_u v."""
     return add(cross(u[1], v[0]), cross(u[0], v[1])), cross(u[1], v[1])
 
 
 @always_inline
 def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
-    """Derivative along u[0] of linear w x v + quadratic w x (w x v) at w = u[1] (theory.md, eq. (5.19))."""
+    """Return the derivative along u[0] of linear w x v + quadratic w x (w x v) at w = u[1] (theory.md, eq. (5.19))."""
     b, w = u[0], u[1]
     doubled = 2.0 * dot(b, w)
     wv, bv = cross(w, v), cross(b, v)
@@ -66,7 +66,7 @@ def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
 
 @always_inline
 def dexp(u, v):
-    """exp(u)' = (dexp(u, u'))^ exp(u) on se(3) (theory.md, eq. (5.19))."""
+    """Return dexp(u, v) on se(3), with exp(u)' = (dexp(u, u'))^ exp(u) (theory.md, eq. (5.19))."""
     square = dot(u[1], u[1])
     c, d = cosine_ratio(square), cubic_ratio(square)
     coupling = _along(c, d, cubic_slope(square), cosine_slope(square), u, v[1])
@@ -75,38 +75,38 @@ def dexp(u, v):
 
 @always_inline
 def dexpinv(u, v):
-    """Inverse of `dexp(u, .)`; singular at a rotation of 2 pi (theory.md, eq. (5.19))."""
+    """Return the inverse of `dexp(u, .)`; singular at a rotation of 2 pi (theory.md, eq. (5.19))."""
     coupling = _along(-0.5, cotangent_ratio(u[1]), cotangent_slope(u[1]), 0.0, u, v[1])
     return add(so3.dexpinv(u[1], v[0]), coupling), so3.dexpinv(u[1], v[1])
 
 
 @always_inline
 def retract(g, u):
-    """g exp(u): moved along the screw u, given in body coordinates."""
+    """Return g exp(u): g moved along the screw u in body coordinates."""
     return Pose(add(g[0], rotate(g[1], so3.dexp(u[1], u[0]))), quaternion.retract(g[1], u[1]))
 
 
 @always_inline
 def embed(g, twist):
-    """Derivative of the seven numbers."""
+    """Return the derivative of the seven numbers."""
     return rotate(g[1], twist[0]), quaternion.embed(g[1], twist[1])
 
 
 @always_inline
 def normalise(g):
-    """The attitude back to unit length."""
+    """Normalise the attitude."""
     return Pose(g[0], quaternion.normalise(g[1]))
 
 
 @always_inline
 def bracket(u, v):
-    """Signed for tangents on the right (theory.md, eq. (5.3)): -[u, v]."""
+    """Return the bracket with the sign for right tangents (theory.md, eq. (5.3)): -[u, v]."""
     return commutator(v, u)
 
 
 @always_inline
 def transport(u, v):
-    """From g exp(u) back to g: Ad of exp(u/2), as on SO(3) (theory.md, eq. (5.20))."""
+    """Transport a tangent from g exp(u) back to g: Ad of exp(u/2), as on SO(3) (theory.md, eq. (5.20))."""
     return adjoint(exp((scale(0.5, u[0]), scale(0.5, u[1]))), v)
 
 

@@ -25,19 +25,19 @@ class Rotation(NamedTuple):
 
 @always_inline
 def hat(v):
-    """The skew matrix with hat(v) a = v x a."""
+    """Return the skew matrix with hat(v) a = v x a."""
     return (0.0, -v[2], v[1], v[2], 0.0, -v[0], -v[1], v[0], 0.0)
 
 
 @always_inline
 def vee(m):
-    """Inverse of `hat` on the skew part of m."""
+    """Return the inverse of `hat` on the skew part of m."""
     return (0.5 * (m[7] - m[5]), 0.5 * (m[2] - m[6]), 0.5 * (m[3] - m[1]))
 
 
 @always_inline
 def exp(v):
-    """Rotation matrix of the rotation vector v (theory.md, eq. (5.6))."""
+    """Return the rotation matrix of the rotation vector v (theory.md, eq. (5.6))."""
     square = dot(v, v)
     s, c = sine_ratio(square), cosine_ratio(square)
     sx, sy, sz = s * v[0], s * v[1], s * v[2]
@@ -50,7 +50,7 @@ def exp(v):
 
 @always_inline
 def turn(v, a):
-    """exp(hat(v)) a without the matrix."""
+    """Return exp(hat(v)) a without the matrix."""
     square = dot(v, v)
     across = cross(v, a)
     return add(a, add(scale(sine_ratio(square), across), scale(cosine_ratio(square), cross(v, across))))
@@ -58,13 +58,13 @@ def turn(v, a):
 
 @always_inline
 def log(m):
-    """Rotation vector, at most pi long, of a rotation matrix: by the quaternion, accurate near zero and near pi."""
+    """Return the rotation vector, at most pi long, via the quaternion: accurate near zero and near pi."""
     return quaternion.log(quaternion.from_matrix(m))
 
 
 @always_inline
 def dexp(u, v):
-    """Derivative of the exponential: exp(u)' = hat(dexp(u, u')) exp(u) (theory.md, eq. (5.7))."""
+    """Return the derivative of the exponential: exp(u)' = hat(dexp(u, u')) exp(u) (theory.md, eq. (5.7))."""
     square = dot(u, u)
     across = cross(u, v)
     return add(v, add(scale(cosine_ratio(square), across), scale(cubic_ratio(square), cross(u, across))))
@@ -72,20 +72,20 @@ def dexp(u, v):
 
 @always_inline
 def dexpinv(u, v):
-    """Inverse of `dexp(u, .)`; singular at |u| = 2 pi (theory.md, eq. (5.8))."""
+    """Return the inverse of `dexp(u, .)`; singular at |u| = 2 pi (theory.md, eq. (5.8))."""
     across = cross(u, v)
     return add(v, add(scale(-0.5, across), scale(cotangent_ratio(u), cross(u, across))))
 
 
 @always_inline
 def determinant(m):
-    """Determinant of a 3x3 matrix: +1 for a rotation, -1 for a reflection."""
+    """Return the determinant of a 3x3 matrix: +1 for a rotation, -1 for a reflection."""
     return dot((m[0], m[1], m[2]), cross((m[3], m[4], m[5]), (m[6], m[7], m[8])))
 
 
 @always_inline
 def _polish(m):
-    """One Newton step towards the polar factor: m (3 I - transpose(m) m) / 2; squares the defect."""
+    """Return one Newton step towards the polar factor: m (3 I - transpose(m) m) / 2; it squares the defect."""
     g = matmul(transpose(m), m)
     return matmul(m, (
         1.5 - 0.5 * g[0], -0.5 * g[1], -0.5 * g[2],
@@ -96,26 +96,26 @@ def _polish(m):
 
 @always_inline
 def normalise(m):
-    """The rotation matrix nearest to m, for m within 0.1 of one."""
+    """Return the rotation matrix nearest to m, for m within 0.1 of one."""
     return Rotation(*_polish(_polish(_polish(_polish(m)))))
 
 
 @always_inline
 def adjoint(m, v):
-    """Ad of a rotation matrix on so(3): the rotated vector."""
+    """Return Ad of a rotation matrix on so(3): the rotated vector."""
     return apply(m, v)
 
 
 @always_inline
 def retract(m, v):
-    """m exp(hat(v)): turned by v in body coordinates."""
+    """Return m exp(hat(v)): m rotated by v in body coordinates."""
     # polished, else the rounding of many equal steps adds up
     return Rotation(*_polish(matmul(m, exp(v))))
 
 
 @always_inline
 def embed(m, omega_body):
-    """Derivative of the nine numbers: m hat(omega_body)."""
+    """Return the derivative of the nine numbers: m hat(omega_body)."""
     return matmul(m, hat(omega_body))
 
 

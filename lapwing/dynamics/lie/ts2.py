@@ -22,56 +22,56 @@ class Swing(NamedTuple):
 
 @always_inline
 def tangent(x, acceleration):
-    """The algebra element (mu_1, mu_2) that moves x with omega' = acceleration, orthogonal to the direction [rad/s^2].
+    """Return the algebra element (mu_1, mu_2) of omega' = acceleration [rad/s^2], normal to the direction.
 
-    theory.md, eq. (5.24).
+    See theory.md, eq. (5.24).
     """
     return x[1], cross(x[0], acceleration)
 
 
 @always_inline
 def act(rotation, shift, x):
-    """Action of the rigid motion (exp(rotation), shift) on x (theory.md, eq. (5.22))."""
+    """Return the action of the rigid motion (exp(rotation), shift) on x (theory.md, eq. (5.22))."""
     direction = so3.turn(rotation, x[0])
     return Swing(direction, add(so3.turn(rotation, x[1]), cross(shift, direction)))
 
 
 @always_inline
 def _polish(x):
-    """First-order return to |q| = 1 and q . omega = 0: rounding of many steps must not add up."""
+    """Restore |q| = 1 and q . omega = 0 to first order, so that the rounding of many steps does not add up."""
     q = scale(1.5 - 0.5 * dot(x[0], x[0]), x[0])
     return Swing(q, subtract(x[1], scale(dot(q, x[1]), q)))
 
 
 @always_inline
 def retract(x, mu):
-    """exp(mu) x with the exponential of SE(3): rotation exp(mu_1), shift dexp(mu_1, mu_2)."""
+    """Return exp(mu) x with the exponential of SE(3): rotation exp(mu_1), shift dexp(mu_1, mu_2)."""
     return _polish(act(mu[0], so3.dexp(mu[0], mu[1]), x))
 
 
 @always_inline
 def embed(x, mu):
-    """Derivative of the six numbers (theory.md, eq. (5.23))."""
+    """Return the derivative of the six numbers (theory.md, eq. (5.23))."""
     return cross(mu[0], x[0]), add(cross(mu[0], x[1]), cross(mu[1], x[0]))
 
 
 @always_inline
 def normalise(x):
-    """Direction to unit length, angular velocity orthogonal to it."""
+    """Normalise the direction and make the angular velocity orthogonal to it."""
     q = scale(1.0 / math.sqrt(dot(x[0], x[0])), x[0])
     return Swing(q, subtract(x[1], scale(dot(q, x[1]), q)))
 
 
 @always_inline
 def bracket(u, v):
-    """[u, v] of (rotation, translation) pairs; rotations act from the left."""
+    """Return [u, v] of (rotation, translation) pairs; rotations act from the left."""
     translation, rotation = commutator((u[1], u[0]), (v[1], v[0]))
     return rotation, translation
 
 
 @always_inline
 def transport(u, v):
-    """From exp(u) x back to x: Ad of exp(-u/2) in SE(3), which acts from the left (theory.md, eq. (5.20))."""
+    """Transport a tangent from exp(u) x back to x: Ad of exp(-u/2) in SE(3), acting from the left (eq. (5.20))."""
     translation, rotation = adjoint(exp((scale(-0.5, u[1]), scale(-0.5, u[0]))), (v[1], v[0]))
     return rotation, translation
 

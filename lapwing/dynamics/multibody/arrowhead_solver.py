@@ -55,7 +55,7 @@ class Result(NamedTuple):
 
 @always_inline
 def times(m, a):
-    """m a for a symmetric matrix of six floats."""
+    """Return m a for a symmetric matrix of six floats."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[4] * a[2],
         m[3] * a[0] + m[1] * a[1] + m[5] * a[2],
@@ -65,28 +65,30 @@ def times(m, a):
 
 @always_inline
 def plus(m, n):
-    """m + n."""
+    """Return m + n."""
     return (m[0] + n[0], m[1] + n[1], m[2] + n[2], m[3] + n[3], m[4] + n[4], m[5] + n[5])
 
 
 @always_inline
 def outer(s, a):
-    """s a a^T for a scalar s."""
+    """Return s a a^T for a scalar s."""
     x, y, z = s * a[0], s * a[1], s * a[2]
     return (x * a[0], y * a[1], z * a[2], x * a[1], x * a[2], y * a[2])
 
 
 @always_inline
 def point_inertia(mass, a):
-    """mass (|a|^2 1 - a a^T): the inertia of a point at a."""
+    """Return mass (|a|^2 1 - a a^T): the inertia of a point at a."""
     xx, yy, zz = mass * a[0] * a[0], mass * a[1] * a[1], mass * a[2] * a[2]
     return (yy + zz, xx + zz, xx + yy, -mass * a[0] * a[1], -mass * a[0] * a[2], -mass * a[1] * a[2])
 
 
 @always_inline
 def reflected_inertia(C, moments, spins):
-    """The inertia of a leaf as its core feels it: C diag(moments) C^T for a rotation matrix C, without the moment about
-    the leaf's z axis if it spins freely."""
+    """Return the inertia of a leaf reflected to its core: C diag(moments) C^T for a rotation matrix C.
+
+    Without the moment about the leaf's z axis if it spins freely.
+    """
     # C diag(1, 1, 1) C^T = 1 saves a column
     along = outer(moments[0] - moments[1], (C[0], C[3], C[6]))
     about = outer((1.0 - spins) * moments[2] - moments[1], (C[2], C[5], C[8]))
@@ -96,7 +98,7 @@ def reflected_inertia(C, moments, spins):
 
 @always_inline
 def solve_symmetric(m, b):
-    """m^-1 b by cofactors."""
+    """Return m^-1 b by cofactors."""
     c00 = m[1] * m[2] - m[5] * m[5]
     c01 = m[4] * m[5] - m[3] * m[2]
     c02 = m[3] * m[5] - m[4] * m[1]
@@ -109,13 +111,13 @@ def solve_symmetric(m, b):
 
 @always_inline
 def _all(a):
-    """Sum over the four lanes of each of the three components of a vector."""
+    """Return the sum over the four lanes of each of the three components of a vector."""
     return (horizontal_sum(a[0]), horizontal_sum(a[1]), horizontal_sum(a[2]))
 
 
 @always_inline
 def _sum(m):
-    """Sum over the four lanes of each of the six entries of a symmetric matrix."""
+    """Return the sum over the four lanes of each of the six entries of a symmetric matrix."""
     return (
         horizontal_sum(m[0]),
         horizontal_sum(m[1]),
@@ -128,7 +130,7 @@ def _sum(m):
 
 @always_inline
 def eliminate(core, leaf):
-    """Accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
+    """Return accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
     given = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
     force = subtract(leaf.force, scale(leaf.mass, leaf.drift))
     torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(given, leaf.axis)))

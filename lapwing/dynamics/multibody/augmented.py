@@ -32,7 +32,7 @@ class Solution(NamedTuple):
 
 @kernel
 def mass_roots(a, p):
-    """Lower roots of the mass matrix's blocks: sqrt(m), shape (n,), and Cholesky of G^T I G, shape (n, 9)."""
+    """Return lower roots of the mass matrix's blocks: sqrt(m), shape (n,), and Cholesky of G^T I G, shape (n, 9)."""
     n = len(a.mass)
     root, rotational = np.sqrt(a.mass), np.zeros((n, 9))
     for b in range(n):
@@ -54,7 +54,7 @@ def mass_roots(a, p):
 
 @kernel
 def divide_root(root, rotational, x):
-    """L^-1 x in place, for x of shape (6 n, c)."""
+    """Compute L^-1 x in place, for x of shape (6 n, c)."""
     for b in range(len(root)):
         l00, l10, l11 = rotational[b, 0], rotational[b, 3], rotational[b, 4]
         l20, l21, l22 = rotational[b, 6], rotational[b, 7], rotational[b, 8]
@@ -71,7 +71,7 @@ def divide_root(root, rotational, x):
 
 @kernel
 def divide_root_transposed(root, rotational, x):
-    """L^-T x in place, for x of shape (6 n,)."""
+    """Compute L^-T x in place, for x of shape (6 n,)."""
     for b in range(len(root)):
         l00, l10, l11 = rotational[b, 0], rotational[b, 3], rotational[b, 4]
         l20, l21, l22 = rotational[b, 6], rotational[b, 7], rotational[b, 8]
@@ -85,9 +85,9 @@ def divide_root_transposed(root, rotational, x):
 
 @noinline
 def generalised_force(a, p, wrench):
-    """Q = Q_v + Q_e, shape (n, 6), of a wrench (n, 6): force at the centre of mass [N], world; torque [N m], body.
+    """Return Q = Q_v + Q_e, shape (n, 6), of wrenches (n, 6): force [N], world; torque [N m], body.
 
-    (theory.md, eqs. (8.6), (8.18))
+    See theory.md, eqs. (8.6), (8.18).
     """
     out = np.empty((len(a.mass), 6))
     for b in range(len(a.mass)):
@@ -107,7 +107,7 @@ def generalised_force(a, p, wrench):
 
 @kernel
 def factor_rows(a, p, e, count, tolerance, most):
-    """(root, rotational, factor) of the first `count` constraint rows."""
+    """Return (root, rotational, factor) of the first `count` constraint rows."""
     root, rotational = mass_roots(a, p)
     b = e.jacobian_t[:, :count].copy()
     divide_root(root, rotational, b)
@@ -116,7 +116,7 @@ def factor_rows(a, p, e, count, tolerance, most):
 
 @noinline
 def constrained(a, p, e, force, gamma, tolerance, most):
-    """Accelerations (n, 6) with M a = force - J^T lambda, J a = gamma: the core of every solve."""
+    """Return accelerations (n, 6) with M a = force - J^T lambda, J a = gamma: the core of every solve."""
     root, rotational, f = factor_rows(a, p, e, len(gamma), tolerance, most)
     free = force.copy().reshape(-1, 1)
     divide_root(root, rotational, free)
@@ -136,8 +136,10 @@ def constrained(a, p, e, force, gamma, tolerance, most):
 
 @noinline
 def solve(a, configuration, velocity, wrench, drive, damping, stiffness, tolerance, most):
-    """`accelerations` on packed arrays: at most `most` independent rows, Baumgarte feedback `damping` [1/s] and
-    `stiffness` [1/s^2] (zero for none); returns (solution, singular body or -1)."""
+    """Solve `accelerations` on packed arrays. Return (solution, singular body or -1).
+
+    At most `most` independent rows; Baumgarte feedback `damping` [1/s] and `stiffness` [1/s^2] (zero for none).
+    """
     p = place(configuration, velocity)
     e = in_coordinates(equations(a, p, drive), p)
     gamma = e.gamma
@@ -150,7 +152,7 @@ def solve(a, configuration, velocity, wrench, drive, damping, stiffness, toleran
 
 @kernel
 def stabilised(e, velocity, damping, stiffness):
-    """Baumgarte's right-hand side: gamma - damping (J v - target) - stiffness residual (theory.md, eq. (8.30))."""
+    """Return Baumgarte's right-hand side: gamma - damping (J v - target) - stiffness residual (eq. (8.30))."""
     gamma = e.gamma.copy()
     flat = velocity.copy().reshape(-1)
     for c in range(len(flat)):
@@ -170,11 +172,11 @@ def accelerations(
     wrench: ArrayLike | None = None,
     drive: ArrayLike | None = None,
 ) -> Solution:
-    """Accelerations of all coordinates, multipliers, rank and conflict of a system (theory.md, eqs. (8.20)-(8.22)).
+    """Return accelerations of all coordinates, multipliers, rank and conflict (theory.md, eqs. (8.20)-(8.22)).
 
     Args:
         system: n bodies and d drives.
-        configuration: (n, 6) Euler or (n, 7) quaternion coordinates; see `placement`.
+        configuration: (n, 6) Euler or (n, 7) quaternion coordinates; see `body_kinematics`.
         velocity: (n, 6).
         wrench: (n, 6) external force at each centre of mass [N], world, and torque [N m], body; gravity is added.
         drive: (d, 2) imposed speed [rad/s] and its rate [rad/s^2] of each drive.
@@ -195,7 +197,7 @@ def prepared(
     wrench: ArrayLike | None,
     drive: ArrayLike | None,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The arguments of `accelerations` as arrays of floats, zeros for None.
+    """Return the arguments of `accelerations` as arrays of floats, zeros for None.
 
     Returns:
         configuration (n, 6) or (n, 7), velocity (n, 6), wrench (n, 6), drive (d, 2).
@@ -222,7 +224,7 @@ def prepared(
 
 
 def refuse_singular(system: System, body: int, when: str = "") -> None:
-    """ValueError if `body` is not -1: its Euler angles are singular."""
+    """Raise ValueError if `body` is not -1: its Euler angles are singular."""
     if body >= 0:
         raise ValueError(
             f"{system.bodies[body].name}: pitch reached 90 degrees{when}, where XYZ Euler angles are singular: "

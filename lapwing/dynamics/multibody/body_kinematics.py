@@ -29,13 +29,13 @@ class BodyKinematics(NamedTuple):
 
 @kernel
 def three(a, i):
-    """Row i of an array as a tuple of three."""
+    """Return row i of an array as a tuple of three."""
     return (a[i, 0], a[i, 1], a[i, 2])
 
 
 @kernel
 def nine(a, i):
-    """Row i of an array as a tuple of nine."""
+    """Return row i of an array as a tuple of nine."""
     return (a[i, 0], a[i, 1], a[i, 2], a[i, 3], a[i, 4], a[i, 5], a[i, 6], a[i, 7], a[i, 8])
 
 
@@ -48,7 +48,7 @@ def put(a, i, values):
 
 @noinline
 def place(configuration, velocity):
-    """Placement of the bodies of a configuration (n, 6 or 7) and velocity (n, 6); theory.md, eqs. (8.1)-(8.3)."""
+    """Return the kinematics of the bodies of a configuration (n, 6 or 7) and velocity (n, 6); eqs. (8.1)-(8.3)."""
     n, width = configuration.shape
     p = BodyKinematics(
         np.zeros((n + 1, 3)), np.zeros((n + 1, 9)), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)),
@@ -80,7 +80,7 @@ def place(configuration, velocity):
 
 @kernel
 def configuration_rate(configuration, velocity):
-    """Time derivative of the stored numbers of a configuration, same shape."""
+    """Return the time derivative of the stored numbers of a configuration, same shape."""
     n, width = configuration.shape
     out = np.empty((n, width))
     for i in range(n):
@@ -100,7 +100,7 @@ def configuration_rate(configuration, velocity):
 
 @kernel
 def displaced(configuration, step):
-    """The configuration reached by a coordinate increment (n, 6); a rotation vector in the body for quaternions."""
+    """Return the configuration plus an increment (n, 6); a body rotation vector for quaternions."""
     n, width = configuration.shape
     out = configuration.copy()
     for i in range(n):

@@ -25,7 +25,7 @@ class Equations(NamedTuple):
 
 @kernel
 def _revolute(a, p, k, out):
-    """Rows of joint k (theory.md, eqs. (8.10)-(8.13))."""
+    """Write the rows of joint k (theory.md, eqs. (8.10)-(8.13))."""
     i, j = a.joint_bodies[k]
     r = 5 * k
     Ri, Rj, wi, wj = nine(p.rotation, i), nine(p.rotation, j), three(p.omega, i), three(p.omega, j)
@@ -66,7 +66,7 @@ def _revolute(a, p, k, out):
 
 @kernel
 def _drive(a, p, k, speed, acceleration, out):
-    """Rows of drive k (theory.md, eqs. (8.15)-(8.17))."""
+    """Write the rows of drive k (theory.md, eqs. (8.15)-(8.17))."""
     i, j = a.drive_bodies[k]
     r = 5 * len(a.joint_bodies) + 3 * k
     Ri, Rj = nine(p.rotation, i), nine(p.rotation, j)
@@ -84,7 +84,7 @@ def _drive(a, p, k, speed, acceleration, out):
 
 @noinline
 def equations(a, p, drive):
-    """All rows at a placement, for imposed (speed [rad/s], acceleration [rad/s^2]) per drive, shape (d, 2)."""
+    """Return all rows at a placement, for imposed (speed [rad/s], acceleration [rad/s^2]) per drive, shape (d, 2)."""
     k, d = len(a.joint_bodies), len(a.drive_bodies)
     m = 5 * k + 3 * d
     out = Equations(np.zeros((6 * len(p.position), m)), np.zeros(5 * k), np.zeros(m), np.zeros(m))
@@ -97,9 +97,9 @@ def equations(a, p, drive):
 
 @noinline
 def in_coordinates(e, p):
-    """The same rows for the coordinates' own rates, ground columns dropped: J <- J G, gamma <- gamma - J bias.
+    """Return the rows for the coordinates' rates, without ground columns: J <- J G, gamma <- gamma - J bias.
 
-    (theory.md, eq. (8.14)); nothing changes for quaternions, whose velocities are the twists.
+    See theory.md, eq. (8.14); rows for quaternions, whose velocities are the twists, are unchanged.
     """
     n = len(p.rate_matrix)
     Jt = e.jacobian_t[: 6 * n]
@@ -118,7 +118,7 @@ def in_coordinates(e, p):
 
 @kernel
 def velocity_defect(e, velocity):
-    """J velocity - target, shape (m,)."""
+    """Return J velocity - target, shape (m,)."""
     flat = velocity.reshape(-1)
     out = -e.target
     for c in range(len(flat)):

@@ -41,7 +41,7 @@ class DroneState(NamedTuple):
 
 
 class Loads(NamedTuple):
-    """What acts from outside and what the motors do; thrust and aerodynamic torque act on the propellers."""
+    """External loads and motor torques; thrust and aerodynamic torque act on the propellers."""
 
     force_world: Vec3  # at the chassis' centre of mass, gravity not included [N]
     torque_body: Vec3  # on the chassis [N m]
@@ -81,7 +81,7 @@ def delivery_drone(
     rotor_sign_y: Sequence[float],
     driven: str = "torque",
 ) -> Drone:
-    """The paper's five bodies (Tables 2, 3) from SI numbers under the names of facts/delivery_drone.toml.
+    """Return the paper's five bodies (Tables 2, 3) from SI numbers under the names of facts/delivery_drone.toml.
 
     Args:
         central_frame, payload, propeller: masses [kg].
@@ -122,7 +122,7 @@ def delivery_drone(
 
 @always_inline
 def _double(angles):
-    """Cosines and sines of twice the angles."""
+    """Return cosines and sines of twice the angles."""
     c, s = math.cos, math.sin
     a, b, d, e = 2.0 * angles[0], 2.0 * angles[1], 2.0 * angles[2], 2.0 * angles[3]
     return interleave((c(a), c(b), c(d), c(e))), interleave((s(a), s(b), s(d), s(e)))
@@ -130,8 +130,7 @@ def _double(angles):
 
 @always_inline
 def _propellers(d, x, loads, g):
-    """The propellers as leaves in chassis axes; their inertia turns with them at twice the speed (theory.md, eq.
-    (8.50))."""
+    """Return the propellers as leaves in chassis axes; their inertia varies at twice the speed (eq. (8.50))."""
     w, speed, spins, held = x.omega_body, interleave(x.speeds), interleave(d.spins), interleave(d.held)
     offset, drive = interleave(d.hubs), interleave(loads.drive)
     mass, inertia = held * interleave(d.propeller_mass), interleave(d.propeller_inertia)
@@ -160,7 +159,7 @@ def _propellers(d, x, loads, g):
 
 @always_inline
 def motion(d, loads, x):
-    """Accelerations and reactions of a drone under loads in a state (theory.md, eqs. (8.40)-(8.45), (8.50))."""
+    """Return accelerations and reactions of a drone under loads in a state (theory.md, eqs. (8.40)-(8.45), (8.50))."""
     R = quaternion.rotation_matrix(x.attitude)
     g = apply_transposed(R, loads.gravity_world)
     w = x.omega_body
@@ -185,7 +184,7 @@ def motion(d, loads, x):
 
 @kernel
 def rate(p, t, x):
-    """Tangent of a `DroneState` for parameters `Flight`."""
+    """Return the tangent of a `DroneState` for parameters `Flight`."""
     m = motion(p.drone, p.loads, x)
     return DroneState(
         x.velocity_world, x.omega_body, m.acceleration_world, m.angular_acceleration_body, x.speeds, m.spin_acceleration
@@ -197,5 +196,5 @@ RATES[Flight] = rate
 
 @kernel
 def solve(drone, loads, x):
-    """`motion` as a function of its own, for callers outside compiled code."""
+    """Call `motion` from outside compiled code."""
     return motion(drone, loads, x)

@@ -87,14 +87,16 @@ class Machine(NamedTuple):
 
 @always_inline
 def column(R, k):
-    """Column k of a 3x3 matrix: body axis k in the world."""
+    """Return column k of a 3x3 matrix: body axis k in the world."""
     return (R[k], R[3 + k], R[6 + k])
 
 
 @always_inline
 def from_chassis(chassis, leaf):
-    """Rotation matrices from the leaves' axes to the chassis' axes, orthogonal even where the stages of a step have
-    attitudes that are not quite of unit length."""
+    """Return rotation matrices from the leaves' axes to the chassis' axes.
+
+    They are orthogonal even if the stages of a step have attitudes that are not quite of unit length.
+    """
     q = quaternion.multiply(quaternion.conjugate(chassis.attitude), leaf.attitude)
     k = 2.0 / ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))
     x2, y2, z2 = k * q[1], k * q[2], k * q[3]
@@ -106,15 +108,17 @@ def from_chassis(chassis, leaf):
 
 @always_inline
 def free_turn(axis, gamma_1, gamma_2):
-    """The relative angular acceleration that the rows v1 . v3 and v2 . v3 ask for, up to the hinge axis itself
-    (theory.md, eq. (8.46)); v1 and v2 are the chassis' x and y axes, `axis` is v3."""
+    """Return the relative angular acceleration required by rows v1 . v3 and v2 . v3, up to the hinge axis (eq. (8.46)).
+
+    v1 and v2 are the chassis' x and y axes, `axis` is v3.
+    """
     k = 1.0 / axis[2]
     return (-k * gamma_2, k * gamma_1, 0.0 * k)
 
 
 @always_inline
 def _fed_back(rate, r, speed, x, chassis, R0, axis, own):
-    """(drift, turn) of Baumgarte's feedback at `rate` [1/s] of what is missing at a hinge (theory.md, eq. (8.30))."""
+    """Return (drift, turn) of Baumgarte's feedback at `rate` [1/s] of a hinge's defect (theory.md, eq. (8.30))."""
     w, back = chassis.omega_body, rate * rate
     gap = subtract(apply_transposed(R0, subtract(x.position_world, chassis.position_world)), r.offset)
     opening = subtract(apply_transposed(R0, subtract(x.velocity_world, chassis.velocity_world)), cross(w, r.offset))
@@ -129,7 +133,7 @@ def _fed_back(rate, r, speed, x, chassis, R0, axis, own):
 
 @always_inline
 def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
-    """What `arrow` must know of the rotors r in states x, in chassis axes; C: `from_chassis`."""
+    """Return the solver's data of the rotors r in states x, in chassis axes; C: `from_chassis`."""
     w, own, axis = chassis.omega_body, apply(C, x.omega_body), column(C, 2)
     slip = subtract(w, own)
     square, wa = dot(slip, slip), dot(w, axis)
@@ -153,7 +157,7 @@ def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
 
 @always_inline
 def solve(p, t, x):
-    """(`arrow.Result` at a state in chassis axes, chassis to world, leaves to chassis)."""
+    """Return (`arrowhead_solver.Result` at a state in chassis axes, chassis to world, leaves to chassis)."""
     c, r, b = x.chassis, interleave(p.rotors), interleave(x.propellers)
     R0, C, w = quaternion.rotation_matrix(c.attitude), from_chassis(c, b), c.omega_body
     g = apply_transposed(R0, p.gravity)
@@ -168,7 +172,7 @@ def solve(p, t, x):
 
 @always_inline
 def rate(p, t, x):
-    """Tangent of the state: index-1 equations of motion by elimination (theory.md, eqs. (8.40)-(8.46))."""
+    """Return the tangent of the state: index-1 equations of motion by elimination (theory.md, eqs. (8.40)-(8.46))."""
     s, R0, C = solve(p, t, x)
     r, b = interleave(p.rotors), interleave(x.propellers)
     acceleration = apply(R0, s.acceleration)
@@ -188,7 +192,7 @@ RATES[Machine] = rate
 
 @always_inline
 def reactions(p, t, x):
-    """(force [N], torque about its hinge [N m]) from the chassis on each propeller, in the world."""
+    """Return (force [N], torque about its hinge [N m]) from the chassis on each propeller, in the world."""
     s, R0, _ = solve(p, t, x)
     return deinterleave((apply(R0, s.reaction_force), apply(R0, s.reaction_torque)))
 
@@ -201,14 +205,14 @@ def machine(
     wrenches: Sequence[Wrench] = (NO_WRENCH,) * 5,
     feedback: float = 0.0,
 ) -> Machine:
-    """The five bodies of a drone.
+    """Return the five bodies of a drone.
 
     Args:
         drone: mass properties.
         gravity: [m/s^2], world.
-        drive: of each propeller: torque from the chassis [N m] if it spins, else imposed acceleration [rad/s^2].
+        drive: torque from the chassis [N m] of a spinning propeller, otherwise imposed acceleration [rad/s^2].
         speeds: imposed speeds relative to the chassis at t = 0 [rad/s].
-        wrenches: on each body from outside, chassis first.
+        wrenches: external wrench on each body, chassis first.
         feedback: Baumgarte's rate [1/s]; 0: none.
     """
     rotors = tuple(
@@ -222,7 +226,7 @@ def machine(
 
 
 def arrays(x: FiveBodies) -> tuple[np.ndarray, np.ndarray]:
-    """The same state for the general engine: configuration (5, 7) and velocity (5, 6). Also takes a tangent apart."""
+    """Return configuration (5, 7) and velocity (5, 6) for the general engine; also splits a tangent."""
     bodies = (x.chassis, *x.propellers)
     first = np.array([[*b.position_world, *b.attitude] for b in bodies])
     return first, np.array([[*b.velocity_world, *b.omega_body] for b in bodies])

@@ -13,7 +13,7 @@ NONE, PARTITION, PROJECTION = 0, 1, 2
 
 @always_inline
 def _gap(chassis, R0, offset, x):
-    """Where the leaf is missing from its hinge [m] and its spin axis, in chassis axes."""
+    """Return the displacement of a leaf from its hinge [m] and its spin axis, in chassis axes."""
     away = subtract(x.position_world, chassis.position_world)
     axis = column(quaternion.rotation_matrix(x.attitude), 2)
     return subtract(apply_transposed(R0, away), offset), apply_transposed(R0, axis)
@@ -21,7 +21,7 @@ def _gap(chassis, R0, offset, x):
 
 @always_inline
 def _resting(r, spins, C, drift, turn, force, torque):
-    """Leaves whose drives rest; what acts on them are momenta, or nothing."""
+    """Return leaves with idle drives, under momenta or no loads."""
     mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
     return HingedBody(
         mass,
@@ -40,7 +40,7 @@ def _resting(r, spins, C, drift, turn, force, torque):
 
 @always_inline
 def _turned(q, turn):
-    """The attitude after a turn in the body [rad], right to its third power; of unit length, without a root."""
+    """Return the attitude after a rotation in the body [rad], of third order and unit length, without a root."""
     s = scale(0.25, turn)
     square = dot(s, s)
     k = 1.0 / (1.0 + square)
@@ -52,7 +52,7 @@ def _turned(q, turn):
 
 @always_inline
 def _attitude(flag, a, b):
-    """The attitude a where flag is above zero, else b."""
+    """Return the attitude a where flag is above zero, else b."""
     return quaternion.Quaternion(
         select(flag, a[0], b[0]), select(flag, a[1], b[1]), select(flag, a[2], b[2]), select(flag, a[3], b[3])
     )
@@ -60,7 +60,7 @@ def _attitude(flag, a, b):
 
 @always_inline
 def _gathered(p, c, r, b):
-    """(chassis, propellers) as lanes with their hinges closed."""
+    """Return (chassis, propellers) as SIMD lanes with closed hinges."""
     R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
     axis = column(C, 2)
     gap = subtract(apply_transposed(R0, subtract(b.position_world, c.position_world)), r.offset)
@@ -90,9 +90,9 @@ def _core(p, force, torque):
 
 @always_inline
 def project(p, t, x):
-    """The nearest state, in the metric of the masses, that meets all constraints (theory.md, eqs. (8.31), (8.32)).
+    """Project to the nearest consistent state in the metric of the masses (theory.md, eqs. (8.31), (8.32)).
 
-    One Newton step on position level, then the velocities: a drift of e is left at e^2.
+    One Newton step on position level, then the velocities: a drift of e leaves e^2.
     """
     r = interleave(p.rotors)
     c, b = _gathered(p, x.chassis, r, interleave(x.propellers))
@@ -120,7 +120,7 @@ def project(p, t, x):
 
 @always_inline
 def partition(p, t, x):
-    """Chassis pose, spin angles and their rates are independent; all else follows (theory.md, eq. (8.33))."""
+    """Compute all dependent coordinates from chassis pose, spin angles and their rates (theory.md, eq. (8.33))."""
     c = x.chassis
     c = BodyState(c.position_world, quaternion.normalise(c.attitude), c.velocity_world, c.omega_body)
     R0, r, b = quaternion.rotation_matrix(c.attitude), interleave(p.rotors), interleave(x.propellers)
@@ -152,20 +152,20 @@ def partition(p, t, x):
 
 @always_inline
 def _unit(q):
-    """`quaternion.normalise` for lanes."""
+    """Normalise quaternions in SIMD lanes."""
     k = 1.0 / sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     return quaternion.Quaternion(k * q[0], k * q[1], k * q[2], k * q[3])
 
 
 @always_inline
 def _worse(a, b):
-    """The larger of two, NaN if the second is."""
+    """Return the larger of two, NaN if the second is."""
     return a if b <= a else b
 
 
 @kernel
 def constraint_violation(p, x):
-    """Largest defect of any hinge: (position [m] or axis [-], velocity [m/s] or [rad/s])."""
+    """Return the largest defect of any hinge: (position [m] or axis [-], velocity [m/s] or [rad/s])."""
     R0 = quaternion.rotation_matrix(x.chassis.attitude)
     w = x.chassis.omega_body
     position, velocity = 0.0, 0.0
@@ -185,7 +185,7 @@ def constraint_violation(p, x):
 
 @kernel
 def advance(method, p, t, x, h, n, stabilisation):
-    """n steps of h with `method` (a token of `lapwing.dynamics.integrators`), held by NONE, PARTITION or PROJECTION."""
+    """Take n steps of h with `method`, a token of `lapwing.dynamics.integrators`, and NONE, PARTITION or PROJECTION."""
     for i in range(n):
         x = step(method, p, t + i * h, x, h)
         if stabilisation == PROJECTION:
@@ -197,7 +197,7 @@ def advance(method, p, t, x, h, n, stabilisation):
 
 @kernel
 def assembled_state(p, chassis, angles, speeds):
-    """Consistent state of a chassis and four spin angles [rad] and speeds [rad/s], relative to the chassis."""
+    """Return the consistent state of a chassis and four spin angles [rad] and speeds [rad/s] relative to it."""
     R0 = quaternion.rotation_matrix(chassis.attitude)
     r = p.rotors
     return FiveBodies(

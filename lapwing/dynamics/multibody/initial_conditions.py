@@ -11,7 +11,7 @@ NEAR = 0.2  # largest position defect that is corrected: beyond it, another asse
 
 
 def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> None:
-    """ValueError that names every violated row and its defect, if a state does not meet its constraints."""
+    """Raise ValueError with every violated row and its defect if a state does not satisfy its constraints."""
     configuration, velocity, _, drive = prepared(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
     refuse_singular(system, p.singular)
@@ -24,10 +24,10 @@ def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> 
 
 
 def consistent(system, configuration, velocity, drive=None):
-    """The nearest consistent state (configuration, velocity) in the metric of the masses.
+    """Return the nearest consistent (configuration, velocity) in the metric of the masses.
 
     Raises:
-        ValueError: a joint is apart by more than `NEAR`, or no state meets all rows; names the violated rows.
+        ValueError: a joint is apart by more than `NEAR`, or no state satisfies all rows; names the violated rows.
     """
     configuration, velocity, _, drive = prepared(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)

@@ -26,14 +26,14 @@ def _at(positions):
 
 
 def pendulum(inertia: float = 1e-9) -> tuple[System, np.ndarray, np.ndarray]:
-    """A01: 1 kg at 1 m from a hinge, released at rest from the horizontal; with a trace of inertia [kg m^2]."""
+    """Return A01: 1 kg at 1 m from a hinge, released at rest from the horizontal, with a small inertia [kg m^2]."""
     hinge = Revolute("hinge", GROUND, 0, (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), Z, Z)
     system = assemble([Body("mass", 1.0, (inertia,) * 3)], [hinge], gravity=GRAVITY)
     return system, _at([(1.0, 0.0, 0.0)]), np.zeros((1, 6))
 
 
 def four_bars(n: int = 2, speed: float = 1.0) -> tuple[System, np.ndarray, np.ndarray]:
-    """A02: n four-bar windows, 2 n + 1 rods of 1 kg and 1 m; cranks upright, tips moving at `speed` [m/s] along x.
+    """Return A02: n four-bar windows, 2 n + 1 rods of 1 kg and 1 m, cranks upright, tips at `speed` [m/s] along x.
 
     Bodies: cranks 0..n, then couplers. Whenever the cranks lie flat, the mechanism has n + 1 degrees of freedom.
     """
@@ -56,9 +56,9 @@ def four_bars(n: int = 2, speed: float = 1.0) -> tuple[System, np.ndarray, np.nd
 
 
 def bricard() -> tuple[System, np.ndarray, np.ndarray]:
-    """A04: five rods of 1 kg and 1 m, 0.1 m square, along the edges of a cube, and six hinges; at rest.
+    """Return A04: five rods of 1 kg and 1 m, 0.1 m square, along the edges of a cube, and six hinges; at rest.
 
-    Counting equations leaves no freedom; one of them is redundant, and it moves.
+    Counting equations leaves no freedom, but one of them is redundant, so it moves.
     """
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], float)
     axes = [(0.0, 1.0, 0.0), Z, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), Z, (1.0, 0.0, 0.0)]
@@ -80,8 +80,11 @@ def bricard() -> tuple[System, np.ndarray, np.ndarray]:
 
 
 def drone_system(drone: Drone, driven: Sequence[bool] = (True, True, True, True)) -> System:
-    """The five bodies of a `delivery_drone.Drone` as a general system: 30 coordinates, 20 joint rows and three rows for
-    each propeller that is `driven` at an imposed speed (gravity along -z, 9.81 m/s^2). Body 0 is the chassis."""
+    """Return the five bodies of a `delivery_drone.Drone` as a general system; body 0 is the chassis.
+
+    It has 30 coordinates, 20 joint rows, and three rows for each propeller that is `driven` at an imposed speed
+    (gravity along -z, 9.81 m/s^2).
+    """
     origin = (0.0, 0.0, 0.0)
     bodies = [Body("chassis", drone.mass, drone.inertia)]
     bodies += [Body(f"propeller {k + 1}", drone.propeller_mass[k], drone.propeller_inertia[k]) for k in range(4)]

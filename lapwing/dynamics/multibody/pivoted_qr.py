@@ -27,7 +27,7 @@ class Factor(NamedTuple):
 
 @kernel
 def _lengths(b, k, out):
-    """Squared length of every column from row k down."""
+    """Compute the squared length of every column from row k down."""
     out[:] = 0.0
     for i in range(k, b.shape[0]):
         row = b[i]
@@ -37,7 +37,7 @@ def _lengths(b, k, out):
 
 @always_inline
 def _reflect(b, v, beta, k):
-    """Reflect the columns of b from row k down; those before k are zero there and stay so."""
+    """Reflect the columns of b from row k down; earlier columns are zero there."""
     n, width = b.shape
     # a row touches two bodies only: most of v is zero at first
     for j in range(k // BLOCK * BLOCK, width, BLOCK):
@@ -61,8 +61,10 @@ def _reflect(b, v, beta, k):
 
 @noinline
 def factor(matrix, tolerance, most):
-    """Factor a matrix (n, m); what is left of a dependent column after elimination is below `tolerance` of its length.
-    At most `most` columns are taken as independent."""
+    """Factor a matrix (n, m) with at most `most` independent columns.
+
+    The remainder of a dependent column after elimination is below `tolerance` of its length.
+    """
     n, m = matrix.shape
     width = -(-m // BLOCK) * BLOCK
     b, reflection = np.zeros((n, width)), np.zeros((n, n))
@@ -118,9 +120,9 @@ def factor(matrix, tolerance, most):
 
 @noinline
 def shortest(f, r):
-    """The shortest y with B^T y = r on the independent rows: (y of shape (n,), Q^T y, conflict).
+    """Return the shortest y with B^T y = r on the independent rows: (y of shape (n,), Q^T y, conflict).
 
-    `conflict` is by how much the dependent equations, scaled to unit length, are not met: zero when they agree.
+    `conflict` is the defect of the dependent equations, scaled to unit length: zero when they agree.
     """
     n, m = len(f.beta), len(f.order)
     z = np.zeros(n)
@@ -159,7 +161,7 @@ def _back_substitute(f, x):
 
 @kernel
 def _solve_positive(m, x):
-    """x <- m^-1 x in place by Cholesky, m positive definite and overwritten."""
+    """Compute m^-1 x in place by Cholesky, m positive definite and overwritten."""
     n = len(x)
     for k in range(n):
         m[k, k] = np.sqrt(m[k, k])
@@ -178,7 +180,7 @@ def _solve_positive(m, x):
 
 @noinline
 def minimum_norm(f, z):
-    """The shortest x of shape (m,) with B x = y, given z = Q^T y (theory.md, eq. (8.22))."""
+    """Return the shortest x of shape (m,) with B x = y, given z = Q^T y (theory.md, eq. (8.22))."""
     m = len(f.order)
     r, free = f.rank, m - f.rank
     # column 0: the basic solution; the others: minus the null space's upper part, R11^-1 R12
@@ -212,7 +214,7 @@ def minimum_norm(f, z):
 
 @kernel
 def basic(f, y):
-    """The x of shape (m,) with B x = y in the least-squares sense that is zero on all dependent columns."""
+    """Return the x of shape (m,) with B x = y in the least-squares sense that is zero on all dependent columns."""
     n, m = len(f.beta), len(f.order)
     c = y.copy()
     for k in range(f.rank):

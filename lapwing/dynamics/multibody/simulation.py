@@ -24,7 +24,7 @@ from lapwing.kernels import kernel
 
 
 class Recorded(NamedTuple):
-    """What `simulate` recorded, first state included; s records."""
+    """Records of `simulate`, including the initial state."""
 
     time: np.ndarray  # (s,) [s]
     configuration: np.ndarray  # (s, n, 6 or 7)
@@ -35,7 +35,7 @@ class Recorded(NamedTuple):
 
 @kernel
 def _drive_at(drive, t):
-    """Speed and rate of every drive at time t, for a constant rate."""
+    """Return the speed and rate of every drive at time t, for a constant rate."""
     now = drive.copy()
     for k in range(len(drive)):
         now[k, 0] += drive[k, 1] * t
@@ -44,7 +44,7 @@ def _drive_at(drive, t):
 
 @kernel
 def _along(x, h, k):
-    """x + h k."""
+    """Return x + h k."""
     out = x.copy()
     for i in range(x.shape[0]):
         for j in range(x.shape[1]):
@@ -54,7 +54,7 @@ def _along(x, h, k):
 
 @kernel
 def _weighted(x, h, k1, k2, k3, k4):
-    """x + h (k1 + 2 k2 + 2 k3 + k4) / 6."""
+    """Return x + h (k1 + 2 k2 + 2 k3 + k4) / 6."""
     out = x.copy()
     for i in range(x.shape[0]):
         for j in range(x.shape[1]):
@@ -64,7 +64,7 @@ def _weighted(x, h, k1, k2, k3, k4):
 
 @kernel
 def _step(a, q, v, wrench, drive, t, h, damping, stiffness, ranks):
-    """One step of RK4 on the stored numbers, quaternions normalised at its end; (q, v, singular body or -1)."""
+    """Take one RK4 step and normalise the quaternions. Return (q, v, singular body or -1)."""
     half = 0.5 * h
     s1, b1 = solve(a, q, v, wrench, _drive_at(drive, t), damping, stiffness, RANK_TOLERANCE, ranks[1])
     k1, a1 = configuration_rate(q, v), s1.acceleration
@@ -151,5 +151,5 @@ def _energy(a, q, v):
 
 
 def energy(system, configuration, velocity) -> tuple[float, float]:
-    """(kinetic, potential) energy [J]; the potential is zero with all centres of mass at the origin."""
+    """Return (kinetic, potential) energy [J]; the potential is zero with all centres of mass at the origin."""
     return _energy(system.arrays, np.asarray(configuration, float), np.asarray(velocity, float))

@@ -22,7 +22,7 @@ ITERATIONS = 8
 
 @kernel
 def largest(x):
-    """Largest absolute value, NaN if there is one, 0 of nothing."""
+    """Return the largest absolute value; NaN if there is one, 0 for an empty array."""
     out = 0.0
     for value in x:
         if not abs(value) <= out:
@@ -32,21 +32,21 @@ def largest(x):
 
 @kernel
 def rows(a, configuration, velocity, drive):
-    """(placement, equations) at a state, in its own coordinates."""
+    """Return (placement, equations) at a state, in its own coordinates."""
     p = place(configuration, velocity)
     return p, in_coordinates(equations(a, p, drive), p)
 
 
 @kernel
 def defects(a, configuration, velocity, drive):
-    """Largest defect of all constraints: (position level [m, -], velocity level [m/s, rad/s])."""
+    """Return the largest defect of all constraints: (position level [m, -], velocity level [m/s, rad/s])."""
     _, e = rows(a, configuration, velocity, drive)
     return largest(e.residual), largest(velocity_defect(e, velocity))
 
 
 @kernel
 def ranks(a, configuration, velocity, drive):
-    """(rank of the holonomic rows, rank of all rows) at a consistent state."""
+    """Return (rank of the holonomic rows, rank of all rows) at a consistent state."""
     p, e = rows(a, configuration, velocity, drive)
     _, _, held = factor_rows(a, p, e, len(e.residual), RANK_TOLERANCE, ANY)
     _, _, every = factor_rows(a, p, e, len(e.target), RANK_TOLERANCE, ANY)
@@ -55,13 +55,13 @@ def ranks(a, configuration, velocity, drive):
 
 @kernel
 def _tolerance(e):
-    """Rank tolerance off the constraints: a dependent row then has an independent part of the order of the defect."""
+    """Return the rank tolerance off the constraints: dependent rows have independent parts of defect order."""
     return max(RANK_TOLERANCE, min(10.0 * largest(e.residual), 1e-3))
 
 
 @noinline
 def project(a, configuration, velocity, drive, ranks):
-    """Nearest consistent state in the metric of the mass matrix (theory.md, eqs. (8.31), (8.32)).
+    """Return the nearest consistent state in the metric of the mass matrix (theory.md, eqs. (8.31), (8.32)).
 
     `ranks`: upper bounds of the rank of the holonomic rows and of all rows.
     """
@@ -85,7 +85,7 @@ def project(a, configuration, velocity, drive, ranks):
 
 @kernel
 def _dependent(f, width):
-    """Mask of the columns that a factorisation of J found independent of each other: the dependent coordinates."""
+    """Return a mask of the dependent coordinates: the columns of J that its factorisation found independent."""
     mask = np.zeros(width, np.bool_)
     for k in range(f.rank):
         mask[f.order[k]] = True
@@ -94,7 +94,7 @@ def _dependent(f, width):
 
 @kernel
 def _correction(jacobian, mask, defect, tolerance, most):
-    """Increment of the masked coordinates alone that takes the defect away, shape (6 n,)."""
+    """Return the increment of the masked coordinates alone that removes the defect, shape (6 n,)."""
     reduced = jacobian.copy()
     for c in range(reduced.shape[1]):
         if not mask[c]:
@@ -104,8 +104,11 @@ def _correction(jacobian, mask, defect, tolerance, most):
 
 @noinline
 def partition(a, configuration, velocity, drive, ranks):
-    """Generalised coordinate partitioning (theory.md, eqs. (8.33), (8.34)): column pivoting of the Jacobian picks the
-    dependent coordinates, Newton's iteration corrects those alone; the same for the velocities. `ranks` as above."""
+    """Correct the dependent coordinates by generalised coordinate partitioning (theory.md, eqs. (8.33), (8.34)).
+
+    Column pivoting of the Jacobian selects the dependent coordinates, which Newton's iteration corrects; then the
+    velocities. See `project` for `ranks`.
+    """
     held, width = 5 * len(a.joint_bodies), 6 * len(a.mass)
     _, e = rows(a, configuration, velocity, drive)
     if held > 0:

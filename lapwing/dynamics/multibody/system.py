@@ -52,7 +52,7 @@ class DrivingConstraint:
 
 
 class Arrays(NamedTuple):
-    """What the kernels see of n bodies, k joints and d drives."""
+    """Arrays of n bodies, k joints and d drives for the kernels."""
 
     mass: np.ndarray  # (n,) [kg]
     inertia: np.ndarray  # (n, 3, 3) [kg m^2], body axes
@@ -74,14 +74,14 @@ class System:
     arrays: Arrays
 
     def row_names(self) -> list[str]:
-        """Name of every constraint row, holonomic ones first."""
+        """Return the name of every constraint row, holonomic ones first."""
         parts = ("point x", "point y", "point z", "axis v1", "axis v2")
         return [f"{joint.name}: {part}" for joint in self.joints for part in parts] + [
             f"{drive.name}: omega {part}" for drive in self.drives for part in "xyz"
         ]
 
     def without(self, name: str) -> "System":
-        """The system after an event has removed the joint or drive `name`; ValueError if there is none."""
+        """Return the system without the joint or drive `name`. Raise ValueError if there is none."""
         names = [joint.name for joint in self.joints] + [drive.name for drive in self.drives]
         if name not in names:
             raise ValueError(f"no joint or drive {name!r}: choose one of {names}")
@@ -94,7 +94,7 @@ class System:
 
 
 def triad(axis: ArrayLike) -> np.ndarray:
-    """Right-handed unit vectors v1, v2, v3 as rows, shape (3, 3), with v3 along `axis` (theory.md, eq. (8.11))."""
+    """Return right-handed unit vectors v1, v2, v3 as rows, shape (3, 3), with v3 along `axis` (eq. (8.11))."""
     v3 = np.asarray(axis, float) / small_matrices.length(axis)
     # the coordinate axis furthest from v3 keeps the cross product far from zero
     v1 = np.cross(np.eye(3)[np.argmin(np.abs(v3))], v3)

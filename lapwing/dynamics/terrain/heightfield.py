@@ -26,7 +26,7 @@ class Relief(NamedTuple):
 
 @kernel
 def _between(t, x, y):
-    """(height, rise along x, rise along y) of the grid, bilinear; beyond its edge as at the edge."""
+    """Return (height, slope along x, slope along y) of the grid, bilinear; beyond its edge as at the edge."""
     rows, columns = t.grid.shape
     u, v = (x - t.corner[0]) / t.spacing, (y - t.corner[1]) / t.spacing
     inside_x, inside_y = 0.0 <= u <= columns - 1.0, 0.0 <= v <= rows - 1.0
@@ -42,7 +42,7 @@ def _between(t, x, y):
 
 @kernel
 def field(t, x, y):
-    """(height [m], rise along x, rise along y) of the ground without what stands on it."""
+    """Return (height [m], slope along x, slope along y) of the ground without obstacles."""
     a, b = t.slope
     height = t.base + a * x + b * y
     if t.bump_height != 0.0:
@@ -64,7 +64,7 @@ def _normal(a, b):
 
 @kernel
 def _in_box(box, x, y):
-    """(distance [m] to the nearest of its four sides, negative outside, and the x and y of that side's normal)."""
+    """Return (distance [m] to the nearest side, negative outside; x and y of that side's normal)."""
     dx, dy, c, s = x - box[0], y - box[1], box[2], box[3]
     u, v = c * dx + s * dy, c * dy - s * dx
     along, across = box[4] - abs(u), box[5] - abs(v)
@@ -77,7 +77,7 @@ def _in_box(box, x, y):
 
 @kernel
 def _in_cylinder(cylinder, x, y):
-    """The same of a cylinder's wall."""
+    """Return (distance [m] to the wall, negative outside; x and y of its normal)."""
     dx, dy = x - cylinder[0], y - cylinder[1]
     radius = math.hypot(dx, dy)
     if radius == 0.0:
@@ -87,7 +87,7 @@ def _in_cylinder(cylinder, x, y):
 
 @kernel
 def top(t, x, y):
-    """(height [m], normal) of what a plumb line meets first."""
+    """Return (height [m], normal) of the highest surface."""
     height, a, b = field(t, x, y)
     normal = _normal(a, b)
     for i in range(t.boxes.shape[0]):
@@ -101,7 +101,7 @@ def top(t, x, y):
 
 @kernel
 def _deeper(found, place, top_z, wall):
-    """The deeper of what is found and of being within a body: as deep as its nearest face is near."""
+    """Return the deeper of a previous result and the depth in an obstacle, measured to its nearest face."""
     under = top_z - place[2]
     inside, x, y = wall
     if under <= 0.0 or inside <= 0.0:
@@ -114,20 +114,20 @@ def _deeper(found, place, top_z, wall):
 
 @kernel
 def depth(t, place):
-    """(depth [m] of a point in the ground or in a body on it, not positive outside; normal of the nearest face)."""
+    """Return (depth [m] of a point in the ground or an obstacle, not positive outside; normal of the nearest face)."""
     height, a, b = field(t, place[0], place[1])
     normal = _normal(a, b)
-    found = ((height - place[2]) * normal[2], normal)
+    result = ((height - place[2]) * normal[2], normal)
     for i in range(t.boxes.shape[0]):
-        found = _deeper(found, place, t.boxes[i, 6], _in_box(t.boxes[i], place[0], place[1]))
+        result = _deeper(result, place, t.boxes[i, 6], _in_box(t.boxes[i], place[0], place[1]))
     for i in range(t.cylinders.shape[0]):
-        found = _deeper(found, place, t.cylinders[i, 3], _in_cylinder(t.cylinders[i], place[0], place[1]))
-    return found
+        result = _deeper(result, place, t.cylinders[i, 3], _in_cylinder(t.cylinders[i], place[0], place[1]))
+    return result
 
 
 @kernel
 def ray(t, origin, direction, longest):
-    """Distance [m] along a unit vector to the ground, inf where it is farther than `longest`; 0 from within it."""
+    """Return the distance [m] along a unit vector to the ground; inf beyond `longest`, 0 from within it."""
     before, after = 0.0, 0.0
     while True:
         x, y = origin[0] + after * direction[0], origin[1] + after * direction[1]

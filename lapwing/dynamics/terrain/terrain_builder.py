@@ -28,22 +28,22 @@ def relief(
     corner: tuple[float, float] = (0.0, 0.0),
     spacing: float = 1.0,
 ) -> Level | Relief:
-    """The ground that these make together; level ground where they make none (theory.md, eq. (2.30)). Lengths in m.
+    """Return the combined terrain; level ground without any feature (theory.md, eq. (2.30)). Lengths in m.
 
     Args:
         slope: rise along world x and y.
         bump_height: A of bumps A sin(k x) sin(k y).
         bump_length: their wavelength 2 pi / k.
-        steps: (distance from home, rise), with growing distances above 0.
-        step_heading: direction in which they follow one another [rad], 0 along x.
-        boxes: that stand on the ground.
-        cylinders: that stand on it, upright.
-        grid: heights, rows along world y and columns along x; they count from that at home.
+        steps: (distance from home, rise), with ascending distances above 0.
+        step_heading: direction of the steps [rad], 0 along x.
+        boxes: boxes on the ground.
+        cylinders: upright cylinders on the ground.
+        grid: heights relative to home, rows along world y and columns along x.
         corner: world x and y of grid[0, 0].
-        spacing: of the grid.
+        spacing: spacing of the grid.
 
     Raises:
-        KeyedError: ground steeper than 45 degrees, a grid that does not hold home, steps out of order.
+        ConfigError: ground steeper than 45 degrees, a grid without home, steps out of order.
     """
     heights = np.zeros((0, 0)) if grid is None else _checked(grid, corner, spacing)
     steep = math.hypot(*slope) + abs(bump_height) * 2.0 * math.pi / bump_length
@@ -56,7 +56,7 @@ def relief(
     over = [row[6] - min(z) for row, z in zip(rows, plane, strict=True)]
     over += [z - slope[0] * x - slope[1] * y + radius * math.hypot(*slope) for x, y, radius, z in cylinders]
     summit = max([base + bump_height + (float(heights.max()) if heights.size else 0.0), *over])
-    found = Relief(
+    result = Relief(
         (float(slope[0]), float(slope[1])), float(bump_height), 2.0 * math.pi / bump_length, base, heights,
         (float(corner[0]), float(corner[1])), float(spacing),
         np.array(rows, dtype=float).reshape(-1, 7), np.array(cylinders, dtype=float).reshape(-1, 4), float(summit),
@@ -64,9 +64,9 @@ def relief(
     if tuple(slope) == (0.0, 0.0) and bump_height == 0.0 and not (heights.size or rows or len(cylinders)):
         return LEVEL
     if heights.size:  # z counts from the ground at home
-        found = found._replace(grid=heights - field(found, 0.0, 0.0)[0])
-        found = found._replace(summit=summit + float(found.grid.max() - heights.max()))
-    return found
+        result = result._replace(grid=heights - field(result, 0.0, 0.0)[0])
+        result = result._replace(summit=summit + float(result.grid.max() - heights.max()))
+    return result
 
 
 def _checked(grid: np.ndarray, corner: tuple[float, float], spacing: float) -> np.ndarray:
@@ -99,7 +99,7 @@ def _corners(row: Sequence[float]) -> list[np.ndarray]:
 
 
 def _treads(steps: Sequence[tuple[float, float]], heading: float) -> tuple[float, list[list[float]]]:
-    """(height of the lowest level, a box for each that is higher, under all that is higher still beside it)."""
+    """Return (height of the lowest level, a box for each higher level)."""
     at = [distance for distance, _ in steps]
     if any(later <= earlier for earlier, later in zip([0.0, *at], at, strict=False)):
         raise ConfigError("steps.distance", f"got {at}", "growing distances above 0 m")

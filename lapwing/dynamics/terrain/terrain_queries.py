@@ -1,4 +1,4 @@
-"""What is asked of the ground, whichever it is; in Python as in compiled code."""
+"""Terrain queries for every kind of terrain, in Python and in compiled code."""
 
 from typing import Any, NamedTuple
 
@@ -15,7 +15,7 @@ LEVEL = Level()
 
 
 def upright(terrain: Any) -> Vec3:
-    """The vector whose product with a position [m] is the height over the plane of the slope, along world z."""
+    """Return the vector whose product with a position [m] is the height above the plane of the slope, along world z."""
     return UP if isinstance(terrain, Level) else (-terrain.slope[0], -terrain.slope[1], 1.0)
 
 
@@ -27,7 +27,7 @@ def _upright(terrain):
 
 
 def over_plane(terrain: Any, vector_world: Vec3) -> float:
-    """World z of a point [m], or of a velocity [m/s], over the plane of the slope."""
+    """Return world z of a point [m], or of a velocity [m/s], above the plane of the slope."""
     return vector_world[2] if isinstance(terrain, Level) else dot(upright(terrain), vector_world)
 
 
@@ -39,7 +39,7 @@ def _over_plane(terrain, vector_world):
 
 
 def summit(terrain: Any) -> float:
-    """[m] over that plane, above which there is no ground."""
+    """Return the maximum height [m] of the terrain above that plane."""
     return 0.0 if isinstance(terrain, Level) else terrain.summit
 
 
@@ -49,7 +49,7 @@ def _summit(terrain):
 
 
 def surface(terrain: Any, x: float, y: float) -> tuple[float, Vec3]:
-    """(height [m], normal) of what a plumb line meets first at world x and y [m]."""
+    """Return (height [m], normal) of the highest surface at world x and y [m]."""
     return (0.0, UP) if isinstance(terrain, Level) else top(terrain, x, y)
 
 
@@ -61,7 +61,7 @@ def _surface(terrain, x, y):
 
 
 def touch(terrain: Any, place_world: Vec3) -> tuple[float, Vec3]:
-    """(depth [m] of a point below the nearest face of the ground, not positive in the air; normal of that face)."""
+    """Return (depth [m] of a point below the nearest face, not positive in the air; normal of that face)."""
     return (-place_world[2], UP) if isinstance(terrain, Level) else depth(terrain, place_world)
 
 

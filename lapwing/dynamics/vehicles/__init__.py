@@ -1,1 +1,1 @@
-"""What flies: equations of motion of each vehicle, and what an airframe's file says."""
+"""Equations of motion of each vehicle, and airframe files."""

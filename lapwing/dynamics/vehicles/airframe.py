@@ -23,12 +23,15 @@ from lapwing.dynamics.vehicles.airframe_tables import (
     Section,
     Triple,
 )
+from lapwing.kernels.math import dist
+
+LEAST_GYRATION = 0.02  # radius of gyration over the distance to the rotors; real vehicles have 0.3 to 0.6
 
 
 class Airframe(Section):
     """A multirotor; the parts that it does not have are None, and so are closed to the effects that need them."""
 
-    mesh: str | None = None  # an STL or OBJ file beside this one, in metres and its axes: how the vehicle is shown
+    mesh: str | None = None  # STL, OBJ or glTF file beside this one, in metres: how the vehicle is shown
     mass: Mass
     rotors: RotorPlacement
     motor: Motor
@@ -46,6 +49,16 @@ class Airframe(Section):
             raise ConfigError("mass.payload", message, "0")
         return self
 
+    @model_validator(mode="after")
+    def _extended(self) -> "Airframe":
+        gyration = math.sqrt(min(self.mass.inertia) / self.mass.total)
+        reach = max(dist(self.mass.centre, place) for place in self.rotors.position)
+        if gyration < LEAST_GYRATION * reach:
+            got = f"got {list(self.mass.inertia)} with {self.mass.total:g} kg: a radius of gyration of {gyration:.2g} m"
+            expected = f"at least {LEAST_GYRATION * reach:.2g} m, a fiftieth of the distance to the rotors; in kg m^2"
+            raise ConfigError("mass.inertia", got, expected)
+        return self
+
     @property
     def motor_current_limit(self) -> float:
         """[A] of one motor: what its controller keeps, or its share of what the battery's C rating allows."""
@@ -54,7 +67,7 @@ class Airframe(Section):
 
     @property
     def loaded(self) -> "Airframe":
-        """The same with the box of [payload] as a part of its mass (theory.md, eq. (2.41))."""
+        """Return the airframe with the box of [payload] in its mass (theory.md, eq. (2.41))."""
         box, own = self.payload, self.mass
         if box is None or own.payload:
             return self
@@ -75,7 +88,7 @@ class Airframe(Section):
 
     @property
     def about_centre(self) -> "Airframe":
-        """The same with every position measured from the centre of mass."""
+        """Return the airframe with every position relative to the centre of mass."""
         if not any(self.mass.centre):
             return self
         x, y, z = self.mass.centre

@@ -73,7 +73,7 @@ class CarriedBox(Section):
 
 
 class RotorPlacement(Section):
-    """Where the rotors are and which way they turn."""
+    """Positions and spin directions of the rotors."""
 
     position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
     spin_direction: tuple[Literal["cw", "ccw"], ...]  # of each rotor seen from above: clockwise or counter-clockwise
@@ -128,6 +128,8 @@ class Propeller(Section):
     zero_lift_drag: NotNegative  # C_fD
     zero_lift_angle: float  # [rad] alpha_0
     lift_curve_slope: Annotated[float, Ge(1e-3), Le(1e3)]  # [1/rad] K_0
+    # of [effects.dynamic_inflow]; 1.15 is usual (Leishman)
+    induced_power_factor: Annotated[float, Ge(1), Le(2)] = 1.0  # kappa: induced power in hover over the ideal
 
 
 class Motor(Section):
@@ -198,7 +200,7 @@ class PublishedFigure(Section):
 
 
 class Published(Section):
-    """What others state of this vehicle; nothing computes with it."""
+    """Published performance of this vehicle; not used in computations."""
 
     source: str  # where the figures are from
     hover_time: PublishedFigure | None = None  # [s]

@@ -29,7 +29,7 @@ class FormationControl(NamedTuple):
 
 @kernel
 def formation_control(p, t, x):
-    """Thrusts and moments of all quadrotors at time t (theory.md, eqs. (7.22) to (7.27))."""
+    """Return thrusts and moments of all quadrotors at time t (theory.md, eqs. (7.22) to (7.27))."""
     wanted, slope = forces.wanted_specific(p, t, x, (0.0, 0.0, 0.0))
     s, s_rate = forces.shares(p, x, wanted, slope)
     thrust = map_index(forces.quad_thrust, x.link, p, x, wanted, slope, s, s_rate)

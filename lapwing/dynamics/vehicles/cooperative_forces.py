@@ -1,4 +1,4 @@
-"""What each quadrotor of a formation should do: its force for load and link, and the moment that turns it there.
+"""Desired force and moment of each quadrotor of a formation.
 
 Lee, Sreenath, Kumar (CDC 2013); theory.md, eqs. (7.22) to (7.27). `p.drive` is a FormationControl.
 """
@@ -30,14 +30,14 @@ SHARE_DAMPING = 0.03  # keeps the shares bounded where the links do not span spa
 
 @always_inline
 def desired_load(path, t):
-    """(position, velocity, acceleration) of the desired path at time t."""
+    """Return (position, velocity, acceleration) of the desired path at time t."""
     velocity = add(path[1], scale(2.0 * t, path[2]))
     return add(path[0], add(scale(t, path[1]), scale(t * t, path[2]))), velocity, scale(2.0, path[2])
 
 
 @always_inline
 def wanted_specific(p, t, x, acceleration):
-    """Wanted v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (theory.md, eq. (7.22))."""
+    """Return the desired v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (eq. (7.22))."""
     c = p.drive
     position, velocity, wanted_acceleration = desired_load(c.path, t)
     e_y, e_v = subtract(x.load_position, position), subtract(x.load_velocity, velocity)
@@ -49,7 +49,7 @@ def wanted_specific(p, t, x, acceleration):
 
 @always_inline
 def _shared(matrix, x, b, b_rate):
-    """Solution of (sum of q q^T + damping) s = b and its derivative."""
+    """Return the solution of (sum of q q^T + damping) s = b and its derivative."""
     s = solve_symmetric(matrix, b)
     for i in range(len(x.link)):
         q = x.link[i].direction
@@ -60,7 +60,7 @@ def _shared(matrix, x, b, b_rate):
 
 @kernel
 def shares(p, x, wanted, slope):
-    """Vector s whose parts along the links carry F_d together, and its derivative (theory.md, eq. (7.23))."""
+    """Return the vector s whose parts along the links carry F_d together, and its derivative (eq. (7.23))."""
     matrix = (SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING)
     for i in range(len(x.link)):
         matrix = add_outer(matrix, 1.0, x.link[i].direction)
@@ -72,7 +72,7 @@ def shares(p, x, wanted, slope):
 
 @kernel
 def desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
-    """Force [N] that quadrotor i should give in the world, and its derivative (theory.md, eqs. (7.24) and (7.25))."""
+    """Return the desired world force [N] of quadrotor i, and its derivative (theory.md, eqs. (7.24) and (7.25))."""
     c = p.drive
     q, omega = x.link[i].direction, x.link[i].omega
     m, inertia = p.quad_mass[i], p.quad_mass[i] * p.link_length[i]
@@ -93,7 +93,7 @@ def desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
 
 @always_inline
 def _unit(a, a_rate):
-    """a / |a| and its derivative."""
+    """Return a / |a| and its derivative."""
     k = 1.0 / norm(a)
     unit = scale(k, a)
     return unit, scale(k, subtract(a_rate, scale(dot(unit, a_rate), unit)))
@@ -101,7 +101,10 @@ def _unit(a, a_rate):
 
 @always_inline
 def upright(force, force_rate, floor):
-    """The force with its vertical part kept above `floor` [N], smoothly, and its derivative: no quadrotor tips over."""
+    """Return the force with a vertical part smoothly limited to above `floor` [N], and its derivative.
+
+    The limit keeps quadrotors from tipping over.
+    """
     over = force[2] - floor
     root = math.sqrt(over * over + 0.04 * floor * floor)
     slope = 0.5 * (1.0 + over / root)
@@ -111,7 +114,7 @@ def upright(force, force_rate, floor):
 
 @always_inline
 def desired_attitude(force, force_rate):
-    """R_world_wanted: z along the force, x towards world x; and its rate in that frame (theory.md, eq. (7.26))."""
+    """Return R_world_desired, with z along the force and x towards world x, and its rate in that frame (eq. (7.26))."""
     z, z_rate = _unit(force, force_rate)
     y, y_rate = _unit(cross(z, FORWARD), cross(z_rate, FORWARD))
     x, x_rate = cross(y, z), add(cross(y_rate, z), cross(y, z_rate))
@@ -121,7 +124,7 @@ def desired_attitude(force, force_rate):
 
 @kernel
 def moment(p, x, force, force_rate, i):
-    """Moment [N m] that turns body z to the wanted force and follows it (theory.md, eq. (7.27))."""
+    """Return the moment [N m] that aligns body z with the desired force (theory.md, eq. (7.27))."""
     c = p.drive
     kept, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
     wanted, omega_wanted = desired_attitude(kept, kept_rate)
@@ -135,7 +138,7 @@ def moment(p, x, force, force_rate, i):
 
 @always_inline
 def quad_thrust(p, x, wanted, slope, s, s_rate, i):
-    """Thrust [N] of quadrotor i: the part of its wanted force along its axis."""
+    """Return the thrust [N] of quadrotor i: the part of its desired force along its axis."""
     # a force does not depend on the accelerations, only its derivative does
     force, _ = desired_force(p, x, wanted, slope, s, s_rate, NOTHING, i)
     m = rotation_matrix(x.attitude[i])
@@ -144,7 +147,7 @@ def quad_thrust(p, x, wanted, slope, s, s_rate, i):
 
 @always_inline
 def quad_moment(p, x, wanted, slope, s, s_rate, force, specific, i):
-    """Moment [N m] of quadrotor i when all give `force` [N] and the load has `specific` acceleration [m/s^2]."""
+    """Return the moment [N m] of quadrotor i for all forces [N] and the specific acceleration [m/s^2]."""
     omega_rate = link_acceleration(p, x, force, specific, i)
     wanted_thrust, thrust_rate = desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i)
     return moment(p, x, wanted_thrust, thrust_rate, i)

@@ -15,7 +15,7 @@ from lapwing.kernels.codegen import map_index, overload_for
 
 
 class LiftCommand(NamedTuple):
-    """What each quadrotor's rotors do; held by the plant between two messages."""
+    """Thrust and moment of each quadrotor; the plant holds them between messages."""
 
     thrust: tuple[float, ...]  # [N] along body z
     moment_body: tuple[Vec3, ...]  # [N m]
@@ -32,7 +32,7 @@ class CooperativeLoadParameters(NamedTuple):
     drive: Any  # a LiftCommand, or the parameters of a control law registered in COMMANDS
 
     def check(self, x0: Any) -> None:
-        """ValueError for fewer than two quadrotors, tuples of different lengths, or a mass or link that is nothing."""
+        """Raise ValueError for fewer than two quadrotors, unequal lengths of tuples, or a non-positive mass or link."""
         n = len(x0.link)
         counts = {len(t) for t in (self.quad_mass, self.quad_inertia, self.link_length, x0.attitude, x0.omega_body)}
         if n < 2 or counts != {n}:
@@ -62,7 +62,7 @@ COMMANDS = DispatchTable()
 
 
 def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> LiftCommand:
-    """The LiftCommand at time t: given, or by the control law that `p.drive` belongs to."""
+    """Return the LiftCommand at time t, received or from the control law of `p.drive`."""
     return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
 
 
@@ -77,7 +77,7 @@ def _command(p, t, x):
 
 @always_inline
 def solve_symmetric(m: Mat3, b: Vec3) -> Vec3:
-    """Solution of m x = b for a symmetric 3x3 matrix, by cofactors."""
+    """Return the solution of m x = b for a symmetric 3x3 matrix, by cofactors."""
     c0 = m[4] * m[8] - m[5] * m[5]
     c1 = m[5] * m[2] - m[1] * m[8]
     c2 = m[1] * m[5] - m[4] * m[2]
@@ -90,7 +90,7 @@ def solve_symmetric(m: Mat3, b: Vec3) -> Vec3:
 
 @always_inline
 def add_outer(m: Mat3, weight: float, q: Vec3) -> Mat3:
-    """m + weight q q^T."""
+    """Return m + weight q q^T."""
     x, y, z = weight * q[0], weight * q[1], weight * q[2]
     return (
         m[0] + x * q[0], m[1] + x * q[1], m[2] + x * q[2],
@@ -101,14 +101,14 @@ def add_outer(m: Mat3, weight: float, q: Vec3) -> Mat3:
 
 @always_inline
 def thrust_world(x, thrust, i):
-    """Thrust of quadrotor i in the world [N]."""
+    """Return the thrust of quadrotor i in the world [N]."""
     m = rotation_matrix(x.attitude[i])
     return scale(thrust[i], (m[2], m[5], m[8]))
 
 
 @kernel
 def load_acceleration(p, x, force):
-    """v' - a_g of the load: M_q (v' - a_g) = sum of (q . u - m L |omega|^2) q (theory.md, eq. (7.19))."""
+    """Return v' - a_g of the load: M_q (v' - a_g) = sum of (q . u - m L |omega|^2) q (theory.md, eq. (7.19))."""
     matrix = (p.load_mass, 0.0, 0.0, 0.0, p.load_mass, 0.0, 0.0, 0.0, p.load_mass)
     pull = (0.0, 0.0, 0.0)
     for i in range(len(force)):
@@ -121,7 +121,7 @@ def load_acceleration(p, x, force):
 
 @always_inline
 def link_acceleration(p, x, force, specific, i):
-    """omega' of link i [rad/s^2]: L omega' = q x (v' - a_g - u / m) (theory.md, eq. (7.20))."""
+    """Return omega' of link i [rad/s^2]: L omega' = q x (v' - a_g - u / m) (theory.md, eq. (7.20))."""
     relative = subtract(specific, scale(1.0 / p.quad_mass[i], force[i]))
     return scale(1.0 / p.link_length[i], cross(x.link[i].direction, relative))
 
@@ -139,7 +139,7 @@ def _body_rate(p, x, given, i):
 
 @kernel
 def rate(p, t, x):
-    """Tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
+    """Return the tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
     given = command(p, t, x)
     force = map_index(thrust_world, x.link, x, given.thrust)
     specific = load_acceleration(p, x, force)
@@ -157,19 +157,19 @@ RATES[CooperativeLoadParameters] = rate
 
 @always_inline
 def quad_position(p, x, i):
-    """Position [m] of quadrotor i: the load's, less the link."""
+    """Return the position [m] of quadrotor i: the load's minus the link."""
     return subtract(x.load_position, scale(p.link_length[i], x.link[i].direction))
 
 
 @always_inline
 def quad_velocity(p, x, i):
-    """Velocity [m/s] of quadrotor i."""
+    """Return the velocity [m/s] of quadrotor i."""
     return subtract(x.load_velocity, scale(p.link_length[i], cross(x.link[i].omega, x.link[i].direction)))
 
 
 @kernel
 def energy(p, x):
-    """Kinetic and potential energy [J] (theory.md, eq. (7.17))."""
+    """Return kinetic and potential energy [J] (theory.md, eq. (7.17))."""
     total = 0.5 * p.load_mass * dot(x.load_velocity, x.load_velocity) + p.load_mass * p.gravity * x.load_position[2]
     for i in range(len(x.link)):
         v, o = quad_velocity(p, x, i), x.omega_body[i]

@@ -1,4 +1,4 @@
-"""How a vehicle stands on the ground: on which feet, and at rest on their springs before anything moves."""
+"""Equilibrium of a vehicle on the ground: supporting feet, and rest on their springs."""
 
 import itertools
 from collections.abc import Sequence
@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from lapwing.dynamics import small_matrices
-from lapwing.dynamics.effects._contact_parameters import NOWHERE, STICKING, GroundContact, GroundContactSmooth
+from lapwing.dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.terrain import LEVEL, Level, Relief, surface
-from lapwing.dynamics.vector import Mat3, Vec3
+from lapwing.dynamics.vector import ZERO, Mat3, Vec3
 from lapwing.dynamics.vector import apply as compiled_apply
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
 from lapwing.kernels import math, python_function
@@ -32,14 +32,14 @@ from_matrix, rotation_matrix = python_function(quaternion.from_matrix), python_f
 
 
 def resting_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: Place = (0.0, 0.0)) -> Pose:
-    """Where a vehicle stands whose centre of mass is over a place, heading along world x.
+    """Return the pose of a vehicle on the ground, with its centre of mass at a place and heading along world x.
 
-    It is tilted so that three feet around its centre of mass touch without pressing and no other is below the ground;
-    equal feet on a plane all touch. Where there are no such three, it is not tilted, and will fall over.
+    Three feet around its centre of mass touch without load and no other is below the ground; equal feet on a plane all
+    touch. Without three such feet it is not tilted, and will fall over.
 
     Args:
-        feet: points that may touch [m], body coordinates.
-        terrain: the ground.
+        feet: possible contact points [m], body coordinates.
+        terrain: terrain.
         place: world x and y of the centre of mass [m]; the origin is home.
     """
     x0, y0 = place
@@ -58,15 +58,15 @@ def resting_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: P
 
 
 def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
-    """The state of a vehicle that stands still: the springs of its feet carry it, and their friction holds it.
+    """Return the state of a vehicle at rest on the springs and friction of its feet.
 
-    Where the ground is too steep for the friction, or the feet do not stand around the centre of mass, it is the state
-    in which the vehicle begins to slide or to fall.
+    If the ground is too steep for the friction, or the feet do not surround the centre of mass, the vehicle starts to
+    slide or fall from this state.
 
     Args:
-        form: module that makes the state: `lapwing.dynamics.vehicles.multirotor` or one with more bodies.
-        p: the vehicle.
-        pose: where it stands, from `resting_pose`.
+        form: module of the state form: `lapwing.dynamics.vehicles.multirotor` or one with more bodies.
+        p: parameters of the vehicle.
+        pose: pose from `resting_pose`.
         gravity: [m/s^2].
     """
     position, attitude = pose
@@ -75,12 +75,12 @@ def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gr
         return form.initial_state(p, position, attitude)
     position, attitude = _balanced(p.effects[k], p.body.mass * gravity, position, attitude)
     state = form.initial_state(p, position, attitude)
-    anchors = _anchors(p.effects[k], position, attitude)
-    return state._replace(memory=(*state.memory[:k], anchors or state.memory[k], *state.memory[k + 1 :]))
+    held = _deflections(p.effects[k], position, attitude)
+    return state._replace(memory=(*state.memory[:k], held or state.memory[k], *state.memory[k + 1 :]))
 
 
 def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pose:
-    """Where springs and weight [N] balance, near a pose: Newton's method on height and slopes; that pose if nowhere."""
+    """Return the nearby pose in which springs and weight [N] balance, by Newton's method; `pose` if there is none."""
     R = rotation_matrix(attitude)
     x = np.array([position[2], R[6] / R[0], R[7] / R[4] - R[6] * R[1] / (R[0] * R[4])])  # height, slopes of the body
     x[0] -= 1.0 / e.inverse_width + weight / (len(e.feet) * e.stiffness)  # every spring beyond its onset
@@ -97,12 +97,12 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
             return position, attitude
         shares = [math.ldexp(1.0, -k) for k in range(20)]
         for trial in (x + share * step for share in shares):
-            found = _springs(e, weight, trial, place)
-            if (nearer := _norm(found)) < left:
+            result = _springs(e, weight, trial, place)
+            if (nearer := _norm(result)) < left:
                 break
         else:
             break  # as near as numbers allow
-        x, residual, left = trial, found, nearer
+        x, residual, left = trial, result, nearer
     if not left < TOLERATED * weight:
         return position, attitude
     slope = (float(x[1]), float(x[2]))
@@ -111,9 +111,9 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
 
 
 def _springs(e: Any, weight: float, x: np.ndarray, place: Place) -> np.ndarray:
-    """Vertical force [N] of the feet less the weight, and its moments about the centre of mass [N m].
+    """Return the vertical force [N] of the feet minus the weight, and its moments about the centre of mass [N m].
 
-    `x`: height [m] and slopes of the vehicle. A foot that friction holds pushes straight up.
+    `x`: height [m] and slopes of the vehicle. A foot held by friction pushes vertically.
     """
     height, *slope = x.tolist()
     R_world_body = _aligned(slope)
@@ -132,38 +132,38 @@ def _norm(residual: np.ndarray) -> float:
 
 
 def _depth(e: Any, arm: Vec3, centre: Vec3) -> tuple[float, Vec3]:
-    """(how deep a foot is in the ground [m], the ground's normal), as in `lapwing.dynamics.effects._foot_contact`."""
+    """Return (depth of a foot in the ground [m], the ground's normal), as in `effects._foot_contact`."""
     ground, normal = surface(e.terrain, centre[0] + arm[0], centre[1] + arm[1])
     return (ground - (centre[2] + arm[2])) * normal[2], normal
 
 
 def _press(e: Any, depth: float) -> float:
-    """Normal force [N] of a foot at rest."""
+    """Return the normal force [N] of a foot at rest."""
     onset = min(depth * e.inverse_width, 1.0)
     return onset * onset * (3.0 - 2.0 * onset) * e.stiffness * depth
 
 
-def _anchors(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Any, ...] | None:
-    """The memory of feet whose friction holds them; None where it is too weak, or remembers nothing."""
+def _deflections(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Vec3, ...] | None:
+    """Return the deflections [m] of feet held by friction. Return None if it is too weak or has no state."""
     if not isinstance(e, GroundContact):
         return None
-    found = []
+    result = []
     for foot in e.feet:
         arm = apply(rotation_matrix(attitude), foot)
         depth, (nx, ny, nz) = _depth(e, arm, position)
         if depth <= 0.0:
-            found.append(NOWHERE)
+            result.append(ZERO)
             continue
         if math.hypot(nx, ny) > e.static * nz:
             return None
-        # straight up is: press along the normal, and across it what has -n_x press, -n_y press along x and y
+        # straight up is: press along the normal, and across it press (z / n_z - n)
         pull = _press(e, depth) / e.tangential_stiffness
-        found.append((position[0] + arm[0] - pull * nx, position[1] + arm[1] - pull * ny, 0.0, STICKING, 0.0))
-    return tuple(found)
+        result.append((pull * nx, pull * ny, pull * (nz - 1.0 / nz)))
+    return tuple(result)
 
 
 def _aligned(slope: Sequence[float]) -> Mat3:
-    """R_world_body of a body that stands on a plane z = a x + b y, with its x axis over the world's."""
+    """Return R_world_body of a body on a plane z = a x + b y, with its x axis above the world's."""
     a, b = slope
     forward, normal = 1.0 / math.hypot(1.0, a), 1.0 / math.sqrt(1.0 + a * a + b * b)
     x = (forward, 0.0, a * forward)
@@ -173,7 +173,7 @@ def _aligned(slope: Sequence[float]) -> Mat3:
 
 
 def _carrying(points: Sequence[Vec3]) -> tuple[float, float] | None:
-    """Slope of the highest plane over the origin through three of the points around it; None if there are none."""
+    """Return the slope of the highest plane over the origin through three points around it, or None."""
     best: tuple[float, tuple[float, float]] | None = None
     for p, q, r in itertools.combinations(points, 3):
         twice_area = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])

@@ -31,14 +31,14 @@ class GyrostatParameters(NamedTuple):
 
     @property
     def torque_without_rate(self) -> bool:
-        """Whether rotors, friction and feedback leave a torque of time and attitude only."""
+        """Return True if the torque of rotors, friction and feedback depends on time and attitude only."""
         of_rate = (*self.rotor_momentum, self.damping, *self.linear_gain, *self.cubic_gain, self.rate_gain)
         return not any(of_rate)
 
 
 @always_inline
 def rotor_momentum(p, t):
-    """Momentum of the rotors and its derivative, both in the body (theory.md, eq. (7.6))."""
+    """Return the momentum of the rotors and its derivative, both in the body (theory.md, eq. (7.6))."""
     h, w = p.rotor_momentum, p.forcing_frequency
     sine, cosine = math.sincos(w * t)
     momentum = (h[0], h[1], h[2] * (1.0 + p.forcing_amplitude * cosine))
@@ -47,14 +47,14 @@ def rotor_momentum(p, t):
 
 @always_inline
 def attitude_torque(p, x):
-    """Proportional-derivative control on SO(3) towards the target (theory.md, eq. (7.9))."""
+    """Return the proportional-derivative control on SO(3) towards the target (theory.md, eq. (7.9))."""
     error = log(multiply(conjugate(p.target), x.attitude))
     return add(scale(-p.attitude_gain, error), scale(-p.rate_gain, x.omega_body))
 
 
 @always_inline
 def rate(p, t, x):
-    """I omega' = (I omega + h) x omega - h' - damping + feedback + control (theory.md, eq. (7.7))."""
+    """Return the tangent: I omega' = (I omega + h) x omega - h' - damping + feedback + control (eq. (7.7))."""
     o = x.omega_body
     h, h_rate = rotor_momentum(p, t)
     missing = (p.desired_rate - o[0], p.desired_rate - o[1], p.desired_rate - o[2])

@@ -4,31 +4,40 @@ import math
 
 from lapwing.kernels import always_inline, kernel
 
-# measured between hover and the windmill brake state: powers of the climb over the induced velocity in hover
-DESCENT = (1.0, -1.125, -1.372, -1.718, -0.655)
+# measured between hover and the windmill brake state: coefficients of the first three powers of the climb over the
+# induced velocity in hover; the fourth, published as -0.655, meets the windmill brake state without a jump
+DESCENT = (-1.125, -1.372, -1.718)
 WINDMILL = -2.0  # climb over the induced velocity in hover, below which a rotor is in the windmill brake state
 NEWTON_STEPS = 12  # from ten hover velocities across to a rounding
 WAKE_STEPS = 8  # from no wake to a rounding
 
 
 @always_inline
-def axial(climb):
-    """Induced velocity in climb or descent, both over that in hover; without a wind across the axis."""
+def axial(climb, kappa):
+    """Return the induced velocity in climb or descent without transverse flow, over the ideal one in hover.
+
+    Args:
+        climb: air speed along the axis, over the ideal induced velocity in hover.
+        kappa: induced velocity in hover over the ideal one; 1 for an ideal rotor.
+    """
     if climb >= 0.0:
-        return -0.5 * climb + math.sqrt(0.25 * climb * climb + 1.0)
+        return kappa * (-0.5 * climb + math.sqrt(0.25 * climb * climb + 1.0))
     if climb > WINDMILL:
-        a, b, c, d, e = DESCENT
-        return a + climb * (b + climb * (c + climb * (d + climb * e)))
+        b, c, d = DESCENT
+        # the value at the windmill brake state is 1: 16 e = 1 - kappa + 2 b - 4 c + 8 d
+        e = (1.0 - kappa + (2.0 * b - 4.0 * c + 8.0 * d)) * 0.0625
+        return kappa + climb * (b + climb * (c + climb * (d + climb * e)))
     return -0.5 * climb - math.sqrt(0.25 * climb * climb - 1.0)
 
 
 @kernel
-def induced_velocity(climb, across):
-    """Induced velocity of a rotor for a given thrust, over that in hover.
+def induced_velocity(climb, across, kappa):
+    """Return the induced velocity of a rotor at constant thrust, over the ideal one in hover.
 
     Args:
-        climb: air speed along the axis, against the flow that the rotor makes, over the induced velocity in hover.
-        across: air speed across it, over the same; not negative.
+        climb: air speed along the axis, against the rotor's flow, over the ideal induced velocity in hover.
+        across: air speed across the axis, over the same; not negative.
+        kappa: induced velocity in hover over the ideal one; 1 for an ideal rotor.
     """
     # Glauert: v sqrt(across^2 + (climb + v)^2) = 1, its largest root from above
     upper = -0.5 * climb + math.sqrt(0.25 * climb * climb + 1.0)
@@ -37,19 +46,20 @@ def induced_velocity(climb, across):
         through = climb + v
         square = across * across + through * through
         v -= (v * v * square - 1.0) / (2.0 * v * (square + v * through))
+    v *= kappa
     # what the ring of vortices adds in descent is blown away by a wind across as fast as the flow in hover
-    return v if climb >= 0.0 else v * (1.0 + max(1.0 - across, 0.0) * (axial(climb) / upper - 1.0))
+    return v if climb >= 0.0 else v * (1.0 + max(1.0 - across, 0.0) * (axial(climb, kappa) / (kappa * upper) - 1.0))
 
 
 @kernel
 def thrust_in_wake(pitch, wash):
-    """Thrust of a rotor in the contracted wake of another one, over that at the same speed by itself; 0 to 1.
+    """Return the thrust of a rotor in the contracted wake of another one, over its isolated thrust; 0 to 1.
 
-    Theory.md, eqs. (2.43) and (2.44).
+    See theory.md, eqs. (2.43) and (2.44).
 
     Args:
-        pitch: way of the blades a radian, over the induced velocity in hover by itself a radian a second; above 1.
-        wash: induced velocity of the upper rotor over the lower one's in hover by itself.
+        pitch: blade advance per radian over the isolated induced velocity in hover per radian per second; above 1.
+        wash: induced velocity of the upper rotor over the lower one's in isolated hover.
     """
     if wash >= pitch:
         return 0.0  # the wake is as fast as the blades

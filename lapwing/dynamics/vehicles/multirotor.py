@@ -30,11 +30,11 @@ from lapwing.kernels.codegen import map_tuple
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-CONTACT_TOLERANCE = 1e-5  # error of a part of a step in contact where nobody says otherwise
+CONTACT_TOLERANCE = 1e-6  # error of a part of a step in contact where nobody says otherwise
 
 
 class MultirotorObservation(NamedTuple):
-    """What can be said about a state beyond the state itself."""
+    """Quantities derived from a state."""
 
     acceleration_world: Vec3  # [m/s^2] of the motion's position
     angular_acceleration_body: Vec3  # [rad/s^2]
@@ -53,19 +53,19 @@ class MultirotorObservation(NamedTuple):
 
 @kernel
 def advance(method, p, key, tick, state, command, h, n):
-    """The state one exchange interval later: n steps of length h [s] under constant voltages.
+    """Return the state a communication step later: n steps of length h [s] under constant voltages.
 
-    Steps are split where the motors' lag is too fast for them.
+    Steps are split if the motors' lag is too fast for them.
 
     Args:
         method: `Method()` of an integrator's module.
         p: MultirotorParameters.
-        key: of the vehicle's random numbers (lapwing/dynamics/noise.py); effects draw at `tick`.
-        tick: number of the exchange; it starts at tick n h seconds.
+        key: key of the vehicle's random numbers (lapwing/dynamics/noise.py); effects draw at `tick`.
+        tick: index of the communication step; it starts at tick n h seconds.
         state: MultirotorState.
-        command: voltage [V] of each motor, held within 0 and the highest.
-        h: [s] step.
-        n: steps in the interval.
+        command: voltage [V] of each motor, clamped to 0..maximum.
+        h: step [s].
+        n: steps in the communication step.
     """
     interval = n * h
     start = tick * interval
@@ -77,7 +77,7 @@ def advance(method, p, key, tick, state, command, h, n):
 
 @kernel
 def observe(p, tick, interval, state, command):
-    """MultirotorObservation of a state at the start of exchange `tick`, under the voltages `command` [V]."""
+    """Return the MultirotorObservation of a state at `tick`, under the voltages `command` [V]."""
     layout = p.layout
     voltage = map_tuple(within, layout.max_voltage, command, command)
     body = hooks.all_mass_properties(p.effects, state.memory, p.body)
@@ -103,7 +103,7 @@ def observe(p, tick, interval, state, command):
 
 
 def parameters(airframe: "Airframe", effects: tuple = ()) -> MultirotorParameters:
-    """The compiled plant's numbers for an airframe under effects (from `lapwing.dynamics.effects.from_scene`)."""
+    """Return the plant's parameters for an airframe with effects (from `lapwing.dynamics.effects.from_scene`)."""
     mass, rotors, engine = airframe.mass, airframe.rotors, airframe.motor
     x_body, y_body, z_body = zip(*rotors.position, strict=True)
     layout = RotorLayout(
@@ -126,6 +126,6 @@ def initial_state(
     velocity_world: Vec3 = ZERO,
     omega_body: Vec3 = ZERO,
 ) -> MultirotorState:
-    """All rotors at the same speed [rad/s], the effects' memory fresh; without more at rest in the world."""
+    """Return a state with all rotors at one speed [rad/s] and initial effects; by default at rest in the world."""
     motion = Motion(position_world, attitude, velocity_world, omega_body, (rotor_speed,) * len(p.layout.x_body))
     return MultirotorState(motion, tuple(hooks.initial_discrete_state(e) for e in p.effects))

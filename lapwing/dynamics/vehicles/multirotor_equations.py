@@ -76,7 +76,7 @@ FORMS = DispatchTable()
 
 
 class MultirotorDrive(NamedTuple):
-    """What the rate of change depends on and stays fixed over a step."""
+    """Inputs of the rate of change that are constant over a step."""
 
     parameters: MultirotorParameters
     body: AnyMassProperties
@@ -91,7 +91,7 @@ def _lag(s, speed, voltage):
 
 @always_inline
 def _static_current(s, torque, voltage):
-    """Current that holds the air's torque (theory.md, eq. (1.14)); none when the controller is off."""
+    """Return the current that balances the aerodynamic torque (theory.md, eq. (1.14)); 0 with the controller off."""
     return torque / s.layout.volt_per_speed + s.layout.no_load_current if voltage > 0.0 else 0.0
 
 
@@ -107,7 +107,7 @@ def _constant(c, a, b):
 
 @always_inline
 def evaluate(drive, t, motion):
-    """One evaluation of all effects: (situation, rotors, force_world [N], torque_body [N m])."""
+    """Evaluate all effects. Return (inputs, rotors, force_world [N], torque_body [N m])."""
     p, memory = drive.parameters, drive.memory
     layout, speed = p.layout, motion.rotor_speed
     body = drive.body
@@ -134,7 +134,7 @@ def evaluate(drive, t, motion):
 
 @always_inline
 def rate(drive, t, motion):
-    """Tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
+    """Return the tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
     s, rotors, force, torque = evaluate(drive, t, motion)
     linear, angular = newton_euler(s.body, drive, s, force, torque)
     return Motion(motion.velocity_world, motion.omega_body, linear, angular, rotors.acceleration)
@@ -147,7 +147,7 @@ def _itself(_, motion):
 
 @always_inline
 def accelerations(drive, t, motion):
-    """(linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
+    """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
     s, _, force, torque = evaluate(drive, t, motion)
     return newton_euler(s.body, drive, s, force, torque)
 
@@ -156,7 +156,7 @@ FORMS[Motion] = StateForm(_itself, rate, _itself, accelerations)
 
 
 def seen(layout: RotorLayout, x: Any) -> Motion:
-    """The vehicle's Motion, whatever form its state has; in compiled code only."""
+    """Return the vehicle's Motion from any state form; compiled code only."""
     raise NotImplementedError("compiled code only")
 
 
@@ -166,7 +166,7 @@ def _seen(layout, x):
 
 
 def accelerations_of_form(drive, t, x):
-    """As `accelerations`, whatever form the state has; in compiled code only."""
+    """Return `accelerations` from any state form; compiled code only."""
     raise NotImplementedError("compiled code only")
 
 

@@ -47,7 +47,7 @@ def _body(b):
 
 @kernel
 def five(x):
-    """The same state on SE(3)."""
+    """Convert the state to SE(3)."""
     b = x.body
     return FiveBodies(_body(b[0]), (_body(b[1]), _body(b[2]), _body(b[3]), _body(b[4])))
 
@@ -60,7 +60,7 @@ def _euler_body(b):
 
 @kernel
 def of_five(x):
-    """The same state in Euler angles."""
+    """Convert the state to Euler angles."""
     p = x.propellers
     return FiveEulerBodies(
         (_euler_body(x.chassis), _euler_body(p[0]), _euler_body(p[1]), _euler_body(p[2]), _euler_body(p[3]))
@@ -69,7 +69,7 @@ def of_five(x):
 
 @kernel
 def _arrays(x):
-    """Configuration and velocity for the general engine, shapes (5, 6)."""
+    """Return the configuration and velocity for the general engine, shapes (5, 6)."""
     q, v = np.empty((5, 6)), np.empty((5, 6))
     for i in range(5):
         b = x.body[i]
@@ -96,7 +96,7 @@ def _tree(q, v):
 
 @kernel
 def _system(a, p):
-    """The arrays with what the effects can change in them."""
+    """Return the arrays with the values that effects can change."""
     mass, inertia, gravity = a.mass.copy(), a.inertia.copy(), a.gravity.copy()
     mass[0] = p.mass
     for k in range(3):
@@ -107,7 +107,7 @@ def _system(a, p):
 
 @kernel
 def _imposed(a, p):
-    """Speed and acceleration of each drive, shape (4 or 0, 2)."""
+    """Return the speed and acceleration of each drive, shape (4 or 0, 2)."""
     out = np.empty((len(a.drive_bodies), 2))
     for k in range(len(out)):
         r = p.rotors[max(a.drive_bodies[k, 0], a.drive_bodies[k, 1]) - 1]  # the chassis is body 0
@@ -117,7 +117,7 @@ def _imposed(a, p):
 
 @kernel
 def _wrenches(p):
-    """Forces and torques on the bodies, shape (5, 6); a motor acts on propeller and chassis."""
+    """Return forces and torques on the bodies, shape (5, 6); a motor acts on propeller and chassis."""
     out = np.empty((5, 6))
     for k in range(3):
         out[0, k], out[0, 3 + k] = p.wrench.force_world[k], p.wrench.torque_body[k]
@@ -132,14 +132,14 @@ def _wrenches(p):
 
 @kernel
 def _ranks(a):
-    """Of the hinges' rows, and of all: of a drive's three rows two are its hinge's."""
+    """Return the ranks of the hinges' rows and of all rows: two of a drive's three rows are its hinge's."""
     held = 5 * len(a.joint_bodies)
     return held, held + len(a.drive_bodies)
 
 
 @always_inline
 def _upright(b):
-    """Whether a pitch is apart from 90 degrees; it passes there without a jump, so that no step leaps over it."""
+    """Return True if a pitch is not at 90 degrees; it passes there continuously, so no step skips it."""
     return math.cos(b.angles[1]) > NEAR
 
 
@@ -151,19 +151,19 @@ def _all_upright(x):
 
 @always_inline
 def _stopped(b):
-    """The tangent of one body where angles end: infinite for a pitch that is there, and nothing else."""
+    """Return the tangent of one body at the singularity: infinite for a singular pitch, otherwise zero."""
     return EulerBody(ZERO, (0.0, 0.0 if _upright(b) else math.inf, 0.0), ZERO, ZERO)
 
 
 @noinline
 def seen(layout, x):
-    """The Motion of the chassis with the speeds of the rotors."""
+    """Return the Motion of the chassis with the speeds of the rotors."""
     return on_se3.seen(layout, five(x))
 
 
 @noinline
 def rate(drive, t, x):
-    """Tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by the cosine of a pitch."""
+    """Return the tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by cos(pitch)."""
     if not _all_upright(x):
         b = x.body
         return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
@@ -188,7 +188,7 @@ def apply_constraint_impulse(drive, x):
 
 @noinline
 def held(drive, x):
-    """The bodies brought together again, as the assembly says."""
+    """Return the bodies with stabilised constraints."""
     given = drive.parameters.layout.bodies
     if given.hold == five_body_stabilisation.NONE or not _all_upright(x):
         return x
@@ -203,7 +203,7 @@ def held(drive, x):
 
 @kernel
 def accelerations(drive, t, x):
-    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
+    """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
     b, tangent = x.body[0], rate(drive, t, x).body[0]
     G, change = cardan_angles.rate_matrix(b.angles), cardan_angles.rate_matrix_derivative(b.angles, b.angle_rates)
     from_rates, from_angles = apply(G, tangent.angle_rates), apply(change, b.angle_rates)
@@ -215,12 +215,12 @@ FORMS[FiveEulerBodies] = StateForm(seen, rate, held, accelerations)
 
 
 def singular(x: FiveEulerBodies) -> int:
-    """The body whose pitch has reached 90 degrees in a state that is no longer finite; -1 if none has."""
+    """Return the body whose pitch has reached 90 degrees in a non-finite state; -1 if none has."""
     return next((i for i, b in enumerate(x.body) if math.isinf(b.angles[1])), -1)
 
 
 def parameters(*given, **named) -> MultirotorParameters:
-    """As `multirotor_multibody.parameters`."""
+    """See `multirotor_multibody.parameters`."""
     return _assembled(multirotor_multibody.parameters(*given, **named))
 
 
@@ -239,6 +239,6 @@ def _assembled(p: MultirotorParameters) -> MultirotorParameters:
 
 
 def initial_state(*given, **named) -> MultirotorState:
-    """As `multirotor_multibody.initial_state`."""
+    """See `multirotor_multibody.initial_state`."""
     state = multirotor_multibody.initial_state(*given, **named)
     return state._replace(motion=of_five(state.motion))

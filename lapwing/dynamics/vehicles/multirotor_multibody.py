@@ -33,10 +33,10 @@ STABILISATIONS = {
 
 
 def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
-    """The five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
+    """Return the five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
 
     Raises:
-        ValueError: "key: message"; not four rotors, nothing said of a single one, tilted ones, or products of inertia.
+        ValueError: "key: message"; not four rotors, no data of a single one, tilted ones, or products of inertia.
     """
     rotors = airframe.rotors
     if len(rotors.position) != 4 or rotors.mass is None or rotors.blade_inertia is None:
@@ -56,16 +56,16 @@ def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
 def parameters(
     airframe: "Airframe", effects: tuple = (), drive: str = "torque", stabilisation: str = "projection"
 ) -> MultirotorParameters:
-    """The compiled plant's numbers, as `multirotor.parameters`.
+    """Return the plant's parameters. See `multirotor.parameters`.
 
     Args:
-        airframe: with four rotors and what is to be known of one.
-        effects: from `lapwing.dynamics.effects.from_scene`; the bodies need no `gyroscopic_torque`, it is left out.
+        airframe: airframe with four rotors and the data of a single one.
+        effects: from `lapwing.dynamics.effects.from_scene`; `gyroscopic_torque` is left out, since bodies include it.
         drive: "torque" (the motors' torque turns the propellers) or "speed" (their acceleration is imposed).
         stabilisation: one of STABILISATIONS.
 
     Raises:
-        ValueError: as `drone_of`.
+        ValueError: see `drone_of`.
     """
     feedback = FEEDBACK if stabilisation == "baumgarte" else 0.0
     assembly = Assembly(drone_of(airframe, drive), STABILISATIONS[stabilisation], feedback, (1.0,) * 4, ())
@@ -93,7 +93,7 @@ def initial_state(
     velocity_world: Vec3 = ZERO,
     omega_body: Vec3 = ZERO,
 ) -> MultirotorState:
-    """All rotors at the same speed [rad/s], blades along x, the effects' memory fresh; without more at rest."""
+    """Return a state with all rotors at one speed [rad/s], blades along x, initial effects; by default at rest."""
     plain = multirotor.initial_state(p, position_world, attitude, rotor_speed)
     d = p.layout.bodies.drone
     chassis = BodyState(position_world, attitude, velocity_world, omega_body)

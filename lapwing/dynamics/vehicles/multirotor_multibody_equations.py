@@ -32,7 +32,7 @@ class Assembly(NamedTuple):
 
 
 class AppliedLoads(NamedTuple):
-    """What acts on the bodies, each where it acts."""
+    """Loads on the bodies."""
 
     gravity_world: Vec3  # [m/s^2]
     force_world: Vec3  # [N] on the chassis, weight and thrust not included
@@ -53,7 +53,7 @@ def _product(_, a, b):
 
 @always_inline
 def seen(layout, x):
-    """The Motion of the chassis with the speeds of the rotors; of one that was torn off it is zero."""
+    """Return the Motion of the chassis with the rotor speeds; 0 for a detached one."""
     c = x.chassis
     speed = map_tuple(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
     speed = map_tuple(_product, 0.0, layout.bodies.drone.held, speed)
@@ -67,7 +67,7 @@ def _triple(accelerations, load, k):
 
 @always_inline
 def acting(drive, t, motion):
-    """(situation, Acting): the effects of `multirotor.evaluate`, taken apart by body."""
+    """Return (inputs, AppliedLoads): the effects of `multirotor_equations.evaluate`, separated by body."""
     s, rotors, force, torque = evaluate(drive, t, motion)
     R, layout = s.R_world_body, s.layout
     field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
@@ -95,7 +95,7 @@ def _rotor(k, layout, R, motion, part):
 
 @always_inline
 def machine(drive, t, motion):
-    """`five_bodies.Machine` at an instant, its imposed speeds those of the state."""
+    """Return `five_bodies.Machine` at a time, with the state's speeds as imposed ones."""
     s, a = acting(drive, t, motion)
     layout, R, part = s.layout, s.R_world_body, a.rotor
     rotors = (
@@ -118,7 +118,7 @@ def _still(k, layout, motion):
 
 @always_inline
 def unloaded(drive, motion):
-    """The machine without loads: all that projection looks at."""
+    """Return the machine without loads, as projection needs it."""
     layout = drive.parameters.layout
     rotors = (
         _still(0, layout, motion),
@@ -132,13 +132,13 @@ def unloaded(drive, motion):
 
 @kernel
 def rate(drive, t, x):
-    """Tangent of the five bodies."""
+    """Return the tangent of the five bodies."""
     return five_bodies.rate(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel
 def held(drive, x):
-    """The bodies brought together again, as the assembly says."""
+    """Return the bodies with stabilised constraints."""
     how = drive.parameters.layout.bodies.hold
     if how == hold.NONE:
         return x
@@ -148,13 +148,13 @@ def held(drive, x):
 
 @kernel
 def apply_constraint_impulse(drive, x):
-    """The bodies after impulses in the hinges that meet all constraints at once; they keep the momentum."""
+    """Return the bodies after hinge impulses that satisfy all constraints and conserve momentum."""
     return hold.project(unloaded(drive, seen(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel
 def accelerations(drive, t, x):
-    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
+    """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
     tangent = rate(drive, t, x)
     return tangent.chassis.velocity_world, tangent.chassis.omega_body
 
@@ -177,8 +177,10 @@ def _on_chassis(chassis, x, reaction):
 
 @kernel
 def joints(drive, t, x):
-    """(force [N] in the world, torque about the centre of mass [N m] in the body) of the hinges on each body, chassis
-    first; z of a propeller's torque is what its drive gives."""
+    """Return (force [N], world; torque about the centre of mass [N m], body) of the hinges on each body, chassis first.
+
+    The z component of a propeller's torque is that of its drive.
+    """
     on = five_bodies.reactions(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
     b, c = x.propellers, x.chassis
     chassis = total_wrench(

@@ -53,17 +53,17 @@ class SlungMotion(NamedTuple):
 
 @always_inline
 def seen(layout, x):
-    """The Motion of the vehicle."""
+    """Return the Motion of the vehicle."""
     return x.vehicle
 
 
 @always_inline
 def tension(sling, away, speed_away):
-    """(force [N] that pulls the hook towards the load, length [m]): none while the cable is slack.
+    """Return (force [N] on the hook towards the load, length [m]); zero while the cable is slack.
 
     Args:
         sling: Sling.
-        away: from hook to load [m].
+        away: vector from hook to load [m].
         speed_away: its rate of change [m/s].
     """
     distance = norm(away)
@@ -76,7 +76,7 @@ def tension(sling, away, speed_away):
 
 @always_inline
 def cable(sling, R_world_body, x):
-    """(force [N] in the world on the vehicle, torque [N m] on it in the body)."""
+    """Return (world force [N], body torque [N m]) on the vehicle."""
     v = x.vehicle
     arm = apply(R_world_body, sling.hook_body)
     turning = apply(R_world_body, cross(v.omega_body, sling.hook_body))
@@ -87,7 +87,7 @@ def cable(sling, R_world_body, x):
 
 @always_inline
 def ground(sling, position, velocity):
-    """Force [N] of the ground on the load: a spring with a damper that does not pull, and Coulomb's friction."""
+    """Return the force [N] of the ground on the load: spring and damper that do not pull, and Coulomb friction."""
     height, normal = surface(sling.terrain, position[0], position[1])
     depth = (height - position[2]) * normal[2]
     if depth <= 0.0:
@@ -101,7 +101,7 @@ def ground(sling, position, velocity):
 
 @always_inline
 def load_acceleration(sling, field, air, pull, x):
-    """[m/s^2] of the load, which the cable pulls back with the force `pull` [N]."""
+    """Return the acceleration [m/s^2] of the load under the cable force `pull` [N]."""
     wind = subtract(air.wind_world, x.load_velocity)
     drag = scale(0.5 * air.density * sling.drag_area * norm(wind), wind)
     force = add(subtract(drag, pull), ground(sling, x.load_position, x.load_velocity))
@@ -110,7 +110,7 @@ def load_acceleration(sling, field, air, pull, x):
 
 @kernel
 def rate(drive, t, x):
-    """Tangent of vehicle and load (theory.md, eqs. (1.20) to (1.22))."""
+    """Return the tangent of vehicle and load (theory.md, eqs. (1.20) to (1.22))."""
     sling = drive.parameters.layout.bodies
     s, rotors, force, torque = evaluate(drive, t, x.vehicle)
     pull, turn = cable(sling, s.R_world_body, x)
@@ -128,7 +128,7 @@ def _itself(_, x):
 
 @kernel
 def accelerations(drive, t, x):
-    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) of the vehicle."""
+    """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body) of the vehicle."""
     tangent = rate(drive, t, x)
     return tangent.vehicle.velocity_world, tangent.vehicle.omega_body
 
@@ -138,18 +138,18 @@ FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations)
 
 @always_inline
 def cable_force(layout, x):
-    """Force [N] in the world of the cable on the load."""
+    """Return the force [N] in the world of the cable on the load."""
     force, _ = cable(layout.bodies, rotation_matrix(x.vehicle.attitude), x)
     return scale(-1.0, force)
 
 
 def frequency(sling: Sling, mass: float) -> float:
-    """Of the load on the taut cable [rad/s] against a vehicle of a mass [kg]."""
+    """Return the natural frequency [rad/s] of the load on the taut cable against a vehicle of a mass [kg]."""
     return math.sqrt(sling.stiffness * (1.0 / sling.load_mass + 1.0 / mass))
 
 
 def parameters(airframe: "Airframe", sling: Sling, effects: tuple = ()) -> MultirotorParameters:
-    """The compiled plant's numbers, as `multirotor.parameters`."""
+    """Return the plant's parameters. See `multirotor.parameters`."""
     p = multirotor.parameters(airframe, effects)
     return p._replace(layout=p.layout._replace(bodies=sling))
 
@@ -162,7 +162,7 @@ def initial_state(
     velocity_world: Vec3 = ZERO,
     omega_body: Vec3 = ZERO,
 ) -> MultirotorState:
-    """As of the bare vehicle; the load hangs under the hook, or stands on the ground there, at rest."""
+    """Return the vehicle's initial state, with the load at rest below the hook or on the ground there."""
     plain = multirotor.initial_state(p, position_world, attitude, rotor_speed, velocity_world, omega_body)
     sling = p.layout.bodies
     x, y, z = (float(v) for v in add(position_world, rotate(attitude, sling.hook_body)))

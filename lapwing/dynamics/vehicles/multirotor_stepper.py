@@ -1,15 +1,24 @@
-"""The steps of a multirotor's exchange interval: in the air, and under error control in contact."""
+"""The steps of a multirotor's communication step: in the air, and under error control in contact."""
 
 import math
 import sys
+from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
-from lapwing.dynamics.integrators import SHORTEST, shorter
-from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorDrive, MultirotorParameters, evaluate, seen
-from lapwing.kernels import always_inline
+from lapwing.dynamics.integrators import SHORTEST
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    FORMS,
+    MultirotorDrive,
+    MultirotorParameters,
+    StateForm,
+    accelerations_of_form,
+    evaluate,
+    seen,
+)
+from lapwing.kernels import always_inline, kernel
 from lapwing.kernels import noinline as never_inlined
 from lapwing.kernels.codegen import map_tuple, overload_for
-from lapwing.kernels.state_tree import finite, relative_difference
+from lapwing.kernels.state_tree import axpy, finite, normalise, relative_difference
 
 FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
 
@@ -29,64 +38,130 @@ def _step_inlined(method, drive, t, x, h):
 
 @always_inline
 def within(limit, voltage, _):
-    """The nearest voltage [V] that the controllers can ask for."""
+    """Clamp a voltage [V] to the controllers' range."""
     return min(max(voltage, 0.0), limit)
 
 
 @always_inline
 def _airborne(p, body, memory, voltage):
-    """The drive without the effects that can sleep."""
+    """Return the drive without the effects that can sleep."""
     effects = hooks.without_sleepers(p.effects, p.effects)
     kept = hooks.without_sleepers(p.effects, memory)
     return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, kept, voltage)
 
 
+class AwakeState(NamedTuple):
+    """The motion with those memories of effects that have a rate: a form while a stiff effect is awake."""
+
+    motion: Any  # of another class in FORMS
+    memory: tuple
+
+
 @always_inline
-def _awake_step(method, drive, t, x, h):
-    """(state's form, memory) a step later with every effect taking part."""
-    x = _step(method, drive, t, x, h)
-    return x, hooks.all_post_steps(drive.parameters.effects, drive.memory, seen(drive.parameters.layout, x), h)
+def _seen_awake(layout, x):
+    return seen(layout, x.motion)
+
+
+def _rate_of_form(drive, t, x):
+    raise NotImplementedError("compiled code only")
+
+
+@overload_for(_rate_of_form, inline=True)
+def _rate_of_form_inlined(drive, t, x):
+    return FORMS[x.instance_class].rate
+
+
+def _held_form(drive, x):
+    raise NotImplementedError("compiled code only")
+
+
+@overload_for(_held_form, inline=True)
+def _held_form_inlined(drive, x):
+    return FORMS[x.instance_class].held
+
+
+@always_inline
+def _remembering(drive, x):
+    """Return the drive with the memories of the state."""
+    p, body, memory, voltage = drive
+    return MultirotorDrive(p, body, hooks.with_integrated(p.effects, memory, x.memory), voltage)
+
+
+@kernel
+def _awake_rate(drive, t, x):
+    drive = _remembering(drive, x)
+    p = drive.parameters
+    stretching = hooks.all_memory_rates(p.effects, drive.memory, seen(p.layout, x.motion))
+    return AwakeState(_rate_of_form(drive, t, x.motion), stretching)
+
+
+@always_inline
+def _held_awake(drive, x):
+    return AwakeState(_held_form(drive, x.motion), x.memory)
+
+
+@always_inline
+def _awake_accelerations(drive, t, x):
+    return accelerations_of_form(_remembering(drive, x), t, x.motion)
+
+
+FORMS[AwakeState] = StateForm(_seen_awake, _awake_rate, _held_awake, _awake_accelerations)
+
+
+def _extrapolated(method, halves, whole):
+    raise NotImplementedError("compiled code only")
+
+
+@overload_for(_extrapolated, inline=True)
+def _extrapolated_by_order(method, halves, whole):
+    share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
+    return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))
+
+
+@always_inline
+def _growth(error, allowed):
+    """Return the length of the next substep over that of the last (theory.md, eq. (2.33))."""
+    return min(max(0.9 * math.sqrt(math.sqrt(allowed / max(error, 1e-3 * allowed))), 0.1), 2.0)
 
 
 @never_inlined
 def _stiff_steps(method, drive, t, x, h, end):
-    """(state's form, memory) at the time `end`, by parts of steps whose error is controlled (theory.md, eq. (2.33)).
+    """Return (motion, memory) at the time `end` by step doubling (theory.md, eq. (2.33)).
 
-    Each part is taken whole and in halves, effects' memories included: what they differ by is its error. Halves are
-    kept, and are no longer than h and than effects ask for.
+    Each substep is taken whole and in halves, with the effects' memories that have a rate; the difference is the error.
+    The result of the halves is kept; they are no longer than h and than effects require.
     """
-    p, body, memory, voltage = drive
+    p, memory = drive.parameters, drive.memory
     allowed, part = p.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
+    x = AwakeState(x, hooks.all_integrated(p.effects, memory, x))
     while True:
         left = end - t
         part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, seen(p.layout, x), h))
         last = part > (1.0 - 1e-9) * left
         taken = left if last else part
         half = 0.5 * taken
-        y, settled, whole, at_once, start, length = x, memory, x, memory, t, taken
+        y, whole, start, length = x, x, t, taken
         for k in range(3):  # one call in the code: passing arguments to three took a sixth of the time
-            y, settled = _awake_step(method, MultirotorDrive(p, body, settled, voltage), start, y, length)
+            y = _step(method, drive, start, y, length)
             if k == 0:
-                y, settled, whole, at_once, length = x, memory, y, settled, half
+                y, whole, length = x, y, half
             else:
                 start = t + half
         sound = finite(y)
-        error = max(relative_difference(y, whole), relative_difference(settled, at_once)) if sound else math.inf
-        if taken > smallest and (error > allowed or hooks.any_discontinuity(p.effects, memory, settled)):
-            part = shorter(taken, error, allowed)
+        error = relative_difference(y, whole) if sound else math.inf
+        part = taken * _growth(error, allowed)
+        if taken > smallest and error > allowed:
             continue
-        x, memory = y, settled
+        x = _extrapolated(method, y, whole)
         if last or not sound:
-            return x, memory
+            return x.motion, hooks.with_integrated(p.effects, memory, x.memory)
         t += taken
-        if error < allowed / 32.0:
-            part = 2.0 * taken
 
 
 @always_inline
 def begin(p, key, tick, state, command, interval):
-    """The drive of the exchange interval `tick`, with what effects draw for it; arguments as of `advance`."""
+    """Return the drive of the communication step `tick`, with the random draws of effects. See `advance`."""
     layout, memory = p.layout, state.memory
     voltage = map_tuple(within, layout.max_voltage, command, command)
     before = _airborne(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
@@ -97,28 +172,27 @@ def begin(p, key, tick, state, command, interval):
 
 @always_inline
 def parts(layout, h):
-    """How many parts a step of h [s] is split into for the motors' lag."""
+    """Return the number of substeps of a step of h [s] for the motors' lag."""
     return max(1, math.ceil(h * layout.lag_rate / FASTEST_LAG))
 
 
 @always_inline
 def airborne_step(method, drive, t, x, h):
-    """The state's form a step later, without the effects that can sleep."""
+    """Return the motion a step later, without the effects that can sleep."""
     return _step(method, _airborne(drive.parameters, drive.body, drive.memory, drive.voltage), t, x, h)
 
 
 @always_inline
 def steps(method, drive, x, start, end, h, first, n):
-    """(state's form, memory) at the `end` [s] of an interval that begins at `start`, from step `first` of its n on."""
+    """Return (motion, discrete state) at the `end` [s] of an interval from `start`, from step `first` of its n."""
     p, body, memory, voltage = drive
     layout, airborne = p.layout, _airborne(p, body, memory, voltage)
     for i in range(first, n):
         if hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
             x = _step(method, airborne, start + i * h, x, h)
             continue
-        drive = MultirotorDrive(p, body, memory, voltage)
         if not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
             x, memory = _stiff_steps(method, drive, start + i * h, x, h, end)
             break
-        x, memory = _awake_step(method, drive, start + i * h, x, h)
+        x = _step(method, drive, start + i * h, x, h)
     return x, memory

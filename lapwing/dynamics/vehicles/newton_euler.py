@@ -8,7 +8,7 @@ from lapwing.kernels.codegen import overload_for
 
 
 def angular_acceleration(body, omega, torque):
-    """Euler's equations (theory.md, eqs. (1.6), (1.6a)), as the class of the mass properties has them."""
+    """Return the angular acceleration by Euler's equations (eqs. (1.6), (1.6a)), by mass properties class."""
     raise NotImplementedError("compiled code only")
 
 
@@ -33,8 +33,10 @@ def _about_principal_axes(body, omega, torque):
 
 
 def newton_euler(body, drive, s, force, torque):
-    """(linear [m/s^2] in the world, angular [rad/s^2] in the body) under a force [N] in the world and a torque [N m] in
-    the body about the motion's position, as the class of the mass properties has them."""
+    """Return (linear [m/s^2], world; angular [rad/s^2], body) acceleration, by mass properties class.
+
+    The force [N] is in the world, the torque [N m] in the body about the motion's position.
+    """
     raise NotImplementedError("compiled code only")
 
 
@@ -50,7 +52,7 @@ def _about_centre(body, drive, s, force, torque):
 
 @always_inline
 def _about_offset_centre(body, drive, s, force, torque):
-    """With the centre of mass at c from the position: gravity alone acts there (theory.md, eq. (2.42))."""
+    """Return the accelerations for a centre of mass at c from the position, where gravity acts (eq. (2.42))."""
     R, omega, c = s.R_world_body, s.motion.omega_body, body.centre_body
     weight = scale(body.mass, hooks.all_fields(drive.parameters.effects, drive.memory, ZERO))
     others = apply_transposed(R, subtract(force, weight))

@@ -1,9 +1,9 @@
-"""What a multirotor can do in steady flight, from the same models that the plant integrates.
+"""Steady-flight performance of a multirotor, from the models that the plant integrates.
 
-Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)) and the thrust of
-equal rotors in the air that comes along their axis (eq. (2.5)); the motors' voltage and current follow from the torque
-(theory.md, section 1.4). Of rotors that are tilted the sum of their thrusts counts, and the mean air along their axes;
-of rotors over one another what the lower ones lose (eq. (2.44)), all of them at one speed.
+Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)), and the thrust of
+equal rotors with axial inflow (eq. (2.5)); the motors' voltage and current follow from the torque (theory.md, section
+1.4). For tilted rotors the sum of their thrusts and their mean axial inflow count; for coaxial rotors the loss of the
+lower ones (eq. (2.44)), all of them at one speed.
 """
 
 import math
@@ -49,7 +49,7 @@ class Gain(NamedTuple):
 
 
 class Rotor(NamedTuple):
-    """What one rotor gives: thrust and torque over the square of its speed, and what inflow along its axis takes."""
+    """Thrust and torque of a rotor over the square of its speed, and their dependence on axial inflow."""
 
     thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 where it goes with the density
     torque: float  # [N m s^2/rad^2], the same
@@ -60,7 +60,7 @@ class Rotor(NamedTuple):
     wash: CoaxialInterference | None = None  # what those lose that stand in the wake of others
 
     def constants(self, density: float) -> tuple[float, float]:
-        """Thrust and torque over the square of the speed at a density [kg/m^3]."""
+        """Return thrust and torque over the square of the speed at a density [kg/m^3]."""
         factor = density if self.with_density else 1.0
         return factor * self.thrust, factor * self.torque
 
@@ -71,10 +71,10 @@ class Rotor(NamedTuple):
 
 
 def rotor_of(airframe: Airframe) -> Rotor:
-    """The rotor that the airframe's propeller makes.
+    """Return the rotor of the airframe's propeller.
 
     Raises:
-        ValueError: it has none, or one that cannot stand in the wake of another as the vehicle's do.
+        ValueError: there is no propeller, or its model does not support rotors in the wake of others.
     """
     propeller, square = airframe.propeller, (2.0 * math.pi) ** 2
     if propeller is None:
@@ -90,7 +90,7 @@ def rotor_of(airframe: Airframe) -> Rotor:
 
 
 def _lift(airframe: Airframe) -> float:
-    """Force of all rotors over the thrust of one: their number, less where they push past one another."""
+    """Return the force of all rotors over the thrust of one: their number, reduced by wakes."""
     axes = airframe.rotors.tilted_axis
     return math.hypot(*map(sum, zip(*axes, strict=True))) if axes else len(airframe.rotors.position)
 
@@ -102,7 +102,7 @@ def trim(
     mass: float | None = None,
     rotor: Rotor | None = None,
 ) -> Trim:
-    """Steady level flight at a speed [m/s]; `mass` [kg] and `rotor` instead of the airframe's.
+    """Return steady level flight at a speed [m/s]; `mass` [kg] and `rotor` override the airframe's.
 
     Raises:
         ValueError: the airframe has no propeller, or no drag areas and a speed above 0.
@@ -121,7 +121,7 @@ def trim(
         before, across = omega, pressure * ahead + count * density * rotor.drag * omega * speed
 
         def forces(tilt: float, across: float = across) -> tuple[float, float]:
-            """What the thrust must push forward and up."""
+            """Return the required thrust forward and up [N]."""
             c, s = math.cos(tilt), math.sin(tilt)
             return across * c * c + pressure * below * s * s, weight + (pressure * below - across) * s * c
 
@@ -142,13 +142,13 @@ def trim(
 
 
 def _electrics(motor: Motor, speed: float, torque: float) -> tuple[float, float]:
-    """(voltage [V], current [A]) of a motor that turns its rotor at a speed [rad/s] against a torque [N m]."""
+    """Return (voltage [V], current [A]) of a motor at a rotor speed [rad/s] and torque [N m]."""
     current = torque / (motor.belt_efficiency * motor.rotor_constant) + motor.no_load_current
     return motor.rotor_constant * speed + (motor.resistance + motor.esc_resistance) * current, current
 
 
 def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """Of all rotors at rest in the air [N], at the highest voltage, current or power of any, whichever comes first."""
+    """Return the maximum thrust of all rotors in still air [N], limited by voltage, current or power."""
     rotor, motor, count = rotor or rotor_of(airframe), airframe.motor, len(airframe.rotors.position)
     gains = rotor.gains(count, density, 1.0)  # in proportion to the square of the speed
     k_thrust, k_torque = rotor.constants(density)
@@ -156,7 +156,7 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
     k_torque += max(gain.torque for gain in gains)
 
     def excess(omega: float) -> float:
-        """The largest of what voltage, current and power are above their limits, in parts of these."""
+        """Return the largest relative excess of voltage, current and power over their limits."""
         voltage, current = _electrics(motor, omega, k_torque * omega**2)
         used = (
             voltage / motor.max_voltage,
@@ -170,34 +170,34 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
 
 
 def thrust_over_weight(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """Of the loaded vehicle at rest in the air; the voltage that the motors' resistance takes is counted."""
+    """Return the maximum thrust over the weight of the loaded vehicle in still air, including resistive losses."""
     return maximum_thrust(airframe, density, rotor) / (airframe.mass.total * GRAVITY)
 
 
 def battery_energy(airframe: Airframe) -> float:
-    """Nominal [J], drawn to the last."""
+    """Return the nominal energy [J] of the battery."""
     if airframe.battery is None:
         raise ValueError("the vehicle has no [battery]")
     return airframe.battery.cells * CELL_VOLTAGE * airframe.battery.capacity
 
 
 def hover_time(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """[s] at constant power."""
+    """Return the hover time [s] at constant power."""
     return battery_energy(airframe) / trim(airframe, 0.0, density, rotor=rotor).power
 
 
 def maximum_payload(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """[kg] that the maximum thrust lifts beyond the empty vehicle, nothing kept for control."""
+    """Return the mass [kg] that the maximum thrust lifts beyond the empty vehicle, without control margin."""
     return maximum_thrust(airframe, density, rotor) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
 
 
 def maximum_tilt(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """[rad] at which the maximum thrust still carries the weight."""
+    """Return the tilt [rad] at which the maximum thrust still balances the weight."""
     return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density, rotor), 1.0))
 
 
 def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Rotor | None = None) -> float:
-    """Altitude [m] at which the maximum thrust is the weight (theory.md, eq. (2.3)).
+    """Return the altitude [m] at which the maximum thrust equals the weight (theory.md, eq. (2.3)).
 
     Raises:
         ValueError: the thrust does not depend on the density.
@@ -213,7 +213,7 @@ def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Ro
 
 
 def maximum_speed(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """[m/s] in level flight, where the voltage is all used."""
+    """Return the speed [m/s] in level flight at the maximum voltage."""
     highest = airframe.motor.max_voltage
 
     def excess(speed: float) -> float:
@@ -223,7 +223,7 @@ def maximum_speed(airframe: Airframe, density: float = DENSITY, rotor: Rotor | N
 
 
 def maximum_range(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> tuple[float, float]:
-    """(distance [m], at the speed [m/s]) in still air."""
+    """Return (range [m], its speed [m/s]) in still air."""
     energy = battery_energy(airframe)
     best = minimize_scalar(
         lambda speed: -speed / trim(airframe, speed, density, rotor=rotor).power,

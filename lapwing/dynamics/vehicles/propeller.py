@@ -9,21 +9,21 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
 
 
 def blade_angle(propeller: "Propeller") -> float:
-    """Effective angle of attack of the blade section at rest [rad], already divided by 1 + K_0 / (pi A)."""
+    """Return the effective angle of attack of the blade section at rest [rad], already divided by 1 + K_0 / (pi A)."""
     geometric = math.atan(propeller.pitch / (math.pi * propeller.diameter))
     angle = propeller.downwash_factor * geometric - propeller.zero_lift_angle
     return angle / (1.0 + propeller.lift_curve_slope / (math.pi * propeller.aspect_ratio))
 
 
 def thrust_coefficient(propeller: "Propeller") -> float:
-    """C_T: thrust over density times (revolutions per second)^2 times diameter^4 (theory.md, eq. (1.9))."""
+    """Return C_T: thrust over density times (revolutions per second)^2 times diameter^4 (theory.md, eq. (1.9))."""
     lift = propeller.lift_curve_slope * blade_angle(propeller) / propeller.aspect_ratio
     blades = propeller.lift_correction * math.square(propeller.radius_weight) * propeller.blades
     return 0.25 * math.square(math.pi) * blades * lift
 
 
 def drag_coefficients(propeller: "Propeller") -> tuple[float, float]:
-    """Of the blade section: (zero-lift part, part induced by lift) (theory.md, eq. (1.11))."""
+    """Return (zero-lift, lift-induced) drag coefficients of the blade section (theory.md, eq. (1.11))."""
     lift = propeller.lift_curve_slope * blade_angle(propeller)
     induced = lift * lift / (math.pi * propeller.aspect_ratio * propeller.oswald_factor)
     return propeller.zero_lift_drag, induced
@@ -32,17 +32,17 @@ def drag_coefficients(propeller: "Propeller") -> tuple[float, float]:
 def from_stand(
     propeller: "Propeller", density: float, speed: float, thrust: float, torque: float
 ) -> tuple[float, float]:
-    """(lift_correction, zero_lift_drag) with which a propeller of this geometry gives what a thrust stand has shown.
+    """Return the (lift_correction, zero_lift_drag) that reproduce a thrust-stand measurement.
 
     Args:
-        propeller: the geometry; of these two constants nothing is used.
-        density: [kg/m^3] of the air on that day.
-        speed: [rad/s] of the propeller.
+        propeller: geometry; its values of these two constants are ignored.
+        density: air density of the measurement [kg/m^3].
+        speed: rotor speed [rad/s].
         thrust: [N] at that speed.
-        torque: [N m].
+        torque: [N m] at that speed.
 
     Raises:
-        ValueError: no propeller of this geometry gives that.
+        ValueError: no propeller of this geometry has these values.
     """
     n = speed / (2.0 * math.pi)
     full = propeller.model_copy(update={"lift_correction": 1.0})
@@ -67,13 +67,13 @@ def from_stand(
 
 
 def h_force_coefficient(propeller: "Propeller") -> float:
-    """[m^3/rad] of the drag across the axis over density, rotor speed and velocity (theory.md, eq. (2.11))."""
+    """Return the in-plane drag coefficient [m^3/rad] over density, rotor speed and velocity (theory.md, eq. (2.11))."""
     radius = 0.5 * propeller.diameter
     blade_area = propeller.blades * radius * propeller.diameter / propeller.aspect_ratio
     return blade_area * math.total(drag_coefficients(propeller)) * radius / 4.0
 
 
 def torque_coefficient(propeller: "Propeller") -> float:
-    """C_M: torque over density times (revolutions per second)^2 times diameter^5 (theory.md, eq. (1.10))."""
+    """Return C_M: torque over density times (revolutions per second)^2 times diameter^5 (theory.md, eq. (1.10))."""
     blades = propeller.lift_correction * math.square(propeller.radius_weight * propeller.blades)
     return math.square(math.pi) * blades * math.total(drag_coefficients(propeller)) / (8.0 * propeller.aspect_ratio)

@@ -48,7 +48,7 @@ class Os4State(NamedTuple):
 
 
 def hover_speed(p: Os4Parameters) -> float:
-    """Rotor speed [rad/s] at which four thrusts carry the weight (theory.md, eq. (7.15))."""
+    """Return the rotor speed [rad/s] at which four thrusts balance the weight (theory.md, eq. (7.15))."""
     return math.sqrt(p.mass * p.gravity / (4.0 * p.lift_constant))
 
 
@@ -60,7 +60,7 @@ def _acceleration(p, motors, speed, voltage):
 
 @always_inline
 def rotor_acceleration(p, motors, speed):
-    """Rotor accelerations [rad/s^2]: shaft torque less drag, over the inertia; zero without motors (eq. (7.14))."""
+    """Return the rotor accelerations [rad/s^2]: torque minus drag, over inertia; 0 without motors (eq. (7.14))."""
     if motors is None:
         return (0.0, 0.0, 0.0, 0.0)
     u = motors.voltage
@@ -74,7 +74,7 @@ def rotor_acceleration(p, motors, speed):
 
 @always_inline
 def rotor_loads(p, speed):
-    """(thrust [N] along body z, torque [N m] in the body) of the rotors (theory.md, eq. (7.11))."""
+    """Return (thrust [N] along body z, torque [N m] in the body) of the rotors (theory.md, eq. (7.11))."""
     w1, w2, w3, w4 = speed[0] * speed[0], speed[1] * speed[1], speed[2] * speed[2], speed[3] * speed[3]
     lever = p.arm * p.lift_constant
     return p.lift_constant * (w1 + w2 + w3 + w4), (
@@ -86,13 +86,13 @@ def rotor_loads(p, speed):
 
 @always_inline
 def residual(four):
-    """Sum over the rotors, signed by their sense of rotation about body z."""
+    """Return the sum over the rotors, signed by their spin direction about body z."""
     return -four[0] + four[1] - four[2] + four[3]
 
 
 @always_inline
 def net_force(p, x):
-    """Force on the centre of mass without drag [N] in the world: thrust and weight (theory.md, eq. (7.13))."""
+    """Return the force on the centre of mass without drag [N] in the world: thrust and weight (eq. (7.13))."""
     m = rotation_matrix(x.attitude)
     thrust, _ = rotor_loads(p, x.rotor_speed)
     return add(scale(thrust, (m[2], m[5], m[8])), (0.0, 0.0, -p.mass * p.gravity))
@@ -100,7 +100,7 @@ def net_force(p, x):
 
 @always_inline
 def rate(p, t, x):
-    """Newton and Euler with the rotors' momentum (theory.md, eqs. (7.12) and (7.13))."""
+    """Return the tangent: Newton and Euler with the rotors' momentum (theory.md, eqs. (7.12) and (7.13))."""
     o = x.omega_body
     _, torque = rotor_loads(p, x.rotor_speed)
     acceleration = rotor_acceleration(p, p.motors, x.rotor_speed)

@@ -32,7 +32,7 @@ class ReleasedLoadState(NamedTuple):
 
 
 def release(p: CooperativeLoadParameters, x: CooperativeLoadState) -> tuple[ReleasedLoadParameters, ReleasedLoadState]:
-    """The load and vehicles as separate free bodies once the links are gone; their motion and command stay."""
+    """Return load and vehicles as separate free bodies without links, with their motion and command."""
     quads = range(len(x.link))
     positions = tuple(formation.quad_position(p, x, i) for i in quads)
     velocities = tuple(formation.quad_velocity(p, x, i) for i in quads)
@@ -56,7 +56,7 @@ def _body_rate(p, x, i):
 
 @always_inline
 def rate(p, t, x):
-    """Tangent of the free bodies (theory.md, eqs. (7.18) and (7.29))."""
+    """Return the tangent of the free bodies (theory.md, eqs. (7.18) and (7.29))."""
     return ReleasedLoadState(
         x.load_velocity,
         (0.0, 0.0, -p.gravity),

@@ -28,7 +28,7 @@ class FreeBodyParameters(NamedTuple):
 
 @always_inline
 def rate(p, t, x):
-    """omega' = I^-1 (I omega x omega)."""
+    """Return the tangent: omega' = I^-1 (I omega x omega)."""
     o = x.omega_body
     return RigidBody(o, divide(cross(multiply(p.inertia, o), o), p.inertia))
 

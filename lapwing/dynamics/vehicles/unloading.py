@@ -62,7 +62,7 @@ class UnloadingState(NamedTuple):
 
 @always_inline
 def _wrench(touches, x):
-    """Sum of the forces [N] and of their torques about the pack's middle [N m], world frame."""
+    """Return the sum of the forces [N] and of their torques about the pack's middle [N m], world frame."""
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for one in touches:
         force = add(force, one.force)
@@ -77,7 +77,7 @@ def _sum(a, b):
 
 @always_inline
 def door_acceleration(p, t, x, f, on_pack):
-    """Angular acceleration of the door [rad/s^2] under the pack's reaction `on_pack` (theory.md, eq. (9.9))."""
+    """Return the angular acceleration of the door [rad/s^2] under the pack's reaction `on_pack` (eq. (9.9))."""
     angle, rate = x.door
     push = 0.0
     for one in on_pack:
@@ -102,13 +102,13 @@ def _bristle_rate(touches, i):
 
 @kernel
 def rate(p, t, x):
-    """Newton and Euler for the pack, the door's equation, and the bristles (theory.md, eqs. (9.3) to (9.9))."""
+    """Return the tangent: Newton and Euler for the pack, door equation, bristles (theory.md, eqs. (9.3) to (9.9))."""
     f = frames(p, t, x)
-    found = contacts(p, t, x)
+    result = contacts(p, t, x)
     o, v = x.omega_body, x.velocity_world
     if t < p.pickup:
-        force, torque = _sum(_sum(_wrench(found.rollers, x), _wrench(found.door, x)), _wrench(found.ground, x))
-        force, torque = _sum((force, torque), _wrench(found.walls, x))
+        force, torque = _sum(_sum(_wrench(result.rollers, x), _wrench(result.door, x)), _wrench(result.ground, x))
+        force, torque = _sum((force, torque), _wrench(result.walls, x))
         acceleration = add(scale(1.0 / p.pack_mass, force), (0.0, 0.0, -p.gravity))
         spin = apply_transposed(f.pack, torque)
         angular = divide(add(spin, cross(multiply(p.pack_inertia, o), o)), p.pack_inertia)
@@ -120,10 +120,10 @@ def rate(p, t, x):
         o,
         acceleration,
         angular,
-        (x.door[1], door_acceleration(p, t, x, f, found.door)),
-        map_index(_bristle_rate, x.on_rollers, found.rollers),
-        map_index(_bristle_rate, x.on_door, found.door),
-        map_index(_bristle_rate, x.on_ground, found.ground),
+        (x.door[1], door_acceleration(p, t, x, f, result.door)),
+        map_index(_bristle_rate, x.on_rollers, result.rollers),
+        map_index(_bristle_rate, x.on_door, result.door),
+        map_index(_bristle_rate, x.on_ground, result.ground),
     )
 
 
@@ -131,7 +131,7 @@ RATES[UnloadingParameters] = rate
 
 
 def initial_state(p: UnloadingParameters, gap: float = 0.01) -> UnloadingState:
-    """At rest on the rollers, its front `gap` [m] behind the shut door."""
+    """Return the pack at rest on the rollers, its front `gap` [m] behind the closed door."""
     none = (0.0, 0.0, 0.0)
     s, c = math.sincos(p.tilt)
     back, up = gap + p.pack_half[0], 2.0 * p.roller_radius + p.pack_half[2]
@@ -155,17 +155,17 @@ def _force(touches, i):
 
 @kernel
 def forces_on_pack(p, t, x):
-    """World forces [N]: (at the ten places on rollers and hinge, of the door, of the ground, of the walls)."""
-    found = contacts(p, t, x)
-    rollers = map_index(_force, x.on_rollers, found.rollers)
-    return rollers, _wrench(found.door, x)[0], _wrench(found.ground, x)[0], _wrench(found.walls, x)[0]
+    """Return world forces [N]: (at the ten points on rollers and hinge, of the door, of the ground, of the walls)."""
+    result = contacts(p, t, x)
+    rollers = map_index(_force, x.on_rollers, result.rollers)
+    return rollers, _wrench(result.door, x)[0], _wrench(result.ground, x)[0], _wrench(result.walls, x)[0]
 
 
 @kernel
 def energy(p, t, x):
-    """Kinetic and potential energy [J] of pack, door, its spring and the ground's and rollers' springs under them.
+    """Return kinetic and potential energy [J] of pack, door, its spring and the springs of ground and rollers.
 
-    Bristles, the door's stop and its edge on the ground are left out: it is an energy while the door is off both.
+    Bristles, the door's stop and its edge on the ground are excluded: it is an energy while the door touches neither.
     """
     f = frames(p, t, x)
     o, v = x.omega_body, x.velocity_world

@@ -17,7 +17,7 @@ FASTEST = 4000.0  # [1/s] at which bristles follow; beyond the slip speed of thi
 
 
 class Touch(NamedTuple):
-    """What one contact does to the pack."""
+    """Effect of one contact on the pack."""
 
     force: Vec3  # [N] world frame
     place: Vec3  # [m] world frame
@@ -26,7 +26,7 @@ class Touch(NamedTuple):
 
 @always_inline
 def friction(friction_static, friction_dynamic, bristle, slip):
-    """(friction force over the normal force, rate of the bristle [m/s]) at the velocity `slip` [m/s]."""
+    """Return (friction force over the normal force, rate of the bristle [m/s]) at the velocity `slip` [m/s]."""
     speed = norm(slip)
     ratio = speed / STRIBECK_SPEED
     limit = friction_dynamic + (friction_static - friction_dynamic) * math.exp(-ratio * ratio)
@@ -38,15 +38,15 @@ def friction(friction_static, friction_dynamic, bristle, slip):
 
 @always_inline
 def touch(surface, depth, normal, place, velocity, bristle):
-    """The force on the pack where it is `depth` [m] inside of something.
+    """Return the contact of the pack at a penetration depth.
 
     Args:
         surface: (stiffness [N/m], damping [N s/m], static friction, dynamic friction).
-        depth: [m]; not positive: no contact.
+        depth: penetration [m]; not positive: no contact.
         normal: unit vector towards the pack.
-        place: of the contact [m].
-        velocity: of the pack's material there, relative to what it touches [m/s].
-        bristle: bend of the bristles [m].
+        place: position of the contact [m].
+        velocity: velocity of the pack's material there, relative to the other body [m/s].
+        bristle: deflection of the bristles [m].
     """
     closing = -dot(velocity, normal)
     force = surface[0] * depth + surface[1] * closing if depth > 0.0 else 0.0

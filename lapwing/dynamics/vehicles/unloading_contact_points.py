@@ -1,4 +1,4 @@
-"""Where the pack touches what, and how fast: rollers, edges, door, ground and walls (theory.md, section 9.3).
+"""Contacts of the pack and their velocities: rollers, edges, door, ground and walls (theory.md, section 9.3).
 
 `p` is a UnloadingParameters, `x` a UnloadingState.
 """
@@ -18,7 +18,7 @@ SIGNS = tuple((float(a), float(b), float(c)) for a in (-1, 1) for b in (-1, 1) f
 
 
 class Frames(NamedTuple):
-    """What all contacts look at."""
+    """Frames shared by all contacts."""
 
     pack: tuple  # R_world_body
     spin_world: Vec3  # [rad/s] of the pack
@@ -32,13 +32,13 @@ class Frames(NamedTuple):
 
 @always_inline
 def roller_speed(p, t):
-    """Speed of the rollers at time t [rad/s]: a ramp."""
+    """Return the roller speed at time t [rad/s]: a ramp."""
     return p.roller_speed * min(max((t - p.ramp_start) / p.ramp_duration, 0.0), 1.0)
 
 
 @always_inline
 def frames(p, t, x):
-    """The frames of crate, door and pack at time t (theory.md, eqs. (9.1) and (9.2))."""
+    """Return the frames of crate, door and pack at time t (theory.md, eqs. (9.1) and (9.2))."""
     s, c = math.sincos(p.tilt)
     forward, upward = (c, 0.0, -s), (s, 0.0, c)
     opened, shut = math.sincos(x.door[0])
@@ -51,13 +51,13 @@ def frames(p, t, x):
 
 @always_inline
 def material_velocity(x, f, place):
-    """Velocity of the pack's material at a place [m/s]."""
+    """Return the velocity of the pack's material at a place [m/s]."""
     return add(x.velocity_world, cross(f.spin_world, subtract(place, x.position_world)))
 
 
 @always_inline
 def bar(p, x, f, surface, centre, radius, rolling, velocity, bristle):
-    """Contact with a cylinder along y through `centre`, which turns at `rolling` [rad/s] (theory.md, eq. (9.7))."""
+    """Return the contact with a cylinder along y through `centre`, rotating at `rolling` [rad/s] (eq. (9.7))."""
     h = p.pack_half
     q = apply_transposed(f.pack, subtract(centre, x.position_world))
     nearest = (min(max(q[0], -h[0]), h[0]), min(max(q[1], -h[1]), h[1]), min(max(q[2], -h[2]), h[2]))
@@ -73,7 +73,7 @@ def bar(p, x, f, surface, centre, radius, rolling, velocity, bristle):
 
 @kernel
 def roller_touch(p, x, f, i):
-    """Contact i of the pack with the rollers (two each) and with the hinge's edge (two)."""
+    """Return contact i of the pack with the rollers (two each) and with the hinge's edge (two)."""
     sideways = scale(SIDES[i % 2] * p.pack_half[1], Y)
     if i < 2 * ROLLERS:
         behind = (i // 2 + 0.5) * p.roller_spacing
@@ -88,13 +88,13 @@ def roller_touch(p, x, f, i):
 
 @always_inline
 def corner(p, x, f, i):
-    """Corner i of the pack in the world [m]."""
+    """Return corner i of the pack in the world [m]."""
     return add(x.position_world, apply(f.pack, multiply(SIGNS[i], p.pack_half)))
 
 
 @kernel
 def door_touch(p, x, f, i):
-    """Contact i of the pack with the door: eight corners on its inner face, and its outer edge on the pack twice."""
+    """Return contact i of the pack with the door: eight corners on its inner face, two of its outer edge."""
     if i >= CORNERS:
         centre = add(f.hinge, scale(p.door_length, f.along_door))
         centre = (centre[0], x.position_world[1] + SIDES[i - CORNERS] * p.pack_half[1], centre[2])
@@ -112,14 +112,14 @@ def door_touch(p, x, f, i):
 
 @kernel
 def ground_touch(p, x, f, i):
-    """Contact of corner i with the ground."""
+    """Return contact of corner i with the ground."""
     place = corner(p, x, f, i)
     return touch(p.on_ground, -place[2], (0.0, 0.0, 1.0), place, material_velocity(x, f, place), x.on_ground[i])
 
 
 @kernel
 def wall_touch(p, x, f, i):
-    """Contact of corner i with the crate's walls, which are smooth: the rear one and the two at the sides."""
+    """Return the contact of corner i with the crate's frictionless walls: the rear one and the two side walls."""
     place = corner(p, x, f, i)
     lever = subtract(place, f.hinge)
     velocity, nothing = material_velocity(x, f, place), (0.0, 0.0, 0.0)
@@ -143,7 +143,7 @@ class Contacts(NamedTuple):
 
 @kernel
 def contacts(p, t, x):
-    """All contacts of the pack at time t."""
+    """Return all contacts of the pack at time t."""
     f = frames(p, t, x)
     return Contacts(
         map_index(roller_touch, x.on_rollers, p, x, f),

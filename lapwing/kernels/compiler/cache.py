@@ -1,4 +1,4 @@
-"""Numba's cache of one kernel: a file for each compiled version, found by its key."""
+"""Disk cache of one kernel: a file for each compiled version, named by its key."""
 
 import contextlib
 import pickle
@@ -18,10 +18,10 @@ from lapwing.kernels.compiler.cache_key import Key, NotKeptError, key
 
 
 class Statistics(NamedTuple):
-    """Numbers of kernels that this process has used."""
+    """Number of kernel versions that this process has compiled and loaded."""
 
     compiled: int
-    loaded: int  # from the disk, with all that they call
+    loaded: int  # from disk, with all kernels that they call
 
 
 _counted = {"compiled": 0, "loaded": 0}
@@ -34,13 +34,14 @@ def statistics() -> Statistics:
 
 
 def on_compile(listener: Callable[[str], None]) -> None:
-    """Call `listener` with the name of every kernel ("module.function") before it is compiled, here or by another
-    process that this one then waits for."""
+    """Call `listener` with the name of every kernel ("module.function") before it is compiled.
+
+    The listener is also called before this process waits for another process that compiles the kernel."""
     _listeners.append(listener)
 
 
 class KernelCache(_Cache):
-    """Keeps one kernel's machine code below `_files.root()`; where that cannot be done, nothing is kept."""
+    """Store of one kernel's machine code below `_files.root()`; it stores nothing where it cannot write."""
 
     def __init__(self, dispatcher: Dispatcher):
         self._dispatcher = dispatcher
@@ -57,11 +58,11 @@ class KernelCache(_Cache):
         return str(root / self._folder) if root else None
 
     def enable(self) -> None:
-        """Look up and keep versions."""
+        """Enable loading and storing of versions."""
         self._enabled = True
 
     def disable(self) -> None:
-        """Do neither."""
+        """Disable loading and storing of versions."""
         self._enabled = False
 
     def flush(self) -> None:
@@ -69,7 +70,7 @@ class KernelCache(_Cache):
         cache_files.remove(self._folder, self._name)
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """The version for a signature; None if it must be compiled."""
+        """Return the version for a signature, or None if it must be compiled."""
         target_context.refresh()
         found = self._key(sig, target_context.codegen()) if self._enabled else None
         result = self._loaded(found, sig, target_context)
@@ -84,10 +85,10 @@ class KernelCache(_Cache):
         return result
 
     def save_overload(self, sig: Any, data: CompileResult) -> None:
-        """Keep a version that has just been compiled."""
+        """Store a newly compiled version."""
         _counted["compiled"] += 1
         if data.lifted or data.library.has_dynamic_globals:
-            warnings.warn(f"{self._label} is not kept on disk: it uses addresses of this process", NumbaWarning, 2)
+            warnings.warn(f"{self._label} is not stored on disk: it uses addresses of this process", NumbaWarning, 2)
             return
         found = self._key(sig, data.codegen) if self._enabled else None
         if found is not None:
@@ -99,7 +100,7 @@ class KernelCache(_Cache):
         content = cache_files.read(self._folder, self._file(found, inner), found.sources) if found else None
         if content is None:
             return None
-        with contextlib.suppress(Exception):  # whatever it is, compiling mends it
+        with contextlib.suppress(Exception):  # any error here is repaired by compiling again
             kept, payload = pickle.loads(content)
             result = self._rebuild(target_context, payload)
             if kept == found and result.signature.args == sigutils.normalize_signature(sig)[0]:
@@ -107,7 +108,7 @@ class KernelCache(_Cache):
         return None
 
     def _is_inner(self, result: CompileResult | None = None) -> bool:
-        """Return True if a result, or else the next one, is code for other kernels only."""
+        """Return True if a result is code for other kernels only; without a result, test the next one."""
         return False
 
     def _reduce(self, result: CompileResult) -> tuple:
@@ -115,7 +116,7 @@ class KernelCache(_Cache):
         return result._reduce()
 
     def _rebuild(self, target_context: Any, payload: tuple) -> CompileResult:
-        """Return the result from its stored parts."""
+        """Return the result that is rebuilt from its stored parts."""
         return CompileResult._rebuild(target_context, *payload)
 
     def _file(self, found: Key, inner: bool) -> str:

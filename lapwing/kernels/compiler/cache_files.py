@@ -1,8 +1,8 @@
-"""Files of the cache: each carries a checksum and appears whole or not at all; none of it ever raises.
+"""Files of the cache: each has a checksum and is written atomically; no function here raises.
 
-What is not there may be in the package itself: `make wheel` makes one that has kernels with it.
+A file that is not in the cache may be in the package: `make wheel` builds a wheel that contains compiled kernels.
 
-Several processes may read and write at once: a file is written under a name of its own and then renamed.
+Several processes may read and write at the same time: a file is written under a unique name and then renamed.
 """
 
 import contextlib
@@ -13,13 +13,13 @@ from functools import cache
 from pathlib import Path
 
 CHECKSUM = 32  # bytes, before the content
-SHIPPED = Path(__file__).parents[1] / "shipped"  # what a wheel carries, laid out as in `root()`
-KEPT = 4  # versions of one file, so that two checkouts do not take it from each other
+SHIPPED = Path(__file__).parents[1] / "shipped"  # contents of a wheel, laid out as in `root()`
+KEPT = 4  # versions of one file, so that two checkouts do not delete each other's
 
 
 @cache
 def root() -> Path | None:
-    """The folder that all is kept in; None if there is nowhere (no home)."""
+    """Return the folder of the cache, or None if there is none (no home folder)."""
     given = os.environ.get("LAPWING_CACHE")
     try:
         return Path(given) if given else Path.home() / ".cache" / "lapwing"
@@ -32,12 +32,12 @@ def _checksum(content: bytes) -> bytes:
 
 
 def _ours(status: os.stat_result) -> bool:
-    """Return True if only this user or root can have written a file: its content is executed."""
+    """Return True if only this user or root can have written a file, because its content is executed."""
     return status.st_uid in (0, os.geteuid()) and not status.st_mode & 0o022
 
 
 def read(folder: str, name: str, version: str) -> bytes | None:
-    """The content that `write` was given; None if there is none, it is damaged, or others could have written it."""
+    """Return the content that `write` stored; None if it is missing, damaged, or writable for other users."""
     places = [base / folder / f"{name}-{version}" for base in (root(), SHIPPED) if base is not None]
     return next((content for place in places if (content := _content(place)) is not None), None)
 
@@ -55,13 +55,13 @@ def _content(path: Path) -> bytes | None:
 
 
 def write(folder: str, name: str, version: str, content: bytes) -> None:
-    """Keep `content`, and only the last few versions of `name`; nothing happens where one cannot write.
+    """Store `content` and delete all but the newest versions of `name`; do nothing where the folder is not writable.
 
     Args:
         folder: relative to the root, such as "kernels/dynamics.cell".
-        name: of the file, without a version.
+        name: file name without the version.
         version: hexadecimal digits.
-        content: any.
+        content: bytes to store.
     """
     base = root()
     if base is None:
@@ -70,7 +70,7 @@ def write(folder: str, name: str, version: str, content: bytes) -> None:
     temporary = place / f"{name}-{version}.{uuid.uuid4().hex}"
     try:
         for path in (base, *reversed([base / p for p in Path(folder).parents if p.name]), place):
-            path.mkdir(mode=0o700, parents=True, exist_ok=True)  # what is read from here is run
+            path.mkdir(mode=0o700, parents=True, exist_ok=True)  # the content is executed
         with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
             file.write(_checksum(content) + content)
         temporary.replace(place / f"{name}-{version}")

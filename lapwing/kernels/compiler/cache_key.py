@@ -1,8 +1,8 @@
 """Key of a compiled version of a kernel: text that is equal in every process.
 
-Three things make it up: the types of its arguments; every function that it can reach through names, closures and
-tables (`DispatchTable`), with the constants that these take from their modules; and the sources that can be in it.
-Anything that cannot be told for certain makes the version one that is not kept.
+The key consists of the types of the arguments; of every function that the kernel can reach through names, closures and
+tables (`DispatchTable`), with the constants that they take from their modules; and of all sources that can be in it.
+A version whose key cannot be determined is not stored.
 """
 
 # numba.core.types fills itself at import
@@ -23,24 +23,24 @@ from numba.core.dispatcher import Dispatcher
 from lapwing.kernels.compiler import source_digest
 from lapwing.kernels.compiler.dispatch_table import DispatchTable
 
-VERSIONED = {"builtins", "llvmlite", "numba", "numpy"}  # their version is in every key
+VERSIONED = {"builtins", "llvmlite", "numba", "numpy"}  # packages whose version is in every key
 PLAIN = (bool, int, float, complex, str, bytes, type(None), type(...))
 
 
 class NotKeptError(Exception):
-    """Something in a kernel has no text that would be the same in every process."""
+    """Error for a kernel whose key would differ between processes."""
 
 
 class Key(NamedTuple):
     """Key of one compiled version."""
 
-    made_of: str  # types, functions and constants, compiler: a digest
-    sources: str  # digest of all sources that can be in it
-    modules: frozenset[str]  # whose sources they are
+    made_of: str  # digest of types, functions, constants and compiler
+    sources: str  # digest of all sources that can be in the kernel
+    modules: frozenset[str]  # modules of the sources
 
 
 class Part(NamedTuple):
-    """The text of one function, what it refers to, and the values that it was made from."""
+    """Text of one function, its references, and the values that the text was made from."""
 
     text: str
     functions: tuple[FunctionType, ...]
@@ -49,19 +49,19 @@ class Part(NamedTuple):
 
 
 class _Writer:
-    """Writes texts and collects what they refer to."""
+    """Writer of texts that collects their references."""
 
     def __init__(self) -> None:
         self.functions: list[FunctionType] = []
         self.modules: set[str] = set()
         self.seen: list[tuple[dict, str, Any]] = []
-        self.mutable = False  # may a value have changed although it is the same object?
+        self.mutable = False  # whether a value may have changed although it is the same object
 
     def value(self, value: Any) -> str:
-        """Text of a constant, a class, a numba type or a function.
+        """Return the text of a constant, a class, a numba type or a function.
 
         Raises:
-            NotKeptError: it is none of these.
+            NotKeptError: the value is none of these.
         """
         if isinstance(value, PLAIN):
             return f"{type(value).__name__} {value!r}"
@@ -72,7 +72,7 @@ class _Writer:
             return self.of_type(value)
         if isinstance(value, type):
             return self.of_class(value)
-        if isinstance(value, FunctionType):  # no code of a kernel, but stands for some in its module
+        if isinstance(value, FunctionType):  # a placeholder for compiled code, found by its module
             self.modules.add(value.__module__)
             return _name(value)
         if isinstance(value, tuple):
@@ -86,14 +86,14 @@ class _Writer:
         raise NotKeptError(f"{type(value).__name__} has no text")
 
     def of_type(self, value: types.Type) -> str:
-        """Types are equal if their classes and keys are."""
-        if isinstance(value, types.Dispatcher):  # numba would rebuild it as another one
+        """Return the text of a type; types with equal classes and keys are equal."""
+        if isinstance(value, types.Dispatcher):  # numba would rebuild it as another type
             raise NotKeptError("a function as an argument")
         inside = (value.key, value._fields) if isinstance(value, types.StructRef) else value.key
         return f"{self.of_class(type(value))}[{self.value(inside)}]"
 
     def of_class(self, value: type) -> str:
-        """A class by its name, and what it stands for."""
+        """Return the text of a class: its name and its entries in dispatch tables."""
         module, name = value.__module__, value.__qualname__
         if module.partition(".")[0] in VERSIONED:
             return f"{module}.{name}"
@@ -130,7 +130,7 @@ def _name(function: FunctionType) -> str:
 
 
 def _codes(code: CodeType) -> Iterable[CodeType]:
-    """A function's code, and that of the functions in it."""
+    """Return the code of a function and of its inner functions."""
     yield code
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -142,7 +142,7 @@ _entered = 0
 
 
 def _part(function: FunctionType) -> Part:
-    """A function by itself: its code, and what its names, closure and defaults refer to."""
+    """Return the text of one function: its code and the references of its names, closure and defaults."""
     global _entered
     if _entered != DispatchTable.entered:
         _parts.clear()
@@ -172,16 +172,16 @@ def _part(function: FunctionType) -> Part:
 
 
 def key(dispatcher: Dispatcher, arguments: tuple, returns: Any, target: tuple) -> Key:
-    """The key of a kernel's version for the types of arguments.
+    """Return the key of a kernel's version for argument types.
 
     Args:
         dispatcher: the kernel.
         arguments: numba types.
-        returns: numba type of the result where it is prescribed, else None.
+        returns: prescribed numba type of the result, or None.
         target: numba's description of the processor.
 
     Raises:
-        NotKeptError: the version cannot be told from others in another process.
+        NotKeptError: no key is equal in every process.
     """
     writer = _Writer()
     text = writer.value((dispatcher, *arguments, returns))

@@ -1,7 +1,7 @@
 """Calling convention between kernels: every argument and the result is one value (by-value aggregate).
 
-numba passes a tuple as its numbers: 400 instructions a call for a state of a hundred numbers, two thirds of the
-code given to LLVM. After inlining both conventions give equal code.
+numba passes a tuple as separate numbers: 400 instructions per call for a state of a hundred numbers, two thirds of the
+code that LLVM receives. After inlining both conventions lead to equal code.
 """
 
 # numba.core.types fills itself at import
@@ -17,12 +17,12 @@ from numba.core.callconv import RETCODE_OK, CPUCallConv, excinfo_t
 from numba.core.imputils import impl_ret_new_ref
 from numba.core.lowering import Lower
 
-WIDEST = '"prefer-vector-width"="512"'  # left to itself, LLVM takes half of the registers of Intel's processors
-WHOLE = ".whole"  # at the end of the names of functions that are called so
+WIDEST = '"prefer-vector-width"="512"'  # by default LLVM uses half of the vector registers of Intel processors
+WHOLE = ".whole"  # suffix of the names of functions with this convention
 
 
 class _Whole:
-    """Arguments as values of their own types; those that stand for nothing are left out."""
+    """Arguments as values of their own types; types without data are omitted."""
 
     def __init__(self, context: Any, given: Sequence[types.Type]):
         self._kinds = [None if isinstance(t, types.Omitted) else context.get_value_type(t) for t in given]
@@ -34,18 +34,18 @@ class _Whole:
         return tuple(_converted(builder, value, kind) for value, kind in pairs if kind is not None)
 
     def from_arguments(self, builder: Any, passed: Sequence[Any]) -> list:
-        """The values of what is passed."""
+        """Return the values of the passed arguments."""
         left = iter(passed)
         return [() if kind is None else next(left) for kind in self._kinds]
 
     def assign_names(self, passed: Sequence[Any], names: Sequence[str]) -> None:
-        """Names of what is passed, for reading the code."""
+        """Assign names to the passed arguments, for readable LLVM code."""
         for value, name in zip(passed, names, strict=False):
             value.name = name
 
 
 def _converted(builder: Any, value: Any, kind: Any) -> Any:
-    """numba gives what is passed for `*arguments` as a struct, also where the type stands for an array."""
+    """Return a value in its declared type: numba passes `*arguments` as a struct even where the type is an array."""
     if value.type == kind:
         return value
     array = llvm.Constant(kind, llvm.Undefined)
@@ -55,7 +55,7 @@ def _converted(builder: Any, value: Any, kind: Any) -> Any:
 
 
 class ValueCallConv(CPUCallConv):
-    """numba's convention for calls, but for tuples: they are handed over as they are."""
+    """Numba's calling convention, except that a tuple is passed as one value."""
 
     def _get_arg_packer(self, argtypes: Sequence[types.Type]) -> _Whole:
         return _Whole(self.context, argtypes)
@@ -65,7 +65,7 @@ class ValueCallConv(CPUCallConv):
         return self.context.get_value_type(ty).as_pointer()
 
     def declare(self, module: Any, fndesc: Any) -> Any:
-        """The function of a descriptor in a module."""
+        """Return the function of a descriptor in a module."""
         kind = self.get_function_type(fndesc.restype, fndesc.argtypes)
         function = cgutils.get_or_insert_function(module, kind, fndesc.mangled_name)
         self.decorate_function(function, fndesc.args, fndesc.argtypes, noalias=fndesc.noalias)
@@ -74,7 +74,7 @@ class ValueCallConv(CPUCallConv):
         return function
 
     def call(self, builder: Any, fndesc: Any, values: Sequence[Any]) -> Any:
-        """Call the function of a descriptor; its result. An error goes on to the caller's caller."""
+        """Call the function of a descriptor and return its result; an error propagates to the caller of the caller."""
         function = self.declare(builder.module, fndesc)
         place = cgutils.alloca_once(builder, self.get_return_type(fndesc.restype).pointee)
         error = cgutils.alloca_once(builder, llvm.PointerType(excinfo_t), name="excinfo")
@@ -86,7 +86,7 @@ class ValueCallConv(CPUCallConv):
 
 
 class _Failed(NamedTuple):
-    """A call that did not return: what is handed on of numba's `Status`."""
+    """Status of a failed call: the part of numba's `Status` that is propagated."""
 
     code: Any
     excinfoptr: Any
@@ -98,7 +98,7 @@ def uses_value_call_conv(fndesc: Any) -> bool:
 
 
 def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
-    """Let code that numba writes call an inner function, which it knows by its entry from Python."""
+    """Let numba's code call an inner function, which it identifies by its Python entry point."""
     if not uses_value_call_conv(fndesc):
         context.insert_user_function(entry, fndesc, [library])
         return
@@ -108,7 +108,7 @@ def offer(context: Any, entry: Any, fndesc: Any, library: Any) -> None:
         return impl_ret_new_ref(context, builder, fndesc.restype, result)
 
     call.libs = (library,)  # type: ignore[attr-defined]
-    context._defns[entry].append(call, fndesc.argtypes)  # of several for the same arguments the last one counts
+    context._defns[entry].append(call, fndesc.argtypes)  # the last definition for equal arguments is used
 
 
 @cache
@@ -117,21 +117,21 @@ def _holds_arrays(models: Any, kind: types.Type) -> bool:
 
 
 class KernelLower(Lower):
-    """numba's, which would take every tuple apart to count references to arrays, also where it holds none."""
+    """Numba's lowering without reference counting of tuples that hold no arrays."""
 
     def setup_function(self, fndesc: Any) -> None:
-        """Begin the function."""
+        """Write the start of the function."""
         super().setup_function(fndesc)
         if self.library.vectorise_loops:
-            set.add(self.function.attributes, WIDEST)  # which llvmlite would refuse as unknown
+            set.add(self.function.attributes, WIDEST)  # which llvmlite rejects as unknown
 
     def incref(self, typ: types.Type, val: Any) -> None:
-        """Count a new reference, unless the type holds no arrays."""
+        """Count a new reference if the type holds arrays."""
         if self._is_counted(typ):
             super().incref(typ, val)
 
     def decref(self, typ: types.Type, val: Any) -> None:
-        """Release a reference, unless the type holds no arrays."""
+        """Release a reference if the type holds arrays."""
         if self._is_counted(typ):
             super().decref(typ, val)
 
@@ -140,7 +140,7 @@ class KernelLower(Lower):
 
 
 class InnerLower(KernelLower):
-    """Writes an inner function, to be called by `ValueCallConv` unless it needs what only numba's own way can do."""
+    """Lowering of an inner function, called by `ValueCallConv` unless it needs numba's own convention."""
 
     def __init__(self, context: Any, library: Any, fndesc: Any, interp: Any, **more: Any):
         special = isinstance(fndesc.restype, types.Optional) or interp.generator_info is not None
@@ -154,7 +154,7 @@ class InnerLower(KernelLower):
         return ValueCallConv(self.context) if uses_value_call_conv(self.fndesc) else super().call_conv
 
     def setup_function(self, fndesc: Any) -> None:
-        """Begin the function."""
+        """Write the start of the function."""
         if not uses_value_call_conv(fndesc):
             super().setup_function(fndesc)
             return

@@ -17,7 +17,7 @@ _EMPTY_COUNTERS = "".join(f"define weak_odr void @{name}(ptr %0) alwaysinline {{
 
 
 def _run(manager: NewPassManager, *arguments: Any) -> None:
-    """Run a pass manager and free it, which llvmlite 0.50 does not: its method is hidden by that of a base class."""
+    """Run a pass manager and free it; llvmlite 0.50 does not, because a base class hides its method."""
     manager.run(*arguments)
     NewPassManager._dispose(manager)
     manager.detach()
@@ -51,7 +51,7 @@ class KernelLibrary(JITCodeLibrary):
 
     def __init__(self, codegen: Any, name: str):
         super().__init__(codegen, name)
-        self._inner: dict[InnerLibrary, None] = {}  # to link before optimisation
+        self._inner: dict[InnerLibrary, None] = {}  # libraries to link before optimisation
         self._noinline: dict[str, InnerLibrary] = {}  # by symbol of the function
         self._bitcode = b""  # after finalisation
 
@@ -121,7 +121,7 @@ class KernelLibrary(JITCodeLibrary):
         super()._finalize_final_module()
         emitted = self._final_module
         self._bitcode = super()._get_module_for_linking().as_bitcode()
-        self._codegen._engine._ee.remove_module(emitted)  # its machine code stays
+        self._codegen._engine._ee.remove_module(emitted)  # keeps its machine code
         self._forget_modules()
 
     def _get_module_for_linking(self) -> Any:
@@ -156,7 +156,7 @@ class InnerLibrary(KernelLibrary):
         self._verify_declare_only_symbols()
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == binding.Linkage.external:
-                function.linkage = "linkonce_odr"  # one of its copies in several callers is used
+                function.linkage = "linkonce_odr"  # one of its copies in the callers is used
         names = {value.name for value in self._final_module.global_variables}
         self._environments = frozenset(name for name in names if name.startswith("_ZN08NumbaEnv"))
         self._bitcode = self._final_module.as_bitcode()

@@ -1,4 +1,4 @@
-"""Tables by which compiled code finds an implementation from the class of an argument."""
+"""Tables that map the class of an argument to its implementation in compiled code."""
 
 import sys
 from collections import UserDict
@@ -8,12 +8,12 @@ from typing import Any
 class DispatchTable(UserDict[type, Any]):
     """Mapping from a class to a compiled function, or to a NamedTuple of compiled functions.
 
-    A kernel may reach code through such a table that its own module never imports. So the cache looks up every class in
-    an argument's type in every table: what is found there is part of what the kernel is made of.
+    A kernel can reach code through such a table that its own module never imports. Therefore the cache looks up every
+    class of an argument's type in every table, and the entries become part of the kernel's key.
     """
 
     tables: "dict[str, DispatchTable]" = {}  # noqa: RUF012 (all there are, by the module that made them and a number in it)
-    entered = 0  # how often any table was written
+    entered = 0  # number of writes to all tables
 
     def __init__(self) -> None:
         super().__init__()
@@ -22,6 +22,6 @@ class DispatchTable(UserDict[type, Any]):
         DispatchTable.tables[f"{maker} {number}"] = self
 
     def __setitem__(self, cls: type, implementation: Any) -> None:
-        """Let a class stand for something."""
+        """Register the implementation of a class."""
         DispatchTable.entered += 1
         super().__setitem__(cls, implementation)

@@ -1,7 +1,7 @@
-"""One process compiles a kernel, and the others that need it at the same time wait, and load it.
+"""File locks by which one process compiles a kernel while the others that need it wait and then load it.
 
-Whoever compiles a kernel holds the lock of a file, which the system frees when the process ends, however it ends. While
-it is held, locks of inner kernels only are waited for, and no kernel calls itself: nobody waits in a circle.
+A process that compiles a kernel holds a file lock, which the system releases when the process ends for any reason. The
+holder waits only for locks of inner kernels, and no kernel calls itself. Therefore no deadlock can occur.
 """
 
 import contextlib
@@ -17,8 +17,8 @@ from typing import NamedTuple
 from lapwing.kernels.compiler import cache_files
 
 FOLDER = "compiling"
-PATIENCE = 120.0  # [s] after which a process is taken to be stopped, and not to be compiling
-LOOK = 0.02  # [s] between two looks at whether it has ended
+PATIENCE = 120.0  # [s] after which the compiling process is assumed to be suspended
+LOOK = 0.02  # [s] between two attempts to take the lock
 
 
 class Lock(NamedTuple):
@@ -29,7 +29,7 @@ class Lock(NamedTuple):
 
 
 class _Held(threading.local):
-    """The locks of this thread, the first one first."""
+    """The locks of this thread, in the order in which they were taken."""
 
     def __init__(self) -> None:
         self.locks: list[Lock] = []
@@ -39,10 +39,10 @@ _held = _Held()
 
 
 def acquire(name: str) -> None:
-    """Take the lock of what is kept in the cache under `name`, and hold it to the end of `released_at_end`.
+    """Take the lock of the cache entry `name` and hold it to the end of `released_at_end`.
 
-    Somebody else may have had it until now: what is kept is worth another look. Where there are no locks, or somebody
-    has it for too long, none is taken.
+    Another process may have held it until now, so look up the cache entry again afterwards. No lock is taken if the
+    file system has none or if another process holds it too long.
     """
     base = cache_files.root()
     if base is None:
@@ -62,7 +62,7 @@ def acquire(name: str) -> None:
 
 @contextlib.contextmanager
 def released_at_end() -> Iterator[None]:
-    """Locks that are taken within the context are released at its end."""
+    """Release the locks that were taken within the context at its end."""
     before = len(_held.locks)
     try:
         yield
@@ -75,16 +75,16 @@ def released_at_end() -> Iterator[None]:
 
 
 def _locked(path: Path) -> int:
-    """The descriptor of a file, locked.
+    """Return the descriptor of a file that is now locked.
 
     Raises:
-        BlockingIOError: somebody else has it, or had it until now.
-        OSError: it cannot be written or locked.
+        BlockingIOError: another process holds the lock, or released it just now.
+        OSError: the file cannot be written or locked.
     """
     descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if os.fstat(descriptor).st_nlink == 0:  # whoever had it has removed it, and the next one makes another
+        if os.fstat(descriptor).st_nlink == 0:  # the previous holder removed the file; the next one creates a new one
             raise BlockingIOError
     except OSError:
         os.close(descriptor)

@@ -1,4 +1,4 @@
-"""Imports in the source of a module, found without running it."""
+"""Imports in the source of a module, found without executing it."""
 
 import ast
 
@@ -6,14 +6,14 @@ from lapwing.kernels.compiler import cache_files
 
 
 def imports(module: str, is_package: bool, source: bytes, version: str) -> list[str]:
-    """Dotted names that a source imports, anywhere in it: modules, and what may be modules or names in them.
+    """Return the dotted names that a source imports anywhere: modules, and names that may be modules.
 
-    To parse the few hundred sources of a run would take half a second, so the result is kept on disk.
+    Parsing the few hundred sources of a run would take half a second, so the result is stored on disk.
 
     Args:
-        module: its dotted name, from which relative imports start.
-        is_package: whether the source is an `__init__.py`.
-        source: its text.
+        module: dotted name of the module, the origin of relative imports.
+        is_package: True if the source is an `__init__.py`.
+        source: text of the module.
         version: hexadecimal digest of the source.
 
     Raises:

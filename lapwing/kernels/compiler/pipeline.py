@@ -47,7 +47,7 @@ def _nested() -> Iterator[None]:
 
 @contextmanager
 def _no_collection() -> Iterator[None]:
-    """Without looking for garbage: of what a compilation makes nearly all is in use until it ends."""
+    """Disable the garbage collector: nearly all objects of a compilation are in use until it ends."""
     enabled = gc.isenabled()
     gc.disable()
     try:
@@ -58,17 +58,17 @@ def _no_collection() -> Iterator[None]:
 
 
 def is_nested() -> bool:
-    """Does a compilation in this thread wait for the next one?"""
+    """Return True if a compilation in this thread waits for the next one."""
     return _depth.value > 0
 
 
 @numba.njit
 def _refuse() -> None:
-    raise RuntimeError("compiled for other kernels only")
+    raise RuntimeError("compiled for use by other kernels only")
 
 
 def _refusal(target_context: Any) -> Any:
-    """A new object that stands where numba wants an entry from Python: by it the caller finds the inner function."""
+    """Return a new placeholder for the Python entry point, by which the caller finds the inner function."""
     _refuse.compile(())
     result = _refuse.overloads[()]
     return target_context.get_executable(result.library, result.fndesc, result.environment)
@@ -101,7 +101,7 @@ class PipelineCache(KernelCache):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class KernelLowering(NativeLowering):
-    """To machine code with wrappers for Python and C."""
+    """Lowering to machine code with wrappers for Python and C."""
 
     _name = "kernel_lowering"
 
@@ -123,7 +123,7 @@ class KernelLowering(NativeLowering):
 def _forwards(func_ir: Any) -> bool:
     """Return True if a function passes its arguments to another and returns its result.
 
-    Not with a kernel among them: its address, of which nothing is made, goes only when the code is optimised.
+    Functions with a kernel as argument do not qualify: optimisation must first remove its unused address.
     """
     if len(func_ir.blocks) != 1:
         return False
@@ -136,7 +136,7 @@ def _forwards(func_ir: Any) -> bool:
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class InnerLowering(KernelLowering):
-    """To an `InnerLibrary`, without wrappers."""
+    """Lowering to an `InnerLibrary`, without wrappers."""
 
     _name = "inner_lowering"
 
@@ -163,22 +163,22 @@ class InnerLowering(KernelLowering):
 
 @register_pass(mutates_CFG=True, analysis_only=False)
 class KernelRewrites(NopythonRewrites):
-    """numba's rewrites of what has types: of expressions with arrays, and of those indexed by texts."""
+    """Numba's rewrites of typed code, limited to functions with array expressions or string indices."""
 
     _name = "kernel_rewrites"
 
     def run_pass(self, state: Any) -> bool:
-        """Rewrite the function of `state` where it holds either."""
+        """Rewrite the function of `state` if it contains either."""
         if any(isinstance(kind, types.Array | types.misc.StringLiteral) for kind in state.typemap.values()):
             return super().run_pass(state)
         return False
 
 
 class Pipeline(Compiler):
-    """numba's pipeline, with the passes of this module."""
+    """Numba's pipeline with the passes of this module."""
 
     def define_pipelines(self) -> list[PassManager]:
-        """The only one."""
+        """Return the only pipeline."""
         ours = {NativeLowering: InnerLowering if _depth.value > 1 else KernelLowering, NopythonRewrites: KernelRewrites}
         pipeline = DefaultPassBuilder.define_nopython_pipeline(self.state)
         pipeline.passes = [(ours.get(each, each), text) for each, text in pipeline.passes]
@@ -188,34 +188,36 @@ class Pipeline(Compiler):
     def _compile_core(self) -> CompileResult:
         with _nested(), _no_collection():
             result = super()._compile_core()
-        if not is_nested():  # those of the inner functions that it holds
+        if not is_nested():  # environments of its inner functions
             for environment in result._find_referenced_environments():
                 result.library.codegen.set_env(environment.env_name, environment)
-        # numba's own form of the function, only to be printed: most of what Python keeps, and slow to put into text
+        # numba's representation of the function for printing: most of the memory in Python, and slow to format
         return result._replace(type_annotation="")
 
 
 def _widened(kind: types.Type) -> types.Type:
-    """The type of a number, where this is that of a constant."""
+    """Return the plain number type of a constant's type."""
     return types.misc.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
 
 
 class KernelDispatcher(CPUDispatcher):
-    """numba's dispatcher, which compiles a function again when Python calls what was compiled for kernels only."""
+    """Numba's dispatcher, which recompiles a function when Python calls a version compiled for kernels only."""
 
     def __init__(self, *arguments: Any, **options: Any):
         super().__init__(*arguments, pipeline_class=Pipeline, **options)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
-        """One version for all whole numbers and truth values, constant or not, where numba makes one for each constant:
-        LLVM puts constants in where it inlines the function."""
+        """Compile one version for all integers and booleans, constant or not.
+
+        numba would compile one for each constant. LLVM substitutes constants where it inlines the function.
+        """
         one, named = [_widened(kind) for kind in args], {name: _widened(kind) for name, kind in kws.items()}
         return super().get_call_template(tuple(one), named)
 
     def compile(self, sig: Any) -> Any:
-        """Its entry from Python for a signature.
+        """Return the Python entry point for a signature.
 
-        numba's own keeps the time, which is a twentieth of it: every call of LLVM is told to all that wait.
+        Numba's method also measures the time of every LLVM call, which takes a twentieth of the compile time.
         """
         arguments, returns = sigutils.normalize_signature(sig)
         with released_at_end(), global_compiler_lock, self._compiling_counter:
@@ -232,9 +234,9 @@ class KernelDispatcher(CPUDispatcher):
             return result.entry_point
 
     def add_overload(self, cres: CompileResult) -> None:
-        """Offer a version to kernels, and to Python if it is emitted."""
+        """Register a version for kernels, and for Python if it has machine code."""
         if isinstance(cres.library, InnerLibrary):
             self.overloads[tuple(cres.signature.args)] = cres
-            offer(self.targetctx, cres.entry_point, cres.fndesc, cres.library)  # also what came from the disk
+            offer(self.targetctx, cres.entry_point, cres.fndesc, cres.library)  # also versions loaded from disk
         else:
             super().add_overload(cres)

@@ -1,4 +1,4 @@
-"""The state of the sources that modules are made of: their own and, transitively, those that they import."""
+"""Digest of the sources of modules and, transitively, of all modules that they import."""
 
 import hashlib
 import importlib.util
@@ -19,7 +19,7 @@ INSTALLED = {"site-packages", "dist-packages"}
 
 
 class Source(NamedTuple):
-    """One module: its file, the digest of that, and the modules that it imports."""
+    """One module: its file, the digest of the file, and the modules that it imports."""
 
     path: str
     digest: str
@@ -28,7 +28,7 @@ class Source(NamedTuple):
 
 @cache
 def _file(module: str) -> str | None:
-    """The source file of a module, without importing it; None if there is none."""
+    """Return the source file of a module without importing it, or None if there is none."""
     loaded = sys.modules.get(module)
     if loaded is not None:
         path = getattr(loaded, "__file__", None)
@@ -87,7 +87,7 @@ def _kind(package: str) -> str:
 
 @cache
 def _source(module: str) -> Source:
-    """A module that has a file. Of somebody else's package, named with a `*`, only its state as a whole counts."""
+    """Return a module with a file. Of an external package, named with a `*`, only its overall state counts."""
     path = _file(module.rstrip("*")) or ""
     if module.endswith("*"):
         state = os.stat(path)
@@ -109,13 +109,13 @@ def _source(module: str) -> Source:
 
 @cache
 def _reach(module: str) -> frozenset[str]:
-    """A module, all that it imports, and the packages in which they are."""
+    """Return a module, all modules that it imports, and the packages that contain them."""
     found, ahead = {module}, [module]
     while ahead:
         new = set(_source(ahead.pop()).imports) - found
         found |= new
         ahead += new
-    # a package's own file runs before any module in it; what it imports for others is not followed
+    # a package's `__init__.py` runs before its modules; its re-exports are not followed
     parts = [name.split(".") for name in found]
     above = {".".join(p[:n]) for p in parts for n in range(1, len(p))}
     return frozenset(found | {name for name in above if _file(name)})
@@ -134,28 +134,28 @@ def _digest(modules: frozenset[str]) -> str:
 
 
 def digest(modules: Iterable[str]) -> str:
-    """Hexadecimal digits that change with the sources of modules and of all that these import.
+    """Return a hexadecimal digest of the sources of modules and of all modules that they import.
 
-    The standard library does not count, and of an installed package that is not this project's only its date.
+    The standard library is not included, and an external package contributes its date only.
 
     Raises:
-        OSError: a module has no source, or it cannot be read.
+        OSError: a module has no source, or the source cannot be read.
         SyntaxError: a source is not Python.
     """
     return _digest(frozenset(modules))
 
 
 def forget() -> None:
-    """Look at all sources anew: a module has been replaced by another of its name."""
+    """Clear the stored digests, after a module was replaced by another one with the same name."""
     for remembered in (_file, _folders, _entries, _kind, _source, _reach, _all, _digest):
         remembered.cache_clear()
 
 
 def unchanged(modules: Iterable[str]) -> bool:
-    """Are these sources those that this process runs? Not so if a file has changed since it began."""
+    """Return True if this process executes these sources: no file has changed since it started."""
     try:
         states = [os.stat(path) for name in _all(frozenset(modules)) if (path := _source(name).path)]
     except OSError:
         return False
-    # a file that is moved here keeps its time of modification, not that of its entry
+    # a moved file keeps its modification time (mtime), but gets a new ctime
     return all(max(state.st_mtime, state.st_ctime) < BEGAN for state in states)

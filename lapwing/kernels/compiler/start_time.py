@@ -1,4 +1,4 @@
-"""Time at which this process read its first source with kernels; imported before numba, which takes long."""
+"""Time at which this process read its first source with kernels; imported before numba, which loads slowly."""
 
 import time
 

@@ -1,12 +1,11 @@
-"""Elementary functions that give the same bits on every machine, in place of Python's `math`.
+"""Elementary functions with bit-for-bit identical results on every machine, in place of Python's `math`.
 
     from lapwing.kernels import math
 
-Functions that the C library would round in its own way are computed here
-(docs/explanation/elementary_functions.md); the others,
-which IEEE 754 or integer arithmetic determines, and the constants are those of Python's `math`. In compiled code every
-function is a kernel. Called from Python it runs as plain Python on the same operations, with the same result.
-Differences from Python's `math`: where it raises a ValueError or OverflowError, the result is NaN or infinite.
+Functions whose rounding depends on the C library are computed here (docs/explanation/elementary_functions.md).
+Functions that IEEE 754 or integer arithmetic determines, and the constants, are those of Python's `math`. In compiled
+code every function is a kernel. Called from Python, it executes the same operations as plain Python, with the same
+result. Where Python's `math` raises a ValueError or OverflowError, the result is NaN or infinite.
 """
 
 from math import (

@@ -1,4 +1,4 @@
-"""Functions that are plain Python when Python calls them, and the kernel of the same source in compiled code."""
+"""Functions that run as plain Python when called from Python, and as a kernel of the same source in compiled code."""
 
 import inspect
 from collections.abc import Callable
@@ -19,12 +19,12 @@ PURE = ("memory(none)", "nounwind", "willreturn", "noinline")
 
 
 def exported(kernel: Any, *, inline: bool = False) -> Callable[..., Any]:
-    """Return the plain Python function of a kernel of floats, which stands for the kernel in compiled code.
+    """Return the plain Python function of a kernel of floats, which compiled code replaces by the kernel.
 
     Args:
-        kernel: always inlined where it is called as a kernel.
-        inline: whether its calls are inlined. If not, LLVM takes them for calls of a pure function: it moves and merges
-            them as those of the C library, and optimises the function once instead of at every call.
+        kernel: compiled function, inlined where it is called as a kernel.
+        inline: True to inline its calls. Otherwise LLVM treats them as calls of a pure function: it moves and merges
+            them like calls of the C library, and optimises the function once instead of at every call.
     """
     plain: Callable[..., Any] = python_function(kernel)
     compiled_as(plain, kernel, inline=inline)
@@ -32,12 +32,12 @@ def exported(kernel: Any, *, inline: bool = False) -> Callable[..., Any]:
 
 
 def compiled_as(function: Callable[..., Any], kernel: Any, *, inline: bool = False) -> None:
-    """Let a function of numbers be a kernel of floats in compiled code; see `exported` for arguments."""
+    """Register a kernel of floats as the compiled form of a function of numbers; see `exported` for arguments."""
     if not hasattr(kernel, "py_func"):
         return  # NUMBA_DISABLE_JIT
     floats = (types.float64,) * len(inspect.signature(kernel.py_func).parameters)
-    inner = always_inline(kernel.py_func)  # never called from Python, so that it gets no entry for that
-    inline = inline or not isinstance(inner, KernelDispatcher)  # numba's own passes make no pure functions
+    inner = always_inline(kernel.py_func)  # never called from Python, so it gets no Python entry point
+    inline = inline or not isinstance(inner, KernelDispatcher)  # numba's own passes cannot declare pure functions
 
     class Implementation(AbstractTemplate):
         key = function
@@ -76,7 +76,7 @@ def _declare(context: Any, module: Any, symbol: str, returns: Any, count: int) -
     kind = ir.FunctionType(context.get_value_type(returns), [ir.DoubleType()] * count)
     function = ir.Function(module, kind, symbol)
     for attribute in PURE:
-        set.add(function.attributes, attribute)  # some of which llvmlite would refuse as unknown
+        set.add(function.attributes, attribute)  # llvmlite rejects some of them as unknown
     return function
 
 

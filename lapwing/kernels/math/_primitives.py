@@ -1,4 +1,4 @@
-"""Error-free operations on doubles, access to their bits, and look-up of constants.
+"""Error-free operations on doubles, access to their bits, and lookup of constants.
 
 Everything here is exact, in compiled code and in plain Python alike. Sums: Knuth, "The Art of Computer Programming",
 volume 2, section 4.2.2; Dekker, "A floating-point technique for extending the available precision", Numer. Math. 18
@@ -68,8 +68,8 @@ def table(name: str, values: tuple) -> Callable[[int], Any]:
     """Return the function from an index to the value of a constant table; the index is not checked when compiled.
 
     Args:
-        name: of the constant in compiled code.
-        values: all doubles or all integers.
+        name: name of the constant in compiled code.
+        values: doubles or integers, not mixed.
     """
     kind, number = (_DOUBLE, types.float64) if isinstance(values[0], float) else (_INTEGER, types.int64)
     content = ir.Constant(ir.ArrayType(kind, len(values)), list(values))

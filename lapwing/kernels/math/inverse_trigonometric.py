@@ -70,7 +70,7 @@ def _direction(y, y_low, x, x_low, back, unscaled):
         y_low: rest of y.
         x: >= 0, not 0 if y is.
         x_low: rest of x.
-        back: whether the first coordinate is -x.
+        back: True if the first coordinate is -x.
         unscaled: the smaller of y and x divided by the larger.
     """
     steep = y > x
@@ -85,7 +85,7 @@ def _direction(y, y_low, x, x_low, back, unscaled):
 
 @always_inline
 def atan2(y, x):
-    """Return the angle of the point (x, y) [rad] in [-pi, pi]; zeros and infinities as of C."""
+    """Return the angle of the point (x, y) [rad] in [-pi, pi]; zeros and infinities as in C."""
     if x != x or y != y:
         return x + y
     a, b = abs(x), abs(y)

@@ -62,7 +62,7 @@ def _parts(x, x_low, has_low):
 
 @always_inline
 def log(x):
-    """Return the natural logarithm; -inf of 0, NaN of what is below."""
+    """Return the natural logarithm; -inf for 0, NaN for negative numbers."""
     first, rest = _parts(x, 0.0, False)
     result = select(x == math.inf, x, first + rest)
     return select(x > 0.0, result, select(x == 0.0, -math.inf, math.nan))
@@ -70,7 +70,7 @@ def log(x):
 
 @always_inline
 def log1p(x):
-    """Return log(1 + x), precise for small x; -inf of -1, NaN of what is below."""
+    """Return log(1 + x), precise for small x; -inf for -1, NaN below."""
     if not x > -1.0:
         return -math.inf if x == -1.0 else math.nan
     if x == math.inf or abs(x) < 1e-18:
@@ -82,7 +82,7 @@ def log1p(x):
 
 @always_inline
 def pow(x, y):
-    """Return x to the power y; special cases as of IEEE 754-2019, section 9.2.1 (no error is raised)."""
+    """Return x to the power y; special cases as in IEEE 754-2019, section 9.2.1 (raises no error)."""
     size, order = abs(x), abs(y)
     first, rest = _parts(size, 0.0, False)
     height, height_low = quick_two_sum(first, rest)

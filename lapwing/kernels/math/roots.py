@@ -1,7 +1,7 @@
 """Cube root, and length of a vector in the plane.
 
-The length is a square root, which IEEE 754 rounds correctly, corrected by what an exact square finds (Dekker 1971). The
-cube root follows from a guess of 17 bits, whose cube is exact, by a series in what is left of it.
+The length is a square root, which IEEE 754 rounds correctly, corrected by the residual of its exact square (Dekker
+1971). The cube root is a guess of 17 bits, whose cube is exact, corrected by a series in the residual.
 """
 
 import math

@@ -12,7 +12,7 @@ _hypot = python_function(roots.hypot)
 def hypot(*coordinates: float) -> float:
     """Return the Euclidean length of a vector, without overflow; of two coordinates in compiled code.
 
-    Each coordinate more is one more rounding.
+    Each further coordinate adds one rounding.
     """
     length = 0.0
     for index, coordinate in enumerate(coordinates):
@@ -26,7 +26,7 @@ compiled_as(hypot, roots.hypot)
 def total(values: Iterable[float]) -> float:
     """Return the sum, added one after the other; not in compiled code.
 
-    Python's `sum` of floats compensates rounding errors from version 3.12 on, and has other bits before.
+    Python's `sum` of floats compensates rounding errors since version 3.12, so its bits depend on the version.
     """
     result = 0.0
     for value in values:

@@ -1,4 +1,4 @@
-"""What a test of one effect needs around it."""
+"""Fixtures for tests of a single effect."""
 
 from pathlib import Path
 

@@ -11,7 +11,7 @@ HIGH = Environment(home=Home(46.0, 11.0, 800.0), atmosphere=Atmosphere(100_000.0
 
 @pytest.mark.parametrize("around", [STANDARD, HIGH])
 @pytest.mark.parametrize("height", [0.0, 100.0, 3000.0, 12_000.0])
-def test_it_is_the_atmospheres_at_home_and_above(drone, situation, rotors, around, height):
+def test_density_equals_standard_atmosphere(drone, situation, rotors, around, height):
     (e,) = effects.from_scene({"air_density": {}}, drone, around)
     memory = tangent.py_func(
         e, e.initial_discrete_state(), situation(position=(0, 0, height)), rotors(), (0, 0), 0, 0.004
@@ -22,6 +22,6 @@ def test_it_is_the_atmospheres_at_home_and_above(drone, situation, rotors, aroun
         assert air_density.py_func(e, memory, s, s.air).density == pytest.approx(expected, rel=bound)
 
 
-def test_it_begins_at_home(drone):
+def test_density_starts_at_home_altitude(drone):
     (e,) = effects.from_scene({"air_density": {}}, drone, HIGH)
     assert e.initial_discrete_state()[0] == density(HIGH.atmosphere, 800.0)

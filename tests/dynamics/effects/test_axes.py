@@ -27,7 +27,7 @@ TABLE = {"advance": [-0.2, 0.0, 0.2, 0.4], "angle_deg": [0.0, 90.0], "diameter":
 
 @dataclass
 class Flown:
-    """What acts on a vehicle in the air, in body coordinates."""
+    """Loads on an airborne vehicle, in body coordinates."""
 
     force: np.ndarray
     torque: np.ndarray
@@ -55,7 +55,7 @@ def flown(frame, tables, turn=(0.2, -0.3, 0.5), velocity=(4.0, -2.0, 1.5), omega
 def test_static_thrust_and_moments_by_hand(drone):
     """F = sum T a, M = sum r x T a + s Q a: reaction torque and thrust lie along the axis."""
     frame = airframe(drone, AXES)
-    found = flown(frame, {"rotor_thrust": {}}, velocity=(0, 0, 0), omega=(0, 0, 0))
+    result = flown(frame, {"rotor_thrust": {}}, velocity=(0, 0, 0), omega=(0, 0, 0))
     (e,) = effects.from_scene({"rotor_thrust": {}}, frame)
     force, torque = np.zeros(3), np.zeros(3)
     spins = drone.rotors.spin_direction
@@ -64,8 +64,8 @@ def test_static_thrust_and_moments_by_hand(drone):
         push = STANDARD_DENSITY * e.thrust_constant * w**2 * a
         reaction = STANDARD_DENSITY * e.torque_constant * w**2 * a  # of a rotor that turns clockwise about its axis
         force, torque = force + push, torque + np.cross(r, push) + (reaction if spin == "cw" else -reaction)
-    assert found.force == pytest.approx(force, rel=1e-12)
-    assert found.torque == pytest.approx(torque, rel=1e-12)
+    assert result.force == pytest.approx(force, rel=1e-12)
+    assert result.torque == pytest.approx(torque, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -81,21 +81,21 @@ def test_static_thrust_and_moments_by_hand(drone):
     ],
     ids=lambda tables: " ".join(tables),
 )
-def test_a_vehicle_in_a_turned_body_frame_flies_the_same(drone, tables):
+def test_vehicle_in_turned_body_frame_flies_same(drone, tables):
     """All axes tilted alike, and the hubs turned with them, are the plain vehicle in other coordinates."""
     hubs = [(x, y, 0.1) for x, y, _ in drone.rotors.position]
     Q = Rotation.from_rotvec([0.3, -0.4, 0.2])  # of the vehicle in its body frame
     turn = Rotation.from_rotvec([0.2, -0.3, 0.5])
     plain = flown(airframe(drone, (), hubs), tables, turn.as_rotvec())
     tilted = airframe(drone, [Q.apply((0, 0, 1))] * 4, Q.apply(hubs).tolist())
-    found = flown(tilted, tables, (turn * Q.inv()).as_rotvec(), omega=Q.apply(RATES))
-    assert Q.inv().apply(found.force) == pytest.approx(plain.force, rel=1e-10, abs=1e-10)
-    assert Q.inv().apply(found.torque) == pytest.approx(plain.torque, rel=1e-10, abs=1e-10)
-    assert found.thrust == pytest.approx(plain.thrust, rel=1e-12)
-    assert found.drag == pytest.approx(plain.drag, rel=1e-12)
+    result = flown(tilted, tables, (turn * Q.inv()).as_rotvec(), omega=Q.apply(RATES))
+    assert Q.inv().apply(result.force) == pytest.approx(plain.force, rel=1e-10, abs=1e-10)
+    assert Q.inv().apply(result.torque) == pytest.approx(plain.torque, rel=1e-10, abs=1e-10)
+    assert result.thrust == pytest.approx(plain.thrust, rel=1e-12)
+    assert result.drag == pytest.approx(plain.drag, rel=1e-12)
 
 
-def test_gyroscopic_torque_is_what_keeps_the_angular_momentum(drone):
+def test_gyroscopic_torque_conserves_angular_momentum(drone):
     """-dL/dt of L = -J sum s w a, carried along by a body that turns: by differences of L in the world."""
     frame = airframe(drone, AXES)
     with_it = flown(frame, {"rotor_thrust": {}, "gyroscopic_torque": {}})

@@ -18,14 +18,14 @@ def both(drone, s):
     return static, axial_inflow.py_func(inflow, (), s, NO_FACTORS, static)
 
 
-def test_thrust_falls_linearly_to_nothing_at_the_pitch_speed(drone, situation):
+def test_thrust_decreases_linearly_to_zero_at_pitch_speed(drone, situation):
     pitch_speed = 300.0 / (2 * math.pi) * drone.propeller.pitch
     for part in (-0.4, 0.1, 0.3, 0.5):
         static, total = both(drone, situation(velocity=(0, 0, part * pitch_speed)))
         assert np.array(total.thrust) / static.thrust == pytest.approx(1 - part)
 
 
-def test_induced_torque_falls_with_the_square(drone, situation):
+def test_induced_torque_falls_with_square(drone, situation):
     from lapwing.dynamics.vehicles.propeller import drag_coefficients
 
     profile, induced = drag_coefficients(drone.propeller)
@@ -47,14 +47,14 @@ def test_slope_against_blade_elements(drone, situation):
     assert 1 - total.thrust[0] / static.thrust[0] == pytest.approx(loss, rel=0.1)
 
 
-def test_only_the_axial_air_speed_counts(drone, situation):
+def test_only_axial_air_speed_counts(drone, situation):
     static, total = both(drone, situation(velocity=(4, 1, 2), wind=(0, 1, 2)))
     assert total.thrust == pytest.approx(static.thrust)
     static, total = both(drone, situation(velocity=(2, 0, 0), turn=(0, math.pi / 2, 0)))  # body z is world x
     assert total.thrust[0] < static.thrust[0]
 
 
-def test_a_rotor_at_rest_has_no_loads(drone, situation):
+def test_rotor_at_rest_has_no_loads(drone, situation):
     _, total = both(drone, situation(velocity=(0, 0, -3), speed=(0, 0, 0, 0)))
     assert total == ((0.0,) * 4, (0.0,) * 4)
 
@@ -69,12 +69,12 @@ def test_rolling_and_pitching_are_damped_by_each_hubs_own_speed(drone, situation
         assert turning.torque[k] == pytest.approx(climbing.torque[k])
 
 
-def test_the_damping_of_roll_is_the_slope_of_thrust_over_the_inertia(drone):
+def test_damping_of_roll_is_slope_of_thrust_over_inertia(drone):
     tables = {"rotor_thrust": {}, "axial_inflow": {}}
     p = multirotor.parameters(drone, effects.from_scene(tables, drone))
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=335.0, omega_body=(0.1, 0.0, 0.0))
-    found = multirotor.observe(p, 0, 0.004, state, (32.0,) * 4).angular_acceleration_body[0] / -0.1
+    result = multirotor.observe(p, 0, 0.004, state, (32.0,) * 4).angular_acceleration_body[0] / -0.1
     inflow = p.effects[0]
     slope = inflow.thrust_constant * STANDARD_DENSITY * 335.0 * inflow.turn_per_metre  # [N s/m] of a rotor
-    assert found == pytest.approx(slope * sum(y * y for _, y, _ in drone.rotors.position) / drone.mass.inertia[0])
-    assert found == pytest.approx(4.5, abs=0.2)
+    assert result == pytest.approx(slope * sum(y * y for _, y, _ in drone.rotors.position) / drone.mass.inertia[0])
+    assert result == pytest.approx(4.5, abs=0.2)

@@ -16,7 +16,7 @@ def test_published_open_circuit_curve():
     assert open_circuit_voltage(0.5) == pytest.approx(3.685 + 0.1078 - 0.02945 + 0.0400125, abs=1e-6)
 
 
-def test_empties_by_the_charge_drawn(drone, situation, rotors):
+def test_empties_by_charge_drawn(drone, situation, rotors):
     """Charge lost times capacity is the integral of power over voltage."""
     e, memory = make(drone), make(drone).initial_discrete_state()
     drawn = 0.0
@@ -35,7 +35,7 @@ def test_sags_with_load(drone, situation, rotors):
     assert light[1] - heavy[1] == pytest.approx(12 * 0.002 * (heavy[2] - light[2]), rel=1e-3)
 
 
-def test_motors_get_what_they_ask_for_or_what_there_is(drone):
+def test_motor_voltage_is_limited_by_battery(drone):
     assert battery.py_func(make(drone), (0.5, 40.0, 0.0), (44.4, 30.0, 0.0, 41.0)) == (40.0, 30.0, 0.0, 40.0)
 
 

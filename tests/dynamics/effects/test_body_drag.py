@@ -13,7 +13,7 @@ def drag_world(drone, s, rotors, **table):
     return rotation_of(s) @ force
 
 
-def test_against_the_formula_in_world_coordinates(drone, situation, rotors):
+def test_against_formula_in_world_coordinates(drone, situation, rotors):
     s = situation(velocity=(8, -2, 1), wind=(3, 1, 0), turn=(0.2, -0.3, 0.5))
     v = np.array([5.0, -3.0, 1.0])
     R = rotation_of(s)
@@ -22,7 +22,7 @@ def test_against_the_formula_in_world_coordinates(drone, situation, rotors):
     assert drag_world(drone, s, rotors, linear=[0.1, 0.2, 0.3]) == pytest.approx(expected, rel=1e-12)
 
 
-def test_takes_energy_and_vanishes_with_the_wind(drone, situation, rotors):
+def test_takes_energy_and_vanishes_with_wind(drone, situation, rotors):
     s = situation(velocity=(8, -2, 1), turn=(0.2, -0.3, 0.5))
     assert drag_world(drone, s, rotors) @ (8, -2, 1) < 0
     s = situation(velocity=(3, 1, 0), wind=(3, 1, 0))

@@ -32,7 +32,7 @@ def through(pitch, thrust):
 
 
 @pytest.mark.parametrize("pitch", [1.2, 1.55, 2.0, 3.5])
-def test_induced_power_at_equal_thrusts_is_1_28_times_that_of_both_alone(pitch):
+def test_coaxial_induced_power_is_1_28_times_isolated(pitch):
     """Leishman, on coaxial rotors: 1.281; the lower one alone takes (sqrt 17 - 1) / 2 = 1.562 times the upper's."""
     wash = brentq(lambda w: w * w - share(pitch, w), 1e-3, pitch)  # thrust over thrust is the square of the wash
     lower = through(pitch, share(pitch, wash)) / wash
@@ -40,7 +40,7 @@ def test_induced_power_at_equal_thrusts_is_1_28_times_that_of_both_alone(pitch):
     assert 0.5 * (1.0 + lower) == pytest.approx(1.281, abs=5e-4)
 
 
-def test_at_equal_torques_the_upper_rotor_carries_more():
+def test_at_equal_torques_upper_rotor_carries_more():
     """From u = v + w: T u = T_u v and conservation of momentum and energy, (1 + u)^2 = 2 u^3; T_u / T = u = 1.4376."""
     u = brentq(lambda u: 2.0 * u**3 - (1.0 + u) ** 2, 1.0, 2.0)
     pitch = 1.7
@@ -48,7 +48,7 @@ def test_at_equal_torques_the_upper_rotor_carries_more():
     assert wash**2 / share(pitch, wash) == pytest.approx(u, rel=1e-9)
 
 
-def test_without_a_wake_nothing_changes_and_one_as_fast_as_the_blades_takes_all():
+def test_thrust_loss_without_wake_and_with_wake_at_pitch_speed():
     assert share(1.5, 0.0) == 1.0
     assert share(1.5, 1.5 - 1e-9) == pytest.approx(0.0, abs=1e-6)
     assert share(1.5, 2.0) == 0.0
@@ -63,7 +63,7 @@ def loads(frame, tables, velocity=(0.0, 0.0, 0.0), speeds=(300.0,) * 8, turn=(0.
     return np.array(rotors.thrust), np.array(rotors.torque)
 
 
-def test_the_lower_rotor_loses_thrust_and_the_upper_does_not(drone):
+def test_lower_rotor_loses_thrust_and_upper_does_not(drone):
     """Thrust and induced power of the lower rotor meet the momentum theory of its disc; its profile power stays."""
     frame = stacked(drone)
     plain, drag = loads(frame, {"rotor_thrust": {}})
@@ -81,23 +81,23 @@ def test_the_lower_rotor_loses_thrust_and_the_upper_does_not(drone):
     assert (torque - drag)[0] * 300.0 == pytest.approx(thrust[0] * u - plain[0] * v, rel=1e-9)
 
 
-def test_a_lost_upper_propeller_has_no_wake(drone):
+def test_lost_upper_propeller_has_no_wake(drone):
     tables = {"rotor_thrust": {}, "coaxial_interference": {}}
     stopped = loads(stacked(drone), tables, speeds=(300.0, 0.0) * 4)[0]
     assert stopped[::2] == pytest.approx(loads(stacked(drone), {"rotor_thrust": {}})[0][::2])
 
 
-def test_fast_flight_carries_the_wake_away(drone):
+def test_fast_flight_carries_wake_away(drone):
     frame, tables = stacked(drone), {"rotor_thrust": {}, "coaxial_interference": {}}
-    found = [loads(frame, tables, (v, 0.0, 0.0))[0][0] for v in (0.0, 10.0, 20.0, 60.0)]
-    assert np.all(np.diff(found) >= 0.0)
-    assert found[-1] == pytest.approx(loads(frame, {"rotor_thrust": {}})[0][0])
+    result = [loads(frame, tables, (v, 0.0, 0.0))[0][0] for v in (0.0, 10.0, 20.0, 60.0)]
+    assert np.all(np.diff(result) >= 0.0)
+    assert result[-1] == pytest.approx(loads(frame, {"rotor_thrust": {}})[0][0])
 
 
 BOTH = {"rotor_thrust": {}, "coaxial_interference": {}}
 
 
-def test_slopes_are_those_of_the_plant(drone):
+def test_slopes_are_those_of_plant(drone):
     """Central differences of the plant's own loads over what each rotor would give by itself."""
     frame = stacked(drone)
     e, rotor = effects.from_scene(BOTH, frame)
@@ -112,7 +112,7 @@ def test_slopes_are_those_of_the_plant(drone):
         assert np.array(slopes.torque)[:, j] + own == pytest.approx(torque, abs=1e-8)
 
 
-def test_along_one_speed_of_all_rotors_the_slopes_give_the_loads_themselves(drone):
+def test_slopes_give_loads_at_equal_rotor_speeds(drone):
     """Euler's theorem: loads are homogeneous in the squares of the speeds."""
     e, _ = effects.from_scene(BOTH, stacked(drone))
     slopes, t = e.slopes(), share(e.pitch, 1.0)
@@ -122,13 +122,13 @@ def test_along_one_speed_of_all_rotors_the_slopes_give_the_loads_themselves(dron
 
 
 @pytest.mark.parametrize("velocity", [(0.0, 0.0, 0.0), (9.0, 0.0, 2.0), (0.0, 4.0, -1.0)])
-def test_changes_are_what_the_plant_adds(drone, velocity):
+def test_load_changes_equal_those_of_plant(drone, velocity):
     frame = stacked(drone)
     e, _ = effects.from_scene(BOTH, frame)
     across, axial = math.hypot(*velocity[:2]), velocity[2]
     with_wash, without = loads(frame, BOTH, velocity), loads(frame, {"rotor_thrust": {}}, velocity)
-    found = 1.225 * np.array(e.changes(300.0, axial, across)).T
-    assert found == pytest.approx(np.array(with_wash) - np.array(without), abs=1e-10)
+    result = 1.225 * np.array(e.changes(300.0, axial, across)).T
+    assert result == pytest.approx(np.array(with_wash) - np.array(without), abs=1e-10)
 
 
 @pytest.mark.parametrize(

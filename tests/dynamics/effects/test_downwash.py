@@ -29,11 +29,11 @@ def wind(offset, *others):
     return np.array(blown(WASH, NO_WIND, NeighbourState(place), others or (hovering(),), 0.004))
 
 
-def test_the_disc_is_as_large_as_those_of_four_rotors():
+def test_disc_is_as_large_as_those_of_four_rotors():
     assert math.pi * R * R == pytest.approx(4.0 * math.pi * 0.128**2)
 
 
-def test_on_the_axis_it_goes_from_the_induced_velocity_to_twice_that_and_spreads():
+def test_axial_velocity_doubles_and_jet_spreads():
     assert wind((0.0, 0.0, 0.0)) == pytest.approx((0.0, 0.0, -INDUCED))
     assert np.linalg.norm(wind((0.0, 0.0, 10.0 * R))) < 0.01 * INDUCED  # above
     for way in (5.0, 20.0):
@@ -42,7 +42,7 @@ def test_on_the_axis_it_goes_from_the_induced_velocity_to_twice_that_and_spreads
         assert wind((0.0, 0.0, -way)) == pytest.approx((0.0, 0.0, -expected))
 
 
-def test_half_of_the_speed_is_where_the_round_jet_of_pope_has_it():
+def test_half_width_equals_round_jet_of_pope():
     """Half width 0.094 m a metre of way, once the disc's own size no longer counts."""
     far = 1000.0
     half = 0.094 * (far + R / 0.113)
@@ -50,7 +50,7 @@ def test_half_of_the_speed_is_where_the_round_jet_of_pope_has_it():
 
 
 @pytest.mark.parametrize("way", [3.0, 10.0])
-def test_its_momentum_is_the_thrust(way):
+def test_wake_momentum_equals_thrust(way):
     """The flux of momentum through a plane below."""
     radius = np.linspace(0.0, 6.0 * (R + 0.113 * way), 2001)
     speed = np.array([-wind((r, 0.0, -way))[2] for r in radius])
@@ -60,7 +60,7 @@ def test_its_momentum_is_the_thrust(way):
     assert flux == pytest.approx(WEIGHT, rel=0.01)
 
 
-def test_it_blows_against_the_thrust_and_many_add_up():
+def test_wake_opposes_thrust_and_wakes_add_up():
     leaning = hovering((WEIGHT, 0.0, 0.0))
     assert wind((-2.0, 0.0, 0.0), leaning)[0] < -0.5 * INDUCED
     assert wind((2.0, 0.0, 0.0), leaning) == pytest.approx((0.0, 0.0, 0.0), abs=0.02 * INDUCED)
@@ -69,3 +69,31 @@ def test_it_blows_against_the_thrust_and_many_add_up():
 
 def test_no_jet_without_thrust_or_of_one_that_names_no_wash():
     assert not wind((0.0, 0.0, -1.0), hovering(NO_WIND), hovering(disc_radius=0.0)).any()
+
+
+OPPOSITE = 2.0 * math.hypot(0.13, 0.22)  # [m] the largest distance between rotors
+
+
+def axial(core, way):
+    wash = from_scene({"downwash": {"core": core}}, QUAD)[0]
+    place = NeighbourState((1.0, 2.0, 50.0 - way))
+    return -blown(wash, NO_WIND, place, (hovering(),), 0.004)[2]
+
+
+def test_jet_spreads_only_beyond_its_core():
+    """2.5 distances of opposite rotors: developed wake above, jet of the same momentum below."""
+    core = 2.5 * OPPOSITE
+    for way in (0.5 * core, core):
+        assert axial(2.5, way) == pytest.approx(INDUCED * (1.0 + way / math.hypot(way, R)))
+    assert axial(2.5, core + 3.0) == pytest.approx(2.0 * INDUCED * R / (R + 0.113 * 3.0), rel=1e-3)
+    assert axial(2.5, core + 3.0) > axial(0.0, core + 3.0)
+
+
+@pytest.mark.parametrize(("published", "difference"), [(6.06, 0.04), (5.8, 0.08)])
+def test_far_field_follows_published_decay(published, difference):
+    """U = B sqrt(4 T / pi rho) / (x - x_0): Panchapakesan and Lumley 6.06, Hussein, Capp and George 5.8 (Pope, 5.1)."""
+    origin = 2.5 * OPPOSITE - R / 0.113
+    for way in (20.0, 60.0, 200.0):
+        expected = published * math.sqrt(4.0 * WEIGHT / (math.pi * DENSITY)) / (way - origin)
+        assert axial(2.5, way) == pytest.approx(expected, rel=difference)
+        assert axial(2.5, way) > expected

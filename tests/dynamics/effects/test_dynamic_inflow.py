@@ -32,7 +32,7 @@ def loads(e, static, memory, s):
     return before, dynamic_inflow.py_func(e, memory, s, NO_FACTORS, before)
 
 
-def test_nothing_changes_in_hover(drone, situation, rotors):
+def test_hover_loads_are_static(drone, situation, rotors):
     e, static = make(drone)
     s = situation()
     memory = settled(e, s, rotors)
@@ -62,6 +62,25 @@ def test_blades_and_disc_agree(drone, situation, rotors, velocity):
     assert after.torque[0] * SPEED == pytest.approx(static_power + thrust * (climb + v), rel=1e-6)
 
 
+@pytest.mark.parametrize("velocity", [(0, 0, 0), (0, 0, 2), (8, 0, 0)])
+def test_induced_power_factor_scales_flow(drone, situation, rotors, velocity):
+    """Solved independently: the flow is 1.15 times that of momentum theory for the thrust; static loads stay."""
+    propeller = drone.propeller.model_copy(update={"induced_power_factor": 1.15})
+    e, static = make(drone.model_copy(update={"propeller": propeller}))
+    s = situation(velocity=velocity)
+    across, climb = math.hypot(*velocity[:2]), velocity[2]
+
+    def difference(v):
+        blades = e.slope * SPEED * (drone.propeller.pitch / (2 * math.pi) * SPEED - climb - v)
+        return blades - 2 * e.area * v / 1.15 * math.hypot(across, climb + v / 1.15)
+
+    memory = settled(e, s, rotors)
+    assert memory == pytest.approx([brentq(difference, 0.0, 20.0)] * 4, rel=1e-6)
+    if not any(velocity):
+        before, after = loads(e, static, memory, s)
+        assert np.array(after) == pytest.approx(np.array(before))
+
+
 def test_translational_lift_and_descent(drone, situation, rotors):
     """Forward flight thins the flow: more thrust for less power; slow descent thickens it more than climb thins it."""
     e, static = make(drone)
@@ -76,7 +95,7 @@ def test_translational_lift_and_descent(drone, situation, rotors):
     assert abs(thrust[3] - thrust[0]) < 0.5 * abs(thrust[2] - thrust[0])
 
 
-def test_the_flow_follows_as_the_apparent_mass_says(drone, situation, rotors):
+def test_inflow_rate_follows_apparent_mass(drone, situation, rotors):
     """About hover m v' = -(4 rho A v_h + slope rho w) (v - v_h), with 0.637 of a sphere of air."""
     e, _ = make(drone)
     s = situation()
@@ -98,7 +117,7 @@ def test_each_hub_has_its_own_speed(drone, situation, rotors):
     assert after.thrust[0] == pytest.approx(after.thrust[1])
 
 
-def test_a_rotor_at_rest(drone, situation, rotors):
+def test_rotor_at_rest(drone, situation, rotors):
     e, static = make(drone)
     s = situation(speed=(0.0,) * 4, velocity=(3, 0, -2))
     memory = settled(e, s, rotors)
@@ -106,7 +125,7 @@ def test_a_rotor_at_rest(drone, situation, rotors):
     assert loads(e, static, memory, s)[1] == ((0.0,) * 4, (0.0,) * 4)
 
 
-def test_it_excludes_rotor_inflow_and_a_pitch_too_small(drone):
+def test_axial_inflow_and_small_pitch_are_rejected(drone):
     with pytest.raises(ConfigError, match=r"both are a flow through the rotors"):
         effects.from_scene({"axial_inflow": {}, "dynamic_inflow": {}}, drone)
     flat = drone.model_copy(update={"propeller": drone.propeller.model_copy(update={"pitch": 0.02})})

@@ -8,7 +8,6 @@ import pytest
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects import ground_contact
-from lapwing.dynamics.effects._contact_parameters import FREE, NOWHERE, SLIDING, STICKING
 from lapwing.dynamics.effects._types import Motion
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.quaternion import Quaternion
@@ -19,7 +18,6 @@ from lapwing.kernels import kernel, python_function
 add, apply, apply_transposed, cross, dot, norm, scale, subtract, rotation_matrix = map(
     python_function, (add, apply, apply_transposed, cross, dot, norm, scale, subtract, quaternion.rotation_matrix)
 )
-STEP = 1e-3
 GROUNDS = {"level": LEVEL, "relief": relief((2e-4, -1e-4), bump_height=2e-5, bump_length=0.7)}
 
 
@@ -34,7 +32,7 @@ def anchored(e, memory, s):
         ground_contact.ground_contact(e, memory, s, 0.0),
         ground_contact.forces(e, memory, s.motion),
         ground_contact.touches(e, memory, s),
-        ground_contact.drag_anchors(e, memory, s.motion, STEP),
+        ground_contact.stretching(e, memory, s.motion),
     )
 
 
@@ -62,20 +60,25 @@ class Foot:
         push = e.stiffness * self.depth + e.damping * self.approach
         self.press = max(onset * onset * (3.0 - 2.0 * onset) * push, 0.0) if self.depth > 0.0 else 0.0
 
-    def spring(self, anchor):
-        k, n = 0.0 if anchor[3] == FREE else self.e.tangential_stiffness, self.normal
-        pull = scale(k, subtract(anchor, self.place))
-        return (pull[0], pull[1], -(n[0] * pull[0] + n[1] * pull[1]) / n[2])
-
-    def trial(self, anchor):
-        limit = (self.e.static if anchor[3] == STICKING else self.e.dynamic) * self.press
-        return subtract(self.spring(anchor), scale(self.e.damping, self.slip)), limit
+    def element(self, deflection):
+        """Return (friction force, rate of the deflection, "sticks" or "slides" or "flies")."""
+        e, n = self.e, self.normal
+        pull = scale(e.tangential_stiffness, deflection)
+        if self.press <= 0.0:
+            return ZERO, scale(-e.tangential_stiffness / e.tangential_damping, deflection), "flies"
+        along = subtract(pull, scale(dot(pull, n), n))
+        stretched = add(along, scale(e.tangential_damping, self.slip))
+        y = min(math.sqrt(dot(self.slip, self.slip)) * e.inverse_stiction, 1.0)
+        limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * self.press
+        square = dot(stretched, stretched)
+        slides = square > limit * limit
+        held = scale(limit / math.sqrt(square), stretched) if slides else stretched
+        rate = scale(1.0 / e.tangential_damping, subtract(held, pull))
+        return scale(-1.0, held), rate, "slides" if slides else "sticks"
 
     def friction(self, memory):
         if memory:
-            trial, limit = self.trial(memory)
-            square = dot(trial, trial)
-            return scale(limit / math.sqrt(square), trial) if square > limit * limit else trial
+            return self.element(memory)[0]
         e, speed = self.e, norm(self.slip)
         x = speed * e.inverse_critical
         if x < 1.0:
@@ -87,22 +90,6 @@ class Foot:
     def force(self, memory):
         return add(scale(self.press, self.normal), self.friction(memory)) if self.press > 0.0 else ZERO
 
-    def settled(self, anchor):
-        if self.press <= 0.0:
-            return NOWHERE
-        e, square = self.e, dot(self.slip, self.slip)
-        if anchor[3] == FREE:
-            since = min(STEP, self.depth / self.approach) if self.approach > 0.0 else STEP
-            anchor = (*subtract(self.place, scale(since, self.slip)), SLIDING, square)
-        trial, limit = self.trial(anchor)
-        if dot(trial, trial) <= limit * limit:
-            return (anchor[0], anchor[1], 0.0, STICKING, square)
-        caught = square < min(e.square_stiction_velocity, anchor[4])
-        limit, pull = (e.static if caught else e.dynamic) * self.press, norm(self.spring(anchor))
-        kept = limit / pull if pull > limit else 1.0
-        dragged = add(self.place, scale(kept, subtract(anchor, self.place)))
-        return (dragged[0], dragged[1], 0.0, STICKING if caught else SLIDING, square)
-
 
 def drawn(rng, e):
     """A vehicle near the ground with its feet at all heights within a tenth of a millimetre or so of it."""
@@ -112,19 +99,15 @@ def drawn(rng, e):
     velocity, omega = (tuple(map(float, rng.normal(scale=10.0 ** rng.uniform(-4, 0), size=3))) for _ in range(2))
     s = Seen(Motion(place, attitude, velocity, omega, (0.0,) * 4), rotation_matrix(attitude))
     memory = []
-    for foot in e.feet:
-        at = Foot(e, s, foot).place if hasattr(e, "tangential_stiffness") else None
-        off = rng.normal(scale=10.0 ** rng.uniform(-6, -3), size=2)
-        how = float(rng.integers(3))
-        square = float(10.0 ** rng.uniform(-8, 0))
-        anchor = (at[0] + float(off[0]), at[1] + float(off[1]), 0.0, how, square) if at else ()
-        memory.append(NOWHERE if at and how == FREE else anchor)
+    for _ in e.feet:
+        off = rng.normal(scale=10.0 ** rng.uniform(-6, -3), size=3)
+        memory.append(tuple(map(float, off)) if hasattr(e, "tangential_stiffness") else ())
     return s, tuple(memory)
 
 
 @pytest.mark.parametrize("ground", GROUNDS)
 @pytest.mark.parametrize("law", ["stick_slip", "regularised"])
-def test_each_foot_does_what_it_does_alone(drone, law, ground):
+def test_feet_are_independent(drone, law, ground):
     (e,) = effects.from_scene({"ground_contact": {"friction": law}}, drone)
     e = e._replace(feet=(*e.feet[:4], (0.01, 0.0, -0.3501)), terrain=GROUNDS[ground])
     rng, kinds = np.random.default_rng(1), set()
@@ -141,6 +124,7 @@ def test_each_foot_does_what_it_does_alone(drone, law, ground):
         assert points == tuple((foot.place, push) for foot, push in zip(feet, alone, strict=True))
         assert touches == any(foot.press > 0.0 for foot in feet)
         if law == "stick_slip":
-            assert settled == [tuple(foot.settled(anchor) for foot, anchor in zip(feet, memory, strict=True))]
-            kinds |= {(before[3], after[3]) for before, after in zip(memory, settled[0], strict=True)}
-    assert law == "regularised" or len(kinds) == 9  # every change between free, sticking and sliding has been seen
+            each = [foot.element(deflection) for foot, deflection in zip(feet, memory, strict=True)]
+            assert settled == [tuple(rate for _, rate, _ in each)]
+            kinds |= {kind for *_, kind in each}
+    assert law == "regularised" or kinds == {"flies", "sticks", "slides"}

@@ -15,13 +15,13 @@ def test_law_of_cheeseman_and_bennett(height, expected):
     assert gain(height) == pytest.approx(expected, rel=1e-14)
 
 
-def test_falls_with_height_without_a_step():
+def test_falls_with_height_without_step():
     values = np.array([gain(z) for z in np.linspace(0.5, 8.5, 4001)])
     assert (np.diff(values) <= 0).all()
     assert np.abs(np.diff(values[2000:])).max() < 1e-5
 
 
-def test_a_lower_rotor_gets_more(drone, situation):
+def test_lower_rotor_gets_more(drone, situation):
     (e,) = effects.from_scene({"ground_effect": {}}, drone)
     level = ground_effect.py_func(e, (), situation(position=(0, 0, 2 * RADIUS)), NO_FACTORS)
     assert level.thrust == pytest.approx([64 / 63] * 4)
@@ -30,7 +30,7 @@ def test_a_lower_rotor_gets_more(drone, situation):
     assert rolled.thrust[2] > 64 / 63 > rolled.thrust[0]  # rolled to the right: rotors 3 and 4 are low
 
 
-def test_sleeps_only_where_it_does_nothing(drone, situation):
+def test_ground_effect_sleeps_only_without_influence(drone, situation):
     (e,) = effects.from_scene({"ground_effect": {}}, drone)
     motion = situation(position=(0, 0, e.highest + 0.01), velocity=(0, 0, -4)).motion
     assert high.py_func(e, (), motion, 0.001)

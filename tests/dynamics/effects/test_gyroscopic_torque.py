@@ -5,7 +5,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.gyroscopic_torque import gyroscopic_torque
 
 
-def test_torque_is_minus_the_change_of_the_rotors_momentum(drone, situation, rotors):
+def test_torque_is_minus_change_of_rotors_momentum(drone, situation, rotors):
     """Rotor k turns at -sign_k w_k about body z: torque on the body -(L' + omega x L)."""
     (e,) = effects.from_scene({"gyroscopic_torque": {}}, drone)
     speed, acceleration = (300, 310, 280, 350), (50.0, -20.0, 70.0, 10.0)

@@ -6,7 +6,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.h_force import h_force
 
 
-def test_is_the_sum_over_the_rotors(drone, situation, rotors):
+def test_is_sum_over_rotors(drone, situation, rotors):
     """Each rotor by itself: force -rho c w (v + omega x r), in its plane, at r."""
     lifted = drone.model_copy(
         update={
@@ -28,7 +28,7 @@ def test_is_the_sum_over_the_rotors(drone, situation, rotors):
     assert result[1] == pytest.approx(torque, rel=1e-12)
 
 
-def test_default_coefficient_is_the_h_force_of_blade_element_theory(drone):
+def test_default_coefficient_is_h_force_of_blade_element_theory(drone):
     """C_H = sigma c_d mu / 4, with thrust-coefficient scaling rho A (w R)^2."""
     (e,) = effects.from_scene({"h_force": {}}, drone)
     radius, chord = 0.2794, 0.5588 / 5

@@ -16,7 +16,7 @@ def make(drone, **table):
     return e
 
 
-def test_force_of_a_steady_wind_is_the_source_formula(drone, situation, rotors):
+def test_force_of_steady_wind_is_source_formula(drone, situation, rotors):
     e = make(drone, sigma=0.0)
     s = situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.004)
@@ -44,7 +44,7 @@ def test_depends_on_tick_and_key_only(drone, situation, rotors):
     assert one != draw.py_func(e, e.initial_discrete_state(), s, rotors(), stream_key(4, "drone1", "effects"), 7, 0.004)
 
 
-def test_the_wind_that_makes_the_force_is_told(drone, situation, rotors):
+def test_wind_of_force_is_reported(drone, situation, rotors):
     """The truth's wind: 0 before, though the vehicle was blown about."""
     e, s = make(drone), situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 5, 0.004)
@@ -60,7 +60,7 @@ def series(e, s, rotors, key, interval, out):
         out[tick, 0], out[tick, 1] = force[0], wind[0]
 
 
-def test_the_spectrum_does_not_depend_on_the_exchange_interval(drone, situation, rotors):
+def test_spectrum_does_not_depend_on_exchange_interval(drone, situation, rotors):
     """sigma^2 T, two-sided, below the frequency of the draws, for wind and (linearised about the mean) for force."""
     e, densities, means = make(drone), [], []
     for interval in (0.001, 0.004, 0.01, 0.02):
@@ -74,7 +74,7 @@ def test_the_spectrum_does_not_depend_on_the_exchange_interval(drone, situation,
     assert means == pytest.approx([means[1]] * 4, rel=0.01)
 
 
-def test_a_draw_is_shared_by_the_exchanges_within_it_and_averaged_over_long_ones(drone, situation, rotors):
+def test_draw_is_shared_by_ticks_and_averaged_over_long_ones(drone, situation, rotors):
     e, s = make(drone), situation()
 
     def at(tick, interval):

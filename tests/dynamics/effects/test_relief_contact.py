@@ -55,14 +55,14 @@ def test_lands_on_bumps_on_three_feet_at_least(drone, place):
 
 
 @pytest.mark.parametrize(("x", "ground"), [(0.0, 0.0), (1.5, 0.1), (3.0, -0.3)])
-def test_lands_on_the_treads_of_a_stair(drone, x, ground):
+def test_lands_on_treads_of_stair(drone, x, ground):
     p = vehicle(drone, STAIR)
     m = run(p, dropped(p, (x, 0.0, 0.6), (0.0, 0.0, -0.5)), 3.0).motion
     assert still(m)
     assert m.position_world[2] == pytest.approx(ground + HEIGHT, abs=1e-4)
 
 
-def test_a_grid_is_the_slope_that_its_points_are(drone):
+def test_grid_is_slope_that_its_points_are(drone):
     slope = relief(slope=(0.1, 0.0))
     ends = []
     for terrain in (slope, GRID):
@@ -74,7 +74,7 @@ def test_a_grid_is_the_slope_that_its_points_are(drone):
     assert ends[0] == pytest.approx(ends[1], abs=1e-9)
 
 
-def test_slides_off_an_edge_and_falls(drone):
+def test_slides_off_edge_and_falls(drone):
     """0.7 m before the edge at 3 m/s; the tread below lies 0.4 m lower."""
     p = vehicle(drone, STAIR)
     start = dropped(p, (1.3, 0.0, 0.1 + HEIGHT), (3.0, 0.0, 0.0))
@@ -86,7 +86,7 @@ def test_slides_off_an_edge_and_falls(drone):
     assert feet_over_ground(drone, STAIR, after).min() > -1e-3
 
 
-def test_stops_at_a_wall_and_does_not_climb_it(drone):
+def test_vehicle_stops_at_wall(drone):
     wall = relief(boxes=[(2.0, 0.0, 1.0, 9.0, 0.0, 3.0)])
     p = vehicle(drone, wall)
     highest, state = 0.0, dropped(p, (0.9, 0.0, HEIGHT), (2.0, 0.0, 0.0))
@@ -103,7 +103,7 @@ def test_stops_at_a_wall_and_does_not_climb_it(drone):
     assert max(energy) < energy[0] * (1.0 + 1e-3)
 
 
-def test_stands_on_a_pillar_and_falls_beside_it(drone):
+def test_vehicle_rests_on_pillar_and_falls_next_to_it(drone):
     pillar = relief(cylinders=[(0.0, 0.0, 0.4, 1.0)])
     p = vehicle(drone, pillar)
     on = run(p, dropped(p, (0.0, 0.0, 1.4), (0.0, 0.0, -0.3)), 3.0).motion

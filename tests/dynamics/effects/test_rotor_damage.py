@@ -16,7 +16,7 @@ def test_one_rotor_from_its_time(drone, situation, rotors):
     assert hurt == ((1.0, 0.6, 1.0, 1.0), (1.0, 1.1, 1.0, 1.0))
 
 
-def test_a_rotor_that_is_not_there(drone):
+def test_missing_rotor_is_rejected(drone):
     with pytest.raises(
         ValueError, match=r"effects.rotor_damage.rotor: expected one of the vehicle's rotors, 1 to 4, got 5"
     ):

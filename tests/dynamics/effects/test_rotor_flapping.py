@@ -17,7 +17,7 @@ def make(drone, **table):
     return e
 
 
-def test_thrust_tilts_back_with_the_advance_ratio(drone, situation, rotors):
+def test_thrust_tilts_with_advance_ratio(drone, situation, rotors):
     """8 m/s at 300 rad/s: mu = 0.0954; against the way through the air, whatever the heading."""
     e, mu = make(drone, coefficient=0.3), 8.0 / (300.0 * R)
     tilt = 0.3 * mu / (1 - mu**2 / 2)
@@ -28,7 +28,7 @@ def test_thrust_tilts_back_with_the_advance_ratio(drone, situation, rotors):
     assert force == pytest.approx((0.0, 4 * 25.0 * tilt, 0.0))
 
 
-def test_the_coefficient_of_the_propeller(drone):
+def test_coefficient_of_propeller(drone):
     """4 theta_t - 2 lambda: tip angle 0.107 rad, v_h / (w R) from the static thrust at any speed."""
     thrust = effects.from_scene({"rotor_thrust": {}}, drone)[0].thrust_constant * 300.0**2  # over the density
     inflow = math.sqrt(thrust / (2 * math.pi * R**2)) / (300.0 * R)
@@ -36,7 +36,7 @@ def test_the_coefficient_of_the_propeller(drone):
     assert 0.2 < make(drone).coefficient < 0.4
 
 
-def test_a_stiff_hub_pitches_the_nose_up(drone, situation, rotors):
+def test_stiff_hub_pitches_nose_up(drone, situation, rotors):
     """Flying ahead: minus y in FLU; flying to the left: rolls to the right, plus x."""
     e, mu = make(drone, coefficient=0.3, stiffness=2.0), 8.0 / (300.0 * R)
     moment = 4 * 2.0 * 0.3 * mu / (1 - mu**2 / 2)
@@ -46,18 +46,18 @@ def test_a_stiff_hub_pitches_the_nose_up(drone, situation, rotors):
     assert left == pytest.approx((moment, 0.0, 0.0), abs=1e-12)
 
 
-def test_at_low_speed_it_has_the_form_of_h_force(drone, situation, rotors):
+def test_low_speed_force_has_form_of_h_force(drone, situation, rotors):
     """T = k_T rho w^2: a force -rho (k_T k / R) w v on each rotor, turning included."""
     static = effects.from_scene({"rotor_thrust": {}}, drone)[0].thrust_constant
     e = make(drone, coefficient=0.3)
     (same,) = effects.from_scene({"h_force": {"coefficient": 0.3 * static / R}}, drone)
     s = situation(velocity=(0.02, -0.03, 0), omega=(0.01, 0.02, 0.05), speed=(300.0,) * 4)
     pushed = rotors(thrust=static * 1.2 * 300.0**2)
-    found, expected = rotor_flapping.py_func(e, (), s, pushed), h_force.py_func(same, (), s, pushed)
-    assert np.array(found) == pytest.approx(np.array(expected), rel=1e-6, abs=1e-12)
+    result, expected = rotor_flapping.py_func(e, (), s, pushed), h_force.py_func(same, (), s, pushed)
+    assert np.array(result) == pytest.approx(np.array(expected), rel=1e-6, abs=1e-12)
 
 
-def test_beyond_its_range_the_tilt_is_held(drone, situation, rotors):
+def test_tilt_is_limited_beyond_valid_range(drone, situation, rotors):
     e = make(drone, coefficient=0.3)
     force, _ = rotor_flapping.py_func(e, (), situation(velocity=(0, 900.0, 0)), rotors(thrust=25.0))
     assert force == pytest.approx((0.0, -100.0 * 0.3 * 0.5 / (1 - 0.125), 0.0))

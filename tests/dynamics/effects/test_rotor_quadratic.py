@@ -12,7 +12,7 @@ def test_loads(drone, situation):
     assert loads.torque == pytest.approx([7e-3, 28e-3, 0.0, 1.75e-3])
 
 
-def test_excludes_the_other_model(drone):
+def test_excludes_other_model(drone):
     with pytest.raises(ValueError, match=r"effects.rotor_thrust: excludes effects.rotor_quadratic"):
         effects.from_scene(
             {"rotor_thrust": {}, "rotor_quadratic": {"thrust_constant": 1.0, "torque_constant": 1.0}}, drone

@@ -28,13 +28,13 @@ def loads(e, s):
     return rotor_table.py_func(e, (), s, NO_FACTORS, NO_LOADS)
 
 
-def test_the_definitions_of_the_coefficients(drone, situation, tmp_path):
+def test_definitions_of_coefficients(drone, situation, tmp_path):
     """T = C_T rho n^2 D^4, P = C_P rho n^3 D^5 at rest, at J = 0.2 and between rows."""
     e = make(drone, tmp_path)
     for j, ct, cp in ((0.0, 0.1, 0.04), (0.2, 0.08, 0.038), (0.3, 0.065, 0.034), (0.9, 0.05, 0.03), (-0.3, 0.1, 0.04)):
-        found = loads(e, situation(velocity=(3.0, 0, j * N * D)))
-        assert found.thrust == pytest.approx([ct * 1.2 * N**2 * D**4] * 4)
-        assert np.array(found.torque) * SPEED == pytest.approx([cp * 1.2 * N**3 * D**5] * 4)
+        result = loads(e, situation(velocity=(3.0, 0, j * N * D)))
+        assert result.thrust == pytest.approx([ct * 1.2 * N**2 * D**4] * 4)
+        assert np.array(result.torque) * SPEED == pytest.approx([cp * 1.2 * N**3 * D**5] * 4)
     assert e.thrust_constant * SPEED**2 == pytest.approx(0.1 * N**2 * D**4)
 
 
@@ -45,7 +45,7 @@ def test_torque_coefficients_commas_and_comments(drone, situation, tmp_path):
     assert np.array(loads(by_torque, s)) == pytest.approx(np.array(loads(by_power, s)))
 
 
-def test_a_grid_over_the_angle_of_the_air(drone, situation, tmp_path):
+def test_grid_over_angle_of_air(drone, situation, tmp_path):
     """At 0.1 across the axis halfway to 0.12; at 45 degrees the mean of the two rows."""
     e = make(drone, tmp_path, GRID)
     v = 0.1 * N * D
@@ -76,12 +76,12 @@ def test_hubs_have_their_own_advance_and_rotors_at_rest_no_loads(drone, situatio
         ("", "the file is empty"),
     ],
 )
-def test_what_is_wrong_with_a_table_is_one_line(drone, tmp_path, text, said):
+def test_table_error_is_one_line(drone, tmp_path, text, said):
     with pytest.raises(ConfigError, match=said) as caught:
         make(drone, tmp_path, text)
     assert "\n" not in str(caught.value)
 
 
-def test_it_stands_for_the_other_rotors(drone):
+def test_rotor_table_replaces_other_rotor_effects(drone):
     with pytest.raises(ConfigError, match=r"effects.rotor_table: stands for effects.rotor_thrust"):
         effects.from_scene({"rotor_thrust": {}, "rotor_table": {}}, drone)

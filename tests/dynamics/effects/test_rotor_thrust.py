@@ -8,7 +8,7 @@ from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
 
 
-def test_loads_by_the_source_formula(drone, situation):
+def test_loads_by_source_formula(drone, situation):
     """rho C_T (N / 60)^2 D^4 and rho C_M (N / 60)^2 D^5 at 3168 rpm."""
     (e,) = effects.from_scene({"rotor_thrust": {}}, drone)
     speed = 3168 / 60 * 2 * math.pi
@@ -20,7 +20,7 @@ def test_loads_by_the_source_formula(drone, situation):
     assert loads.torque == pytest.approx([torque] * 4, rel=1e-12)
 
 
-def test_hover_thrust_is_about_half_the_highest(drone, situation):
+def test_hover_thrust_is_about_half_highest(drone, situation):
     (e,) = effects.from_scene({"rotor_thrust": {}}, drone)
     top = 44.4 / drone.motor.rotor_constant
     loads = rotor_thrust.py_func(e, (), situation(speed=(top,) * 4, density=1.225), NO_FACTORS, NO_LOADS)
@@ -28,7 +28,7 @@ def test_hover_thrust_is_about_half_the_highest(drone, situation):
     assert 1.9 < loads.thrust[0] / (10.0224 * 9.80665 / 4) < 2.0  # the source asks for a ratio of two
 
 
-def test_needs_a_propeller(drone):
+def test_needs_propeller(drone):
     bare = drone.model_copy(update={"propeller": None})
     with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
         effects.from_scene({"rotor_thrust": {}}, bare)

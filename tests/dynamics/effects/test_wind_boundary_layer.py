@@ -14,7 +14,7 @@ HILL, ROOF = relief(slope=(0.1, 0.0)), relief(boxes=[(0.0, 0.0, 500.0, 500.0, 0.
 
 
 @pytest.mark.parametrize(("terrain", "ground"), [(LEVEL, 0.0), (HILL, 2.0), (ROOF, 3.0)])
-def test_it_is_the_logarithm_of_the_height_over_the_ground(drone, situation, terrain, ground):
+def test_wind_is_logarithmic_in_height_over_ground(drone, situation, terrain, ground):
     (e,) = effects.from_scene({"wind_boundary_layer": TABLE}, drone, Environment(terrain=terrain))
 
     def wind(height):

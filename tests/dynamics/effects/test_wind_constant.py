@@ -1,4 +1,4 @@
-"""The same wind everywhere, and who feels it."""
+"""Uniform wind, and the effects that use it."""
 
 import pytest
 
@@ -7,12 +7,12 @@ from lapwing.dynamics.effects.wind_constant import WindConstant, wind_constant
 from lapwing.dynamics.vehicles import multirotor
 
 
-def test_adds_to_the_wind(situation):
+def test_adds_to_wind(situation):
     s = situation(wind=(1, 0, 0), density=1.1)
     assert wind_constant.py_func(WindConstant((2.0, -1.0, 0.5)), (), s, s.air) == (1.1, (3.0, -1.0, 0.5))
 
 
-def test_every_aerodynamic_effect_feels_the_motion_of_the_air(drone):
+def test_every_aerodynamic_effect_feels_motion_of_air(drone):
     """At rest in a wind is flying against it in still air, for drag, H-force and inflow (Galileo)."""
     tables = {"rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
     wind = (4.0, -2.0, 1.0)

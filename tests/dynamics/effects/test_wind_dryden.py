@@ -19,8 +19,8 @@ FOOT = 0.3048
 
 
 def make(drone, **table):
-    given = {"wind_speed": 7.0, "airspeed": 8.0, "altitude": 10.0, **table}
-    (e,) = effects.from_scene({"wind_dryden": given}, drone)
+    values = {"wind_speed": 7.0, "airspeed": 8.0, "altitude": 10.0, **table}
+    (e,) = effects.from_scene({"wind_dryden": values}, drone)
     return e
 
 
@@ -44,14 +44,14 @@ def test_scales_and_intensities(drone):
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.2])
-def test_it_follows_the_vehicles_height_over_the_ground_and_its_airspeed(drone, situation, rotors, slope):
-    """As with that height and airspeed given: the spectra are those, too."""
+def test_turbulence_follows_height_and_airspeed(drone, situation, rotors, slope):
+    """The spectra equal those at a given height and airspeed."""
     around = Environment(terrain=relief(slope=(slope, 0.0)))
     (follows,) = effects.from_scene({"wind_dryden": {"wind_speed": 7.0}}, drone, around)
     s = situation(position=(50.0, 0, 30.0 + 50.0 * slope), velocity=(6.0, 0, 8.0), wind=(0.0, 0.0, 3.0))
     fixed = make(drone, airspeed=math.hypot(6.0, 5.0), altitude=30.0)
-    ours, given = (draw(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.01) for e in (follows, fixed))
-    assert ours[1] == pytest.approx(given[1], rel=1e-12)
+    ours, values = (draw(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.01) for e in (follows, fixed))
+    assert ours[1] == pytest.approx(values[1], rel=1e-12)
     low, high, still = (passing(follows.conditions, situation(**where)) for where in (
         {"position": (0, 0, 1.0), "velocity": (5, 0, 0)}, {"position": (0, 0, 2000.0), "velocity": (5, 0, 0)},
         {"position": (0, 0, 20.0)}))  # fmt: skip
@@ -101,7 +101,7 @@ def test_starts_stationary_and_is_exact_at_any_interval(drone, situation, rotors
     assert lag == pytest.approx(expected, abs=0.08)
 
 
-def test_heading_turns_the_axes(drone, situation, rotors):
+def test_heading_turns_axes(drone, situation, rotors):
     along = draw(make(drone), make(drone).initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1]
     e = make(drone, direction_to=math.pi / 2)
     turned = draw(e, e.initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1]

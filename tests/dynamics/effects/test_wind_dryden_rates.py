@@ -50,7 +50,7 @@ def published(omega):
 
 
 @pytest.mark.parametrize("interval", [0.01, 0.03])
-def test_spectra_whatever_the_interval(drone, situation, rotors, interval):
+def test_spectra_hold_at_any_interval(drone, situation, rotors, interval):
     rate = np.empty((2**18, 3))
     e = make(drone)
     series(e, e.initial_discrete_state(), situation(), rotors(), KEY, interval, rate)
@@ -62,7 +62,7 @@ def test_spectra_whatever_the_interval(drone, situation, rotors, interval):
         assert [part.mean() for part in np.array_split(ratio[:, axis], 8)] == pytest.approx(np.ones(8), abs=0.12)
 
 
-def test_standard_deviations_from_the_first_exchange_on(drone, situation, rotors):
+def test_standard_deviations_from_first_exchange_on(drone, situation, rotors):
     """The spread over seeds is the root of the spectrum's integral, at once and after a long interval."""
     omega = np.geomspace(1e-3, 1e4, 20000)
     expected = np.sqrt(np.trapezoid(published(omega), omega, axis=0))
@@ -76,17 +76,17 @@ def test_standard_deviations_from_the_first_exchange_on(drone, situation, rotors
     assert np.std(second, axis=0) == pytest.approx(expected, rel=0.1)
 
 
-def test_the_gusts_are_those_of_wind_dryden_to_the_bit(drone, situation, rotors):
+def test_gusts_equal_wind_dryden_bit_for_bit(drone, situation, rotors):
     e = make(drone)
     (plain,) = effects.from_scene({"wind_dryden": {key: TABLE[key] for key in TABLE if key != "span"}}, drone)
     ours, theirs = e.initial_discrete_state(), plain.initial_discrete_state()
     for tick in range(20):
         ours = draw(e, ours, situation(), rotors(), KEY, tick, 0.02)
         theirs = wind_dryden.draw(plain, theirs, situation(), rotors(), KEY, tick, 0.02)
-        assert ours[:2] == theirs
+        assert (ours[0][:5], ours[1]) == (theirs[0][0], theirs[1])
 
 
-def test_a_gust_that_rises_as_it_comes_lifts_the_bow(drone, situation, rotors):
+def test_rising_gust_lifts_nose(drone, situation, rotors):
     """A field that passes at V along x has dw/dx = -(1/V) dw/dt: the air turns about y at -dw/dx."""
     e, interval, low_pass = make(drone), 0.001, 4 * SPAN / (math.pi * AIRSPEED)
     memory, rows = e.initial_discrete_state(), []
@@ -102,7 +102,7 @@ def test_a_gust_that_rises_as_it_comes_lifts_the_bow(drone, situation, rotors):
     assert np.corrcoef(wind[1:, 1] - wind[:-1, 1], rate[1:, 2] - rate[:-1, 2])[0, 1] < -0.99
 
 
-def test_rotors_feel_the_air_turn_as_they_feel_the_vehicle_turn(drone, situation):
+def test_air_rotation_acts_on_rotors_like_body_rotation(drone, situation):
     (inflow,) = effects.from_scene({"axial_inflow": {}}, drone)
     s = situation(omega=(0.3, -0.2, 0.1))
     other = situation()
@@ -112,7 +112,7 @@ def test_rotors_feel_the_air_turn_as_they_feel_the_vehicle_turn(drone, situation
     )
 
 
-def test_it_is_a_turbulence_with_the_vehicles_span(drone, situation):
+def test_rates_depend_on_vehicle_span(drone, situation):
     (e,) = effects.from_scene({"wind_dryden_rates": {"wind_speed": 7.0}}, drone)
     assert e.span == pytest.approx(2 * 0.4974 + 0.5588)
     memory = (e.initial_discrete_state()[0], (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3))

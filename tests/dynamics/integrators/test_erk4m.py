@@ -30,7 +30,7 @@ def ramp_rate(p, t, x):
 RATES[RampParameters] = ramp_rate
 
 
-def test_the_local_error_is_the_curvature_term():
+def test_local_error_is_curvature_term():
     k, slope = np.array([0.7, -0.4, 0.5]), np.array([-0.3, 0.9, 0.6])
     p, x0, h = RampParameters(tuple(k), tuple(slope)), RampState(NO_ROTATION), 0.005
     got = integrate_fixed(erk4m.Method(), p, 0.0, x0, h, 1)

@@ -41,7 +41,7 @@ def invariants(states):
     return 0.5 * (momentum * states[:, 4:]).sum(axis=1), world
 
 
-def test_the_closed_form_is_a_solution():
+def test_closed_form_is_solution():
     # guards the test itself: Euler's equations by differences of the closed form
     t, h = np.linspace(0, 30, 61), 1e-5
     derivative = (closed_form(t + h) - closed_form(t - h)) / (2 * h)
@@ -61,7 +61,7 @@ def test_adaptive_run_against_elliptic_functions():
     assert abs(solve(P, START, times, 1e-12)[0][:, 4:] - closed_form(times)).max() < 1e-10
 
 
-def test_momentum_to_round_off_and_no_energy_drift_over_a_long_time():
+def test_momentum_is_exact_and_energy_has_no_drift():
     _, states = simulate(get("rigid_splitting"), P, START, 0.1, 200_000, every=200)
     energy, world = invariants(states)
     assert abs(world - world[0]).max() < 1e-11  # 2 million turns of 45 roundings each
@@ -70,7 +70,7 @@ def test_momentum_to_round_off_and_no_energy_drift_over_a_long_time():
     assert late < 2 * early + 1e-12
 
 
-def test_a_method_without_that_structure_does_drift():
+def test_method_without_that_structure_does_drift():
     _, states = simulate(get("rkmk4"), P, START, 0.1, 200_000, every=200)
     energy, _ = invariants(states)
     assert abs(energy[-1] / energy[0] - 1) > 1e-6

@@ -54,19 +54,19 @@ def test_adaptive_run_meets_its_tolerance_between_its_steps(tolerance):
     assert abs(world_z - 2.0).max() < 100 * tolerance
 
 
-def test_smaller_tolerance_costs_steps_as_the_order_says():
+def test_step_count_follows_order_for_smaller_tolerance():
     counts = [solve(TOP, START, np.array([0.0, 20.0]), tol)[1]["steps"] for tol in (1e-6, 1e-11)]
     assert 6.0 < counts[1] / counts[0] < 16.0  # 1e5 ** (1/5) = 10
 
 
-def test_simulate_writes_the_first_and_every_nth_state():
+def test_simulate_writes_first_and_every_nth_state():
     times, states = simulate(get("rkmk4"), TOP, START, 0.01, 100, every=10)
     assert times == pytest.approx(np.linspace(0, 1, 11))
     assert states[0] == pytest.approx([1, 0, 0, 0, 0.3, 0, 1])
     assert abs(states[:, 4:] - precession(times)).max() < 1e-10
 
 
-def test_a_pole_is_reported_with_time_and_state():
+def test_pole_is_reported_with_time_and_state():
     with pytest.raises(
         ValueError, match=r"BlowUp: tolerance 1e-08 cannot be met at t = (0\.99999\d*|1) s, state level = "
     ):

@@ -22,13 +22,13 @@ def matrix(a):
     return np.array(q.rotation_matrix(a)).reshape(3, 3)
 
 
-def test_quarter_turn_to_the_left_takes_forward_to_left():
+def test_quarter_turn_to_left_takes_forward_to_left():
     left = q.exp((0.0, 0.0, math.pi / 2))
     assert q.rotate(left, (1.0, 0.0, 0.0)) == pytest.approx((0.0, 1.0, 0.0), abs=1e-15)
     assert q.rotate_back(left, (0.0, 1.0, 0.0)) == pytest.approx((1.0, 0.0, 0.0), abs=1e-15)
 
 
-def test_positive_pitch_points_the_nose_down():
+def test_positive_pitch_points_nose_down():
     down = q.from_roll_pitch_yaw(0.0, 0.3, 0.0)
     assert q.rotate(down, (1.0, 0.0, 0.0)) == pytest.approx((math.cos(0.3), 0.0, -math.sin(0.3)), abs=1e-15)
 
@@ -91,7 +91,7 @@ def test_from_matrix_keeps_tiny_angles_to_full_relative_accuracy():
     assert q.log(q.from_matrix(q.rotation_matrix(q.exp(v)))) == pytest.approx(v, rel=1e-15)
 
 
-def test_embed_is_the_derivative_along_retract():
+def test_embed_is_derivative_along_retract():
     a, w = q.exp((0.3, -1.0, 0.5)), (0.2, 0.7, -0.4)
     h = 1e-6
     ahead, behind = q.retract(a, tuple(h * c for c in w)), q.retract(a, tuple(-h * c for c in w))
@@ -101,7 +101,7 @@ def test_embed_is_the_derivative_along_retract():
 
 
 @given(vector, st.floats(-2, 2))
-def test_normalise_gives_unit_length_far_and_near(v, exponent):
+def test_normalise_returns_unit_length(v, exponent):
     for scale in (10.0**exponent, 1 + 1e-9, 1 - 1e-12):
         n = q.normalise(tuple(scale * c for c in q.exp(v)))
         assert sum(c * c for c in n) == pytest.approx(1.0, abs=1e-15)

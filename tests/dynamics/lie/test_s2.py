@@ -11,7 +11,7 @@ from lapwing.dynamics.vector import apply, cross, dot, scale
 NORTH = Direction(0.0, 0.0, 1.0)
 
 
-def test_retract_is_the_rotation_and_stays_unit():
+def test_retract_is_rotation_and_stays_unit():
     q, v = s2.normalise(Direction(0.3, -0.5, 0.9)), (1.0, 0.2, -0.4)
     assert s2.retract(q, v) == pytest.approx(apply(so3.exp(v), q), abs=1e-15)
     for _ in range(20000):
@@ -29,13 +29,13 @@ def test_log_inverts_retract_on_orthogonal_tangents(angle):
     assert s2.log(q, s2.retract(q, v)) == pytest.approx(v, rel=1e-14, abs=allowed)
 
 
-def test_embed_is_the_derivative_along_retract():
+def test_embed_is_derivative_along_retract():
     q, v, h = s2.normalise(Direction(0.3, -0.5, 0.9)), (1.0, 0.2, -0.4), 1e-6
     ahead, behind = s2.retract(q, scale(h, v)), s2.retract(q, scale(-h, v))
     assert [(a - b) / (2 * h) for a, b in zip(ahead, behind, strict=True)] == pytest.approx(s2.embed(q, v), abs=1e-9)
 
 
-def test_transport_around_an_octant_turns_by_its_area():
+def test_transport_around_octant_turns_by_its_area():
     # north -> x -> y -> north: a triangle with three right angles, of area pi / 2
     legs = ((0.0, math.pi / 2, 0.0), (0.0, 0.0, math.pi / 2), (math.pi / 2, 0.0, 0.0))
     q, start = NORTH, (1.0, 0.0, 0.0)

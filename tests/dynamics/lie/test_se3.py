@@ -71,7 +71,7 @@ def test_log_inverts_exp(u):
     assert back[1] == pytest.approx(u[1], rel=1e-14)
 
 
-def test_adjoint_moves_the_exponential_across():
+def test_adjoint_moves_exponential_across():
     g, u = se3.exp(((0.3, 0.1, -2.0), (0.2, 0.5, -1.0))), (B, (0.1, -0.7, 0.4))
     left, right = se3.compose(g, se3.exp(u)), se3.compose(se3.exp(se3.adjoint(g, u)), g)
     assert left.position == pytest.approx(right.position, abs=2e-15)
@@ -79,7 +79,7 @@ def test_adjoint_moves_the_exponential_across():
     assert se3.retract(g, u).position == pytest.approx(left.position, abs=2e-15)
 
 
-def test_embed_is_the_derivative_along_retract():
+def test_embed_is_derivative_along_retract():
     g, h = se3.exp(((0.3, 0.1, -2.0), (0.2, 0.5, -1.0))), 1e-6
     ahead, behind = (se3.retract(g, tuple(tuple(s * h * c for c in part) for part in V)) for s in (1, -1))
     position, attitude = se3.embed(g, V)

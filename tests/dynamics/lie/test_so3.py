@@ -45,7 +45,7 @@ def worst(got, exact):
     return max(abs(g - e) for g, e in zip(got, exact, strict=True))
 
 
-def test_the_reference_exponential_is_the_matrix_exponential():
+def test_reference_exponential_is_matrix_exponential():
     for v in cases()[::7]:
         assert mpmath.mnorm(exp_reference(v) - mpmath.expm(hat(v)), 1) < 1e-30
 
@@ -76,7 +76,7 @@ def test_log_undoes_exp_to_full_relative_accuracy(v):
     assert worst(got, exact) < allowed
 
 
-def test_dexp_is_the_derivative_of_exp():
+def test_dexp_is_derivative_of_exp():
     u, du, h = np.array([0.9, -1.3, 0.4]), np.array(W), 1e-6
     difference = (np.array(so3.exp(u + h * du)) - np.array(so3.exp(u - h * du))).reshape(3, 3) / (2 * h)
     spatial = np.array(so3.hat(so3.dexp(tuple(u), W))).reshape(3, 3) @ np.array(so3.exp(u)).reshape(3, 3)
@@ -99,7 +99,7 @@ def test_matrix_and_quaternion_leaves_agree():
     assert (step(h) - step(-h)) / (2 * h) == pytest.approx(np.array(so3.embed(m, v)), abs=1e-9)
 
 
-def test_transport_is_the_seed_formula_with_the_matrix_root():
+def test_transport_is_seed_formula_with_matrix_root():
     m, u, v = so3.exp((0.5, 0.1, -0.7)), (0.4, -0.9, 0.3), (1.0, 2.0, -0.5)
     r, root = np.array(m).reshape(3, 3), np.array(so3.exp(tuple(0.5 * c for c in u))).reshape(3, 3)
     there = r @ root @ root
@@ -108,14 +108,14 @@ def test_transport_is_the_seed_formula_with_the_matrix_root():
     assert quaternion.transport(u, so3.vee(tuple(moved.ravel()))) == pytest.approx(v, abs=1e-15)
 
 
-def test_normalise_finds_the_polar_factor():
+def test_normalise_finds_polar_factor():
     rng = np.random.default_rng(4)
     m = np.array(so3.exp((0.7, -2.0, 0.3))).reshape(3, 3) + 0.02 * rng.standard_normal((3, 3))
     left, _, right = np.linalg.svd(m)
     assert np.array(so3.normalise(tuple(m.ravel()))).reshape(3, 3) == pytest.approx(left @ right, abs=1e-14)
 
 
-def test_retract_stays_a_rotation_over_many_equal_steps():
+def test_retract_stays_rotation_over_many_equal_steps():
     m = Rotation(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
     for _ in range(5000):
         m = so3.retract(m, (0.0123, -0.021, 0.0087))

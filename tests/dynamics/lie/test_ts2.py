@@ -11,7 +11,7 @@ X = ts2.normalise(Swing((0.3, -0.5, 0.9), (1.0, 0.4, 0.2)))
 MU = ((0.3, -1.1, 0.7), (0.5, 0.2, -0.9))
 
 
-def test_it_is_a_group_action():
+def test_action_is_group_action():
     g, h = ((0.2, 0.5, -1.0), (0.1, 0.9, 0.3)), ((-0.7, 0.1, 0.4), (0.6, -0.2, 1.5))
     # product of (exp(r), s) pairs: rotation R_g R_h, shift s_g + R_g s_h
     rotation = so3.log(tuple((np.array(so3.exp(g[0])).reshape(3, 3) @ np.array(so3.exp(h[0])).reshape(3, 3)).ravel()))
@@ -21,21 +21,21 @@ def test_it_is_a_group_action():
     assert one.omega == pytest.approx(two.omega, abs=2e-15)
 
 
-def test_tangent_gives_the_kinematics_and_the_acceleration():
+def test_tangent_contains_kinematics_and_acceleration():
     acceleration = cross(X.direction, (0.4, -0.3, 2.0))
     direction, omega = ts2.embed(X, ts2.tangent(X, acceleration))
     assert direction == pytest.approx(cross(X.omega, X.direction), abs=1e-16)
     assert omega == pytest.approx(acceleration, abs=1e-15)
 
 
-def test_embed_is_the_derivative_along_retract():
+def test_embed_is_derivative_along_retract():
     h = 1e-6
     ahead, behind = (ts2.retract(X, tuple(tuple(s * h * c for c in part) for part in MU)) for s in (1, -1))
     for a, b, d in zip(ahead, behind, ts2.embed(X, MU), strict=True):
         assert (np.array(a) - b) / (2 * h) == pytest.approx(np.array(d), abs=1e-9)
 
 
-def test_both_constraints_hold_to_round_off_over_many_steps():
+def test_constraints_hold_to_round_off_over_many_steps():
     x = X
     for _ in range(5000):
         x = ts2.retract(x, tuple(tuple(0.05 * c for c in part) for part in MU))
@@ -43,7 +43,7 @@ def test_both_constraints_hold_to_round_off_over_many_steps():
         assert abs(dot(x.direction, x.omega)) < 2e-16 * max(1.0, dot(x.omega, x.omega) ** 0.5) * 2
 
 
-def test_the_exponential_is_that_of_se3():
+def test_exponential_is_that_of_se3():
     g = se3.exp((MU[1], MU[0]))
     y = ts2.retract(X, MU)
     assert y.direction == pytest.approx(so3.turn(MU[0], X.direction), abs=1e-15)

@@ -8,7 +8,7 @@ from lapwing.dynamics.multibody.body_kinematics import place
 
 
 def euler_from_quaternion(configuration, velocity):
-    """The same state in Euler angles: configuration (n, 7) to (n, 6), velocity (n, 6) to (n, 6).
+    """Convert a state to Euler angles: configuration (n, 7) to (n, 6), velocity (n, 6) to (n, 6).
 
     Raises:
         ValueError: a body's pitch is at 90 degrees.
@@ -24,7 +24,7 @@ def euler_from_quaternion(configuration, velocity):
 
 
 def quaternion_from_euler(configuration, velocity):
-    """The same state with quaternions: configuration (n, 6) to (n, 7), velocity (n, 6) to (n, 6)."""
+    """Convert a state to quaternions: configuration (n, 6) to (n, 7), velocity (n, 6) to (n, 6)."""
     placed = place(np.asarray(configuration, float), np.asarray(velocity, float))
     q = [quaternion.from_matrix(tuple(R)) for R in placed.rotation[:-1]]
     return np.hstack([placed.position[:-1], np.array(q)]), np.hstack([placed.velocity[:-1], placed.omega[:-1]])

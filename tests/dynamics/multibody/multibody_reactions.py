@@ -10,7 +10,7 @@ from lapwing.dynamics.multibody.constraints import equations
 
 
 class Reaction(NamedTuple):
-    """What body i does to body j through a joint, at the joint's point; the drive between the two included."""
+    """Load of body i on body j through a joint, at the joint's point, including the drive between them."""
 
     force_world: np.ndarray  # (3,) [N]
     torque_world: np.ndarray  # (3,) [N m]

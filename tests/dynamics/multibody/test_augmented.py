@@ -45,7 +45,7 @@ def state(rng):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("driven", "rank", "count"), [(True, 24, 32), (False, 20, 20)])
-def test_the_drone_against_a_dense_pseudo_inverse(driven, rank, count):
+def test_drone_against_dense_pseudo_inverse(driven, rank, count):
     """30 coordinates, 32 rows of rank 24: unique accelerations, shortest multipliers; 10 freedoms undriven."""
     rng = np.random.default_rng(5)
     for _ in range(5):
@@ -67,7 +67,7 @@ def test_the_drone_against_a_dense_pseudo_inverse(driven, rank, count):
         assert ours.conflict < 1e-11 * scale
 
 
-def test_the_normal_equations_lose_the_digits_that_the_factorisation_keeps():
+def test_normal_equations_lose_digits_that_factorisation_keeps():
     """The naive way, one LU of the assembled 62 x 62 matrix, is singular: it has no answer."""
     drone, q, v, wrench, drive = state(np.random.default_rng(8))
     system = drone_system(drone)
@@ -80,7 +80,7 @@ def test_the_normal_equations_lose_the_digits_that_the_factorisation_keeps():
 
 
 @pytest.mark.parametrize("driven", [True, False])
-def test_embedding_technique_gives_the_same_accelerations(driven):
+def test_embedding_technique_agrees_with_augmented_form(driven):
     rng = np.random.default_rng(6)
     for _ in range(5):
         drone, q, v, wrench, drive = state(rng)
@@ -92,7 +92,7 @@ def test_embedding_technique_gives_the_same_accelerations(driven):
         np.testing.assert_allclose(second.acceleration / scale, first.acceleration / scale, atol=1e-12)
 
 
-def test_euler_angles_and_quaternions_give_the_same_motion():
+def test_euler_angles_and_quaternions_give_same_motion():
     """theta'' from the Euler form, taken to omega', equals the quaternion form's omega'."""
     rng = np.random.default_rng(7)
     for _ in range(5):
@@ -153,12 +153,12 @@ def test_bad_arguments(change, message):
         accelerations(drone_system(drone), *change(q, v, wrench), drive)
 
 
-def test_a_column_of_round_off_is_not_scaled_up_to_look_independent():
+def test_round_off_column_is_not_independent():
     B = np.diag([1.0, 2.0, 1e-17])
     assert pivoted_qr.factor(B, 1e-9, augmented.ANY).rank == 2
 
 
-def test_pivoted_qr_solves_a_rank_deficient_problem():
+def test_pivoted_qr_solves_rank_deficient_problem():
     rng = np.random.default_rng(12)
     B = rng.normal(size=(6, 4)) @ rng.normal(size=(4, 9))
     f = pivoted_qr.factor(B, 1e-9, augmented.ANY)

@@ -21,7 +21,7 @@ def test_rotation_is_roll_then_pitch_then_yaw_of_turned_axes():
     )
 
 
-def test_rate_matrix_gives_the_angular_velocity_in_the_body():
+def test_rate_matrix_maps_rates_to_body_angular_velocity():
     h = 1e-6
     change = matrix(cardan_angles.rotation(ANGLES + h * RATES)) - matrix(cardan_angles.rotation(ANGLES - h * RATES))
     skew = matrix(cardan_angles.rotation(ANGLES)).T @ change / (2.0 * h)

@@ -30,7 +30,7 @@ def state(kind):
 
 
 @pytest.mark.parametrize("kind", ["quaternion", "euler"])
-def test_rows_are_the_derivatives_of_the_residuals(kind):
+def test_rows_are_derivatives_of_residuals(kind):
     q, v = state(kind)
     acceleration = RNG.normal(size=(3, 6))
     h = 1e-5
@@ -57,7 +57,7 @@ def test_rows_are_the_derivatives_of_the_residuals(kind):
     np.testing.assert_allclose(change, expected, atol=1e-7)
 
 
-def test_a_drive_turns_body_i_about_the_axis_of_body_j():
+def test_drive_turns_body_i_about_axis_of_body_j():
     q, v = state("quaternion")
     v[:] = 0.0
     p = place(q, v)
@@ -67,7 +67,7 @@ def test_a_drive_turns_body_i_about_the_axis_of_body_j():
     np.testing.assert_allclose(velocity_defect(e, v)[15:18], 0.0, atol=1e-14)
 
 
-def test_the_two_coordinates_place_bodies_alike():
+def test_two_coordinates_place_bodies_alike():
     q, v = state("quaternion")
     angles, rates = euler_from_quaternion(q, v)
     a, b = place(q, v), place(angles, rates)

@@ -31,21 +31,21 @@ def loads(rng):
 
 
 @pytest.mark.parametrize("driven", ["torque", "speed"])
-def test_least_coordinates_are_the_five_bodies(driven):
+def test_least_coordinates_are_five_bodies(driven):
     rng = np.random.default_rng(51)
     drone = delivery_drone(**PAPER, driven=driven)
     for _ in range(20):
-        x, given = state(rng), loads(rng)
+        x, values = state(rng), loads(rng)
         R = np.array(quaternion.rotation_matrix(x.attitude)).reshape(3, 3)
         thrusts = [
-            Wrench(tuple((given.thrust[k] * R[:, 2]).tolist()), (0.0, 0.0, given.aerodynamic_torque[k]))
+            Wrench(tuple((values.thrust[k] * R[:, 2]).tolist()), (0.0, 0.0, values.aerodynamic_torque[k]))
             for k in range(4)
         ]
-        wrenches = (Wrench(given.force_world, given.torque_body), *thrusts)
-        p = machine(drone, GRAVITY, given.drive, x.speeds, wrenches)
+        wrenches = (Wrench(values.force_world, values.torque_body), *thrusts)
+        p = machine(drone, GRAVITY, values.drive, x.speeds, wrenches)
         five = assembled_state(p, BodyState(*x[:4]), x.angles, x.speeds)
         _, expected = arrays(rate(p, 0.0, five))
-        ours = solve(drone, given, x)
+        ours = solve(drone, values, x)
         scale = np.abs(expected).max()
         np.testing.assert_allclose(np.array(ours.acceleration_world) / scale, expected[0, :3] / scale, atol=1e-12)
         np.testing.assert_allclose(
@@ -54,17 +54,17 @@ def test_least_coordinates_are_the_five_bodies(driven):
         spin = expected[1:, 5] - ours.angular_acceleration_body[2]  # z of the propeller is z of the chassis
         np.testing.assert_allclose(np.array(ours.spin_acceleration) / scale, spin / scale, atol=1e-12)
         if driven == "torque":
-            np.testing.assert_allclose(ours.drive_torque, given.drive, atol=1e-12)
+            np.testing.assert_allclose(ours.drive_torque, values.drive, atol=1e-12)
 
 
-def test_what_is_imposed_and_what_it_costs_are_each_others_inverse():
+def test_imposed_speed_and_drive_torque_are_inverse():
     """The drive torque that an imposed acceleration needs, given as torque, produces that acceleration."""
     rng = np.random.default_rng(52)
-    x, given = state(rng), loads(rng)
-    imposed = solve(delivery_drone(**PAPER, driven="speed"), given, x)
-    assert imposed.spin_acceleration == given.drive
-    back = solve(delivery_drone(**PAPER), given._replace(drive=imposed.drive_torque), x)
-    np.testing.assert_allclose(back.spin_acceleration, given.drive, rtol=1e-11)
+    x, values = state(rng), loads(rng)
+    imposed = solve(delivery_drone(**PAPER, driven="speed"), values, x)
+    assert imposed.spin_acceleration == values.drive
+    back = solve(delivery_drone(**PAPER), values._replace(drive=imposed.drive_torque), x)
+    np.testing.assert_allclose(back.spin_acceleration, values.drive, rtol=1e-11)
     np.testing.assert_allclose(back.angular_acceleration_body, imposed.angular_acceleration_body, rtol=1e-11)
 
 
@@ -82,7 +82,7 @@ def momentum(drone, x):
     return R @ L
 
 
-def test_free_flight_keeps_angular_momentum_whatever_the_motors_do():
+def test_free_flight_keeps_angular_momentum_under_motors():
     drone = delivery_drone(**PAPER)
     x = state(np.random.default_rng(53))
     motors = QUIET._replace(drive=(0.02, -0.01, 0.005, 0.01))
@@ -111,12 +111,12 @@ def without_propeller(drone, k):
     return drone._replace(held=tuple(0.0 if i == k else held for i, held in enumerate(drone.held)))
 
 
-def test_a_torn_off_propeller_is_gone():
+def test_detached_propeller_is_removed():
     """Only its mass, thrust and torque are missing: the rest accelerates about the shifted centre of mass."""
     rng = np.random.default_rng(54)
     drone = without_propeller(delivery_drone(**PAPER), 2)
-    x, given = state(rng), loads(rng)
-    m = solve(drone, given, x)
+    x, values = state(rng), loads(rng)
+    m = solve(drone, values, x)
     assert m.reaction_force_body[2] == (0.0, 0.0, 0.0)
     assert np.all(np.isfinite(np.hstack([np.ravel(v) for v in m])))
     # total force = sum of masses times accelerations
@@ -127,9 +127,9 @@ def test_a_torn_off_propeller_is_gone():
         relative = np.cross(alpha, hub[k]) + np.cross(w, np.cross(w, hub[k]))
         total += drone.propeller_mass[k] * (np.array(m.acceleration_world) + R @ relative)
     mass = drone.mass + sum(drone.propeller_mass[k] for k in (0, 1, 3))
-    thrust = sum(given.thrust[k] for k in (0, 1, 3))
+    thrust = sum(values.thrust[k] for k in (0, 1, 3))
     np.testing.assert_allclose(
-        total, np.array(given.force_world) + thrust * R[:, 2] + mass * np.array(GRAVITY), atol=1e-10
+        total, np.array(values.force_world) + thrust * R[:, 2] + mass * np.array(GRAVITY), atol=1e-10
     )
 
 

@@ -35,7 +35,7 @@ def scene(rng, driven):
 
 
 def general(drone, x, wrench, speeds, drive, driven, feedback=0.0):
-    """The same by the general engine; a motor torque acts on propeller and chassis. `feedback` is Baumgarte's [1/s]."""
+    """Solve with the general engine; a motor torque acts on propeller and chassis. `feedback` is Baumgarte's [1/s]."""
     q, v = arrays(x)
     if driven == "speed":
         system, imposed = drone_system(drone), np.stack([speeds, drive], axis=1)
@@ -47,10 +47,10 @@ def general(drone, x, wrench, speeds, drive, driven, feedback=0.0):
         R0, R = (rotation(q[b, 3:]) for b in (0, k + 1))
         wrench[0, 3:] -= drive[k] * R0.T @ R[:, 2]
     none = np.zeros((0, 2))
-    found, _ = augmented.solve(
+    result, _ = augmented.solve(
         system.arrays, q, v, wrench, none, 2.0 * feedback, feedback * feedback, augmented.RANK_TOLERANCE, augmented.ANY
     )
-    return system, found, None
+    return system, result, None
 
 
 def rotation(q):
@@ -60,7 +60,7 @@ def rotation(q):
 
 
 @pytest.mark.parametrize("driven", ["speed", "torque"])
-def test_identical_to_the_general_path(driven):
+def test_identical_to_general_path(driven):
     rng = np.random.default_rng(31)
     for _ in range(20):
         drone, p, x, wrench, speeds, drive = scene(rng, driven)
@@ -71,7 +71,7 @@ def test_identical_to_the_general_path(driven):
 
 
 @pytest.mark.parametrize("feedback", [0.0, 50.0])
-def test_identical_off_the_constraints_too(feedback):
+def test_identical_off_constraints_too(feedback):
     """Index-1 equations hold wherever the integration has drifted to: hinges apart by 1 %; so does feedback of that."""
     rng = np.random.default_rng(32)
     for _ in range(20):
@@ -89,7 +89,7 @@ def test_identical_off_the_constraints_too(feedback):
         np.testing.assert_allclose(ours / scale, expected.acceleration / scale, atol=1e-12)
 
 
-def test_reactions_are_the_multipliers():
+def test_reactions_are_multipliers():
     drone, p, x, wrench, speeds, drive = scene(np.random.default_rng(33), "speed")
     system, solution, imposed = general(drone, x, wrench, speeds, drive, "speed")
     expected = reactions(system, *arrays(x), solution, imposed)
@@ -99,7 +99,7 @@ def test_reactions_are_the_multipliers():
 
 
 @pytest.mark.parametrize("driven", ["speed", "torque"])
-def test_one_torn_off_is_the_general_engine_without_its_rows(driven):
+def test_torn_off_propeller_equals_general_engine(driven):
     """The other three go on as a mechanism, it as a free body; nothing acts between the two parts any more."""
     rng = np.random.default_rng(34)
     for _ in range(10):

@@ -39,7 +39,7 @@ def imposed(p):
 
 
 @pytest.mark.parametrize("driven", ["speed", "torque"])
-def test_projection_is_the_general_one(driven):
+def test_projection_is_general_one(driven):
     rng = np.random.default_rng(41)
     drone, p, x, *_ = scene(rng, driven)
     x = disturbed(x, 1e-5, rng)
@@ -55,7 +55,7 @@ def test_projection_is_the_general_one(driven):
 
 @pytest.mark.parametrize("hold", [project, partition])
 @pytest.mark.parametrize("driven", ["speed", "torque"])
-def test_a_drift_is_taken_away_and_a_consistent_state_left_alone(hold, driven):
+def test_drift_is_removed_and_consistent_state_unchanged(hold, driven):
     rng = np.random.default_rng(42)
     _, p, x, *_ = scene(rng, driven)
     for a, b in zip(arrays(hold(p, 0.0, x)), arrays(x), strict=True):
@@ -90,7 +90,7 @@ def test_order_four_with_every_stabilisation(stabilisation):
     assert np.all(orders > 3.7), orders
 
 
-def test_energy_of_a_free_tumbling_drone_with_projection():
+def test_energy_of_free_tumbling_drone_with_projection():
     drone, p, x, *_ = scene(np.random.default_rng(45), "torque")
     free = p._replace(
         gravity=(0.0, 0.0, 0.0),

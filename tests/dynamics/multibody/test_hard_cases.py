@@ -59,7 +59,7 @@ def test_pitch_through_90_degrees():
 
 
 @pytest.mark.parametrize("stabilisation", [PARTITION, PROJECTION])
-def test_an_hour_of_flight_stays_together(stabilisation):
+def test_hour_of_flight_stays_together(stabilisation):
     """3600 s turning in the air with slow propellers; the worst of 60 looks is below 1e-10 on both levels."""
     p, x = five(delivery_drone(**PAPER), (0.3, 0.2, 0.5), (20.0, -20.0, 20.0, -20.0), NOWHERE)
     worst = (0.0, 0.0)
@@ -70,7 +70,7 @@ def test_an_hour_of_flight_stays_together(stabilisation):
     assert max(worst) < 1e-10, worst
 
 
-def test_without_stabilisation_an_hour_drifts_apart():
+def test_without_stabilisation_hour_drifts_apart():
     p, x = five(delivery_drone(**PAPER), (0.3, 0.2, 0.5), (20.0, -20.0, 20.0, -20.0), NOWHERE)
     drift = []
     for _ in range(3):
@@ -116,7 +116,7 @@ def test_five_bodies_with_light_fast_propellers_are_held(driven):
         assert np.abs(end.chassis.omega_body).max() < 5.0
 
 
-def test_a_locked_propeller_a_free_one_and_two_driven():
+def test_locked_propeller_free_one_and_two_driven():
     """One of each kind in one flight; the locked one turns with the chassis."""
     drone = delivery_drone(**PAPER)._replace(spins=(0.0, 1.0, 0.0, 0.0))
     x = DroneState(
@@ -139,7 +139,7 @@ def test_a_locked_propeller_a_free_one_and_two_driven():
     np.testing.assert_allclose(motion.configuration[-1, 0, 3:], end.attitude, atol=1e-6)
 
 
-def test_a_propeller_torn_off_in_flight():
+def test_propeller_torn_off_in_flight():
     """The event removes a joint and a drive: both parts go on with their momentum, the propeller as a free body."""
     drone = delivery_drone(**PAPER, driven="speed")
     speeds = (100.0, -100.0, 100.0, -100.0)
@@ -182,7 +182,7 @@ def test_a_propeller_torn_off_in_flight():
     np.testing.assert_allclose(np.abs(end.attitude), np.abs(after.configuration[-1, 0, 3:]), atol=1e-6)
 
 
-def test_a_rank_found_afresh_locks_bricard():
+def test_rank_found_afresh_locks_bricard():
     """Off the constraints by 1e-6 the redundant row looks independent: the naive rank decision leaves no freedom, and
     the mechanism stands still in mid-air. With the rank of the start as a bound it falls as it should."""
     system, q, v = bricard()

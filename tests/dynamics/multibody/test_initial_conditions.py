@@ -20,7 +20,7 @@ def test_violated_rows_are_named():
 
 
 @pytest.mark.parametrize("build", [four_bars, bricard])
-def test_a_disturbed_mechanism_is_closed_again(build):
+def test_disturbed_mechanism_is_closed_again(build):
     system, q, v = build()
     rng = np.random.default_rng(1)
     q, v = consistent(system, displaced(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape))
@@ -28,7 +28,7 @@ def test_a_disturbed_mechanism_is_closed_again(build):
 
 
 @pytest.mark.parametrize("kind", ["quaternion", "euler"])
-def test_the_driven_drone_gets_its_imposed_speeds(kind):
+def test_driven_drone_gets_its_imposed_speeds(kind):
     drone, q, v, _, drive = state(np.random.default_rng(2))
     system = drone_system(drone)
     at_rest = np.zeros_like(v)
@@ -41,7 +41,7 @@ def test_the_driven_drone_gets_its_imposed_speeds(kind):
         np.testing.assert_allclose(system.arrays.mass @ v[:, :3], 0.0, atol=1e-12)
 
 
-def test_what_is_too_far_apart_is_refused():
+def test_inconsistent_initial_state_is_rejected():
     system, q, v = four_bars()
     q[4, 0] += 1.0
     with pytest.raises(ValueError, match=r"initial state violates .* left 1: point x"):

@@ -18,7 +18,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 def model(drone, step):
-    """The same five bodies as MuJoCo describes them: a free joint and four hinges, no damping, no contact."""
+    """Return the five bodies in MuJoCo: a free joint and four hinges, no damping, no contact."""
     propellers = "".join(
         f'<body pos="{x} {y} {z}"><joint type="hinge" axis="0 0 1"/>'
         f'<inertial pos="0 0 0" mass="{drone.propeller_mass[k]}" diaginertia="{i[0]} {i[1]} {i[2]}"/></body>'

@@ -13,7 +13,7 @@ from lapwing.dynamics.multibody.mechanisms import drone_system, pendulum
 G = 9.81
 
 
-def test_a_hanging_and_a_swinging_pendulum():
+def test_hanging_and_swinging_pendulum():
     """The hinge carries m g at rest, 3 m g at the bottom of a swing from the horizontal."""
     system, q, v = pendulum()
     down = np.array([[0.0, -1.0, 0.0, np.sqrt(0.5), 0.0, 0.0, -np.sqrt(0.5)]])
@@ -48,7 +48,7 @@ def test_reactions_close_newton_and_euler_for_every_propeller(kind):
         assert r.axial_torque == pytest.approx(change @ R[:, 2], abs=1e-9)
 
 
-def test_a_free_hinge_carries_no_torque_about_its_axis():
+def test_free_hinge_carries_no_torque_about_its_axis():
     drone, q, v, wrench, _ = state(np.random.default_rng(21))
     system = drone_system(drone, (False,) * 4)
     solution = accelerations(system, q, v, wrench)

@@ -53,7 +53,7 @@ def test_euler_and_quaternion_coordinates_fly_alike(stabilisation, driven):
     assert max(first.velocity_defect[-1], second.velocity_defect[-1]) < 1e-10
 
 
-def test_energy_is_that_of_the_bodies():
+def test_energy_is_that_of_bodies():
     system, q, v = four_bars(2, speed=1.0)
     kinetic, potential = energy(system, q, v)
     assert kinetic == pytest.approx(0.5 * (3.0 / 3.0 + 2.0))  # three cranks about their ends, two couplers

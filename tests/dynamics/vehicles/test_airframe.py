@@ -9,7 +9,7 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 DRONE = Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml"
 
 
-def test_the_delivery_drone_loads():
+def test_delivery_drone_loads():
     drone = load_airframe(DRONE)
     assert drone.mass.total == pytest.approx(8.0 + 2.0 + 4 * 5.6e-3)
     assert len(drone.rotors.position) == 4
@@ -26,6 +26,7 @@ def test_the_delivery_drone_loads():
         ),
         ("blades = 2 ", 'blades = "two" ', "propeller.blades"),
         ("[0.27, 0.26, 0.42]", "[0.1, 0.1, 0.42]", "triangle"),
+        ("[0.27, 0.26, 0.42]", "[1e-6, 1e-6, 1e-6]", "mass.inertia: expected at least 0.0099 m"),
         (
             'spin_direction = ["cw", "ccw", "cw", "ccw"]',
             'spin_direction = ["cw", "ccw", "left", "ccw"]',
@@ -35,7 +36,7 @@ def test_the_delivery_drone_loads():
         ("[motor]", "[motor", "not valid TOML"),
     ],
 )
-def test_a_faulty_file_gets_one_line_that_names_file_and_key(tmp_path, old, new, expected):
+def test_invalid_file_error_names_file_and_key(tmp_path, old, new, expected):
     text = DRONE.read_text()
     assert old in text
     path = tmp_path / "vehicle.toml"
@@ -48,6 +49,6 @@ def test_a_faulty_file_gets_one_line_that_names_file_and_key(tmp_path, old, new,
     assert expected in message
 
 
-def test_a_missing_file(tmp_path):
+def test_missing_file(tmp_path):
     with pytest.raises(ValueError, match=r"none.toml: cannot be read"):
         load_airframe(tmp_path / "none.toml")

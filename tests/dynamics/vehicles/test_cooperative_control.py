@@ -57,7 +57,7 @@ def tripod():
     )
 
 
-def test_the_desired_path_is_the_published_one():
+def test_desired_path_is_published_one():
     p, _ = published()
     for t in (0.0, 1.3, 5.0):
         position, velocity, acceleration = forces_of.desired_load(p.drive.path, t)
@@ -67,34 +67,34 @@ def test_the_desired_path_is_the_published_one():
 
 
 def forces(p, t, x, acceleration=ZERO, omega_rate=(ZERO,) * 3):
-    wanted, slope = forces_of.wanted_specific(p, t, x, acceleration)
-    s, s_rate = forces_of.shares(p, x, wanted, slope)
+    expected, slope = forces_of.wanted_specific(p, t, x, acceleration)
+    s, s_rate = forces_of.shares(p, x, expected, slope)
     n = len(x.link)
-    return wanted, [forces_of.desired_force(p, x, wanted, slope, s, s_rate, omega_rate[i], i) for i in range(n)]
+    return expected, [forces_of.desired_force(p, x, expected, slope, s, s_rate, omega_rate[i], i) for i in range(n)]
 
 
-def test_wanted_forces_give_the_wanted_motion():
+def test_desired_forces_produce_desired_motion():
     p, x = tripod()
-    wanted, pairs = forces(p, 0.3, x)
+    expected, pairs = forces(p, 0.3, x)
     force = tuple(f for f, _ in pairs)
     specific = load_acceleration(p, x, force)
     # the damping of the shares leaves a part of second order
-    assert specific == pytest.approx(wanted, abs=0.03 * max(map(abs, wanted)))
+    assert specific == pytest.approx(expected, abs=0.03 * max(map(abs, expected)))
     for i in range(3):
         q, omega = x.link[i].direction, x.link[i].omega
         swing = -16.0 * np.cross(p.drive.direction[i], q) - 5.0 * np.array(omega)
-        exact = np.array(swing) + np.cross(q, np.array(specific) - wanted) / p.link_length[i]
+        exact = np.array(swing) + np.cross(q, np.array(specific) - expected) / p.link_length[i]
         assert link_acceleration(p, x, force, specific, i) == pytest.approx(exact, abs=1e-12)
 
 
-def test_derivatives_of_the_wanted_forces_along_the_motion():
+def test_derivatives_of_desired_forces_along_motion():
     p, x = published()
     links = tuple(normalise(Swing(q, (0.4, -0.2, 0.3))) for q in ((0.3, 0.1, -0.9), (-0.4, 0.2, -0.8)))
     x = x._replace(load_velocity=(0.9, 0.1, 4.8), attitude=(exp((0.1, -0.2, 0.05)),) * 2, link=links)
     tangent = rate(p, 0.3, x)
     specific = np.add(tangent.load_velocity, (0.0, 0.0, G))
-    given = command(p, 0.3, x)
-    force = tuple(thrust_world(x, given.thrust, i) for i in range(2))
+    values = command(p, 0.3, x)
+    force = tuple(thrust_world(x, values.thrust, i) for i in range(2))
     omega_rate = [link_acceleration(p, x, force, tuple(specific), i) for i in range(2)]
     _, pairs = forces(p, 0.3, x, tangent.load_velocity, omega_rate)
     h = 1e-5
@@ -116,7 +116,7 @@ def test_wanted_attitude_and_its_rate():
     assert (spin[2, 1], spin[0, 2], spin[1, 0]) == pytest.approx(omega, abs=1e-9)
 
 
-def test_a_force_that_points_down_does_not_tip_the_quadrotor_over():
+def test_force_that_points_down_does_not_tip_quadrotor_over():
     for z in (-20.0, 0.0, 1.0):
         kept, _ = forces_of.upright((3.0, 1.0, z), (0.0, 0.0, 1.0), 2.0)
         assert kept[2] >= 2.0
@@ -129,7 +129,7 @@ def test_a_force_that_points_down_does_not_tip_the_quadrotor_over():
     assert slope[2] == pytest.approx(1.0, abs=2e-3)
 
 
-def test_the_moment_vanishes_on_the_wanted_attitude_and_opposes_an_error():
+def test_moment_vanishes_at_desired_attitude_and_opposes_error():
     p, x = published()
     force = (0.0, 0.0, 10.0)
     aligned = from_matrix(forces_of.desired_attitude(force, ZERO)[0])
@@ -141,7 +141,7 @@ def test_the_moment_vanishes_on_the_wanted_attitude_and_opposes_an_error():
     )
 
 
-def test_the_published_flight_reaches_path_formation_and_attitude():
+def test_published_flight_reaches_path_formation_and_attitude():
     p, x0 = published()
     _, rows = simulate(get("rkmk4"), p, x0, 5.0 / 2000, 2000, every=1000)
     for t, row in zip((2.5, 5.0), rows[1:], strict=True):

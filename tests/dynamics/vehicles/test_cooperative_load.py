@@ -62,7 +62,7 @@ def constrained_accelerations(p, x):
 
 
 @pytest.mark.parametrize("n", [2, 3])
-def test_accelerations_are_those_of_the_constrained_particles(n):
+def test_accelerations_are_those_of_constrained_particles(n):
     p = system(n, pushing(n))
     for seed in range(3):
         x = swinging(n, seed)
@@ -76,7 +76,7 @@ def test_accelerations_are_those_of_the_constrained_particles(n):
             assert abs(np.dot(q, omega_rate)) < 1e-14 * (1 + np.linalg.norm(omega_rate))
 
 
-def test_a_whole_flight_agrees_with_the_constrained_formulation():
+def test_whole_flight_agrees_with_constrained_formulation():
     p, x0 = system(2, pushing(2)), swinging(2, 5)
     _, states = simulate(get("rkmk4"), p, x0, 1e-3, 1000, every=1000)
     end = unflatten(x0, tuple(map(float, states[-1])))
@@ -117,7 +117,7 @@ def test_energy_and_constraints_without_rotors():
 
 
 @pytest.mark.parametrize("method", ["lie_euler", "rkmk4"])
-def test_constraints_hold_to_round_off_whatever_the_method(method):
+def test_constraints_hold_to_round_off_in_each_method(method):
     p, x0 = system(2, pushing(2)), swinging(2, 3)
     _, rows = simulate(get(method), p, x0, 0.01, 500)
     for i in range(2):
@@ -127,7 +127,7 @@ def test_constraints_hold_to_round_off_whatever_the_method(method):
         assert (abs((q * omega).sum(axis=1)) / (1 + abs(omega).max(axis=1))).max() < 1e-15
 
 
-def test_what_cannot_be_flown_is_refused():
+def test_invalid_parameters_are_rejected():
     p, x0 = system(2, pushing(2)), swinging(2)
     cases = {
         r"link_length\[1\] = 0: must be positive": p._replace(link_length=(0.6, 0.0)),

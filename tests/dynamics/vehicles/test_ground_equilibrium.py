@@ -1,4 +1,4 @@
-"""How a vehicle stands: level, on a slope, between bumps."""
+"""Rest on level ground, on a slope, between bumps."""
 
 import math
 
@@ -21,13 +21,13 @@ def clearances(feet, ground=LEVEL):
     return R, np.array([z - surface(ground, x, y)[0] for x, y, z in places])
 
 
-def test_on_level_ground_it_is_not_turned_by_a_bit():
+def test_resting_pose_on_level_ground_is_exact():
     assert resting_pose(FEET) == ((0.0, 0.0, 0.35), NO_ROTATION)
     assert resting_pose([]) == ((0.0, 0.0, 0.0), NO_ROTATION)
 
 
 @pytest.mark.parametrize("slope", [(0.1, 0.0), (0.0, -0.2), (0.5, 0.5), (-0.9, 0.1)])
-def test_on_a_slope_every_foot_touches(slope):
+def test_on_slope_every_foot_touches(slope):
     plane = relief(slope=slope)
     R, heights = clearances(FEET, plane)
     assert abs(heights).max() < 1e-12
@@ -40,7 +40,7 @@ UNEVEN = [(0.2, 0.2, -0.30), (-0.2, 0.2, -0.35), (-0.2, -0.2, -0.35), (0.25, -0.
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.1, 0.0), (-0.2, 0.3)])
-def test_of_uneven_feet_three_around_the_centre_of_mass_touch(slope):
+def test_of_uneven_feet_three_around_centre_of_mass_touch(slope):
     R, heights = clearances(UNEVEN, relief(slope=slope))
     assert heights.min() > -1e-12
     assert np.sort(heights)[2] < 1e-12
@@ -50,13 +50,13 @@ def test_of_uneven_feet_three_around_the_centre_of_mass_touch(slope):
     assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_three_feet_of_unequal_height_give_the_tilt_in_closed_form():
+def test_three_feet_of_unequal_height_give_tilt_in_closed_form():
     R, heights = clearances([(0.2, 0.0, -0.30), (-0.2, 0.1, -0.35), (-0.2, -0.1, -0.35)])
     assert abs(heights).max() < 1e-12
     assert math.atan2(-R[2, 0], R[2, 2]) == pytest.approx(math.atan2(0.05, 0.4), abs=1e-12)  # nose down
 
 
-def test_feet_that_do_not_stand_around_the_centre_of_mass_leave_it_level():
+def test_feet_off_centre_of_mass_leave_vehicle_level():
     (x, y, z), attitude = resting_pose([(0.1, 0.1, -0.3), (0.2, 0.1, -0.35), (0.2, -0.1, -0.35)])
     assert (x, y, z, attitude) == (0.0, 0.0, 0.35, NO_ROTATION)
 

@@ -46,7 +46,7 @@ def published(t, o, p):
 @pytest.mark.parametrize(
     "p", [GE_LIN, CHAOTIC, BLOCKED, GE_LIN._replace(desired_rate=0.7, inertia=(400.0, 520.0, 900.0))]
 )
-def test_rate_is_the_published_one(p):
+def test_rate_is_published_one(p):
     for t, o in ((0.0, (0.1, 0.1, 0.1)), (2.3, (-0.4, 1.2, 0.6))):
         got = rate(p, t, RigidBody(NO_ROTATION, o))
         assert got.omega_body == pytest.approx(published(t, o, p), rel=1e-14)
@@ -60,7 +60,7 @@ def world_momentum(states, h=ZERO):
     return momentum + w * t + np.cross(u, t)
 
 
-def test_blocked_rotors_are_a_free_body():
+def test_blocked_rotors_are_free_body():
     _, one = simulate(get("rkmk4"), BLOCKED, START, 0.01, 1000, every=100)
     _, two = simulate(get("rkmk4"), FreeBodyParameters(INERTIA), START, 0.01, 1000, every=100)
     assert (one == two).all()
@@ -76,7 +76,7 @@ def test_steady_rotors_keep_energy_and_world_momentum():
     assert abs(momentum - momentum[0]).max() < 1e-8 * np.linalg.norm(momentum[0])
 
 
-def test_uneven_rotors_still_keep_the_total_momentum_without_friction():
+def test_uneven_rotors_keep_momentum_without_friction():
     p = CHAOTIC._replace(damping=0.0)
     times = np.linspace(0.0, 20.0, 41)
     states, _ = solve(p, START, times, 1e-12)
@@ -94,7 +94,7 @@ def test_friction_takes_energy():
     assert energy[-1] < 0.9 * energy[0]
 
 
-def test_neighbouring_starts_part_only_in_the_chaotic_case():
+def test_neighbouring_starts_part_only_in_chaotic_case():
     near = RigidBody(NO_ROTATION, (0.1 + 1e-9, 0.1, 0.1))
     strong = GE_LIN._replace(linear_gain=(100.0, 100.0, 100.0))
     growth = {}
@@ -107,14 +107,14 @@ def test_neighbouring_starts_part_only_in_the_chaotic_case():
     assert growth["chaotic"] > 1e6
 
 
-def test_ten_hours_stay_on_the_group_and_bounded():
+def test_ten_hours_stay_on_group_and_bounded():
     _, states = simulate(get("rkmk4"), GE_LIN, START, 0.01, 60_000, every=60)
     assert abs((states[:, :4] ** 2).sum(axis=1) - 1).max() < 5e-16
     assert abs(states[:, 4:]).max() < 10.0
 
 
 @pytest.mark.parametrize("start", [START, RigidBody(exp((0.0, 3.1, 0.0)), (0.5, -0.3, 0.2))])
-def test_control_brings_the_satellite_to_the_prescribed_attitude(start):
+def test_control_brings_satellite_to_prescribed_attitude(start):
     target = exp((0.6, -0.9, 1.1))
     p = CHAOTIC._replace(attitude_gain=50.0, rate_gain=300.0, target=target)
     _, states = simulate(get("rkmk4"), p, start, 0.02, 10_000, every=10_000)

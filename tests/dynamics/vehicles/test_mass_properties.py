@@ -34,7 +34,7 @@ def tumbled(inertia, products, attitude, omega):
     return Rotation.from_quat(np.roll(m.attitude, -1)), np.array(m.omega_body)
 
 
-def test_a_body_tumbles_the_same_along_whatever_axes_it_is_described():
+def test_tumbling_is_independent_of_body_axes():
     omega = np.array([3.0, 0.2, -1.0])
     attitude, rate = tumbled(np.diag(PRINCIPAL), (0.0, 0.0, 0.0), Rotation.identity(), omega)
     turned, turned_rate = tumbled(np.diag(MATRIX), PRODUCTS, TURN.inv(), TURN.apply(omega))
@@ -42,7 +42,7 @@ def test_a_body_tumbles_the_same_along_whatever_axes_it_is_described():
     assert turned_rate == pytest.approx(TURN.apply(rate), abs=1e-9)
 
 
-def test_the_inverse_is_the_inverse_and_without_products_nothing_changes():
+def test_inverse_inertia_with_and_without_products():
     full = body_of(2.0, tuple(np.diag(MATRIX)), PRODUCTS)
     product = np.reshape(full.inertia, (3, 3)) @ np.reshape(full.inverse_inertia, (3, 3))
     assert product == pytest.approx(np.eye(3), abs=1e-12)
@@ -53,12 +53,12 @@ def test_the_inverse_is_the_inverse_and_without_products_nothing_changes():
     ("products", "message"),
     [((0.4, 0.0, 0.0), "products: .* principal moment"), ((0.0, 0.0, 0.15), "triangle inequality")],
 )
-def test_a_matrix_that_no_body_has_is_refused(products, message):
+def test_matrix_that_no_body_has_is_refused(products, message):
     with pytest.raises(ValueError, match=message):
         Mass(total=1.0, payload=0.0, inertia=(0.27, 0.26, 0.42), products=products)
 
 
-def test_positions_are_moved_to_the_centre_of_mass_once():
+def test_positions_are_moved_to_centre_of_mass_once():
     mass = DRONE.mass.model_copy(update={"centre": (0.017, 0.0, -0.01)})
     moved = DRONE.model_copy(update={"mass": mass}).about_centre
     assert moved.rotors.position[0] == pytest.approx((0.35171491 - 0.017, 0.35171491, 0.01))
@@ -68,7 +68,7 @@ def test_positions_are_moved_to_the_centre_of_mass_once():
     assert isinstance(moved, Airframe)
 
 
-def test_in_hover_the_rotors_share_the_weight_by_their_distance_from_the_centre_of_mass():
+def test_hover_thrusts_balance_offset_centre_of_mass():
     """The least thrusts that carry W without a torque: F = W / 4 (1 + (c . r) / l^2), r from the hubs' centre."""
     c, arm = 0.017, 0.35171491
     flight = lapwing.fly("hover", {"airframe.mass.centre": [c, 0.0, 0.0], "run.duration": 5.5})

@@ -35,7 +35,7 @@ def start(omega=(0.0, 0.0, 0.0), attitude=NO_ROTATION, speed=0.0, p=BARE):
     return state._replace(motion=state.motion._replace(omega_body=omega))
 
 
-def test_falls_freely_with_the_rotors_at_rest():
+def test_falls_freely_with_rotors_at_rest():
     m = fly(start(), (0.0,) * 4, 1.0).motion
     assert m.position_world == pytest.approx((0.0, 0.0, 10.0 - G / 2), abs=1e-12)
     assert m.velocity_world == pytest.approx((0.0, 0.0, -G), abs=1e-12)
@@ -85,7 +85,7 @@ def test_torque_free_rotation_keeps_momentum_and_energy():
     assert not np.allclose(after.omega_body, before.omega_body, atol=0.1)
 
 
-def test_agrees_with_an_independent_implementation():
+def test_agrees_with_independent_implementation():
     """Newton-Euler with a rotation matrix and full inertia tensor, in scipy's eighth-order method."""
     voltage = np.array([33.0, 30.0, 34.0, 32.0])
     position = np.array(DRONE.rotors.position)
@@ -130,14 +130,14 @@ def test_converges_with_fourth_order():
     assert np.log2(np.divide(error[:-1], error[1:])) == pytest.approx(4.0, abs=0.3)
 
 
-def test_two_intervals_are_one_of_twice_the_length():
+def test_two_intervals_are_one_of_twice_length():
     voltage = (33.0, 30.0, 34.0, 32.0)
     state = start((0.1, 0.2, 0.3), speed=300.0)
     half = multirotor.advance(RK4, BARE, KEY, 0, state, voltage, 1e-3, 4)
     assert multirotor.advance(RK4, BARE, KEY, 1, half, voltage, 1e-3, 4) == fly(state, voltage, 0.008)
 
 
-def test_observed_acceleration_is_the_slope_of_velocity():
+def test_observed_acceleration_is_slope_of_velocity():
     attitude = Quaternion(*np.array([0.9, 0.1, -0.3, 0.2]) / math.sqrt(0.95))
     state = start((0.4, -0.2, 0.9), attitude, 300.0)
     voltage = (33.0, 30.0, 34.0, 32.0)

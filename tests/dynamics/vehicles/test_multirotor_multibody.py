@@ -62,7 +62,7 @@ def reference():
 
 
 @pytest.mark.parametrize("stabilisation", ["projection", "partitioning", "baumgarte", "none"])
-def test_symmetric_propellers_at_imposed_speed_are_the_reduced_model(reference, stabilisation):
+def test_symmetric_propellers_at_imposed_speed_are_reduced_model(reference, stabilisation):
     p = multirotor_multibody.parameters(SYMMETRIC, ACTIVE, "speed", stabilisation)
     start = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED, omega_body=OMEGA)
     # feedback turns the drift that the integration leaves into motion of the chassis: half the step for the same error
@@ -99,7 +99,7 @@ def hinges(p, state, volts):
 
 
 @pytest.mark.parametrize("drive", ["torque", "speed"])
-def test_hinges_carry_thrust_and_drives_hold_the_drag(drive):
+def test_hinges_carry_thrust_and_drives_hold_drag(drive):
     p, state, volts = hovering(DRONE, drive)
     seen = multirotor.observe(p, 0, 0.004, state, volts)
     up = sum(seen.thrust) / DRONE.mass.total - 9.80665
@@ -113,7 +113,7 @@ def test_hinges_carry_thrust_and_drives_hold_the_drag(drive):
     assert chassis[1] == pytest.approx((0.0, 0.0, 0.0), abs=1e-10)
 
 
-def test_a_single_rotor_must_be_described():
+def test_single_rotor_must_be_described():
     bare = DRONE.model_copy(update={"rotors": DRONE.rotors.model_copy(update={"mass": None})})
     with pytest.raises(ValueError, match="rotors: the five bodies need four rotors with mass and blade_inertia"):
         multirotor_multibody.parameters(bare)

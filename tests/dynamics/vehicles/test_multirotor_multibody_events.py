@@ -97,7 +97,7 @@ def before(coordinates, drive):
 @pytest.mark.parametrize("coordinates", FORMS)
 @pytest.mark.parametrize("drive", ["torque", "speed"])
 @pytest.mark.parametrize("becomes", BECOMES)
-def test_momentum_is_kept_across_the_event(coordinates, drive, becomes):
+def test_momentum_is_kept_across_event(coordinates, drive, becomes):
     form, p, start, state = before(coordinates, drive)
     after = form.with_propeller_failure(p, 1, becomes)
     kept = momenta(p, state.motion)
@@ -110,7 +110,7 @@ def test_momentum_is_kept_across_the_event(coordinates, drive, becomes):
     assert np.abs(momenta(after, end.motion) - kept).max() < 1e-7
 
 
-def test_a_locked_propeller_gives_its_spin_to_the_chassis():
+def test_locked_propeller_transfers_spin_to_chassis():
     """The naive way, which just stops it, loses the spin."""
     _, p, _, state = before("se3", "torque")
     after = multirotor_multibody.with_propeller_failure(p, 1, "locked")
@@ -129,7 +129,7 @@ def test_a_locked_propeller_gives_its_spin_to_the_chassis():
 
 
 @pytest.mark.parametrize("drive", ["torque", "speed"])
-def test_a_free_propeller_keeps_its_spin_without_air(drive):
+def test_free_propeller_keeps_its_spin_without_air(drive):
     """The naive way, a motor without voltage, brakes it."""
     _, p, _, state = before("se3", drive)
     after = multirotor_multibody.with_propeller_failure(p, 1, "free")
@@ -144,7 +144,7 @@ def test_a_free_propeller_keeps_its_spin_without_air(drive):
 
 
 @pytest.mark.parametrize("coordinates", FORMS)
-def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
+def test_of_torn_off_propeller_constraint_rows_vanish(coordinates):
     """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held. The naive way,
     a propeller that gives no thrust any more, stays where it is."""
     form, p, _, state = before(coordinates, "speed")
@@ -174,7 +174,7 @@ def test_of_a_torn_off_propeller_the_constraint_rows_vanish(coordinates):
     assert np.abs(np.subtract(naive[2].position_world, straight)).max() > 1e-4
 
 
-def test_both_coordinates_tear_alike():
+def test_detachment_is_equal_in_both_coordinates():
     ends = []
     for coordinates in FORMS:
         form, p, _, state = before(coordinates, "torque")
@@ -184,7 +184,7 @@ def test_both_coordinates_tear_alike():
         np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-5)
 
 
-def test_thrust_of_what_is_gone_is_gone():
+def test_detached_propeller_has_no_thrust():
     active = effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE)
     p = multirotor_multibody.with_propeller_failure(multirotor_multibody.parameters(DRONE, active), 1, "torn_off")
     state = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=SPEED)

@@ -58,7 +58,7 @@ def invariants(x):
     return kinetic + height + 0.5 * SLING.stiffness * stretch**2, momentum, angular
 
 
-def test_on_a_fixed_hook_it_is_a_pendulum():
+def test_load_on_fixed_hook_is_pendulum():
     """Period 4 sqrt(L / g) K(sin^2(a / 2)), L with the stretch under the load."""
     sling = SLING._replace(stiffness=2e4)
 
@@ -80,7 +80,7 @@ def test_on_a_fixed_hook_it_is_a_pendulum():
     assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-4)
 
 
-def test_with_a_taut_cable_energy_and_both_momenta_are_kept():
+def test_with_taut_cable_energy_and_both_momenta_are_kept():
     p = vehicle(SLING)
     x = begin(p, (0.05, 0.3, 97.9), (2.0, 0.5, 0.0), omega=(0.3, -0.2, 0.5))
     energy, momentum, angular = invariants(x)
@@ -90,7 +90,7 @@ def test_with_a_taut_cable_energy_and_both_momenta_are_kept():
     assert after[2] == pytest.approx(angular, abs=1e-7)
 
 
-def test_on_a_slack_cable_both_fall_freely():
+def test_on_slack_cable_both_fall_freely():
     p = vehicle(SLING)
     x = flown(p, begin(p, (0.5, 0.0, 99.5), (0.3, 0.2, 1.0), velocity=(0.1, 0.0, 0.0)), 0.8)
     assert x.load_position == pytest.approx((0.74, 0.16, 99.5 + 0.8 - 0.32 * G), abs=1e-9)
@@ -98,7 +98,7 @@ def test_on_a_slack_cable_both_fall_freely():
     assert x.vehicle.omega_body == (0.0, 0.0, 0.0)
 
 
-def test_what_it_pulls_with_when_it_comes_taut_is_bounded_by_its_stiffness():
+def test_taut_cable_force_is_bounded_by_stiffness():
     """In free fall and without damping: speed apart times sqrt(stiffness times reduced mass)."""
     sling = SLING._replace(hook_body=(0.0, 0.0, 0.0))
     p, speed = vehicle(sling), 1.5
@@ -112,7 +112,7 @@ def test_what_it_pulls_with_when_it_comes_taut_is_bounded_by_its_stiffness():
     assert apart == pytest.approx(speed, rel=2e-3)  # thrown back as fast: nothing is lost
 
 
-def test_a_damped_cable_pulls_and_never_pushes():
+def test_damped_cable_pulls_and_never_pushes():
     sling = SLING._replace(damping=500.0)
     closing, _ = python_function(slung.tension)(sling, (0.0, 0.0, -2.001), (0.0, 0.0, 3.0))
     assert closing == (0.0, 0.0, 0.0)
@@ -131,13 +131,13 @@ def test_a_damped_cable_pulls_and_never_pushes():
         ({"slung_load.mass": 0.0}, "slung_load.mass: expected a number above 0"),
     ],
 )
-def test_what_cannot_be_is_refused(changes, message):
+def test_invalid_cable_parameters_are_rejected(changes, message):
     with pytest.raises(lapwing.SceneError, match=message):
         load("slung_load", changes)
 
 
 @pytest.mark.long
-def test_the_autopilot_lifts_it_carries_it_and_holds_height():
+def test_autopilot_lifts_and_carries_load_at_height():
     flight = lapwing.fly("slung_load", {"run.duration": 20.0})
     assert not flight.failure
     body, truth = flight.topic("body_states"), flight.truth

@@ -36,7 +36,7 @@ def points_of(mass, inertia, centre):
     return [(mass / 6.0, centre + arm) for arm in arms]
 
 
-def test_mass_centre_and_inertia_are_those_of_the_points_of_both_bodies():
+def test_mass_centre_and_inertia_equal_point_masses():
     """Against a sum over point masses that know no theorem; the box by hand: m (b^2 + c^2) / 12."""
     box = 2.0 / 12.0 * np.diag([0.2**2 + 0.1**2, 0.3**2 + 0.1**2, 0.3**2 + 0.2**2])
     points = points_of(8.0, BARE.matrix, np.array(BARE.centre)) + points_of(2.0, box, np.array(BOX.position))
@@ -73,7 +73,7 @@ def momenta(mass, inertia, centre, motion):
     return linear, np.cross(np.array(motion.position_world) + arm, linear) + own
 
 
-def test_when_it_goes_both_keep_their_momentum():
+def test_release_conserves_momentum_of_both():
     """In free space: the vehicle's is constant after the release, and with the box's the one before."""
     p, state = flying({"payload_release": {}})
     (effect,) = p.effects
@@ -93,7 +93,7 @@ def test_when_it_goes_both_keep_their_momentum():
     assert after[1] + box[1] == pytest.approx(before[1], abs=1e-6)
 
 
-def test_while_it_is_carried_it_is_a_plain_body():
+def test_carried_payload_acts_as_part_of_body():
     p, state = flying({"payload_release": {}, "gravity": {}, "rotor_thrust": {}})
     plain, other = flying({"gravity": {}, "rotor_thrust": {}})
     m = FRAME.loaded.mass
@@ -105,7 +105,7 @@ def test_while_it_is_carried_it_is_a_plain_body():
     assert np.array(state.motion.omega_body) == pytest.approx(other.motion.omega_body, abs=1e-10)
 
 
-def test_an_empty_vehicle_is_the_vehicle_described_without_the_box():
+def test_empty_vehicle_is_vehicle_described_without_box():
     """After the release it flies as the bare airframe does whose state is that of its own centre of mass."""
     tables = {"gravity": {}, "rotor_thrust": {}, "h_force": {"coefficient": 1e-4}, "gyroscopic_torque": {}}
     p, state = flying({**tables, "payload_release": {}})
@@ -128,7 +128,7 @@ def test_an_empty_vehicle_is_the_vehicle_described_without_the_box():
     assert np.array(state.motion.omega_body) == pytest.approx(np.array(other.motion.omega_body), abs=1e-7)
 
 
-def test_a_flight_lets_a_payload_go_that_hangs_ahead():
+def test_flight_lets_payload_go_that_hangs_ahead():
     """The front rotors carry more with it; without it all carry the rest about the vehicle's own centre."""
     ahead, arm, g = 0.1, 0.35171491, 9.80665
     box = {"mass": 2.0, "position": [ahead, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
@@ -152,7 +152,7 @@ def test_a_flight_lets_a_payload_go_that_hangs_ahead():
     assert without == pytest.approx(np.full(4, 0.25 * 8.0224 * g), rel=1e-2)
 
 
-def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
+def test_batch_release_is_bit_for_bit_identical():
     box = {"mass": 2.0, "position": [0.1, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
     scene = load(
         "hover",
@@ -161,13 +161,13 @@ def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
     )  # fmt: skip
     batch = lapwing.BatchSimulator(scene, 2)
     for _ in range(50):
-        found = batch.step(motor_voltages=np.full((2, 4), 36.0))
+        result = batch.step(motor_voltages=np.full((2, 4), 36.0))
     core, state = resolve(scene).services["plant"].parameters.core, resolve(scene).services["plant"].parameters.start
     x = state.vehicle
     for tick in range(50):
         x = multirotor.advance(core.method, core.vehicle, core.key, tick, x, (36.0,) * 4, core.step, core.steps)
-    assert found.position_world[1].tolist() == list(x.motion.position_world)
-    assert found.omega_body[1].tolist() == list(x.motion.omega_body)
+    assert result.position_world[1].tolist() == list(x.motion.position_world)
+    assert result.omega_body[1].tolist() == list(x.motion.omega_body)
 
 
 @pytest.mark.parametrize(
@@ -177,7 +177,7 @@ def test_a_batch_of_vehicles_lets_it_go_to_the_same_bits():
         ({"vehicle.model": "multibody"}, "payload: the five bodies have no place for one"),
     ],
 )
-def test_refused_in_a_scene(overrides, message):
+def test_refused_in_scene(overrides, message):
     box = {"mass": 2.0, "position": [0.1, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
     with pytest.raises(ValueError, match=message):
         resolve(load("hover", {"airframe.mass.payload": 0.0, "airframe.payload": box, **overrides}))

@@ -25,27 +25,27 @@ def test_hover():
     assert hover.voltage == pytest.approx(hover.rotor_speed / (150 * 2 / 3 * math.pi / 30) + 0.085 * hover.current)
 
 
-def test_trim_is_where_the_plant_does_not_accelerate():
+def test_trim_is_where_plant_does_not_accelerate():
     """The plant under its own drag, H-force and inflow at the tilt and rotor speed of the card."""
     tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
     for speed in (3.0, 12.0, 20.0):
         t = performance.trim(DRONE, speed)
         state = multirotor.initial_state(p, (0.0, 0.0, 20.0), exp((0.0, t.tilt, 0.0)), t.rotor_speed, (speed, 0.0, 0.0))
-        found = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 4)
-        assert found.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
-        assert found.thrust == pytest.approx((t.thrust,) * 4)
-        assert t.current == pytest.approx(found.motor_current[0])
+        result = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 4)
+        assert result.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+        assert result.thrust == pytest.approx((t.thrust,) * 4)
+        assert t.current == pytest.approx(result.motor_current[0])
 
 
-def test_thrust_over_weight_counts_the_resistance():
+def test_thrust_over_weight_counts_resistance():
     ideal = DRONE.model_copy(update={"motor": DRONE.motor.model_copy(update={"resistance": 0.0})})
     assert performance.thrust_over_weight(DRONE) == pytest.approx(1.83, abs=0.01)
     hover = performance.trim(ideal)
     assert performance.thrust_over_weight(ideal) == pytest.approx((44.4 / hover.voltage) ** 2)
 
 
-def test_power_has_a_minimum_at_speed_zero_or_above_and_grows_in_the_end():
+def test_power_has_minimum_and_grows_with_speed():
     power = [performance.trim(DRONE, v).power for v in np.linspace(0.0, performance.maximum_speed(DRONE), 30)]
     assert power[-1] > 1.5 * min(power)
 
@@ -55,7 +55,7 @@ def papers_density(height):
     return 1.293 * 273 / 288 * (1 - 0.0065 * height / 288) ** 5.2561
 
 
-def test_table_8_of_the_source():
+def test_table_8_of_source():
     """Hover time 19.3 min, payload 9.9 kg, ceiling 5.3 km, tilt 58.9 degrees, speed 20.7 m/s, range 12.1 km: an online
     estimator's figures; the last two hang on drag areas that are chosen."""
     assert performance.hover_time(DRONE) / 60 == pytest.approx(19.3, rel=0.05)
@@ -66,19 +66,19 @@ def test_table_8_of_the_source():
     assert performance.maximum_range(DRONE)[0] == pytest.approx(12100, rel=0.35)
 
 
-def test_at_the_ceiling_the_highest_thrust_is_the_weight():
+def test_at_ceiling_highest_thrust_is_weight():
     h = performance.ceiling(DRONE)
     assert performance.maximum_thrust(DRONE, density(Atmosphere(), h)) == pytest.approx(WEIGHT)
     assert performance.maximum_thrust(DRONE, papers_density(h)) < 0.93 * WEIGHT  # thinner aloft than the standard
 
 
-def test_the_highest_speed_uses_all_the_voltage():
+def test_highest_speed_uses_all_voltage():
     top = performance.maximum_speed(DRONE)
     assert performance.trim(DRONE, top).voltage == pytest.approx(44.4)
     assert performance.maximum_range(DRONE)[1] <= top
 
 
-def test_without_the_parts():
+def test_without_parts():
     with pytest.raises(ValueError, match=r"no \[propeller\]"):
         performance.trim(DRONE.model_copy(update={"propeller": None}))
     with pytest.raises(ValueError, match=r"no \[battery\]"):
@@ -87,7 +87,7 @@ def test_without_the_parts():
         performance.trim(DRONE.model_copy(update={"drag": None}), 5.0)
 
 
-def test_the_highest_thrust_keeps_current_and_power():
+def test_highest_thrust_keeps_current_and_power():
     def limited(**motor):
         frame = DRONE.model_copy(update={"motor": DRONE.motor.model_copy(update=motor)})
         thrust = performance.maximum_thrust(frame)
@@ -114,8 +114,8 @@ def test_rotors_that_lean_past_one_another_carry_less():
     p = multirotor.parameters(frame, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, frame))
     t = performance.trim(frame)
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=t.rotor_speed)
-    found = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 4)
-    assert found.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    result = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 4)
+    assert result.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
 def stacked(drone):
@@ -127,21 +127,21 @@ def stacked(drone):
 
 
 @pytest.mark.parametrize("speed", [0.0, 6.0, 14.0])
-def test_the_trim_of_rotors_over_one_another_is_the_plants(speed):
+def test_trim_of_rotors_over_one_another_is_plants(speed):
     """Under `coaxial_interference` the plant hovers at the card's trim and takes the card's current."""
     frame = stacked(DRONE)
     tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "coaxial_interference": {}}
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     t = performance.trim(frame, speed, rotor=performance.rotor_of(frame)._replace(drag=0.0))
     state = multirotor.initial_state(p, (0.0, 0.0, 20.0), exp((0.0, t.tilt, 0.0)), t.rotor_speed, (speed, 0.0, 0.0))
-    found = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 8)
-    assert found.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
-    assert found.thrust[1] == pytest.approx(t.thrust)
-    assert t.current == pytest.approx(max(found.motor_current))
+    result = multirotor.observe(p, 0, 0.004, state, (t.voltage,) * 8)
+    assert result.acceleration_world == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
+    assert result.thrust[1] == pytest.approx(t.thrust)
+    assert t.current == pytest.approx(max(result.motor_current))
 
 
-def test_lower_rotors_cost_what_momentum_theory_says():
-    """Of four pairs, at the voltage at which four rotors by themselves reach their limit, the lower ones give 0.44."""
+def test_lower_rotor_thrust_follows_momentum_theory():
+    """The lower rotors of four pairs have 0.44 of the thrust, at the voltage limit of four isolated rotors."""
     frame, rotor = stacked(DRONE), performance.rotor_of(stacked(DRONE))
     lost = 1.0 - thrust_in_wake.py_func(rotor.wash.pitch, 1.0)
     assert lost == pytest.approx(0.56, abs=0.01)

@@ -24,7 +24,7 @@ def fly(rpm, p=OS4, method="lie_euler"):
     return unflatten(start(*rpm), tuple(map(float, states[-1])))
 
 
-def test_hover_speed_is_the_published_one():
+def test_hover_speed_is_published_one():
     assert round(hover_speed(OS4) / RPM) == 2155
 
 
@@ -39,7 +39,7 @@ def test_experiment_1_hovers():
 
 
 @pytest.mark.parametrize("method", ["lie_euler", "rkmk4"])
-def test_experiments_2_to_4_go_where_the_text_says(method):
+def test_experiments_2_to_4_follow_published_directions(method):
     two, three, four = (
         fly(r, method=method) for r in ((2155, 2154, 2155, 2156), (2154, 2155, 2156, 2155), (2154, 2154, 2156, 2156))
     )
@@ -82,7 +82,7 @@ def test_net_vertical_force_to_first_order():
     assert net_force(OS4, x) == pytest.approx((weight * math.sin(0.1), 0.0, weight * (math.cos(0.1) - 1)), abs=3e-3)
 
 
-def test_residual_rotor_speed_precesses_the_body():
+def test_residual_rotor_speed_precesses_body():
     # rotors 2 and 4 only, both one way: a gyroscope, J omega' = Omega_r J_r e3 x omega
     x = start(0, 2155, 0, 2155)._replace(omega_body=(0.2, 0.0, 0.0))
     spin = OS4.rotor_inertia * 2 * 2155 * RPM
@@ -102,7 +102,7 @@ def steady_voltage(p, constant, resistance, speed):
     return resistance * p.drag_constant * speed * speed / constant + constant * speed
 
 
-def test_motors_reach_the_speed_of_their_voltage_and_push_the_body_back():
+def test_motors_reach_voltage_speed_and_react_on_body():
     speed, km, r = 2155 * RPM, 5.2e-3, 0.6
     u = steady_voltage(OS4, km, r, speed)
     p = OS4._replace(motors=Os4Motors((u, u, u, u), km, r))

@@ -23,7 +23,7 @@ def let_go():
     return release(p, CooperativeLoadState((1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (NO_ROTATION, tilted), (SPIN,) * 2, links))
 
 
-def test_every_body_goes_on_from_where_it_was():
+def test_release_keeps_state_of_every_body():
     _, x = let_go()
     assert x.quad_position == (pytest.approx((1.0, 2.0, 3.6)), pytest.approx((0.2, 2.0, 3.0)))
     # less the link's length times omega x q: (2, 0, 0) x (0, 0, -1) = (0, 2, 0) and (0, 0, 3) x (1, 0, 0) = (0, 3, 0)

@@ -30,7 +30,7 @@ def run(p, x, seconds, start=0.0, h=H):
     return integrate_fixed(RK4, p, start, x, h, round(seconds / h))
 
 
-def test_the_contact_of_two_that_move_as_one_does_no_work():
+def test_contact_of_equal_velocities_does_no_work():
     """Pack and door turn together about the hinge: what the door takes from the pack, the pack gets."""
     p = P._replace(floor_height=5.0, ramp_start=-1.0, door_damping=0.0, depth=9.0)
     angle, turning = 1.2, 0.7
@@ -55,7 +55,7 @@ def test_the_contact_of_two_that_move_as_one_does_no_work():
 
 
 @pytest.mark.long
-def test_the_door_alone_swings_with_its_period():
+def test_door_alone_swings_with_its_period():
     p = P._replace(gravity=0.0, floor_height=1.0, ramp_start=-1.0, pickup=0.0, door_damping=0.0, door_preload=-1.5)
     x = run(p, initial_state(p)._replace(position_world=(0.0, 0.0, 5.0), door=(1.0, 0.0)), 1.0)
     w = math.sqrt(3 * p.door_spring / (p.door_mass * p.door_length**2))
@@ -63,31 +63,31 @@ def test_the_door_alone_swings_with_its_period():
     assert x.door[1] == pytest.approx(0.5 * w * math.sin(w), abs=1e-9)
 
 
-def test_below_the_friction_angle_the_pack_stands():
+def test_pack_rests_below_friction_angle():
     p = P._replace(ramp_start=NEVER, pickup=NEVER)
     settled = run(p, initial_state(p), 1.0)
     later = run(p, settled, 4.0, start=1.0)
     assert later.position_world == pytest.approx(settled.position_world, abs=1e-7)
 
 
-def test_above_the_friction_angle_it_slides_as_coulomb_says():
+def test_sliding_above_friction_angle_follows_coulomb():
     p = P._replace(tilt=math.radians(35.0), ramp_start=NEVER, pickup=NEVER, depth=9.0)
     speeds = [np.linalg.norm(run(p, initial_state(p, gap=0.05), t).velocity_world) for t in (0.06, 0.12)]
     expected = G * (math.sin(p.tilt) - 0.3 * math.cos(p.tilt))
     assert (speeds[1] - speeds[0]) / 0.06 == pytest.approx(expected, rel=0.02)
 
 
-def test_rollers_carry_the_pack_at_their_surface_speed():
+def test_rollers_carry_pack_at_their_surface_speed():
     p = P._replace(roller_speed=2.5, ramp_start=0.0, ramp_duration=0.2, pickup=NEVER, depth=9.0)
     x = run(p, initial_state(p, gap=0.1), 0.8)
     assert np.dot(x.velocity_world, FORWARD) == pytest.approx(2.5 * p.roller_radius, rel=1e-3)
 
 
-def test_the_ramp():
+def test_ramp():
     assert [roller_speed(P, t) for t in (0.5, 1.5, 9.0)] == pytest.approx([0.0, math.pi, 2 * math.pi])
 
 
-def test_a_fall_bounces_lower_every_time():
+def test_fall_bounces_lower_every_time():
     p = P._replace(pickup=NEVER)
     x = initial_state(p)._replace(position_world=(1.0, 0.0, 0.2), attitude=exp((0.0, 0.05, 0.0)))
     at, total, t = [], [], 0.0
@@ -103,7 +103,7 @@ def test_a_fall_bounces_lower_every_time():
 
 
 @pytest.mark.long
-def test_the_whole_unloading_converges_and_the_door_shuts():
+def test_whole_unloading_converges_and_door_shuts():
     coarse, fine = (
         integrate_step_doubling(StepDoubling(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)
         for tolerance, step in ((1e-5, 1e-3), (1e-8, 2.5e-4))

@@ -33,7 +33,7 @@ def with_a_table_of_one(table):
     return map_index(indexed, (0.0, 0.0), table)
 
 
-def test_what_stands_for_arguments_may_be_of_one_length():
+def test_argument_values_may_have_equal_length():
     assert with_a_table_of_one(((1.0, 2.0), (3.0, 4.0))) == ((1.0, 2.0), (3.0, 4.0))
 
 
@@ -81,7 +81,7 @@ def caught(rows, i):
         return -1.0
 
 
-def test_recursion_optional_results_generators_and_errors_stay_numbas_own():
+def test_unsupported_functions_use_default_compilation():
     rows = np.arange(6.0)
     assert special(4, 9.0, rows) == (24, 3.0, 6, 4.0)
     assert special(4, -9.0, rows) == (24, -1.0, 6, 4.0)
@@ -116,7 +116,7 @@ def defined(library):
     return {f.name for f in library._get_module_for_linking().functions if not f.is_declaration}
 
 
-def test_a_function_apart_is_linked_into_the_outermost_kernel_only():
+def test_function_apart_is_linked_into_outermost_kernel_only():
     twice_both._cache.disable()  # what comes from the disk has no inner kernels
     assert twice_both((2.0, 3.0)) == 2.0 * (8.0 + 27.0 + 8.0)
     (inner,) = (result.library for result in both.overloads.values())

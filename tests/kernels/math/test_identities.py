@@ -23,7 +23,7 @@ def _values(low: float, high: float, count: int = 3000) -> list[float]:
 
 
 @pytest.mark.parametrize("name", sorted(KERNELS.keys() - {"sincos"}))
-def test_plain_python_gives_same_bits(name):
+def test_plain_python_is_bit_for_bit_identical(name):
     for arguments in samples(name, 300, seed=5):
         a, b = KERNELS[name](*arguments), getattr(functions, name)(*arguments)
         assert a == b or (a != a and b != b), arguments

@@ -1,0 +1,126 @@
+"""More thrust close below a ceiling."""
+
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Gt, Le
+
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
+from lapwing.dynamics.effects._types import Factors
+from lapwing.dynamics.vector import norm, pair
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.kernels import always_inline, math, noinline
+from lapwing.kernels.codegen import map_tuple
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+LOWEST = 0.25  # radii: nearer to the ceiling the law no longer holds, and the distance is taken as this
+FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.2 %, is faded out
+UNBOUNDED = 1e9  # [m]
+
+Length = Annotated[float, Gt(0), Le(1e6)]
+Place = Annotated[float, Ge(-1e6), Le(1e6)]
+
+
+class Settings(NamedTuple):
+    """Scene table."""
+
+    height: Annotated[float, Gt(0), Le(1e5)]  # [m] world z of the ceiling
+    centre: tuple[Place, Place] = (0.0, 0.0)  # [m] world x and y of its middle
+    size: tuple[Length, Length] | None = None  # [m] along world x and y; without bounds if left out
+    asymmetry: Annotated[float, Ge(0), Le(4)] = 1.0  # alpha_0 of the inflow; 1 for an even one
+
+
+class CeilingEffect(NamedTuple):
+    """Thrust and torque of blades whose induced flow a ceiling reduces (theory.md, eq. (2.69), (2.70)).
+
+    Source: Hsiao and Chirarattananon, IEEE/ASME Trans. Mechatronics 24 (2019) 2316, momentum theory of the induced
+    power, without recirculation; blades of one pitch as in `dynamic_inflow`. Valid in hover for distances above a
+    quarter of a radius, below a level ceiling; the vehicle does not collide with it.
+    """
+
+    inverse_radius: float  # [1/m]
+    height: float  # [m]
+    centre: tuple[float, float]  # [m]
+    half_size: tuple[float, float]  # [m]
+    asymmetry: float
+    pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed; above 1
+    induced: float  # induced part of the static torque
+    reach: float  # [m] from the centre of mass within which the ceiling is felt
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "CeilingEffect":
+        """Return the parameters of the airframe's propeller."""
+        given = checked(Settings, table)
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
+        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
+        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
+        torque = torque_coefficient(propeller) * math.pow(propeller.diameter, 5) / math.square(2.0 * math.pi)
+        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
+        if flow >= pitch:
+            reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+        length, width = given.size or (UNBOUNDED, UNBOUNDED)
+        reach = FADE_TO * radius + max(math.hypot(*place) for place in airframe.rotors.position)
+        return cls(
+            1.0 / radius, given.height, given.centre, (0.5 * length, 0.5 * width), given.asymmetry, pitch / flow,
+            min(static * flow / torque, 1.0), reach,
+        )  # fmt: skip
+
+
+@always_inline
+def _inside(e, half, offset):
+    """Return the share of a disc's width that lies under the ceiling, along one of its axes."""
+    return min(max(0.5 + 0.5 * (half - abs(offset)) * e.inverse_radius, 0.0), 1.0)
+
+
+@always_inline
+def power_ratio(e, distance):
+    """Return gamma, the induced power without a ceiling over that with one, at a distance in radii and equal thrust."""
+    z = max(distance, LOWEST)
+    fade = min(max((z - FADE_FROM) * (1.0 / (FADE_TO - FADE_FROM)), 0.0), 1.0)
+    left = 1.0 - fade * fade * (3.0 - 2.0 * fade)
+    return 1.0 + left * (0.5 * math.sqrt(1.0 + e.asymmetry / (8.0 * z * z)) - 0.5)
+
+
+@noinline
+def _changed(c, plan, z):
+    """Return the factors on the thrust and the torque of a rotor."""
+    e, s = c
+    R, (px, py, pz) = s.R_world_body, s.motion.position_world
+    x, y = plan
+    below = e.height - (pz + R[6] * x + R[7] * y + R[8] * z)
+    if below <= 0.0:
+        return 1.0, 1.0
+    share = _inside(e, e.half_size[0], px + R[0] * x + R[1] * y + R[2] * z - e.centre[0])
+    share *= _inside(e, e.half_size[1], py + R[3] * x + R[4] * y + R[5] * z - e.centre[1])
+    gamma = 1.0 + share * (power_ratio(e, e.inverse_radius * below) - 1.0)
+    # t (q - 1) + sqrt(t) / gamma = q: the blades' thrust and the flow of that thrust
+    slope = e.pitch - 1.0
+    root = (math.sqrt(1.0 / (gamma * gamma) + 4.0 * e.pitch * slope) - 1.0 / gamma) / (2.0 * slope)
+    return root * root, 1.0 + e.induced * (root * root * root / gamma - 1.0)
+
+
+@always_inline
+def _times_first(_, factor, change):
+    return factor * change[0]
+
+
+@always_inline
+def _times_second(_, factor, change):
+    return factor * change[1]
+
+
+@load_factors(CeilingEffect)
+def ceiling_effect(e, memory, s, before):
+    """Multiply the thrust and torque factors."""
+    change = map_tuple(_changed, (e, s), map_tuple(pair, 0.0, s.layout.x_body, s.layout.y_body), s.layout.z_body)
+    return Factors(
+        map_tuple(_times_first, 0.0, before.thrust, change), map_tuple(_times_second, 0.0, before.torque, change)
+    )
+
+
+@is_sleeping(CeilingEffect)
+def low(e, memory, motion, h):
+    """Return True if no rotor can reach the ceiling effect within a step."""
+    return e.height - motion.position_world[2] - 2.0 * h * norm(motion.velocity_world) > e.reach

@@ -1,0 +1,163 @@
+"""Rotors behind or beside others in forward flight, in the flow that these induce."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.effects._axes import air_body, hub_speeds
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import loads
+from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.effects._vortex_wake import OFFSETS, SKEWS, mean_wash
+from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vehicles import inflow
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.kernels import always_inline, kernel, math, noinline
+from lapwing.kernels.codegen import map_tuple
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+NEAREST = 0.5  # radii between axes; nearer rotors are coaxial
+SAME = 1e-6  # [m] distances that differ by less share a table
+SLOWEST = 1e-3  # [m/s] least induced velocity that speeds are compared with
+NOT_BESIDE = ("coaxial_interference", "rotor_quadratic", "rotor_table")
+
+
+class Settings(NamedTuple):
+    """No keys: the airframe's [propeller] and [rotors] say it all."""
+
+
+class RotorInterference(NamedTuple):
+    """Change of static loads by the flow that the other rotors induce (theory.md, eq. (2.73) to (2.75)).
+
+    Source: skewed cylinder of vortex rings of Castles and De Leeuw, NACA TR 1184 (1954), its mean over each disc; flow
+    of each rotor by Glauert; blades of one pitch as in `dynamic_inflow`. None in hover. Valid for rotors in one plane,
+    uniform discs, and wakes that neither roll up nor bend each other.
+    """
+
+    thrust_constant: float  # [m^4/rad^2]
+    slope: float  # [m^3/rad] -dT / (density speed dV)
+    flow: float  # [m/rad] induced velocity in hover over the rotor's speed
+    area: float  # [m^2] of the disc
+    numbers: tuple[int, ...]  # of the rotors
+    pairs: tuple[tuple[tuple[float, float, int], ...], ...]  # each rotor seen from each: unit vector, table; -1: itself
+    wash: np.ndarray  # mean flow at a disc over that at the inducing one, shape (tables, skews, offsets)
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorInterference":
+        """Return the parameters of every pair of rotors."""
+        checked(Settings, table)
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
+        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
+        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
+        area = math.pi * radius * radius
+        flow = math.sqrt(0.5 * static / area)
+        if flow >= pitch:
+            reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+        places = airframe.rotors.position
+        distances: list[float] = []
+        pairs = []
+        for k, (x, y, _) in enumerate(places):
+            row = []
+            for j, (u, v, _) in enumerate(places):
+                distance = math.hypot(x - u, y - v)
+                if j == k:
+                    row.append((0.0, 0.0, -1))
+                    continue
+                if distance < NEAREST * radius:
+                    reject("rotors that lie over each other have effects.coaxial_interference")
+                known = [n for n, d in enumerate(distances) if abs(d - distance) < SAME]
+                if not known:
+                    distances.append(distance)
+                row.append(((x - u) / distance, (y - v) / distance, known[0] if known else len(distances) - 1))
+            pairs.append(tuple(row))
+        wash = np.array([[[mean_wash(w, f, d / radius) for f in OFFSETS] for w in SKEWS] for d in distances])
+        return cls(static, static / (pitch - flow), flow, area, tuple(range(len(places))), tuple(pairs), wash)
+
+
+def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
+    """Check that the scene has `rotor_thrust`, whose loads this effect changes."""
+    if "rotor_thrust" not in tables:
+        reject("goes with effects.rotor_thrust, which the scene does not name")
+    for name in NOT_BESIDE:
+        if name in tables:
+            reject(f"is not made to stand beside effects.{name}: keep one of them")
+
+
+@always_inline
+def _node(count, value):
+    """Return (index, weight of the next node) of a value between 0 and 1 on equally spaced nodes."""
+    scaled = min(max(value, 0.0), 1.0) * (count - 1.0)
+    i = min(int(scaled), count - 2)
+    return i, scaled - i
+
+
+@kernel
+def _share(wash, number, skew, offset):
+    """Return the mean flow at a disc over that at the inducing one, bilinear."""
+    i, a = _node(wash.shape[1], skew)
+    k, b = _node(wash.shape[2], offset)
+    low = wash[number, i, k] + b * (wash[number, i, k + 1] - wash[number, i, k])
+    high = wash[number, i + 1, k] + b * (wash[number, i + 1, k + 1] - wash[number, i + 1, k])
+    return low + a * (high - low)
+
+
+@always_inline
+def _induced(e, speed, hub):
+    """Return (induced velocity [m/s], air speed through the disc [m/s], air speed across [m/s])."""
+    hover = max(e.flow * speed, SLOWEST)
+    v = hover * inflow.induced_velocity(hub[0] / hover, hub[1] / hover, 1.0)
+    return v, max(hub[0] + v, 0.0), hub[1]
+
+
+@noinline
+def _change(c, row, both):
+    """Return (change of thrust [N], change of torque [N m]) of a rotor at a density of 1."""
+    e, flows, (ahead, aside) = c
+    number, speed = both
+    if speed <= 0.0:
+        return 0.0, 0.0
+    motion = max(math.sqrt(ahead * ahead + aside * aside), 1e-9)
+    flow = 0.0
+    for j in range(len(row)):
+        x, y, table = row[j]
+        if table >= 0:
+            v, through, across = flows[j]
+            skew = across / max(across + through, 1e-9)
+            # downstream is against the motion through the air: 0 straight behind, 1 straight ahead
+            offset = math.sqrt(max(0.5 + 0.5 * (x * ahead + y * aside) / motion, 0.0))
+            flow += v * _share(e.wash, table, skew, offset)
+    v, through, across = flows[number]
+    disc = 2.0 * e.area * (math.sqrt(across * across + through * through) + v)  # dT / (density dv) of the disc
+    blades = e.slope * speed
+    thrust = -blades * flow / (1.0 + blades / max(disc, 1e-9))  # the rotor's own flow shrinks with its thrust
+    own = thrust / max(disc, 1e-9)
+    static = e.thrust_constant * speed * speed
+    return thrust, (thrust * through + static * (flow + own)) / speed
+
+
+@always_inline
+def _more_thrust(density, before, both):
+    factor, change = both
+    return before + density * factor * change[0]
+
+
+@always_inline
+def _more_torque(density, before, both):
+    factor, change = both
+    return before + density * factor * change[1]
+
+
+@loads(RotorInterference)
+def rotor_interference(e, memory, s, factors, before):
+    """Add the loads of each rotor to `before`."""
+    speed = s.motion.rotor_speed
+    air, _ = air_body(s)
+    flows = map_tuple(_induced, e, speed, hub_speeds(s))
+    change = map_tuple(_change, (e, flows, (air[0], air[1])), e.pairs, map_tuple(pair, 0.0, e.numbers, speed))
+    return Loads(
+        map_tuple(_more_thrust, s.air.density, before.thrust, map_tuple(pair, 0.0, factors.thrust, change)),
+        map_tuple(_more_torque, s.air.density, before.torque, map_tuple(pair, 0.0, factors.torque, change)),
+    )

@@ -1,0 +1,119 @@
+"""Loss and unsteadiness of the thrust of rotors that descend into their own flow."""
+
+import zlib
+from typing import TYPE_CHECKING, Annotated, NamedTuple
+
+from annotated_types import Ge, Le
+
+from lapwing.dynamics.effects._axes import hub_speeds
+from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._hooks import discrete_update, load_factors
+from lapwing.dynamics.effects._types import Factors
+from lapwing.dynamics.noise import normal3
+from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.kernels import always_inline, math
+from lapwing.kernels.codegen import map_tuple
+
+if TYPE_CHECKING:  # a process that flies has no need of pydantic
+    from lapwing.dynamics.vehicles.airframe import Airframe
+
+LANE = zlib.crc32(b"vortex_ring")
+# descent over the induced velocity in hover where the ring begins, is strongest, and ends (windmill brake state)
+BEGINS, STRONGEST, ENDS = 0.4, 1.25, 2.0
+SHORTEST, LONGEST = 20.0, 50.0  # revolutions between two rings that leave the rotor
+# rates over the rotor's speed: of the oscillation, and at which it forgets its phase
+TURNING = 1.0 / math.sqrt(SHORTEST * LONGEST)
+FADING = 0.25 * (1.0 / SHORTEST - 1.0 / LONGEST)
+SLOWEST = 1e-3  # [m/s] least induced velocity that speeds are compared with
+
+
+class Settings(NamedTuple):
+    """Scene table."""
+
+    loss: Annotated[float, Ge(0), Le(0.6)] = 0.2  # of the mean thrust where the ring is strongest
+    unsteadiness: Annotated[float, Ge(0), Le(0.4)] = 0.13  # standard deviation over the thrust without a ring, there
+
+
+class VortexRing(NamedTuple):
+    """Factor on the thrust of each rotor in descent: a mean loss, and a random oscillation (theory.md, eq. (2.71),
+    (2.72)).
+
+    Sources: losses and fluctuations are largest at 1.2 to 1.3 times the induced velocity in hover: Veismann, Dougherty
+    and Gharib, Flow 3 (2023) E7; fluctuations of up to 95 % of the mean from peak to peak, every 20 to 50 revolutions:
+    Stack, Caradonna and Savas, J. American Helicopter Society 50 (2005). The size of the mean loss is chosen. Valid for
+    descent along the rotors' axes; a wind across as fast as the flow in hover blows the ring away. The mean of
+    `dynamic_inflow` is a gain, on which the loss comes. Drawn exactly once a communication step.
+    """
+
+    flow: float  # [m/rad] induced velocity in hover over the rotor's speed
+    loss: float
+    unsteadiness: float
+    lanes: tuple[int, ...]  # of the random numbers of each rotor
+    calm: tuple[tuple[float, float], ...]  # zeros for each rotor
+
+    @classmethod
+    def from_scene(cls, table: dict, airframe: "Airframe") -> "VortexRing":
+        """Return the parameters of the airframe's propeller."""
+        given = checked(Settings, table)
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]")
+        radius, count = 0.5 * propeller.diameter, len(airframe.rotors.position)
+        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
+        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
+        lanes = tuple(LANE + k for k in range(count))
+        return cls(flow, given.loss, given.unsteadiness, lanes, ((0.0, 0.0),) * count)
+
+    def initial_discrete_state(self) -> tuple[tuple[float, float], ...]:
+        """Return the oscillation of each rotor, in phase and a quarter of a period behind, of unit deviation later."""
+        return self.calm
+
+
+@always_inline
+def strength(descent, across):
+    """Return the strength of the ring, 1 at most.
+
+    Args:
+        descent: air speed along the axis with the rotor's flow, over the induced velocity in hover.
+        across: air speed across the axis, over the same.
+    """
+    up = min(max((descent - BEGINS) * (1.0 / (STRONGEST - BEGINS)), 0.0), 1.0)
+    down = min(max((ENDS - descent) * (1.0 / (ENDS - STRONGEST)), 0.0), 1.0)
+    return up * up * (3.0 - 2.0 * up) * (down * down * (3.0 - 2.0 * down)) * max(1.0 - across, 0.0)
+
+
+@always_inline
+def _oscillated(c, state, both):
+    """Return the oscillation of a rotor an interval later."""
+    key, tick, interval = c
+    speed, lane = both
+    angle = speed * interval
+    kept, drawn = math.exp(-FADING * angle), normal3(key, tick, lane)
+    fresh = math.sqrt(1.0 - kept * kept)
+    sine, cosine = math.sincos(TURNING * angle)
+    a, b = state
+    return kept * (cosine * a - sine * b) + fresh * drawn[0], kept * (sine * a + cosine * b) + fresh * drawn[1]
+
+
+@discrete_update(VortexRing)
+def oscillate(e, memory, s, rotors, key, tick, interval):
+    """Return the oscillation of each rotor for the next interval."""
+    return map_tuple(_oscillated, (key, tick, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, e.lanes))
+
+
+@always_inline
+def _factor(e, hub, both):
+    speed, state = both
+    hover = max(e.flow * speed, SLOWEST)
+    return 1.0 - strength(-hub[0] / hover, hub[1] / hover) * (e.loss + e.unsteadiness * state[0])
+
+
+@always_inline
+def _product(_, a, b):
+    return a * b
+
+
+@load_factors(VortexRing)
+def vortex_ring(e, memory, s, before):
+    """Multiply the thrust factors; torque is unchanged."""
+    factor = map_tuple(_factor, e, hub_speeds(s), map_tuple(pair, 0.0, s.motion.rotor_speed, memory))
+    return Factors(map_tuple(_product, 0.0, before.thrust, factor), before.torque)

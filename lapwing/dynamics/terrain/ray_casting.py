@@ -1,0 +1,122 @@
+"""Exact intersections of rays with the ground and its obstacles, for many rays (theory.md, eq. (3.52))."""
+
+import numpy as np
+
+from lapwing.dynamics.terrain.heightfield import Relief, field
+from lapwing.dynamics.terrain.terrain_queries import Level
+from lapwing.kernels import kernel, math
+
+FINEST = 0.02  # [m] least step of a march over bumps or a grid
+HALVINGS = 24  # from the step to below a micrometre
+
+
+def as_relief(terrain: Level | Relief) -> Relief:
+    """Return the terrain as a `Relief`, level ground too, so that scans compile once."""
+    if isinstance(terrain, Relief):
+        return terrain
+    none = (np.zeros((0, 0)), np.zeros((0, 7)), np.zeros((0, 4)))
+    return Relief((0.0, 0.0), 0.0, 1.0, 0.0, none[0], (0.0, 0.0), 1.0, none[1], none[2], 0.0)
+
+
+def steepness(terrain: Relief) -> float:
+    """Return a bound of the ground's slope [m/m] without its obstacles, by which a march passes over nothing."""
+    steep = math.hypot(*terrain.slope) + abs(terrain.bump_height) * terrain.bump_wavenumber * math.sqrt(2.0)
+    if terrain.grid.size:
+        along, across = (float(np.abs(np.diff(terrain.grid, axis=k)).max()) / terrain.spacing for k in (1, 0))
+        steep += math.hypot(along, across)
+    return steep
+
+
+@kernel
+def _to_plane(t, o, d):
+    a, b = t.slope
+    gap = o[2] - (t.base + a * o[0] + b * o[1])
+    if gap <= 0.0:
+        return 0.0
+    approach = a * d[0] + b * d[1] - d[2]
+    return gap / approach if approach > 0.0 else math.inf
+
+
+@kernel
+def _to_field(t, o, d, steep, longest):
+    """Return the distance to bumps or a grid by a march within the bound of the slope, and bisection."""
+    before, after = 0.0, 0.0
+    closing = steep * math.sqrt(d[0] * d[0] + d[1] * d[1]) - d[2]  # greatest decrease of the gap by distance
+    while True:
+        gap = o[2] + after * d[2] - field(t, o[0] + after * d[0], o[1] + after * d[1])[0]
+        if gap <= 0.0:
+            break
+        if after > longest or closing <= 0.0:
+            return math.inf
+        before, after = after, after + max(FINEST, gap / closing)
+    for _ in range(HALVINGS):
+        middle = 0.5 * (before + after)
+        if o[2] + middle * d[2] > field(t, o[0] + middle * d[0], o[1] + middle * d[1])[0]:
+            before = middle
+        else:
+            after = middle
+    return after
+
+
+@kernel
+def _between(position, direction, half, first, last):
+    """Return the part of [first, last] in which a coordinate is within +-half."""
+    if direction == 0.0:
+        return (first, last) if abs(position) <= half else (math.inf, -math.inf)
+    one, two = (-half - position) / direction, (half - position) / direction
+    return max(first, min(one, two)), min(last, max(one, two))
+
+
+@kernel
+def _below(height, o, d, first, last):
+    """Return the part of [first, last] in which the ray is not above a height."""
+    if d[2] == 0.0:
+        return (first, last) if o[2] <= height else (math.inf, -math.inf)
+    crossing = (height - o[2]) / d[2]
+    return (max(first, crossing), last) if d[2] < 0.0 else (first, min(last, crossing))
+
+
+@kernel
+def _to_box(box, o, d):
+    x, y, c, s = o[0] - box[0], o[1] - box[1], box[2], box[3]
+    first, last = _below(box[6], o, d, 0.0, math.inf)
+    first, last = _between(c * x + s * y, c * d[0] + s * d[1], box[4], first, last)
+    first, last = _between(c * y - s * x, c * d[1] - s * d[0], box[5], first, last)
+    return first if first <= last else math.inf
+
+
+@kernel
+def _to_cylinder(cylinder, o, d):
+    x, y = o[0] - cylinder[0], o[1] - cylinder[1]
+    a, b = d[0] * d[0] + d[1] * d[1], x * d[0] + y * d[1]
+    outside = x * x + y * y - cylinder[2] * cylinder[2]
+    first, last = 0.0, math.inf
+    if a == 0.0:
+        if outside > 0.0:
+            return math.inf
+    else:
+        square = b * b - a * outside
+        if square < 0.0:
+            return math.inf
+        root = math.sqrt(square)
+        first, last = max((-b - root) / a, 0.0), (root - b) / a
+    first, last = _below(cylinder[3], o, d, first, last)
+    return first if first <= last else math.inf
+
+
+@kernel
+def cast(t, origin, direction, steep, longest):
+    """Return the distance [m] along a unit vector to the ground or an obstacle; inf beyond `longest`, 0 from within.
+
+    `steep` is `steepness` of the terrain.
+    """
+    result = math.inf
+    for i in range(t.boxes.shape[0]):
+        result = min(result, _to_box(t.boxes[i], origin, direction))
+    for i in range(t.cylinders.shape[0]):
+        result = min(result, _to_cylinder(t.cylinders[i], origin, direction))
+    if t.bump_height == 0.0 and t.grid.size == 0:
+        result = min(result, _to_plane(t, origin, direction))
+    else:
+        result = min(result, _to_field(t, origin, direction, steep, min(result, longest)))
+    return result if result <= longest else math.inf

@@ -1,0 +1,53 @@
+"""Loads in hover: power, currents, throttle, and the margins of speed controllers and battery."""
+
+import math
+
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.dynamics.vehicles.performance import CELL_VOLTAGE, DENSITY, Rotor, trim
+
+
+def power(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Return the power [W] that the motors draw from the battery in hover."""
+    return trim(airframe, 0.0, density, rotor=rotor).power
+
+
+def current(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Return the current [A] of the battery in hover, at nominal cell voltage less the drop over its resistance."""
+    return battery_current(airframe, power(airframe, density, rotor))
+
+
+def battery_current(airframe: Airframe, watts: float) -> float:
+    """Return the current [A] at which the battery at nominal charge gives a power, `watts` [W].
+
+    Raises:
+        ValueError: there is no battery, or its resistance does not let it give that power.
+    """
+    if (battery := airframe.battery) is None:
+        raise ValueError("the vehicle has no [battery]")
+    source, resistance = battery.cells * CELL_VOLTAGE, battery.cells * battery.cell_resistance
+    left = source * source - 4.0 * resistance * watts  # of V (source - V) = resistance * watts
+    if left < 0.0:
+        raise ValueError(f"the battery cannot give {watts:.0f} W at {CELL_VOLTAGE} V a cell")
+    return 2.0 * watts / (source + math.sqrt(left))
+
+
+def throttle(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Return the voltage of the hardest-turning motor in hover over its maximum."""
+    return trim(airframe, 0.0, density, rotor=rotor).voltage / airframe.motor.max_voltage
+
+
+def motor_current(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Return the current [A] of the hardest-turning motor in hover."""
+    return trim(airframe, 0.0, density, rotor=rotor).current
+
+
+def esc_margin(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Return the share of a speed controller's current limit that is free in hover; negative beyond the limit."""
+    return 1.0 - motor_current(airframe, density, rotor) / airframe.motor.esc_current
+
+
+def battery_margin(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
+    """Return the share of the battery's current limit (C rating) that is free in hover; negative beyond it."""
+    drawn = current(airframe, density, rotor)
+    assert airframe.battery is not None  # else `current` raises
+    return 1.0 - drawn / airframe.battery.current_limit
