@@ -29,7 +29,7 @@ class RunFailed(RuntimeError):
 
 
 class LockStepError(RuntimeError):
-    """The lock step cannot continue; the text names who waits for what."""
+    """The lock step cannot continue; the text names the process that waits, and what it waits for."""
 
     EXIT_CODE = ExitCode.FAILED
 

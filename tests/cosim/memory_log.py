@@ -20,7 +20,7 @@ from lapwing.studies.topic_view import TopicView
 
 
 class MemoryLog:
-    """What a flight would record; messages are decoded when asked for, topics named without their vehicle."""
+    """Recorded messages of a flight in memory, decoded on access, by topic name without the vehicle."""
 
     def __init__(self, setup: RunConfig):
         self.setup = setup
@@ -46,12 +46,12 @@ class MemoryLog:
 
     def payloads(self, name: str) -> list[tuple[int, bytes]]:
         """(tick, payload) of each message of a topic, in order."""
-        found = [
+        result = [
             (int(tick), payload.tobytes())
             for page in self._pages.get(name, ())
             for tick, payload in zip(page.ticks, page.payloads, strict=True)
         ]
-        return sorted(found, key=lambda message: message[0])  # stable: as they came within a tick
+        return sorted(result, key=lambda message: message[0])  # stable: as they came within a tick
 
     def messages(self, name: str) -> list[Any]:
         """The messages of a topic."""
@@ -80,7 +80,7 @@ class MemoryLog:
 
     @property
     def digest(self) -> str:
-        """What the log of this flight would state."""
+        """Return the digest of the log."""
         digest = Digest()
         for name, topic in self._topics.items():
             for tick, payload in self.payloads(name):

@@ -10,6 +10,7 @@ from lapwing.messages import (
     Clock,
     ContactForces,
     Estimate,
+    EstimateCovariance,
     FluidPressure,
     Imu,
     MagneticField,
@@ -222,8 +223,12 @@ def estimate(given, time_ns, e):
     return Estimate(header(time_ns, "world"), at, *[Vector3(*v) for v in vectors], rejected, e.health)
 
 
+def estimate_covariance(given, time_ns, x):
+    return EstimateCovariance(header(time_ns, "world"), x.covariance, x.nis)
+
+
 def status(given, time_ns, x):
-    w = given.words[x.words]
+    w = given.words[x.status_text_id]
     return Status(
         header(time_ns, "body"),
         w.mode,
@@ -271,6 +276,7 @@ BUILDERS = {
     topics.SETPOINT: reference,
     topics.ACTUATORS: actuators,
     topics.ESTIMATE: estimate,
+    topics.ESTIMATE_COVARIANCE: estimate_covariance,
     topics.STATUS: status,
     topics.LIFT: lift,
 }

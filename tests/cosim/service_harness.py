@@ -34,5 +34,5 @@ class Alone:
     def message(self, topic: Topic) -> Any:
         """The message of a topic of the last tick, None where it had none."""
         tick = self.graph.tick - 1
-        found = [page.payloads[-1].tobytes() for page in self.graph.pages(tick, tick + 1, [topic], keep=True)]
-        return topic.message.decode(found[-1]) if found else None
+        result = [page.payloads[-1].tobytes() for page in self.graph.record_batches(tick, tick + 1, [topic], keep=True)]
+        return topic.message.decode(result[-1]) if result else None

@@ -5,7 +5,7 @@ import pytest
 from flights import OPERATED, command, scripted
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.transport.packets import StepPacketCodec, pack_batch, unpack_batch
+from lapwing.cosim.transport.packets import StepPacketCodec, pack_log_packet, unpack_log_packet
 from lapwing.services.process_table import CLOCK_OWNER, create_all
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import MemoryLog, fly
@@ -60,15 +60,15 @@ def fly_apart(setup, operator):
         ended = graphs[CLOCK_OWNER].ended
         for i, (name, graph) in enumerate(graphs.items()):
             if ended or graph.tick - handed[name] >= 11 + 6 * i:
-                pages = graph.pages(handed[name], graph.tick)
-                _, stop, pages = unpack_batch(pack_batch(pages, handed[name], graph.tick))
+                pages = graph.record_batches(handed[name], graph.tick)
+                _, stop, pages = unpack_log_packet(pack_log_packet(pages, handed[name], graph.tick))
                 log.write(pages, stop - 1)
                 handed[name] = stop
     return log
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_together_and_apart_record_the_same(name):
+def test_together_and_apart_record_same(name):
     scene, overrides, duration, script = CASES[name]
     setup = resolve(load(scene, [*overrides, f"run.duration={duration}"]))
     operator = scripted(script) if script else None
@@ -79,7 +79,7 @@ def test_together_and_apart_record_the_same(name):
     assert apart.digest == together.digest
 
 
-def test_the_cases_do_what_they_are_named_after():
+def test_agreement_cases_cover_their_names():
     def flown(name):
         scene, overrides, duration, script = CASES[name]
         return fly(resolve(load(scene, [*overrides, f"run.duration={duration}"])), scripted(script) if script else None)

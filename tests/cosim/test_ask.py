@@ -12,5 +12,5 @@ def test_query_returns_payload_or_none():
         responder.answer("test/_setup/responder", b"payload")
         responder.declare_alive(KEYS[0])
         assert client.wait_alive(KEYS, 20.0) == []
-        assert client.ask("test/_setup/responder", 20.0) == b"payload"
-        assert client.ask("test/_setup/missing", 20.0) is None
+        assert client.query("test/_setup/responder", 20.0) == b"payload"
+        assert client.query("test/_setup/missing", 20.0) is None

@@ -1,5 +1,7 @@
-"""What Zenoh itself guarantees when a session closes: a message that was put just before may be lost, and one that was
-confirmed was not. Why `Process.leave` waits for confirmations."""
+"""Delivery by Zenoh when a session closes: a message published just before may be lost, a confirmed one is not.
+
+`Participant.leave` therefore waits for confirmations.
+"""
 
 import multiprocessing
 import threading
@@ -26,17 +28,17 @@ def receive(endpoint, results, slow):
         news = bus.subscribe(KEY)
         bus.watch_alive("test-close/sender", gone)
         bus.declare_alive(THERE)
-        while (found := news.get(0.2)) is not None or not done.is_set():
-            if found:
+        while (result := news.get(0.2)) is not None or not done.is_set():
+            if result:
                 count += 1
                 sum(range(slow))  # keeps the interpreter, which the session needs, too
-                if found[0] == MESSAGES - 1:
+                if result[0] == MESSAGES - 1:
                     bus.declare_alive(CONFIRMED)
     results.put(count)
 
 
 def lost(waits):
-    """How many of the messages are lost of a sender that closes its session at once, or waits for a confirmation."""
+    """Return the number of lost messages of a sender that closes at once, or waits for a confirmation."""
     context = multiprocessing.get_context("spawn")
     results = context.Queue()
     confirmed = threading.Event()
@@ -57,10 +59,10 @@ def lost(waits):
     return MESSAGES - count
 
 
-def test_closing_a_session_loses_what_is_still_queued():
+def test_zenoh_close_loses_queued_messages():
     if not any(lost(waits=False) for _ in range(5)):
         pytest.skip("this machine was quick enough: nothing was queued at the close")
 
 
-def test_a_confirmed_message_and_those_before_it_have_arrived():
+def test_confirmation_covers_all_earlier_messages():
     assert lost(waits=True) == 0

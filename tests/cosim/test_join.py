@@ -43,22 +43,22 @@ def participant(name, peers, tmp_path, *more, insecure=True):
     return subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
 
-def test_a_participant_with_another_set_up_is_refused_and_the_first_difference_named(tmp_path):
+def test_participant_with_other_configuration_is_rejected(tmp_path):
     peers = loopback_endpoints(["plant", "recorder"])
     short = ("--set", "run.duration=50.0")
     plant = participant("plant", peers, tmp_path, *short, "--set", "gyrostat.inertia=[500.0,501.0,1000.0]")
     log = str(tmp_path / "log.mcap")
     recorder = participant("recorder", peers, tmp_path, *short, "--log", log)
     for process in (plant, recorder):
-        _, said = process.communicate(timeout=120)
-        assert process.returncode == 2, said
-        assert "services.plant.parameters.core.system.inertia.1" in said
-        assert "501.0" in said
-        assert "500.0" in said
-        assert len(said.splitlines()) == 1
+        _, output = process.communicate(timeout=120)
+        assert process.returncode == 2, output
+        assert "services.plant.parameters.core.system.inertia.1" in output
+        assert "501.0" in output
+        assert "500.0" in output
+        assert len(output.splitlines()) == 1
 
 
-def test_the_same_set_up_flies_over_certified_links_to_the_same_digest(tmp_path):
+def test_same_set_up_flies_over_certified_links_to_same_digest(tmp_path):
     keys, log, alone = tmp_path / "keys", tmp_path / "log.mcap", tmp_path / "alone.mcap"
     make(keys, ["plant", "recorder"], 1)
     peers = {name: end.replace("tcp/", "tls/") for name, end in loopback_endpoints(["plant", "recorder"]).items()}
@@ -66,22 +66,22 @@ def test_the_same_set_up_flies_over_certified_links_to_the_same_digest(tmp_path)
     plant = participant("plant", peers, tmp_path, *more)
     recorder = participant("recorder", peers, tmp_path, *more, "--log", str(log))
     for process in (plant, recorder):
-        _, said = process.communicate(timeout=120)
-        assert process.returncode == 0, said
+        _, output = process.communicate(timeout=120)
+        assert process.returncode == 0, output
     fly_single(resolve(load(SCENE, ["run.duration=50.0"])), alone)
     with LogReader(log) as read, LogReader(alone) as expected:
         assert read.digest() == expected.digest()
 
 
-def test_who_has_no_certificate_starts_only_where_that_is_asked_for(tmp_path):
+def test_start_without_certificate_needs_insecure(tmp_path):
     peers = loopback_endpoints(["plant", "recorder"])
     plant = participant("plant", peers, tmp_path, insecure=False)
-    _, said = plant.communicate(timeout=60)
+    _, output = plant.communicate(timeout=60)
     assert plant.returncode == 2
-    assert "endpoint is not authenticated; use tls/HOST:PORT with --keys FOLDER, or --insecure" in said
+    assert "endpoint is not authenticated; use tls/HOST:PORT with --keys FOLDER, or --insecure" in output
 
 
-def test_a_participant_speaks_for_itself_alone(tmp_path):
+def test_participant_cannot_publish_for_others(tmp_path):
     """Also where it knows the marks of the others: access control refuses it on both ends of a link."""
     keys, run = tmp_path / "keys", PublisherIds("test-access")
     make(keys, ["plant", "sensors"], 1)
@@ -89,8 +89,8 @@ def test_a_participant_speaks_for_itself_alone(tmp_path):
     rules = by_certificate("test-access", says(setup, "test-access"))
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["plant"]).values())
     with (
-        ZenohBus([end], mark=run.mark("plant"), security={**tls(keys, "plant"), **rules}) as plant,
-        ZenohBus(connect=[end], mark=run.mark("sensors"), security={**tls(keys, "sensors"), **rules}) as sensors,
+        ZenohBus([end], gid=run.gid("plant"), security={**tls(keys, "plant"), **rules}) as plant,
+        ZenohBus(connect=[end], gid=run.gid("sensors"), security={**tls(keys, "sensors"), **rules}) as sensors,
     ):
         pairs = (("plant", plant, "sensors"), ("sensors", sensors, "plant"))
         heard = {name: bus.receive(run.senders(STEP_KEY, [other, "autopilot"])) for name, bus, other in pairs}
@@ -99,9 +99,9 @@ def test_a_participant_speaks_for_itself_alone(tmp_path):
         for _, bus, other in pairs:
             assert not bus.wait_alive([f"test-access/{ALIVE_KEY}/{other}"], 10.0)
         for name, bus, _ in pairs:
-            own, bus._mark = bus._mark, run.mark("autopilot")
+            own, bus._gid = bus._gid, run.gid("autopilot")
             bus.publisher(f"test-access/{STEP_KEY}/autopilot")(b"forged", 0)
-            bus._mark = own
+            bus._gid = own
             bus.publisher(f"test-access/{STEP_KEY}/{name}")(b"own", 0)
         for name, bus, other in pairs:
             messages = []
@@ -115,15 +115,15 @@ def test_a_participant_speaks_for_itself_alone(tmp_path):
             assert bus.refused == 0
 
 
-def test_a_viewer_of_a_run_on_several_hosts_reads_and_is_not_heard_and_who_has_no_certificate_reads_nothing(tmp_path):
+def test_viewer_reads_only_and_needs_certificate(tmp_path):
     keys, run = tmp_path / "keys", PublisherIds("test-viewer")
     make(keys, ["autopilot", VIEWER], 1)
     rules = by_certificate("test-viewer", says(resolve(load("groundstation")), "test-viewer"))
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["autopilot"]).values())
-    mark, topic, bundles = run.mark("autopilot"), "test-viewer/drone1/status", f"test-viewer/{STEP_KEY}/autopilot"
+    gid, topic, bundles = run.gid("autopilot"), "test-viewer/drone1/status", f"test-viewer/{STEP_KEY}/autopilot"
     with (
-        ZenohBus([end], mark=mark, security={**tls(keys, "autopilot"), **rules}) as autopilot,
-        ZenohBus(connect=[end], mode="client", mark=run.mark(MAVLINK), security=tls(keys, VIEWER)) as viewer,
+        ZenohBus([end], gid=gid, security={**tls(keys, "autopilot"), **rules}) as autopilot,
+        ZenohBus(connect=[end], mode="client", gid=run.gid(MAVLINK), security=tls(keys, VIEWER)) as viewer,
     ):
         withheld = viewer.subscribe(f"test-viewer/{STEP_KEY}/*")
         heard, read = autopilot.subscribe("test-viewer/**"), viewer.subscribe(topic)

@@ -1,4 +1,4 @@
-"""Nobody leaves a run before the others have confirmed its last message, or have left."""
+"""Participants leave a run after the others have confirmed their last message, or have left."""
 
 import threading
 from collections import Counter
@@ -7,6 +7,8 @@ from contextlib import contextmanager
 import pytest
 
 import lapwing.cosim.executors.participant
+import lapwing.cosim.executors.peer_tracker
+import lapwing.cosim.executors.stop_request
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig
@@ -21,8 +23,8 @@ SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "gauss_seidel", "drone1", {}, {}
 
 @contextmanager
 def joined(monkeypatch, external=()):
-    """A process that has joined, and the session of the only other participant, which has said that it is there."""
-    monkeypatch.setattr(lapwing.cosim.executors.participant.signal, "signal", lambda *_: None)
+    """A process that has joined, and the session of the only other participant."""
+    monkeypatch.setattr(lapwing.cosim.executors.stop_request.signal, "signal", lambda *_: None)
     monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda told: None)
     with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
         process = Participant("plant", SETUP, bus, PublisherIds(PREFIX, external=external), ["plant", "other"])
@@ -32,7 +34,7 @@ def joined(monkeypatch, external=()):
             yield process, other
 
 
-def test_who_does_not_confirm_is_named(monkeypatch):
+def test_missing_confirmation_is_named(monkeypatch):
     monkeypatch.setattr(lapwing.cosim.executors.participant, "CONFIRMED", 0.1)
     with (
         joined(monkeypatch) as (process, _),
@@ -41,13 +43,13 @@ def test_who_does_not_confirm_is_named(monkeypatch):
         process.leave(lambda: None)
 
 
-def test_a_last_message_is_repeated_until_it_is_confirmed(monkeypatch):
-    said, heard = Counter(), threading.Event()
+def test_last_message_is_repeated_until_confirmed(monkeypatch):
+    output, heard = Counter(), threading.Event()
     with joined(monkeypatch) as (process, other):
 
         def repeat():
-            said["end"] += 1
-            if said["end"] == 3:
+            output["end"] += 1
+            if output["end"] == 3:
                 other.declare_alive(f"{PREFIX}/{HEARD_KEY}/other")
                 heard.set()
 
@@ -55,12 +57,12 @@ def test_a_last_message_is_repeated_until_it_is_confirmed(monkeypatch):
     assert heard.is_set()
 
 
-def test_who_has_left_is_not_waited_for(monkeypatch):
+def test_participant_that_has_left_is_not_awaited(monkeypatch):
     with joined(monkeypatch) as (process, other):
         process.leave(other.close)
 
 
-def test_a_program_of_another_author_confirms_by_leaving_or_is_late(monkeypatch):
-    monkeypatch.setattr(lapwing.cosim.executors.participant, "FOREIGN", 0.1)
+def test_external_service_confirms_by_leaving_or_timeout(monkeypatch):
+    monkeypatch.setattr(lapwing.cosim.executors.peer_tracker, "FOREIGN", 0.1)
     with joined(monkeypatch, external=("other",)) as (process, _):
         process.leave(lambda: None)

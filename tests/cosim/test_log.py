@@ -17,16 +17,16 @@ from lapwing.messages.digest import Digest
 def messages(count=300):
     """Topic, message, time: three topics, some at the same times, one of them late."""
     rng = random.Random(1)
-    found = []
+    result = []
     for k in range(count):
         t = k * 4_000_000
-        found.append(("/clock", Clock(stamp(t)), t))
+        result.append(("/clock", Clock(stamp(t)), t))
         imu = Imu(header(t, "drone1/base_link"))
-        found.append(("/drone1/imu", imu._replace(linear_acceleration=(rng.random(), 0.0, 9.81)), t))
+        result.append(("/drone1/imu", imu._replace(linear_acceleration=(rng.random(), 0.0, 9.81)), t))
         if k % 5 == 4:
             tf = TFMessage((TransformStamped(header(t, "world"), "drone1/base_link"),) * 2)
-            found.append(("/tf", tf, t - 8_000_000))
-    return found
+            result.append(("/tf", tf, t - 8_000_000))
+    return result
 
 
 def write(path, entries, metadata=None, attachments=None, flush_each=0):
@@ -84,7 +84,7 @@ def test_two_readings_at_once(path):
         assert all(a == b for a, b in pairs)
 
 
-def test_digest_does_not_depend_on_interleaving_or_chunks_but_on_content(tmp_path):
+def test_digest_depends_on_content_only(tmp_path):
     entries = messages()
     by_topic = sorted(entries, key=lambda entry: entry[0])
     digests = {
@@ -100,7 +100,7 @@ def test_digest_does_not_depend_on_interleaving_or_chunks_but_on_content(tmp_pat
     assert write(tmp_path / "d", entries[:-1]) not in digests
 
 
-def test_messages_that_are_not_deterministic_stay_out_of_the_digest(tmp_path):
+def test_messages_that_are_not_deterministic_stay_out_of_digest(tmp_path):
     entries = messages(10)
     with LogWriter(tmp_path / "a", {}, {}) as log:
         for topic, message, t in entries:
@@ -138,28 +138,28 @@ def test_opens_in_mcaps_own_reader_with_matching_summary(path):
         assert imu[0].header.frame_id == "drone1/base_link"
 
 
-def test_opens_in_the_rosbags_library(path):
+def test_opens_in_rosbags_library(path):
     entries = messages()
     entries.append(("/drone1/status", Status(header(5, ""), "auto", "hover", True), 5))
     write(path, entries, flush_each=40)
     with AnyReader([path]) as reader:
         assert reader.message_count == len(entries)
-        found = [(c.topic, c.msgtype, t, bytes(raw)) for c, t, raw in reader.messages()]
-        assert sorted(found) == sorted(expected(entries))
+        result = [(c.topic, c.msgtype, t, bytes(raw)) for c, t, raw in reader.messages()]
+        assert sorted(result) == sorted(expected(entries))
         status = [c for c in reader.connections if c.topic == "/drone1/status"]
         (_, _, raw) = next(reader.messages(status))
         decoded = reader.deserialize(raw, "lapwing_msgs/msg/Status")
         assert (decoded.mode, decoded.phase, decoded.armed, decoded.landed) == ("auto", "hover", True, False)
 
 
-def test_an_empty_log_is_a_log(path):
+def test_empty_log_is_log(path):
     digest = write(path, [])
     with LogReader(path) as log:
         assert (list(log.messages()), log.topics(), log.complete) == ([], {}, True)
         assert log.digest() == digest
 
 
-def test_a_log_whose_writer_was_killed_is_readable(path):
+def test_log_of_killed_writer_is_readable(path):
     code = textwrap.dedent(
         f"""
         import os, signal
@@ -182,7 +182,7 @@ def test_a_log_whose_writer_was_killed_is_readable(path):
         assert [t for _, _, t, _ in log.messages()] == list(range(1000))
 
 
-def test_cut_anywhere_it_reads_up_to_the_last_whole_chunk(path, tmp_path):
+def test_truncated_log_reads_to_last_whole_chunk(path, tmp_path):
     entries = messages(60)
     write(path, entries, flush_each=20)
     whole = path.read_bytes()
@@ -198,7 +198,7 @@ def test_cut_anywhere_it_reads_up_to_the_last_whole_chunk(path, tmp_path):
     assert counts[-1] == len(entries)
 
 
-def test_a_paused_writer_flushes_with_the_next_message(path, monkeypatch):
+def test_paused_writer_flushes_with_next_message(path, monkeypatch):
     now = [0.0]
     monkeypatch.setattr("lapwing.cosim.log.log_writer.time.monotonic", lambda: now[0])
     log = LogWriter(path, {}, {})
@@ -225,7 +225,7 @@ def test_faults_are_one_clear_line(path, tmp_path):
             LogReader(path)
 
 
-def test_a_damaged_chunk_is_named(path):
+def test_damaged_chunk_is_named(path):
     write(path, messages(100))
     data = bytearray(path.read_bytes())
     data[len(data) // 3] ^= 0xFF
@@ -235,7 +235,7 @@ def test_a_damaged_chunk_is_named(path):
     assert "\n" not in str(caught.value)
 
 
-def test_a_full_disk_is_a_clear_error():
+def test_full_disk_is_clear_error():
     with pytest.raises(ValueError, match="/dev/full: cannot write the log: No space left"):
         write("/dev/full", messages(5))
 

@@ -39,10 +39,10 @@ def page(first, ticks=50):
 
 def single(parts):
     """The messages of a page one by one, in their order: topic, class, payload, time."""
-    found = []
+    result = []
     for topic, message, times, payloads, order in parts:
-        found += zip(order.tolist(), itertools.repeat((topic, message)), payloads, times.tolist(), strict=False)
-    return [(*names, payload.tobytes(), time) for _, names, payload, time in sorted(found, key=lambda item: item[0])]
+        result += zip(order.tolist(), itertools.repeat((topic, message)), payloads, times.tolist(), strict=False)
+    return [(*names, payload.tobytes(), time) for _, names, payload, time in sorted(result, key=lambda item: item[0])]
 
 
 def write_pages(path, pages):
@@ -53,7 +53,7 @@ def write_pages(path, pages):
 
 
 def contents(path):
-    """What a reader of the mcap library finds: topic, type, time, sequence, payload in the file's order."""
+    """Return topic, type, time, sequence and payload from the mcap library, in file order."""
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
         return [
@@ -62,7 +62,7 @@ def contents(path):
         ]
 
 
-def test_pages_hold_what_single_messages_hold(tmp_path):
+def test_record_batches_equal_single_messages(tmp_path):
     pages = [page(0), page(50), page(100, 7)]
     digest = write_pages(tmp_path / "pages", pages)
     with LogWriter(tmp_path / "single", {}, {}) as log:
@@ -75,7 +75,7 @@ def test_pages_hold_what_single_messages_hold(tmp_path):
         assert read.digest() == digest
 
 
-def test_messages_of_a_page_stand_in_ascending_order_whatever_the_order_of_the_parts(tmp_path):
+def test_record_batch_is_sorted_for_any_block_order(tmp_path):
     parts = page(0)
     write_pages(tmp_path / "a", [parts])
     random.Random(1).shuffle(parts)
@@ -87,13 +87,13 @@ def test_messages_of_a_page_stand_in_ascending_order_whatever_the_order_of_the_p
     assert contents(tmp_path / "a") == contents(tmp_path / "b")
 
 
-def test_pages_and_single_messages_stand_in_order_of_the_calls(tmp_path):
+def test_batches_and_messages_keep_call_order(tmp_path):
     path = tmp_path / "mixed"
-    given = OperatorInput(header(50 * TICK, "")).encode()
+    values = OperatorInput(header(50 * TICK, "")).encode()
     with LogWriter(path, {}, {}) as log:
-        log.write("/drone1/vehicle_command", OperatorInput, given, 0)
+        log.write("/drone1/vehicle_command", OperatorInput, values, 0)
         log.write_page(page(0))
-        log.write("/drone1/vehicle_command", OperatorInput, given, 50 * TICK)
+        log.write("/drone1/vehicle_command", OperatorInput, values, 50 * TICK)
         log.write("/drone1/imu", Imu, Imu().encode(), 50 * TICK)
         log.write_page(page(51))
     imu = [entry for entry in contents(path) if entry[0] == "/drone1/imu"]
@@ -102,7 +102,7 @@ def test_pages_and_single_messages_stand_in_order_of_the_calls(tmp_path):
     assert at == [0, 1 + len(single(page(0)))]
 
 
-def test_every_page_is_a_chunk_whose_index_leads_to_each_message(tmp_path):
+def test_every_page_is_chunk_with_message_index(tmp_path):
     pages = [page(0), page(50)]
     write_pages(tmp_path / "log", pages)
     counts, current = [], b""
@@ -121,24 +121,24 @@ def test_every_page_is_a_chunk_whose_index_leads_to_each_message(tmp_path):
     assert counts == [len(single(parts)) for parts in pages]
 
 
-def test_other_tools_find_the_messages_of_a_page_by_time(tmp_path):
+def test_other_tools_find_messages_of_page_by_time(tmp_path):
     write_pages(tmp_path / "log.mcap", [page(0), page(50), page(100)])
     expected = [entry[3] for parts in (page(0), page(50)) for entry in single(parts) if entry[0] == "/drone1/imu"][
         40:70
     ]
     with open(tmp_path / "log.mcap", "rb") as file:
         reader = make_reader(file, validate_crcs=True, decoder_factories=[DecoderFactory()])
-        found = list(reader.iter_decoded_messages(["/drone1/imu"], starting_at=40 * TICK, ending_before=70 * TICK))
-        assert [message.log_time for _, _, message, _ in found] == expected
-        stamps = [imu.header.stamp.sec * 10**9 + imu.header.stamp.nanosec for *_, imu in found]
+        result = list(reader.iter_decoded_messages(["/drone1/imu"], starting_at=40 * TICK, ending_before=70 * TICK))
+        assert [message.log_time for _, _, message, _ in result] == expected
+        stamps = [imu.header.stamp.sec * 10**9 + imu.header.stamp.nanosec for *_, imu in result]
         assert stamps == expected
     with AnyReader([tmp_path / "log.mcap"]) as reader:
-        wanted = [connection for connection in reader.connections if connection.topic == "/drone1/imu"]
-        found = list(reader.messages(wanted, start=40 * TICK, stop=70 * TICK))
-        assert [time_ns for _, time_ns, _ in found] == expected
+        required = [connection for connection in reader.connections if connection.topic == "/drone1/imu"]
+        result = list(reader.messages(required, start=40 * TICK, stop=70 * TICK))
+        assert [time_ns for _, time_ns, _ in result] == expected
 
 
-def test_the_same_pages_give_the_same_file_whatever_the_wall_clock_shows(tmp_path, monkeypatch):
+def test_equal_pages_give_equal_file_at_any_wall_time(tmp_path, monkeypatch):
     files = []
     for speed in (0.01, 3.0):
         clock = itertools.count(0.0, speed)
@@ -148,7 +148,7 @@ def test_the_same_pages_give_the_same_file_whatever_the_wall_clock_shows(tmp_pat
     assert files[0] == files[1]
 
 
-def test_wall_time_messages_leave_the_chunks_of_pages_as_they_are(tmp_path):
+def test_wall_time_messages_do_not_change_batch_chunks(tmp_path):
     def chunks(wall_times):
         with LogWriter(tmp_path / "log", {}, {}) as log:
             for k in range(4):
@@ -157,13 +157,13 @@ def test_wall_time_messages_leave_the_chunks_of_pages_as_they_are(tmp_path):
                     message = WallTime(header(0, ""), random.random())
                     log.write("/wall_time", WallTime, message.encode(), 50 * k * TICK, deterministic=False)
         with open(tmp_path / "log", "rb") as file:
-            found = StreamReader(file, emit_chunks=True).records
-            return [r.data for r in found if isinstance(r, Chunk) and r.message_end_time > r.message_start_time]
+            result = StreamReader(file, emit_chunks=True).records
+            return [r.data for r in result if isinstance(r, Chunk) and r.message_end_time > r.message_start_time]
 
     assert chunks([]) == chunks([0, 2]) == chunks([1, 3])
 
 
-def test_arrays_may_be_reused_after_the_call(tmp_path):
+def test_arrays_may_be_reused_after_call(tmp_path):
     pages = [page(0), page(50)]
     expected = write_pages(tmp_path / "a", pages)
     with LogWriter(tmp_path / "b", {"seed": "7"}, {"scene.toml": b"a = 1\n"}) as log:
@@ -177,7 +177,7 @@ def test_arrays_may_be_reused_after_the_call(tmp_path):
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_an_empty_page_is_no_chunk(tmp_path):
+def test_empty_page_is_no_chunk(tmp_path):
     write_pages(tmp_path / "log", [[], page(0, 0)])
     with LogReader(tmp_path / "log") as log:
         assert list(log.messages()) == []
@@ -200,17 +200,17 @@ def test_pages_that_do_not_fit_are_refused(tmp_path, change, words):
         log.write_page([tuple(part)])
 
 
-def test_a_negative_time_of_a_single_message_is_refused(tmp_path):
+def test_negative_time_of_single_message_is_refused(tmp_path):
     with LogWriter(tmp_path / "log", {}, {}) as log, pytest.raises(ValueError, match="/a: time -4 ns is negative"):
         log.write("/a", Imu, Imu().encode(), -4)
 
 
-def test_a_full_disk_is_a_clear_error_for_pages():
+def test_full_disk_is_clear_error_for_pages():
     with pytest.raises(ValueError, match="/dev/full: cannot write the log: No space left"):
         write_pages("/dev/full", [page(0), page(50)])
 
 
-def test_history_of_a_topic(tmp_path):
+def test_history_of_topic(tmp_path):
     pages = [page(0), page(50)]
     write_pages(tmp_path / "log", pages)
     with LogReader(tmp_path / "log") as log:
@@ -227,7 +227,7 @@ def test_history_of_a_topic(tmp_path):
             log.history("/mag")
 
 
-def test_history_reads_only_the_chunks_of_its_topic(tmp_path):
+def test_history_reads_only_chunks_of_its_topic(tmp_path):
     path = tmp_path / "log"
     with LogWriter(path, {}, {}) as log:
         log.write_page([("/a", Vector3, np.zeros(50, int), Record.of(Vector3()).encode(50, {}), np.zeros(50, int))])
@@ -242,7 +242,7 @@ def test_history_reads_only_the_chunks_of_its_topic(tmp_path):
             log.history("/a")
 
 
-def test_a_log_without_message_indexes_is_read_as_well(tmp_path):
+def test_log_without_message_indexes_is_read_as_well(tmp_path):
     path = tmp_path / "other.mcap"
     with open(path, "wb") as file:
         writer = Writer(file, index_types=IndexType.NONE)

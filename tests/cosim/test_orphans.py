@@ -6,15 +6,15 @@ import sys
 BUSY = """
 import sys, time
 from types import SimpleNamespace
-from lapwing.cosim.executors import participant as process
+from lapwing.cosim.executors import stop_request as process
 process.ORPHANED = 0.1
-process.Participant.end_with_parent(SimpleNamespace(), sys.argv[1])
+process.StopRequest.stop_with_parent(SimpleNamespace(), sys.argv[1])
 print("busy", flush=True)
 time.sleep(600.0)
 """
 
 
-def test_one_that_goes_on_is_ended(tmp_path):
+def test_busy_orphan_process_exits(tmp_path):
     folder = tmp_path / "sockets"
     folder.mkdir()
     command = [sys.executable, "-c", BUSY, f"unixsock-stream/{folder}/plant"]

@@ -20,15 +20,15 @@ SUM = Port("sum", Sum(0.0))
 
 
 def counts(parameters):
-    """Whether the code of the parts of this class counts references."""
-    compiled = [found for found in advance.overloads.values() if parameters.__name__ in str(found.signature)]
-    modules = [found.library._get_module_for_linking() for found in compiled]
+    """Return True if the code of blocks of this class counts references."""
+    compiled = [result for result in advance.overloads.values() if parameters.__name__ in str(result.signature)]
+    modules = [result.library._get_module_for_linking() for result in compiled]
     return [any(function.name == "NRT_incref" for function in module.functions) for module in modules]
 
 
 @pytest.fixture
 def living():
-    """What numba has made and not freed: (arrays' owners, blocks of memory)."""
+    """Return numba's live allocations: (array owners, memory blocks)."""
     _nrt_python.memsys_enable_stats()
 
     def count():
@@ -40,7 +40,7 @@ def living():
     _nrt_python.memsys_disable_stats()
 
 
-def test_arrays_changed_in_place_are_not_counted_and_freed_with_their_owners(living):
+def test_arrays_changed_in_place_are_freed_with_owner(living):
     weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
     before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
     part = Block("mean", Mean(weights), Cell(Last(ticks, 0)), (), (SUM,))
@@ -55,7 +55,7 @@ def test_arrays_changed_in_place_are_not_counted_and_freed_with_their_owners(liv
     assert (sys.getrefcount(weights), sys.getrefcount(ticks)) == before
 
 
-def test_a_function_that_python_calls_counts_also_where_a_part_has_it():
+def test_function_called_from_python_counts_references():
     """Code has it by its name: that of a part, which does not count, must not be taken for it."""
     p, s = Mean(np.linspace(-1.0, 2.0, 5)), Last(np.arange(5.0), 0)
     graph = graph_of(Block("mean", p, Cell(s), (), (SUM,)))
@@ -68,7 +68,7 @@ def test_a_function_that_python_calls_counts_also_where_a_part_has_it():
     assert total == pytest.approx(p.weights @ s.ticks)
 
 
-def test_a_part_that_makes_arrays_counts_and_frees_them(living):
+def test_block_that_allocates_arrays_frees_them(living):
     owners = living()
     part = Block("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
     graph = graph_of(part)
@@ -83,7 +83,7 @@ def test_a_part_that_makes_arrays_counts_and_frees_them(living):
     assert living() == owners
 
 
-def test_a_part_that_is_not_trusted_may_put_an_array_in_anothers_place(living):
+def test_untrusted_block_may_replace_array(living):
     weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
     before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
     part = Block("exchange", Exchange(weights), Cell(Last(ticks, 0)), (), (SUM,), trusted=False)

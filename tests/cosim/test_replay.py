@@ -47,7 +47,7 @@ def messages(n):
     return [("/clock", "", k * TICK, b"") for k in range(n)]
 
 
-def test_speed_scales_the_time_between_messages():
+def test_speed_scales_time_between_messages():
     assert [due.wait for due in schedule(messages(3), 2.0)] == pytest.approx([0.0, 0.002, 0.004])
 
 
@@ -55,7 +55,7 @@ def test_at_top_speed_everything_is_due_at_once():
     assert [due.wait for due in schedule(messages(3), None)] == [0.0, 0.0, 0.0]
 
 
-def test_time_counts_from_the_first_message_of_the_cut(log):
+def test_time_counts_from_first_message_of_cut(log):
     cut = Cut.of(0.1, 0.2)
     with LogReader(log) as source:
         due = list(schedule(source.messages(None, cut.start_ns, cut.end_ns), 1.0))
@@ -65,7 +65,7 @@ def test_time_counts_from_the_first_message_of_the_cut(log):
     assert due[-1].wait == pytest.approx(0.1)
 
 
-def test_recording_a_replay_gives_the_same_digest(log, tmp_path):
+def test_recorded_replay_has_equal_digest(log, tmp_path):
     again = tmp_path / "again.mcap"
     key_prefix, (endpoint,) = "test-record", loopback_endpoints(["a"]).values()
     command = replay(log, "--speed", "max", "--record", again, "--key-prefix", key_prefix, "--listen", endpoint)
@@ -77,7 +77,7 @@ def test_recording_a_replay_gives_the_same_digest(log, tmp_path):
         assert second.deterministic_topics() == {"/clock"}
 
 
-def test_a_subscriber_gets_every_message_in_order(log):
+def test_subscriber_gets_every_message_in_order(log):
     key_prefix, (endpoint,) = "test-subscriber", loopback_endpoints(["a"]).values()
     with subprocess.Popen(replay(log, "--speed", "max", "--key-prefix", key_prefix, "--listen", endpoint)) as player:
         with ZenohBus(connect=[endpoint]) as bus:
@@ -91,15 +91,31 @@ def test_a_subscriber_gets_every_message_in_order(log):
         assert digest.hexdigest() == source.digest()
 
 
-def test_a_signal_ends_a_loop_at_once(log):
+def test_replay_waits_for_confirmation_of_its_end(log):
+    key_prefix, (endpoint,) = "test-confirmed", loopback_endpoints(["a"]).values()
+    command = replay(log, "--speed", "max", "--key-prefix", key_prefix, "--listen", endpoint)
+    with subprocess.Popen(command) as player, ZenohBus(connect=[endpoint]) as bus:
+        arriving = bus.subscribe(f"{key_prefix}/clock")
+        bus.declare_alive(f"{key_prefix}/_alive/slow")
+        payloads = [arriving.get(timeout=30.0)[1]]
+        while payloads[-1]:
+            payloads.append(arriving.get(timeout=30.0)[1])
+        time.sleep(1.0)
+        assert player.poll() is None
+        bus.declare_alive(f"{key_prefix}/_heard/slow")
+        assert player.wait(timeout=30) == 0
+    assert len(payloads) == 201
+
+
+def test_signal_ends_loop_at_once(log):
     key_prefix, (endpoint,) = "test-signal", loopback_endpoints(["a"]).values()
     with subprocess.Popen(replay(log, "--loop", "--key-prefix", key_prefix, "--listen", endpoint)) as player:
         with ZenohBus(connect=[endpoint]) as bus:
             assert bus.subscribe(f"{key_prefix}/clock").get(timeout=30.0) is not None
-        asked = time.monotonic()
+        requested = time.monotonic()
         player.terminate()
         assert player.wait(timeout=30) == 143
-        assert time.monotonic() - asked < 10.0
+        assert time.monotonic() - requested < 10.0
 
 
 @pytest.mark.parametrize(
@@ -116,12 +132,12 @@ def test_a_signal_ends_a_loop_at_once(log):
         (["LOG", "--listen", "nonsense"], "nonsense"),
     ],
 )
-def test_what_cannot_be_replayed_is_said_in_one_line(log, arguments, said):
+def test_unreplayable_log_is_rejected_in_single_line(log, arguments, said):
     arguments = [str(log) if a == "LOG" else a for a in arguments]
     (endpoint,) = loopback_endpoints(["a"]).values()
-    given = [] if "--listen" in arguments else ["--listen", endpoint]
+    values = [] if "--listen" in arguments else ["--listen", endpoint]
     result = subprocess.run(
-        replay(*arguments, *given, "--key-prefix", "test-error"),
+        replay(*arguments, *values, "--key-prefix", "test-error"),
         capture_output=True,
         text=True,
         timeout=60,
@@ -154,7 +170,7 @@ def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkey
             assert list(log.messages()) == first
 
 
-def test_only_the_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
+def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
     monkeypatch.setattr(player, "AUDIENCE", 0.0)
     (endpoint,) = loopback_endpoints(["a"]).values()
     heard, record = [], tmp_path / "a.mcap"
@@ -181,37 +197,37 @@ class Terminal:
         self.now += seconds
 
     def went(self, messages):
-        """When each of the messages (due [s], time [ns]) went."""
-        pace, found = Pace(self.keys, self.said.append, self.wait, lambda: self.now), []
+        """Return the wall time of each message (due [s], time [ns])."""
+        pace, result = Pace(self.keys, self.said.append, self.wait, lambda: self.now), []
         for due, time_ns in messages:
             pace.wait(due, time_ns, lambda: self.now > 100.0)
             if pace.quit or self.now > 100.0:
                 break
-            found.append(self.now)
-        return found
+            result.append(self.now)
+        return result
 
 
-def test_a_pause_holds_and_the_rest_follows_at_its_distance():
+def test_pause_holds_and_rest_follows_at_its_distance():
     terminal = Terminal({1.5: " ", 6.0: " "})
     went = terminal.went([(float(k), k) for k in range(5)])
     assert went[:2] == pytest.approx([0.0, 1.0], abs=0.03)
     assert went[2] == pytest.approx(6.0, abs=0.03)
     assert np.diff(went[2:]) == pytest.approx([1.0, 1.0], abs=0.03)
-    assert [line.split()[0] for line in terminal.said] == ["paused", "goes"]
+    assert [line.split()[0] for line in terminal.said] == ["paused", "resumed"]
 
 
-def test_a_step_lets_all_messages_of_one_instant_go():
+def test_step_lets_all_messages_of_one_instant_go():
     terminal = Terminal({0.5: " ", 10.0: ".", 20.0: ".", 30.0: "q"})
     went = terminal.went([(0.0, 0), (1.0, 7), (1.0, 7), (2.0, 9), (3.0, 11)])
     assert went == pytest.approx([0.0, 10.0, 10.0, 20.0], abs=0.05)
     assert terminal.now == pytest.approx(30.0, abs=0.05)
 
 
-def test_a_full_stop_without_a_pause_does_nothing():
+def test_single_step_key_is_ignored_without_pause():
     assert Terminal({0.5: "."}).went([(0.0, 0), (1.0, 1)]) == pytest.approx([0.0, 1.0], abs=0.03)
 
 
-def test_keys_come_from_a_terminal_one_by_one_and_it_is_as_before_afterwards():
+def test_terminal_keys_are_read_and_terminal_is_restored():
     ours, theirs = pty.openpty()
     before = termios.tcgetattr(theirs)
     with Keyboard(theirs) as keyboard:

@@ -72,7 +72,7 @@ class Running:
         assert set(self.children) >= SERVICES
 
     def _recorded(self):
-        """How many messages the log holds; it is read while it grows."""
+        """Return the number of messages in the growing log."""
         if not self.log.exists():
             return 0
         try:
@@ -83,10 +83,10 @@ class Running:
 
     def end(self):
         """Exit code and what was said on standard error; asserts that nothing is left but a readable log."""
-        _, said = self.launcher.communicate(timeout=STARTED)
+        _, output = self.launcher.communicate(timeout=STARTED)
         self.assert_gone()
         assert self._recorded() > 100
-        return self.launcher.returncode, said
+        return self.launcher.returncode, output
 
     def assert_gone(self, seconds=END):
         deadline = time.monotonic() + seconds
@@ -95,7 +95,7 @@ class Running:
             time.sleep(0.05)
 
     def whole(self):
-        """Whether the log has its end, and the digest in its metadata is right."""
+        """Return True if the log is complete and its metadata has the right digest."""
         with LogReader(self.log) as read:
             return read.complete and read.digest() == read.metadata["digest"]
 
@@ -129,7 +129,7 @@ def started(tmp_path):
         run.kill()
 
 
-def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
+def test_digest_is_equal_in_every_mode(tmp_path):
     alone = single(tmp_path)  # first: it compiles what the processes then load
     first, second = (processes(tmp_path, key_prefix) for key_prefix in ("test-first", "test-second"))
     assert first["digest"] == second["digest"] == alone
@@ -141,7 +141,7 @@ def test_the_same_scene_and_seed_give_the_same_bits_in_every_mode(tmp_path):
         assert log.attachments["scene.toml"] == SCENE.read_bytes()
 
 
-def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_path):
+def test_failing_multibody_has_equal_digest_in_both_modes(tmp_path):
     broken = ", ".join(
         f'{{time={1.2 + 0.2 * k}, propeller={k + 1}, failure="{fate}"}}'
         for k, fate in enumerate(("locked", "free", "torn_off"))
@@ -150,19 +150,19 @@ def test_five_bodies_that_break_in_flight_give_the_same_bits_in_both_modes(tmp_p
     alone = single(tmp_path, *bodies)
     assert processes(tmp_path, "test-broken", *bodies)["digest"] == alone
     with LogReader(tmp_path / "test-broken.mcap") as log:
-        told = [BodyStates.decode(payload) for *_, payload in log.messages(["/drone1/body_states"])]
+        reported = [BodyStates.decode(payload) for *_, payload in log.messages(["/drone1/body_states"])]
         assert b"torn_off" in log.attachments["setup.json"]
-    assert told[60].force[3].z != 0.0
-    assert told[-1].force[3].z == 0.0
+    assert reported[60].force[3].z != 0.0
+    assert reported[-1].force[3].z == 0.0
 
 
-def test_another_seed_gives_other_bits(tmp_path):
+def test_other_seed_changes_digest(tmp_path):
     wind = "effects.random_wind_force={mean=[1.0, 0.0, 0.0], sigma=0.5}"
     assert single(tmp_path, wind, "run.seed=1") == single(tmp_path, wind, "run.seed=1")
     assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
     with LogReader(tmp_path / "single.mcap") as log:
-        told = [VehicleState.decode(payload).wind.x for *_, payload in log.messages(["/drone1/ground_truth"])]
-    assert sum(told) / len(told) == pytest.approx(1.0, abs=0.1)  # the wind at the vehicle, not 0
+        reported = [VehicleState.decode(payload).wind.x for *_, payload in log.messages(["/drone1/ground_truth"])]
+    assert sum(reported) / len(reported) == pytest.approx(1.0, abs=0.1)  # the wind at the vehicle, not 0
 
 
 IDLE = [
@@ -172,26 +172,26 @@ IDLE = [
 ]
 
 
-def test_effects_that_have_nothing_to_do_leave_every_recorded_bit(tmp_path):
-    """The same log as if they had never been named, the random wind of another effect included."""
+def test_idle_effects_change_no_recorded_bit(tmp_path):
+    """Idle effects do not change the log, including the random wind of another effect."""
     windy = single(tmp_path, "effects.random_wind_force={}")
     assert single(tmp_path, "effects.random_wind_force={}", *IDLE) == windy
     assert single(tmp_path) != windy
 
 
-def test_parallel_coupling_gives_its_own_bits_in_both_modes(tmp_path):
+def test_jacobi_digest_is_equal_in_both_modes(tmp_path):
     parallel = single(tmp_path, "communication.coupling=jacobi")
     assert processes(tmp_path, "test-parallel", "communication.coupling=jacobi")["digest"] == parallel
     assert parallel != single(tmp_path)
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
-def test_a_signal_ends_all_processes_and_completes_the_log(started, number, code):
+def test_signal_ends_all_processes_and_completes_log(started, number, code):
     run = started(f"test-{number.name}")
-    asked = time.monotonic()
+    requested = time.monotonic()
     run.launcher.send_signal(number)
     assert run.end() == (code, f"lapwing: ended by {number.name}\n")
-    assert time.monotonic() - asked < END
+    assert time.monotonic() - requested < END
     assert run.whole()
 
 
@@ -204,20 +204,20 @@ def test_a_signal_ends_all_processes_and_completes_the_log(started, number, code
         ("trajectory", signal.SIGTERM),
     ],
 )
-def test_service_ended_by_a_signal_is_named_and_ends_the_run(started, victim, number):
+def test_service_ended_by_signal_is_named_and_ends_run(started, victim, number):
     run = started(f"test-dead-{victim}")
     os.kill(run.children[victim], number)
-    code, said = run.end()
+    code, output = run.end()
     assert code == 1
-    assert said.startswith(f"lapwing: {victim} ended unexpectedly (signal {number:d}) at t = ")
-    assert said.count("\n") == 1
+    assert output.startswith(f"lapwing: {victim} ended unexpectedly (signal {number:d}) at t = ")
+    assert output.count("\n") == 1
     assert run.whole() == (victim != "recorder")
     if number == signal.SIGTERM:
         with LogReader(run.log) as log:
             assert log.metadata["failure"] == f"{victim} was ended by SIGTERM"
 
 
-def test_launcher_stopped_during_the_end_of_a_run_succeeds(started):
+def test_launcher_stopped_during_end_of_run_succeeds(started):
     run = started("test-paused", "--set", "run.duration=4", "--set", "success.require=[]")
     run.launcher.send_signal(signal.SIGSTOP)
     run.assert_gone(STARTED)  # once the lease of the launcher's session is over
@@ -226,9 +226,8 @@ def test_launcher_stopped_during_the_end_of_a_run_succeeds(started):
     assert run.whole()
 
 
-def test_a_killed_recorder_loses_half_a_second_at_most(started):
-    """What a listener had heard of when the recorder was killed is in the recovered log; the best of three, for a
-    machine that is busy elsewhere."""
+def test_killed_recorder_loses_half_second_at_most(started):
+    """Messages received before the kill are in the recovered log; best of three, for a busy machine."""
     lost = []
     while len(lost) < 3 and min(lost, default=1.0) > 0.5:
         (door,) = loopback_endpoints(["door"]).values()
@@ -241,31 +240,31 @@ def test_a_killed_recorder_loses_half_a_second_at_most(started):
                 heard = newer[0]
             os.kill(run.children["recorder"], signal.SIGKILL)
         assert run.end()[0] == 1
-        found = recover(run.log, run.log.with_suffix(".recovered.mcap"))
-        lost.append((heard - found.end_ns) * 1e-9)
+        result = recover(run.log, run.log.with_suffix(".recovered.mcap"))
+        lost.append((heard - result.end_ns) * 1e-9)
         with LogReader(run.log.with_suffix(".recovered.mcap")) as log:
             assert log.complete
     assert min(lost) <= 0.5
 
 
-def test_a_service_that_freezes_is_named_and_ends_the_run(started):
+def test_service_that_freezes_is_named_and_ends_run(started):
     run = started("test-frozen")
     os.kill(run.children["autopilot"], signal.SIGSTOP)
-    code, said = run.end()
+    code, output = run.end()
     assert code == 1
-    assert said.startswith("lapwing: autopilot: stopped for ")
-    assert said.count("\n") == 1
+    assert output.startswith("lapwing: autopilot: stopped for ")
+    assert output.count("\n") == 1
     assert run.whole()
 
 
-def test_services_end_by_themselves_when_the_launcher_is_killed(started):
+def test_services_end_by_themselves_when_launcher_is_killed(started):
     run = started("test-orphans")
     run.launcher.kill()
     run.assert_gone()
     assert run.whole()
 
 
-def test_a_service_that_cannot_start_for_a_reason_that_the_user_can_mend(tmp_path):
+def test_service_that_cannot_start_for_reason_that_user_can_mend(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         door = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
         command = arguments(tmp_path, "test-door", "--listen", door, "--insecure")

@@ -1,4 +1,4 @@
-"""What no participant of a run has said is counted, and changes nothing."""
+"""Messages from outside the run are counted and change nothing."""
 
 import json
 import os
@@ -27,32 +27,32 @@ SCENE = "lapwing/scenes/hover.toml"
 PREFIX = "test-strangers"
 
 
-def test_marks_are_of_the_run_and_of_the_participant():
+def test_gids_depend_on_run_and_participant():
     run, other = PublisherIds(PREFIX, new_secret(), ["autopilot"]), PublisherIds(PREFIX, new_secret())
-    assert len({run.mark("plant"), run.mark("sensors"), other.mark("plant"), PublisherIds("x").mark("plant")}) == 4
-    assert len(run.mark("plant")) == 16
+    assert len({run.gid("plant"), run.gid("sensors"), other.gid("plant"), PublisherIds("x").gid("plant")}) == 4
+    assert len(run.gid("plant")) == 16
     assert run.senders(STEP_KEY, ["autopilot", "plant"]) == {
         f"{PREFIX}/_step/autopilot": None,
-        f"{PREFIX}/_step/plant": run.mark("plant"),
+        f"{PREFIX}/_step/plant": run.gid("plant"),
     }
     # its messages are made by a process of ours
-    assert run.senders(BATCH_KEY, ["autopilot"]) == {f"{PREFIX}/_batch/autopilot": run.mark("autopilot_messages")}
+    assert run.senders(BATCH_KEY, ["autopilot"]) == {f"{PREFIX}/_batch/autopilot": run.gid("autopilot_messages")}
 
 
 def arrivals(subscription):
-    found = []
+    result = []
     while (message := subscription.get(timeout=0.5)) is not None:
-        found.append(message)
-    return found
+        result.append(message)
+    return result
 
 
-def test_only_the_sender_is_received():
+def test_only_sender_is_received():
     mine, key = PublisherIds(PREFIX, new_secret()), f"{PREFIX}/_step/plant"
     with private_endpoints(["a", "b", "c"]) as ends, ZenohBus(*mesh("a", ends)) as bus:
         received = bus.receive(mine.senders(STEP_KEY, ["plant"]))
         first_comer = bus.receive({f"{PREFIX}/free": None})
         with (
-            ZenohBus(*mesh("b", ends), mark=mine.mark("plant")) as plant,
+            ZenohBus(*mesh("b", ends), gid=mine.gid("plant")) as plant,
             ZenohBus([ends["c"]], [ends["a"]]) as stranger,
         ):
             zenoh = stranger._session
@@ -73,7 +73,7 @@ def test_only_the_sender_is_received():
             assert arrivals(first_comer) == []
 
 
-def test_sockets_are_in_a_folder_of_the_users_own():
+def test_sockets_are_in_folder_of_users_own():
     with private_endpoints(["plant"]) as ends:
         folder = Path(ends["plant"].removeprefix("unixsock-stream/")).parent
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
@@ -81,7 +81,7 @@ def test_sockets_are_in_a_folder_of_the_users_own():
     assert not folder.exists()
 
 
-def test_a_long_name_of_the_folder_for_temporary_files_is_no_obstacle(monkeypatch, tmp_path):
+def test_long_name_of_folder_for_temporary_files_is_no_obstacle(monkeypatch, tmp_path):
     long = tmp_path / ("x" * 90)
     long.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(long))
@@ -111,7 +111,7 @@ def listening(pid):
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="finds ports in /proc")
-def test_a_flight_under_a_rain_of_strangers_messages_is_the_same_flight(tmp_path):
+def test_unauthenticated_messages_do_not_change_flight(tmp_path):
     """Even of one who is the same user and knows where the sockets are."""
     (tmp_path / "calm").mkdir()
     short = ["--set", "run.duration=3"]
@@ -137,39 +137,39 @@ def test_a_flight_under_a_rain_of_strangers_messages_is_the_same_flight(tmp_path
                     stranger.publisher(key)(payload, 0)
                     stranger._session.put(key, payload)
             time.sleep(0.05)
-    said, wrong = run.communicate()
+    output, wrong = run.communicate()
     assert (run.returncode, wrong) == (0, "")
-    assert "messages that no participant of this run has sent" in said
+    assert "messages from outside the run" in output
     assert (
         json.loads((tmp_path / "run.json").read_text())["digest"]
         == (json.loads((tmp_path / "calm/run.json").read_text())["digest"])
     )
 
 
-def test_somebodys_program_with_another_set_up_is_refused(tmp_path):
+def test_external_service_with_other_configuration_is_rejected(tmp_path):
     other = to_json(resolve(load(SCENE, {"run.duration": 9.0}))).encode()
     with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
         program.answer(f"{PREFIX}/{SETUP_KEY}/autopilot", other)
         run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
         program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
-        _, said = run.communicate(timeout=120)
+        _, output = run.communicate(timeout=120)
     assert run.returncode == 2
-    assert said.startswith("lapwing: autopilot_messages: last_tick is ")
-    assert "2250 for autopilot: resolve the same scene" in said
-    assert said.count("\n") == 1
+    assert output.startswith("lapwing: autopilot_messages: last_tick is ")
+    assert "2250 in autopilot; start all services from the same scene" in output
+    assert output.count("\n") == 1
 
 
-def test_a_flight_that_somebodys_program_ends_early_has_failed(tmp_path):
+def test_early_end_of_external_service_fails_run(tmp_path):
     with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
         run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
         program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
         others = ("plant", "trajectory", "recorder", "autopilot_messages")
         assert not program.wait_alive([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in others], 120.0)
         program.publisher(f"{PREFIX}/{STEP_KEY}/autopilot")(b"", 0)
-        _, said = run.communicate(timeout=120)
+        _, output = run.communicate(timeout=120)
     assert run.returncode == 1
-    assert said.startswith("lapwing: the run ended before its time, at t = ")
-    assert "autopilot ended before the run did" in said
-    assert said.count("\n") == 1
+    assert output.startswith("lapwing: the run ended early at t = ")
+    assert "autopilot ended before the run did" in output
+    assert output.count("\n") == 1
     with LogReader(tmp_path / "log.mcap") as log:
         assert log.metadata["failure"] == "autopilot ended before the run did"

@@ -1,4 +1,4 @@
-"""What lies in the working directory is not imported, whatever it is called."""
+"""Files in the working directory are not imported, whatever their names."""
 
 import subprocess
 import sys
@@ -7,7 +7,7 @@ from pathlib import Path
 LAPWING = Path(sys.executable).with_name("lapwing")
 
 
-def test_folders_of_our_packages_names_in_the_working_directory_do_no_harm(tmp_path):
+def test_working_directory_does_not_shadow_packages(tmp_path):
     for name in ("messages", "services", "lapwing", "numpy"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "__init__.py").write_text("raise SystemExit('imported from the working directory')\n")

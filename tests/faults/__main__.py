@@ -22,12 +22,12 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1, help="trials at once")
     parser.add_argument("--timeout", type=float, default=TIMEOUT, help="[s] for an end; more on a busy machine")
     parser.add_argument("--kinds", nargs="+", help="leave out all others")
-    given = parser.parse_args()
-    trials = [draw(given.seed + k, given.kinds) for k in range(given.trials)]
+    values = parser.parse_args()
+    trials = [draw(values.seed + k, values.kinds) for k in range(values.trials)]
     counts: Counter = Counter()
     longest: dict[str, float] = {}
-    with ThreadPoolExecutor(given.jobs) as pool:
-        for trial, outcome in zip(trials, pool.map(partial(fly, timeout=given.timeout), trials), strict=True):
+    with ThreadPoolExecutor(values.jobs) as pool:
+        for trial, outcome in zip(trials, pool.map(partial(fly, timeout=values.timeout), trials), strict=True):
             counts[trial.kind, not outcome.wrong] += 1
             longest[trial.kind] = max(longest.get(trial.kind, 0.0), outcome.seconds)
             words = "; ".join(outcome.wrong) or "ok"

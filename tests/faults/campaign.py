@@ -55,9 +55,9 @@ def fly(
     kernels = folder / "cache" if cold else None
     environment = {**os.environ, "TMPDIR": str(own), **({"LAPWING_CACHE": str(kernels)} if kernels else {})}
     command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", str(out)]
-    with (folder / "said").open("w+") as said:
+    with (folder / "said").open("w+") as output:
         begun = subprocess.Popen(
-            command, stdout=subprocess.DEVNULL, stderr=said, env=environment, cwd=ROOT, start_new_session=True
+            command, stdout=subprocess.DEVNULL, stderr=output, env=environment, cwd=ROOT, start_new_session=True
         )
         while kind == WORKER and begun.poll() is None and not _workers(folder):
             time.sleep(0.02)
@@ -80,22 +80,22 @@ def fly(
         for process in leak_checks.of_trial(folder):
             with suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
-        said.seek(0)
-        code, text = begun.returncode, said.read()
+        output.seek(0)
+        code, text = begun.returncode, output.read()
     if not KINDS[kind](code, text) and (code, text) != (0, ""):
         wrong.append(f"exit code {code}: {text!r}")
-    if kind != KILL and (found := [path.name for place in (own, out) for path in place.glob("*/.*")]):
-        wrong.append(f"left behind: {', '.join(found)}")
+    if kind != KILL and (result := [path.name for place in (own, out) for path in place.glob("*/.*")]):
+        wrong.append(f"left behind: {', '.join(result)}")
     return victim, code, text.strip(), seconds, wrong + _goes_on(command, environment, out)
 
 
 def _goes_on(command: list[str], environment: dict[str, str], out: Path) -> list[str]:
-    """What is wrong with the same command afterwards."""
+    """Return the problems of running the same command again."""
     again = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=LONGEST)
     if (again.returncode, again.stderr) != (0, ""):
         return [f"does not go on: exit code {again.returncode}: {again.stderr!r}"]
-    found, wanted = _digest(again.stdout), undisturbed()
-    return [] if found == wanted else [f"digest {found} when it has gone on, expected {wanted}"]
+    result, expected = _digest(again.stdout), undisturbed()
+    return [] if result == expected else [f"digest {result} when it has gone on, expected {expected}"]
 
 
 @cache
@@ -108,16 +108,16 @@ def undisturbed() -> str:
 
 
 def _digest(said: str) -> str:
-    found = re.search(r"^digest +([0-9a-f]{32})$", said, re.MULTILINE)
-    assert found, said
-    return found[1]
+    result = re.search(r"^digest +([0-9a-f]{32})$", said, re.MULTILINE)
+    assert result, said
+    return result[1]
 
 
 def _workers(folder: Path) -> list[int]:
     """The numbers of a campaign's worker processes."""
-    found = []
+    result = []
     for process in sorted(leak_checks.of_trial(folder)):
         with suppress(OSError):
             if b"spawn_main" in Path(f"/proc/{process}/cmdline").read_bytes():
-                found.append(process)
-    return found
+                result.append(process)
+    return result

@@ -1,4 +1,4 @@
-"""What is done to a run, and what must come of it."""
+"""Faults of a run, and their expected results."""
 
 import os
 import re
@@ -58,7 +58,7 @@ def interrupt(pid: int) -> None:
 
 
 def nothing(pid: int) -> None:
-    """What is done is not done to a process (trial.py)."""
+    """Do nothing to a process; trial.py applies the fault."""
 
 
 def _send(pid: int, number: int) -> None:
@@ -72,10 +72,10 @@ def _flies_on(victim: str, code: int, said: str) -> str:
 
 def _named(pattern: str) -> Callable[[str, int, str], str]:
     def check(victim: str, code: int, said: str) -> str:
-        wanted = pattern.replace("VICTIM", victim)
-        if code == 1 and re.fullmatch(rf"lapwing: {wanted}.*\n", said):
+        expected = pattern.replace("VICTIM", victim)
+        if code == 1 and re.fullmatch(rf"lapwing: {expected}.*\n", said):
             return ""
-        return f"expected exit code 1 and {wanted!r}, got {code}: {said!r}"
+        return f"expected exit code 1 and {expected!r}, got {code}: {said!r}"
 
     return check
 

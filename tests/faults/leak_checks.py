@@ -1,4 +1,4 @@
-"""What may not be there any more after a trial: processes, their ports, locks of the kernel cache."""
+"""Leak checks after a trial: processes, ports, locks of the kernel cache."""
 
 import fcntl
 import os
@@ -15,15 +15,15 @@ TABLES = ("tcp", "tcp6", "udp", "udp6", "unix")
 
 
 def of_trial(folder: Path) -> dict[int, str]:
-    """What the processes of a trial are, by number: those with its folder in their environment or command line."""
-    found, mark = {}, os.fsencode(folder)
+    """Return the processes of a trial by number: those with its folder in environment or command line."""
+    result, mark = {}, os.fsencode(folder)
     for place in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
-            given = (place / "cmdline").read_bytes() + (place / "environ").read_bytes()
+            values = (place / "cmdline").read_bytes() + (place / "environ").read_bytes()
             ended = (place / "stat").read_text().rpartition(")")[2].split()[0] == "Z"
-            if mark in given and not ended:
-                found[int(place.name)] = (place / "comm").read_text().strip()
-    return found
+            if mark in values and not ended:
+                result[int(place.name)] = (place / "comm").read_text().strip()
+    return result
 
 
 def ports(processes: Iterable[int]) -> dict[str, str]:
@@ -39,21 +39,21 @@ def ports(processes: Iterable[int]) -> dict[str, str]:
 
 def _bound() -> dict[str, str]:
     """Every socket of this machine with an address of its own that nobody is connected to, by inode."""
-    found = {}
+    result = {}
     for table in TABLES:
         with suppress(OSError):
             for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
                 words = line.split()
                 if table == "unix":
                     if len(words) > 7 and int(words[3], 16) & 0x10000:  # it listens
-                        found[words[6]] = f"{table} {words[7]}"
+                        result[words[6]] = f"{table} {words[7]}"
                 elif words[3] == ("0A" if table.startswith("tcp") else "07"):
-                    found[words[9]] = f"{table} port {int(words[1].rpartition(':')[2], 16)}"
-    return found
+                    result[words[9]] = f"{table} port {int(words[1].rpartition(':')[2], 16)}"
+    return result
 
 
 def ended(process: subprocess.Popen, name: str, seconds: float) -> list[str]:
-    """What is wrong where a process has not ended after so many seconds; it has ended then."""
+    """Return a problem if a process has not ended in time; end it."""
     try:
         process.wait(seconds)
     except subprocess.TimeoutExpired:
@@ -64,18 +64,18 @@ def ended(process: subprocess.Popen, name: str, seconds: float) -> list[str]:
 
 
 def left(folder: Path, taken: dict[str, str], cache: Path | None, seconds: float) -> list[str]:
-    """What is still there after so many seconds, which is nothing where all is well.
+    """Return the leaks that remain after a time; empty if there are none.
 
     Args:
-        folder: of the trial.
-        taken: the ports of its processes, as they were.
-        cache: its kernel cache, None: that of everybody.
-        seconds: to wait.
+        folder: folder of the trial.
+        taken: previous ports of its processes.
+        cache: its kernel cache; None: the shared one.
+        seconds: time to wait.
     """
     deadline = time.monotonic() + seconds
-    while (found := _left(folder, taken, cache)) and time.monotonic() < deadline:
+    while (result := _left(folder, taken, cache)) and time.monotonic() < deadline:
         time.sleep(0.1)
-    return found
+    return result
 
 
 def _left(folder: Path, taken: dict[str, str], cache: Path | None) -> list[str]:
@@ -89,7 +89,7 @@ def _left(folder: Path, taken: dict[str, str], cache: Path | None) -> list[str]:
 
 def locked(cache: Path) -> list[str]:
     """The locks of a kernel cache that are held, and by nobody else who is there: others may compile in it, too."""
-    found, holders = [], _holders()
+    result, holders = [], _holders()
     for path in sorted((cache / LOCKS).glob("*")):
         with suppress(OSError):
             descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC)
@@ -97,13 +97,13 @@ def locked(cache: Path) -> list[str]:
                 fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
                 if not Path(f"/proc/{holders.get(os.fstat(descriptor).st_ino)}").exists():
-                    found.append(path.name)
+                    result.append(path.name)
             finally:
                 os.close(descriptor)
-    return found
+    return result
 
 
 def _holders() -> dict[int, str]:
-    """Who has taken each lock of a file, by the file's inode."""
+    """Return the holders of each file lock, by the file's inode."""
     lines = [line.split() for line in Path("/proc/locks").read_text().splitlines()]
     return {int(words[5].rpartition(":")[2]): words[4] for words in lines if words[1] == "FLOCK"}

@@ -39,20 +39,20 @@ def fly(victim: str, kind: str, delay: float, folder: Path) -> tuple[int, str, f
             network.cut_off = set()
         ends = run.ends()
     seconds = time.monotonic() - struck
-    code, said = ends[MONITOR]
+    code, output = ends[MONITOR]
     wrong = [f"{name}: a traceback: {words}" for name, (_, words) in ends.items() if "Traceback" in words]
     wrong += [f"{name} was left: {words}" for name, (c, words) in ends.items() if c < 0]
     if over or not ever:
         wrong += [f"{name} ended with exit code {c}: {words}" for name, (c, words) in ends.items() if c]
     elif code == 1:
-        named = said.partition(": ")[2].partition(": ")[0].split(", ")
+        named = output.partition(": ")[2].partition(": ")[0].split(", ")
         if named != ([victim] if victim != MONITOR else sorted(set(HOSTS) - {MONITOR})):
-            wrong.append(f"names the wrong: {said}")
+            wrong.append(f"names the wrong: {output}")
     elif code:
-        wrong.append(f"exit code {code}: {said}")
-    if (stated := said.partition("at t = ")[2]) and victim != "recorder":  # the others fly on without it
+        wrong.append(f"exit code {code}: {output}")
+    if (stated := output.partition("at t = ")[2]) and victim != "recorder":  # the others fly on without it
         with LogReader(run.log) as read:
             last = max(time_ns for _, _, time_ns, _ in read.messages()) * 1e-9
         if last < float(stated.split()[0].rstrip(":;,")) - RECOVERED:
-            wrong.append(f"the log ends at {last:.3f} s: {said}")
-    return code, said, seconds, wrong
+            wrong.append(f"the log ends at {last:.3f} s: {output}")
+    return code, output, seconds, wrong

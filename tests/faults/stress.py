@@ -35,7 +35,7 @@ TIMEOUT = 900.0  # [s] for one run
 
 
 class Result(NamedTuple):
-    """What came of a run."""
+    """Result of a run."""
 
     kind: str
     seconds: float
@@ -108,9 +108,9 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=60)
     parser.add_argument("--at-once", type=int, default=6)
     parser.add_argument("--load", type=int, default=0, help="processes that keep a processor busy")
-    given = parser.parse_args()
+    values = parser.parse_args()
     flown, wrong, longest = Counter[str](), Counter[str](), Counter[str]()
-    for number, (kind, seconds, fault) in enumerate(trial(given.runs, given.at_once, given.load)):
+    for number, (kind, seconds, fault) in enumerate(trial(values.runs, values.at_once, values.load)):
         flown[kind] += 1
         longest[kind] = max(longest[kind], seconds)
         if fault:

@@ -28,7 +28,7 @@ FEW = {
 
 
 @pytest.mark.parametrize("trial", FEW.values(), ids=FEW)
-def test_a_fault_has_the_end_that_it_should(trial):
+def test_fault_ends_run_as_specified(trial):
     if not Path("/proc/self/stat").exists():
         pytest.skip("finds processes in /proc")
     if trial.kind == "full disk" and os.geteuid() != 0:
@@ -39,13 +39,13 @@ def test_a_fault_has_the_end_that_it_should(trial):
     assert not outcome.wrong, outcome
 
 
-def test_a_seed_makes_the_same_trial():
+def test_seed_makes_same_trial():
     assert draw(7) == draw(7)
     assert len({draw(seed).kind for seed in range(40)}) >= 4
     assert draw(7, [campaign.KILL]).scene == "hover"
 
 
-def test_what_is_left_of_a_trial_is_found(tmp_path):
+def test_leftovers_of_trial_are_detected(tmp_path):
     """A process of it, the port at which it listens, and a lock that it has taken."""
     (tmp_path / "cache" / leak_checks.LOCKS).mkdir(parents=True)
     lock = tmp_path / "cache" / leak_checks.LOCKS / "kernel"

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lapwing.cosim.log import LogReader
-from lapwing.services.process_table import needed
+from lapwing.services.process_table import required_processes
 from lapwing.services.scene_resolver import load, resolve
 from tests.faults import campaign, leak_checks, network_partition
 from tests.faults.fault_types import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER
@@ -34,7 +34,7 @@ RECOVERED = 0.5  # [s] before the fault up to which a log must be whole
 
 
 class Trial(NamedTuple):
-    """What is done: made from a seed."""
+    """Fault of a trial, derived from a seed."""
 
     seed: int
     scene: str
@@ -44,7 +44,7 @@ class Trial(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What came of it."""
+    """Result of a trial."""
 
     victim: str
     code: int
@@ -75,8 +75,8 @@ def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
             victim = network_partition.HOSTS[
                 min(int(trial.place * len(network_partition.HOSTS)), len(network_partition.HOSTS) - 1)
             ]
-            code, said, seconds, wrong = network_partition.fly(victim, trial.kind, trial.delay / 2, folder)
-            return Outcome(victim, code, said, seconds, wrong + leak_checks.left(folder, {}, None, timeout))
+            code, output, seconds, wrong = network_partition.fly(victim, trial.kind, trial.delay / 2, folder)
+            return Outcome(victim, code, output, seconds, wrong + leak_checks.left(folder, {}, None, timeout))
         if trial.kind in campaign.KINDS:
             cold = trial.seed % 2 == 1
             return Outcome(*campaign.fly(trial.kind, trial.place, trial.delay, cold, folder, timeout))
@@ -94,11 +94,11 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
     command = [sys.executable, "-m", "lapwing", "run", trial.scene, *sets, "--speed", "1", "--log", str(log)]
     at_once = trial.kind == INTERRUPT
     cold = {"LAPWING_CACHE": str(folder / "cache")} if at_once and trial.seed % 2 else {}
-    with (folder / "said").open("w+") as said:
+    with (folder / "said").open("w+") as output:
         launcher = subprocess.Popen(
             [*command, "--set", "success.require=[]", "--report", str(folder / "report.html")],
             stdout=subprocess.DEVNULL,
-            stderr=said,
+            stderr=output,
             env={**os.environ, "TMPDIR": str(folder), **cold},
             cwd=Path(__file__).parents[2],
         )
@@ -128,8 +128,8 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
             with suppress(ProcessLookupError):
                 os.kill(children[name], signal.SIGKILL)
         wrong += leak_checks.left(folder, taken, Path(cold["LAPWING_CACHE"]) if cold else None, timeout)
-        said.seek(0)
-        text = said.read()
+        output.seek(0)
+        text = output.read()
     code = launcher.returncode
     wrong += _wrong_end(trial, victim, code, text, late)
     wrong += _wrong_log(trial, victim, log, text, late)
@@ -146,8 +146,8 @@ def _wrong_end(trial: Trial, victim: str, code: int, said: str, late: bool) -> l
         return [] if code == -signal.SIGKILL or (late and over) else [f"exit code {code}"]
     if victim == LAUNCHER and trial.kind == "freeze":
         return [] if code in (0, 1) else [f"exit code {code}: {said}"]
-    found = KINDS[trial.kind].ends(victim, code, said)
-    return [found] if found and not over else []
+    result = KINDS[trial.kind].ends(victim, code, said)
+    return [result] if result and not over else []
 
 
 def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> list[str]:
@@ -169,7 +169,7 @@ def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> l
 @cache
 def _needed(scene: str) -> list[str]:
     """The processes of the run of a scene of a trial."""
-    return needed(resolve(load(scene, SCENES[scene])))
+    return required_processes(resolve(load(scene, SCENES[scene])))
 
 
 def _fill(path: Path) -> None:
@@ -180,7 +180,7 @@ def _fill(path: Path) -> None:
 
 
 def _gone(pids: dict[str, int], seconds: float) -> list[str]:
-    """Who is still there after so many seconds."""
+    """Return the processes that remain after a time."""
     deadline = time.monotonic() + seconds
     while (left := [name for name, pid in pids.items() if _running(pid)]) and time.monotonic() < deadline:
         time.sleep(0.05)

@@ -1,6 +1,6 @@
 """Certificates for participants that meet over a network: one authority, and a folder for each of them.
 
-FOLDER/NAME/authority.pem     who is trusted
+FOLDER/NAME/authority.pem     trusted certificate authority
 FOLDER/NAME/certificate.pem   NAME as its common name
 FOLDER/NAME/key.pem           its private key, mode 0600
 FOLDER/NAME/zenoh.json5       all of it in a Zenoh configuration for programs of one's own, wherever it is taken; 0600
@@ -9,18 +9,24 @@ FOLDER/NAME/zenoh.json5       all of it in a Zenoh configuration for programs of
 import base64
 import json
 import os
+import re
+import ssl
 import stat
 import subprocess
 import tempfile
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 AUTHORITY, CERTIFICATE, KEY, CONFIGURATION = "authority.pem", "certificate.pem", "key.pem", "zenoh.json5"
 _CURVE = ("-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:P-256", "-nodes")
+# Two ASN.1 times (UTCTime or GeneralizedTime) in a sequence: the field `validity` (RFC 5280, section 4.1.2.5)
+_TIME = rb"(?:\x17\x0d|\x18\x0f)(\d{12,14}Z)"
+_VALIDITY = re.compile(rb"\x30." + _TIME + _TIME, re.DOTALL)
 _LINKS = {
     "enable_mtls": True,
-    # who is at the other end is told by the common name, at both ends (lapwing.cosim.access.zenoh_access),
+    # both ends identify their peer by its common name (lapwing.cosim.access.zenoh_access),
     # whatever its address
     "verify_name_on_connect": False,
     "close_link_on_expiration": True,
@@ -75,7 +81,7 @@ def tls(folder: Path, name: str) -> dict[str, Any]:
     """Zenoh's settings for the certificate of a participant.
 
     Raises:
-        ValueError: it is not there, cannot be read, or others can read its key.
+        ValueError: it is not there, cannot be read, is not valid now, or others can read its key.
     """
     own = folder.absolute() / name
     for file in (AUTHORITY, CERTIFICATE, KEY):
@@ -83,9 +89,35 @@ def tls(folder: Path, name: str) -> dict[str, Any]:
             raise ValueError(
                 f"--keys {folder}: {name}/{file} cannot be read; `lapwing certificates {folder}` makes them"
             )
+    for file in (AUTHORITY, CERTIFICATE):
+        _check_validity(own / file, f"--keys {folder}: {name}/{file}")
     if stat.S_IMODE((own / KEY).stat().st_mode) & 0o077:
         raise ValueError(f"--keys {folder}: others can read {name}/{KEY}; chmod 600 mends it")
     return {"transport/link/tls": _tls(own)}
+
+
+def _check_validity(path: Path, location: str) -> None:
+    """Raise ValueError for a certificate outside its period, or that is none."""
+    try:
+        result = _VALIDITY.search(ssl.PEM_cert_to_DER_cert(path.read_text().strip()))
+    except ValueError:
+        result = None
+    if result is None:
+        raise ValueError(f"{location}: is not a certificate; `lapwing certificates FOLDER` makes new ones")
+    begin, end = (_time(text) for text in result.groups())
+    now = datetime.now(UTC)
+    if not begin <= now:
+        raise ValueError(f"{location}: is valid from {begin:%Y-%m-%d %H:%M} UTC; check the clock of this machine")
+    if now >= end:
+        raise ValueError(
+            f"{location}: expired on {end:%Y-%m-%d %H:%M} UTC; `lapwing certificates FOLDER` makes new ones"
+        )
+
+
+def _time(text: bytes) -> datetime:
+    """Return an ASN.1 time: two digits of the year up to 2049, else four."""
+    form = "%y%m%d%H%M%SZ" if len(text) == 13 else "%Y%m%d%H%M%SZ"
+    return datetime.strptime(text.decode(), form).replace(tzinfo=UTC)
 
 
 def _tls(own: Path) -> dict[str, Any]:
@@ -101,7 +133,7 @@ def _tls(own: Path) -> dict[str, Any]:
 
 
 def _configuration(own: Path) -> dict[str, Any]:
-    """For a client: what the files hold instead of where they are."""
+    """Return a client's settings with the contents of the files instead of their paths."""
     entries = {
         "root_ca_certificate_base64": AUTHORITY,
         "connect_private_key_base64": KEY,

@@ -1,4 +1,4 @@
-"""What is of the user alone: sockets where the participants of a run on one machine meet, files that are run."""
+"""User-private sockets of a run on one machine, and checks of files that are executed."""
 
 import os
 import shutil
@@ -13,7 +13,7 @@ LONGEST = 107  # bytes of a socket's path, on Linux
 
 @contextmanager
 def private_endpoints(names: Iterable[str]) -> Iterator[dict[str, str]]:
-    """A Unix-domain socket for each name, in a new folder with mode 0700 and a name that nobody can guess.
+    """Yield a Unix-domain socket for each name, in a new folder with mode 0700 and an unguessable name.
 
     Raises:
         ValueError: there is no folder for temporary files.
@@ -38,7 +38,7 @@ def remove(endpoint: str) -> None:
 
 
 def only_ours(path: Path) -> bool:
-    """Whether only this user, or root, can change a file, or what is in a folder.
+    """Return True if only this user or root can change a file, or the content of a folder.
 
     Raises:
         OSError: it is not there.

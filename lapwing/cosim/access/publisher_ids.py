@@ -1,8 +1,8 @@
-"""Whose messages count: each participant of a run marks what it publishes, and nobody else's marks are taken.
+"""Publisher GIDs: each participant of a run accepts messages only with the GID of their sender.
 
-A mark is the publisher's identifier in the attachment. A run on one machine makes the marks from a secret that its
-launcher draws and hands over on standard input. Participants that were started separately share no secret: there a
-mark only tells one run from another, and certificates keep strangers out (docs/explanation/security.md).
+The GID is the publisher's identifier in the attachment. A run on one machine derives GIDs from a secret that its
+launcher draws and writes to the standard input of each process. Participants that are started separately share no
+secret: there a GID only distinguishes runs, and certificates authenticate the senders (docs/explanation/security.md).
 """
 
 import hashlib
@@ -14,35 +14,35 @@ from lapwing.cosim.transport.bus_keys import BATCH_KEY, ENCODER
 
 
 def new_secret() -> str:
-    """A secret for one run, 64 hexadecimal digits, from which its participants derive their marks."""
+    """Return a secret for one run, 64 hexadecimal digits, from which its participants derive their GIDs."""
     return secrets.token_hex(32)
 
 
 class PublisherIds(NamedTuple):
-    """The participants of one run: the marks by which their messages are known."""
+    """GIDs of the participants of one run."""
 
     key_prefix: str
-    secret: str = ""  # hexadecimal; "" where they share none
-    external: Collection[str] = ()  # programs of somebody else's, which choose their own marks
+    secret: str = ""  # hexadecimal; "" without a shared secret
+    external: Collection[str] = ()  # names of external services, which choose their own GIDs
 
-    def mark(self, name: str) -> bytes:
-        """What a participant's messages carry: 16 bytes."""
+    def gid(self, name: str) -> bytes:
+        """Return the GID of a participant: 16 bytes."""
         text = f"{self.key_prefix}/{name}".encode()
         return hashlib.blake2b(text, key=bytes.fromhex(self.secret), digest_size=16).digest()
 
-    def author(self, name: str) -> bytes:
-        """The mark of whoever makes the messages of a service."""
-        return self.mark(f"{name}{ENCODER}" if name in self.external else name)
+    def encoder_gid(self, name: str) -> bytes:
+        """Return the GID of the process that encodes the messages of a service."""
+        return self.gid(f"{name}{ENCODER}" if name in self.external else name)
 
     def senders(self, key: str, names: Iterable[str]) -> dict[str, bytes | None]:
-        """The mark that a message must carry, by Zenoh key; None where a program chooses its own.
+        """Return the GID that a message must carry, by Zenoh key; None for an external service, which chooses its own.
 
         Args:
             key: of the lock step (`lapwing.cosim.transport.bus_keys`).
-            names: whose messages on it are wanted.
+            names: of the senders.
         """
-        found: dict[str, bytes | None] = {}
+        result: dict[str, bytes | None] = {}
         for name in names:
-            mark = self.author(name) if key == BATCH_KEY else None if name in self.external else self.mark(name)
-            found[f"{self.key_prefix}/{key}/{name}"] = mark
-        return found
+            gid = self.encoder_gid(name) if key == BATCH_KEY else None if name in self.external else self.gid(name)
+            result[f"{self.key_prefix}/{key}/{name}"] = gid
+        return result

@@ -1,4 +1,4 @@
-"""Who may say what: Zenoh's access control, for both ends of every link. What is not allowed is denied."""
+"""Zenoh access-control rules for both ends of every link. All that is not allowed is denied."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -15,7 +15,7 @@ _ALL = [*_LISTEN, *_SAY, "query", "delete"]
 
 
 def by_certificate(key_prefix: str, says: Mapping[str, Iterable[str]]) -> dict[str, Any]:
-    """Zenoh's settings for a run whose participants have certificates.
+    """Return Zenoh's settings for a run whose participants have certificates.
 
     Args:
         key_prefix: of the run.
@@ -33,7 +33,7 @@ def by_certificate(key_prefix: str, says: Mapping[str, Iterable[str]]) -> dict[s
 
 
 def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
-    """Zenoh's settings for the door of a run on one machine: who comes in reads, and says nothing.
+    """Return the Zenoh settings for the open endpoint of a run on one machine: its clients read, and publish nothing.
 
     Args:
         key_prefix: of the run.
@@ -49,9 +49,9 @@ def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
 
 
 def withholding(key_prefix: str) -> dict[str, Any]:
-    """Zenoh's settings for a router that cannot tell viewers from participants, who are joined without it."""
-    policies = [{"rules": ["withhold"], "subjects": ["anybody"]}]
-    return _settings([_withheld(key_prefix)], [{"id": "anybody"}], policies, default="allow")
+    """Return the Zenoh settings for a router that cannot authenticate viewers; participants are linked without it."""
+    policies = [{"rules": ["withhold"], "subjects": ["any"]}]
+    return _settings([_withheld(key_prefix)], [{"id": "any"}], policies, default="allow")
 
 
 def _reading(key: str) -> list[dict[str, Any]]:

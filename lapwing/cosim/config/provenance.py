@@ -1,8 +1,10 @@
-"""What a log says about its own making: seed, solver, version, commit, and all that was resolved."""
+"""Provenance of a log: seed, solver, version, commit, and the resolved run configuration."""
 
 import os
+import platform
 import subprocess
 from collections.abc import Mapping
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
@@ -10,13 +12,14 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import digest, to_json
 
 SETUP_FILE = "setup.json"
+MACHINE = ("python", "packages", "system", "processor")  # keys of the machine that recorded
 FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended before its time: why, and whether it diverged
 
 WAITED = "waited_for_disk"  # key of a run that the disk has held up: for how long
 
 
 def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
-    """The entries of the log's "lapwing" metadata record, all text."""
+    """Return the entries of the log's "lapwing" metadata record, all text."""
     solver = setup.resolved.get("solver", {})
     return {
         "scene": setup.scene,
@@ -25,7 +28,8 @@ def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
         "vehicle": ", ".join(setup.vehicles),
         "setup": digest(setup),
         "version": package_version(),
-        "commit": _commit(),
+        "commit": source_commit(),
+        **machine(),
         "exchange_rate": str(setup.rate),
         "coupling": setup.coupling,
         **{f"solver_{key}": str(value) for key, value in solver.items()},
@@ -37,13 +41,13 @@ def failure(text: str, diverged: bool = False) -> dict[str, str]:
 
     Args:
         text: why.
-        diverged: whether a state was no longer sound.
+        diverged: True if a state became invalid.
     """
     return {FAILURE: text, **({DIVERGED: "yes"} if diverged else {})}
 
 
 def attachments(setup: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes]:
-    """Files that travel inside the log: the set-up, from which the run can be flown again, and its sources."""
+    """Return the attachments of a log: the run configuration, for resimulation, and its source files."""
     return {SETUP_FILE: to_json(setup).encode(), **{name: text.encode() for name, text in sources.items()}}
 
 
@@ -55,8 +59,34 @@ def package_version() -> str:
         return "unknown"
 
 
-def _commit() -> str:
-    """The commit of the source tree; with "+" when files differ from it, "unknown" outside a git checkout."""
+def machine() -> dict[str, str]:
+    """Return the versions and the processor that this process runs with, by the keys of `MACHINE`."""
+    packages = " ".join(f"{name} {_installed(name)}" for name in ("numba", "llvmlite", "numpy"))
+    library, release = platform.libc_ver()
+    values = (platform.python_version(), packages, f"{platform.system()} {library} {release}".strip(), _processor())
+    return dict(zip(MACHINE, values, strict=True))
+
+
+def _installed(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return "unknown"
+
+
+def _processor() -> str:
+    """Architecture and model."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    model = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), "")
+    return f"{platform.machine()} {model}".strip()
+
+
+@cache
+def source_commit() -> str:
+    """Return the commit of the source tree, with "+" if files differ, or "unknown" outside a git checkout."""
     if stated := os.environ.get("LAPWING_COMMIT"):  # in an image, which has no checkout
         return stated
     here = Path(__file__).parent

@@ -1,6 +1,6 @@
-"""A scene and every file that it names, resolved once: numbers in SI, nothing left to open or to parse.
+"""Run configuration: a scene and every file that it names, resolved to numbers in SI units.
 
-The set-up is made by whoever starts a run, handed to every process as it is, recorded whole in the log, and hashed.
+The process that starts a run resolves it once, sends it to every other process, and records it in the log.
 """
 
 from typing import Any, NamedTuple
@@ -10,26 +10,25 @@ from lapwing.cosim.run_errors import LockStepError
 
 
 class ServiceConfig(NamedTuple):
-    """What a service of the lock step is given, takes and gives."""
+    """Parameters, inputs and ports of a lock-step service."""
 
     parameters: Any  # NamedTuples of numbers; their classes are the service's own
     inputs: tuple[InputPort, ...]  # ports of other services
-    ports: tuple[Port, ...]  # that it gives
+    ports: tuple[Port, ...]  # output ports
 
 
 class PerVehicle(NamedTuple):
-    """What the vehicles of a fleet are each given: their parameters of a service, or of a process beside."""
+    """Values of the vehicles of a fleet: their parameters of a service or of an auxiliary process."""
 
     vehicles: tuple[str, ...]  # names; those that have it
     given: tuple[Any, ...]
 
 
 class RunConfig(NamedTuple):
-    """One run, resolved.
+    """Resolved run.
 
-    In that of a fleet (`lapwing.cosim.diagram.multi_vehicle.joined`) the parameters of a service are `PerVehicle`
-    vehicle's `ServiceConfig`, and a
-    port has the vehicle's name in front: "left/truth".
+    In a fleet (`lapwing.cosim.diagram.multi_vehicle.merge_configs`) the parameters of a service are each
+    vehicle's `ServiceConfig`, and the names of ports begin with the vehicle's: "left/ground_truth".
     """
 
     scene: str  # name
@@ -41,7 +40,7 @@ class RunConfig(NamedTuple):
     coupling: str  # "gauss_seidel" or "jacobi"
     vehicle: str  # name, first part of its topics' names; "" of a fleet, whose topics have it already
     services: dict[str, ServiceConfig]  # those of the lock step, by name
-    beside: dict[str, Any]  # what processes outside of the lock step are given, by name
+    auxiliary: dict[str, Any]  # what processes outside of the lock step are given, by name
     resolved: dict[str, Any]  # the scene's tables with all that its files say
 
     @property
@@ -51,7 +50,7 @@ class RunConfig(NamedTuple):
 
     @property
     def duration(self) -> float:
-        """Where the run ends at the latest [s]."""
+        """Latest end of the run [s]."""
         return self.last_tick / self.rate
 
     @property
@@ -73,7 +72,7 @@ class RunConfig(NamedTuple):
 
     @property
     def producers(self) -> dict[str, str]:
-        """The service that gives each port."""
+        """The service that publishes each port."""
         return {port.name: name for name, service in self.services.items() for port in service.ports}
 
     @property
@@ -85,12 +84,12 @@ class RunConfig(NamedTuple):
         )
 
     def port(self, name: str) -> Port:
-        """The port of this name.
+        """Return the port of this name.
 
         Raises:
-            LockStepError: nobody gives it.
+            LockStepError: no service has it.
         """
         try:
             return self.ports[name]
         except KeyError:
-            raise LockStepError(f"no service of this scene gives {name}") from None
+            raise LockStepError(f"no service of this scene publishes {name}") from None

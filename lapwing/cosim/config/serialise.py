@@ -1,4 +1,4 @@
-"""Trees of values as canonical JSON and back, exactly: the same tree gives the same text, on every machine.
+"""Exact conversion of trees of values to canonical JSON and back: equal trees lead to equal text on every machine.
 
 Dicts and lists are JSON's own. All else is an object with the key "$", which says what it is:
 
@@ -16,15 +16,17 @@ import importlib
 import json
 import math
 import sys
+import zlib
 from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.class_aliases import FIELDS, present_name
+from lapwing.cosim.config.former_names import FORMER_PACKAGES, present_fields, present_name
 from lapwing.messages.former_names import current_fields
 
 TAG = "$"
+LARGEST = 1 << 26  # [bytes] of the text of a run configuration; the largest have some millions
 DTYPES = ("bool", "float64", "int64")  # of arrays
 SCALARS = ("bool", "float64", "int64", "uint64")
 
@@ -43,10 +45,10 @@ def to_json(tree: Any) -> str:
 
 
 def from_json(text: str, modules: Collection[str] = ()) -> Any:
-    """The tree of a text that `to_json` gave.
+    """Return the tree of a text that `to_json` has written.
 
     Args:
-        text: may be a stranger's: nothing is imported for it but this project's own packages, and what is declared.
+        text: may be untrusted: only this package and the declared modules are imported for it.
         modules: further modules whose classes it may have.
 
     Raises:
@@ -56,6 +58,29 @@ def from_json(text: str, modules: Collection[str] = ()) -> Any:
         return _decoded(json.loads(text), modules)
     except RecursionError:
         raise ValueError("not a tree of values: nested too deeply") from None
+
+
+def compress(tree: Any) -> bytes:
+    """Return the canonical text of a tree as a message that needs no fragments."""
+    return zlib.compress(to_json(tree).encode())
+
+
+def decompress(message: bytes) -> str:
+    """Return the text of a message; external services may send it uncompressed.
+
+    Raises:
+        ValueError: not a text, or larger than `LARGEST`.
+    """
+    if message.startswith(b"{"):
+        return message.decode()
+    unpacking = zlib.decompressobj()
+    try:
+        text = unpacking.decompress(message, LARGEST)
+    except zlib.error as error:
+        raise ValueError(f"not a compressed text: {error}") from None
+    if not unpacking.eof:
+        raise ValueError(f"compressed text is incomplete, or larger than {LARGEST} bytes")
+    return text.decode()
 
 
 def digest(tree: Any) -> str:
@@ -75,7 +100,7 @@ OWN = ("lapwing",)  # packages whose modules a text may have imported
 
 
 def first_difference(a: Any, b: Any) -> tuple[str, Any, Any] | None:
-    """Where two trees differ first: (dotted path, value in `a`, value in `b`); None if they are the same to the bit.
+    """Return the first difference of two trees: (dotted path, value in `a`, value in `b`); None if they are identical.
 
     A value that one of them does not have is `ABSENT`.
     """
@@ -89,14 +114,14 @@ def _difference(a: Any, b: Any, path: str) -> tuple[str, Any, Any] | None:
         return None if same else (path, a, b)
     for key in dict.fromkeys([*children_a, *children_b]):
         inner = f"{path}.{key}" if path else str(key)
-        found = _difference(children_a.get(key, ABSENT), children_b.get(key, ABSENT), inner)
-        if found:
-            return found
+        result = _difference(children_a.get(key, ABSENT), children_b.get(key, ABSENT), inner)
+        if result:
+            return result
     return None
 
 
 def _children(value: Any) -> dict[Any, Any] | None:
-    """The members of a tree's node by name or index; None for a leaf."""
+    """Return the members of a tree's node by name or index; None for a leaf."""
     if isinstance(value, dict):
         return dict(sorted(value.items()))
     if _is_record(type(value)):
@@ -168,16 +193,16 @@ def _listed(dtype: Any, allowed: Collection[str]) -> str:
 
 
 def _record(cls: type, name: str, members: dict[str, Any]) -> Any:
-    members = current_fields(f"{cls.__module__}:{cls.__qualname__}", members)
-    renamed = FIELDS.get(f"{cls.__module__}:{cls.__qualname__}", {})
-    members = {renamed.get(key, key): value for key, value in members.items()}
+    if set(members) != set(_fields(cls)):
+        path = f"{cls.__module__}:{cls.__qualname__}"
+        members = present_fields(path, current_fields(path, members))
     if set(members) != set(_fields(cls)):
         raise ValueError(f"{name}: has the fields {', '.join(_fields(cls))}, got {', '.join(members)}")
     return cls(**members)
 
 
 def _is_record(cls: type) -> bool:
-    """Whether it is a NamedTuple or a frozen dataclass."""
+    """Return True for a NamedTuple or a frozen dataclass."""
     if issubclass(cls, tuple):
         return hasattr(cls, "_fields")
     return dataclasses.is_dataclass(cls) and cls.__dataclass_params__.frozen  # type: ignore[attr-defined]
@@ -195,17 +220,20 @@ def _name_of(cls: type) -> str:
 
 
 def _class_of(name: str, modules: Collection[str]) -> type:
-    if name.partition(":")[0] not in modules:  # a declared module may have the name of a former package
-        name = present_name(name)
     module, _, path = name.partition(":")
+    declared = module in modules  # a declared module may have the name of a former package
+    if not declared and module.partition(".")[0] in FORMER_PACKAGES:
+        return _class_of(present_name(name), modules)
     if module.partition(".")[0] not in OWN and module not in sys.modules and module not in modules:
         raise ValueError(f"{name}: no such class; expected one of {', '.join(OWN)} or of a declared module")
     try:
-        found: Any = importlib.import_module(module)
+        result: Any = importlib.import_module(module)
         for part in path.split("."):
-            found = getattr(found, part)
+            result = getattr(result, part)
     except (ImportError, AttributeError, TypeError, ValueError) as error:
+        if not declared and (present := present_name(name)) != name:
+            return _class_of(present, modules)
         raise ValueError(f"{name}: no such class can be imported ({error})") from None
-    if not (isinstance(found, type) and _is_record(found)):
+    if not (isinstance(result, type) and _is_record(result)):
         raise ValueError(f"{name}: expected a NamedTuple or a frozen dataclass")
-    return found
+    return result

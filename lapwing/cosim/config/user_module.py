@@ -1,7 +1,7 @@
-"""A user's own modules: found beside the scene or where Python finds modules, and carried in the set-up as text.
+"""User modules: found in the folder of the scene or on Python's path, and stored in the run configuration as text.
 
-Whoever takes part in a run, and whoever flies it again, runs that text: no process looks for the file a second time,
-and an edit while a run starts reaches nobody. The text is laid down in a folder of the cache that is named by its
+Each process of a run, and each resimulation, runs that text: no process looks for the file a second time, and an
+edit during the start of a run has no effect. The text is written to a folder of the cache that is named by its
 content, so that tracebacks can show it and machine code made of it can be kept. A package, or a module in one, is
 imported as usual: it has to be installed wherever the run is flown.
 """
@@ -30,7 +30,7 @@ from lapwing.kernels import cache_folder, forget_sources
 
 
 def find(key: str, name: str, folder: Path) -> dict[str, Path]:
-    """The file of a module, beside the scene or on `sys.path`, and those beside it that it imports; none is imported.
+    """Return the files of a module and of the neighbouring modules that it imports, without importing them.
 
     Args:
         key: dotted key of the scene that names it.
@@ -48,33 +48,33 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
     file, installed = (folder / f"{name}.py").resolve(), installed_module(name)
     if file.is_file():
         if _taken(name, file):
-            raise ConfigError(key, f"{file}: another module has this name", "a name of its own")
+            raise ConfigError(key, f"{file}: another module has this name", "a unique name")
     elif installed is None:
         raise ConfigError(key, f"no module {name}", f"{file}, or a module on Python's path")
     elif not (installed.origin or "").endswith(".py"):
         raise ConfigError(key, f"module {name} has no source", "one written in Python")
     else:
         file = Path(str(installed.origin)).resolve()
-    found = {name: file}
+    result = {name: file}
     ahead = [file] if _is_carried(name, file) else []
     while ahead:
         for imported in _imports(ahead.pop()):
             beside = file.parent / f"{imported}.py"
-            if imported not in found and beside.is_file() and not _taken(imported, beside):
-                found[imported] = beside
+            if imported not in result and beside.is_file() and not _taken(imported, beside):
+                result[imported] = beside
                 ahead.append(beside)
-    return found
+    return result
 
 
 def _taken(name: str, file: Path) -> bool:
-    """Whether Python would import another file of that name."""
+    """Return True if Python would import another file of that name."""
     installed = installed_module(name)
     other = installed is not None and Path(str(installed.origin)).resolve() != file
     return other or name in sys.stdlib_module_names
 
 
 def installed_module(name: str) -> ModuleSpec | None:
-    """The module of that name on `sys.path`, without the folders that this module has laid down."""
+    """Return the module of that name on `sys.path`, except in the folders that this module has written."""
     if "." not in name:
         return PathFinder.find_spec(name, [path for path in sys.path if path not in _laid_down])
     with suppress(ImportError, ValueError):
@@ -88,14 +88,14 @@ def _is_carried(name: str, file: Path) -> bool:
 
 def _imports(file: Path) -> list[str]:
     """Top-level names that a source imports; none where it is no Python."""
-    found: set[str] = set()
+    result: set[str] = set()
     with suppress(SyntaxError, ValueError, OSError):
         for node in ast.walk(ast.parse(file.read_bytes())):
             if isinstance(node, ast.Import):
-                found.update(alias.name.partition(".")[0] for alias in node.names)
+                result.update(alias.name.partition(".")[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                found.add(node.module.partition(".")[0])
-    return sorted(found)
+                result.add(node.module.partition(".")[0])
+    return sorted(result)
 
 
 FAULTS = (Exception, SystemExit)  # what a user's code may raise, and a run ends with one line
@@ -103,7 +103,7 @@ _laid_down: set[str] = set()  # folders on `sys.path` with the texts of set-ups
 
 
 def load(name: str, texts: Mapping[str, str]) -> ModuleType:
-    """The module of that name, run from its text unless it has been imported from the same text before.
+    """Return the module of that name, imported from its text unless the same text was imported before.
 
     Args:
         name: of the module.
@@ -136,7 +136,7 @@ def install(texts: Mapping[str, str]) -> None:
 
 
 def source(module: ModuleType) -> str | None:
-    """Source of a module that has a file of its own; None where it is a package."""
+    """Return the source of a module; None for a package."""
     file = Path(getattr(module, "__file__", None) or "__init__.py")
     with suppress(OSError, UnicodeDecodeError):
         return None if file.name == "__init__.py" else file.read_text(encoding="utf-8")
@@ -144,7 +144,7 @@ def source(module: ModuleType) -> str | None:
 
 
 def _lay_down(texts: Mapping[str, str]) -> str:
-    """The folder with these modules as files: in the cache, or of this process where others could write to that."""
+    """Write these modules into a folder of the cache, or of this process if other users can write there."""
     digest = hashlib.blake2b("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode(), digest_size=16).hexdigest()
     kept = cache_folder()
     if kept is not None:
@@ -174,7 +174,7 @@ def _write(folder: Path, texts: Mapping[str, str]) -> None:
 
 @cache
 def _folder_of_this_process() -> Path:
-    """A new one, which goes with this process; its forks may use it, too."""
+    """Create a folder that is removed with this process; its forks may use it, too."""
     folder, maker = tempfile.mkdtemp(prefix="lapwing-"), os.getpid()
 
     @atexit.register
@@ -186,7 +186,7 @@ def _folder_of_this_process() -> Path:
 
 
 def blame(error: BaseException, module: ModuleType) -> str:
-    """What an exception says, with the last line of the module on its way."""
+    """Return the message of an exception, with the last line of the module in its traceback."""
     file = getattr(module, "__file__", None)  # what is typed at a prompt has none
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
     where = f" ({Path(str(file)).name}, line {lines[-1]})" if lines else ""

@@ -1,7 +1,7 @@
-"""The parts of one or of all services of a run on their rows, ready to be run from tick to tick.
+"""Executable block diagram: the blocks of one or all services of a run, bound to the rows of their ports.
 
-All executors run a graph: a process one with the parts of its own service, the single and the batch executor one with
-the parts of all.
+All executors run a diagram: a process one with the blocks of its service, the single-process and batch executors one
+with the blocks of all services.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -12,7 +12,7 @@ import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock, bind
-from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_all, groups
+from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_groups, independent_groups
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode
 from lapwing.cosim.run_errors import DivergedError, LockStepError
@@ -24,34 +24,51 @@ SPARE = 8  # rows of a port beyond those of a page
 
 
 class PythonBlock(Protocol):
-    """A part that stays in Python: it acts at the ticks that it names, or when a part before it calls for it."""
+    """Python block: it runs at the ticks that it requests, or when a block before it wakes it."""
 
     name: str
     outputs: tuple[Port, ...]
 
     def bind(self, graph: "BlockDiagram") -> None:
-        """Get the graph whose rows it reads and writes, before the first tick."""
+        """Store the diagram whose rows it reads and writes; called before the first tick."""
         ...
 
-    def act(self, tick: int) -> int:
-        """Do what is to be done at `tick`; the tick at which it has its next say, NEVER where it waits for a call."""
+    def on_tick(self, tick: int) -> int:
+        """Run the block at `tick`. Return the tick of its next wake-up, or NEVER to wait for another block."""
+        ...
+
+
+class ConnectedBlock(PythonBlock, Protocol):
+    """A Python block with a connection to a program outside the run."""
+
+    def open(self, waits: Callable[[str], None]) -> None:
+        """Connect, before the first tick; call `waits` with what it waits for, again and again, here and in `act`."""
+        ...
+
+    def close(self) -> None:
+        """End the connection."""
+        ...
+
+    @property
+    def reports(self) -> dict[str, str]:
+        """Entries of the log's metadata."""
         ...
 
 
 @dataclass
 class Service:
-    """A service of the lock step as it runs: its parts in their order, and its topics."""
+    """Running lock-step service: its blocks in their order, and its topics."""
 
     name: str
     parts: Sequence[Any]  # Part or PythonPart
     wires: Sequence[TopicEncoder]
     messages: list[tuple[Topic, int, bytes]] = field(default_factory=list)  # (topic, tick, payload) not yet fetched
-    spoken: Sequence[Topic] = ()  # the topics of `messages`
+    python_topics: Sequence[Topic] = ()  # the topics of `messages`
 
     @property
     def topics(self) -> list[Topic]:
         """Every topic that it publishes."""
-        return [*(wire.topic for wire in self.wires), *self.spoken]
+        return [*(wire.topic for wire in self.wires), *self.python_topics]
 
 
 class BlockDiagram:
@@ -90,7 +107,7 @@ class BlockDiagram:
         used |= {i.port for part in parts for i in getattr(part, "inputs", ())}
         unknown = sorted(used - self.ports.keys())
         if unknown:
-            raise LockStepError(f"no service of this scene gives {', '.join(unknown)}")
+            raise LockStepError(f"no service of this scene publishes {', '.join(unknown)}")
         delays: dict[str, int] = {}
         for part in parts:
             for i in getattr(part, "inputs", ()):
@@ -99,18 +116,37 @@ class BlockDiagram:
         self._rows = {} if rows is None else rows
         for name in sorted(used):
             self._rows[name] = _ring(self.ports[name], kept[name], delays.get(name, 0), self._rows.get(name))
-        self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # of the ports that somebody has asked for
+        self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # of the ports that were read
         self._parts = parts
         self._codes: list[BoundBlock | None] = []
         for part in parts:
             self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Block) else None)
-        self._turns = [ExecutionGroup(numbers, parts, self._codes) for numbers in groups(parts)]
+        self._turns = [ExecutionGroup(numbers, parts, self._codes) for numbers in independent_groups(parts)]
         for part in parts:
             if not isinstance(part, Block):
                 part.bind(self)
 
+    @property
+    def _connected(self) -> list[Any]:
+        return [part for part in self._parts if hasattr(part, "reports")]
+
+    def open(self, waits: Callable[[str], None] = lambda text: None) -> None:
+        """Connect the blocks that have a connection; see `ConnectedBlock`."""
+        for part in self._connected:
+            part.open(waits)
+
+    def close(self) -> None:
+        """End these connections."""
+        for part in self._connected:
+            part.close()
+
+    @property
+    def reports(self) -> dict[str, str]:
+        """Entries of these blocks for the log's metadata."""
+        return {key: text for part in self._connected for key, text in part.reports.items()}
+
     def part(self, name: str) -> Block:
-        """The compiled part of this name."""
+        """Return the compiled block of this name."""
         return next(part for part in self._parts if part.name == name)
 
     def prepare(self, part: Block) -> BoundBlock:
@@ -127,11 +163,11 @@ class BlockDiagram:
         """Run up to before the tick `stop`, or to the end of the run.
 
         Raises:
-            LockStepError: the state of a part is no longer sound.
+            LockStepError: the state of a block is invalid.
         """
         if self.ended:
             return
-        stop, self.ended, failed = advance_all(self._turns, stop, self._act, self._failure)
+        stop, self.ended, failed = advance_groups(self._turns, stop, self._act, self._failure)
         self.tick = max(self.tick, stop)
         if len(self._turns) > 1:
             for service in self.services:
@@ -141,7 +177,7 @@ class BlockDiagram:
 
     def _act(self, part: int, tick: int) -> int:
         self._come_to(tick)
-        return self._parts[part].act(tick)
+        return self._parts[part].on_tick(tick)
 
     def _failure(self, part: int, tick: int) -> Exception:
         self._come_to(tick)
@@ -157,11 +193,11 @@ class BlockDiagram:
             turn.finish()
 
     def has(self, port: str) -> bool:
-        """Whether somebody here gives or takes this port."""
+        """Return True if a block of this diagram reads or writes the port."""
         return port in self._rows
 
     def latest(self, port: str, tick: int) -> Any:
-        """The value of a port at the last tick not after `tick` at which one was due."""
+        """Return the value of a port at the last tick up to `tick` at which one was due."""
         period = max(1, self.ports[port].period)
         if port not in self._readers:
             self._readers[port] = row_unpacker(self.ports[port].like)
@@ -180,22 +216,22 @@ class BlockDiagram:
         self._rows[port][self._index(port, ticks)] = rows
 
     def row(self, port: str, tick: int) -> np.ndarray:
-        """The numbers of a port at `tick`, shape (width,)."""
+        """Return the row of a port at `tick`, shape (width,)."""
         return self._rows[port][self._index(port, tick)]
 
     def rows(self, port: str, ticks: np.ndarray) -> np.ndarray:
-        """The rows of a port at `ticks` (n,), of which the newest are kept; shape (n, width)."""
+        """Return the rows of a port at recent `ticks` (n,), shape (n, width)."""
         return self._rows[port][self._index(port, ticks)]
 
-    def all_rows(self, port: str, every: int) -> np.ndarray:
-        """The rows of a port that keeps all, at each `every` ticks from 0 up to now; a view, shape (n, width)."""
+    def history(self, port: str, every: int) -> np.ndarray:
+        """Return the rows of a port with full history, every `every` ticks from 0; a view, shape (n, width)."""
         period = self.ports[port].period
         return self._rows[port][: -(-self.tick // period)][:: every // period]
 
-    def pages(
+    def record_batches(
         self, first: int, stop: int, only: Iterable[Topic] | None = None, keep: bool = False
     ) -> list[RecordBatch]:
-        """The messages of the ticks [first, stop).
+        """Return the messages of the ticks [first, stop).
 
         Args:
             first: the first tick.
@@ -204,37 +240,37 @@ class BlockDiagram:
             keep: whether single messages are to be given again by a later call.
         """
         wanted = None if only is None else set(only)
-        found: list[RecordBatch] = []
+        result: list[RecordBatch] = []
         for service in self.services:
             for wire in service.wires:
                 ticks = due_ticks(first, stop, wire.period)
                 if len(ticks) and (wire.topic.recorded if wanted is None else wire.topic in wanted):
-                    found += encode(wire, self.ports[wire.port], self.setup, ticks, self.rows(wire.port, ticks))
+                    result += encode(wire, self.ports[wire.port], self.setup, ticks, self.rows(wire.port, ticks))
             said = [m for m in service.messages if first <= m[1] < stop and (wanted is None or m[0] in wanted)]
-            found += pages_of(said)
+            result += to_record_batches(said)
             if not keep:
                 service.messages = [m for m in service.messages if m[1] >= stop]
-        return found
+        return result
 
     def _index(self, port: str, ticks: Any) -> Any:
         period = self.ports[port].period
         return 0 if period == LATCHED else (ticks // period) & (len(self._rows[port]) - 1)
 
 
-def pages_of(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
+def to_record_batches(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
     """Single messages (topic, tick, payload) as pages of messages of one length."""
     groups: dict[tuple[Topic, int], list[tuple[int, bytes]]] = {}
     for topic, tick, payload in messages:
         groups.setdefault((topic, len(payload)), []).append((tick, payload))
-    found = []
+    result = []
     for (topic, size), group in groups.items():
         payloads = np.frombuffer(b"".join(payload for _, payload in group), np.uint8).reshape(-1, size)
-        found.append(RecordBatch(topic, np.array([tick for tick, _ in group], np.int64), payloads))
-    return found
+        result.append(RecordBatch(topic, np.array([tick for tick, _ in group], np.int64), payloads))
+    return result
 
 
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
-    """Rows for so many ticks, in the memory of the former ones where these are as many."""
+    """Return rows for `ticks` ticks, in the memory of the former ones if these have the same shape."""
     rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
     shape = 1 << (rows - 1).bit_length(), max(1, row_width(port.like))
     if former is None or former.shape != shape:
@@ -248,4 +284,4 @@ def _tick(message: tuple[Topic, int, bytes]) -> int:
 
 
 def _unsound(name: str) -> Any:
-    return lambda tick: DivergedError(f"{name}: the state is not sound at tick {tick}")
+    return lambda tick: DivergedError(f"{name}: non-finite or invalid state at tick {tick}")

@@ -1,13 +1,13 @@
-"""A part of a service's core, compiled: takes the rows that are due, steps, and gives rows.
+"""Compiled block of a service: reads the samples that are due, steps, and writes its outputs.
 
-A part is described by its parameters, a NamedTuple. The module of their class has the pure function
+A block is described by its parameters, a NamedTuple. The module of their class has the pure function
 
     step(parameters, state, tick, inputs) -> (state, outputs, signal)
 
 `inputs` is a tuple of `InputSample`, `outputs` a tuple of trees, one for each port; the state lives in a cell,
 which parts
-of one service may share. Every part is compiled once, to a function of (its memory, tick), and every executor calls
-that same machine code by its address: whatever the executor, the bits are the same.
+of one service may share. Every block is compiled once, to a function of (its memory, tick), and every executor calls
+the same machine code by its address, so the results of all executors are bit-for-bit identical.
 """
 
 import sys
@@ -29,18 +29,18 @@ from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.kernels.row_packing import load, store
 
 CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE = range(4)
-"""Signals of a step: nothing; Python parts are to act at this tick; the tick is the last; the state is unsound."""
+"""Step status: continue; wake Python blocks at this tick; this tick is the last; the state is non-finite."""
 
 
 class InputSample(NamedTuple):
-    """What an input has at a tick; without a message that is due the value means nothing."""
+    """Sample of an input at a tick; the value is meaningless unless a sample is due."""
 
     due: bool
     value: Any
 
 
 class InputRing(NamedTuple):
-    """Where an input is read: a ring of rows."""
+    """Ring buffer of rows that an input reads."""
 
     like: Any
     rows: np.ndarray  # (depth, width), the depth a power of two
@@ -49,14 +49,14 @@ class InputRing(NamedTuple):
 
 
 class OutputRing(NamedTuple):
-    """Where an output is written: a ring of rows."""
+    """Ring buffer of rows that an output writes."""
 
     rows: np.ndarray  # (depth, width)
     period: int
 
 
 class BlockData(NamedTuple):
-    """All that a compiled part is given at a tick."""
+    """Data of a compiled block."""
 
     parameters: Any
     state: Any  # cell
@@ -66,16 +66,16 @@ class BlockData(NamedTuple):
 
 @dataclass
 class Block:
-    """A compiled part, as its service declares it.
+    """Compiled block as its service declares it.
 
     Attributes:
         name: "plant", "sensors.imu".
         parameters: a NamedTuple whose module has `step`.
         state: the cell that holds its state.
         inputs: what it takes, in the order of the argument `inputs`.
-        outputs: the ports that it gives, in the order of its outputs.
+        outputs: its output ports, in the order of its outputs.
         every: ticks between two steps.
-        failure: the error of a step at a tick that says that the state is unsound.
+        failure: returns the error of a tick at which the state is non-finite.
         vehicle: of a fleet, whose part it is.
         trusted: whether its step changes arrays in place or not at all, so that references need not be counted.
     """
@@ -92,7 +92,7 @@ class Block:
 
 
 class BoundBlock(NamedTuple):
-    """The machine code of a bound part."""
+    """Machine code of a bound block."""
 
     function: int  # address
     memory: int  # address
@@ -100,7 +100,7 @@ class BoundBlock(NamedTuple):
 
 
 def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> BoundBlock:
-    """Compile a part or load it, on the rows of its ports."""
+    """Compile or load a block on the rows of its ports."""
     inputs = tuple(InputRing(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
     outputs = tuple(OutputRing(rows[port.name], port.period) for port in part.outputs)
     cell = Cell(BlockData(part.parameters, part.state, inputs, outputs))
@@ -109,7 +109,7 @@ def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Bo
 
 @cache
 def _address(cell: types.Type, trusted: bool) -> int:
-    """The machine code that advances a part whose `BlockData` is in a cell of this type."""
+    """Return the address of the machine code that advances a block with a cell of this type."""
     signature, function = (cell, types.int64), advance if trusted else advance_counted
     function.compile(signature)  # type: ignore[attr-defined]
     compiled: Any = function.overloads[signature]  # type: ignore[attr-defined]
@@ -117,7 +117,7 @@ def _address(cell: types.Type, trusted: bool) -> int:
 
 
 def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
-    """`step` of the module that declares the class of the parameters."""
+    """Call `step` of the module that declares the class of the parameters."""
     raise NotImplementedError("compiled code only")
 
 
@@ -128,7 +128,7 @@ def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: t
 
 @always_inline
 def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
-    """The row of the message stamped with the tick `stamp`, in a ring of 2^k rows."""
+    """Return the index of the sample with the tick `stamp` in a ring of 2^k rows."""
     if period == 1:
         return stamp & (rows.shape[0] - 1)
     return 0 if period == LATCHED else (stamp // period) & (rows.shape[0] - 1)
@@ -168,7 +168,7 @@ def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Cal
 
 @no_refcount
 def advance(memory: Any, tick: int) -> int:
-    """One step of the part whose `BlockData` is in the cell `memory`; its signal."""
+    """Step the block whose `BlockData` is in the cell `memory`. Return the step status."""
     core = memory.value
     s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
     core.state.value = s
@@ -178,7 +178,7 @@ def advance(memory: Any, tick: int) -> int:
 
 @kernel
 def advance_counted(memory: Any, tick: int) -> int:
-    """The same for parts that may put an array in another's place (docs/explanation/decisions/0017)."""
+    """Advance a block whose step may replace an array (docs/explanation/decisions/0017): references are counted."""
     return advance(memory, tick)
 
 
@@ -207,7 +207,7 @@ class Schedule(NamedTuple):
 
 
 def schedule(codes: Sequence[BoundBlock | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
-    """The schedule of these parts, with the vehicle of each; None stands for a part in Python, which looks first at
+    """Return the schedule of blocks with the vehicle of each; None is a Python block, which first runs at
     tick 0."""
     names = list(dict.fromkeys(vehicles)) or [""]
     return Schedule(
@@ -223,11 +223,11 @@ def schedule(codes: Sequence[BoundBlock | None], every: Sequence[int], vehicles:
 
 @kernel
 def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]:
-    """Run the schedule in a cell from part `first` of `tick` until before the tick `stop`, or until somebody has a say.
+    """Run the schedule in a cell from block `first` of `tick` to the tick `stop` (exclusive), or to a Python block.
 
     Returns:
         (tick, part, signal): LOOK: the Python part is to act at the tick, then go on with the next; FAILED: the part's
-        state is unsound; END: the tick before was the last; GO_ON: `stop` is reached.
+        state is non-finite; END: the previous tick was the last; GO_ON: `stop` is reached.
     """
     plan = schedule.value
     while tick < stop:

@@ -1,7 +1,7 @@
-"""Who steps when: all parts of a graph tick by tick, or where nothing couples its vehicles one vehicle after the other.
+"""Execution groups: sets of blocks that are stepped tick by tick, independently of the other sets.
 
-A vehicle that goes through a page of ticks by itself stays in the processor's cache; where 32 take turns at every tick
-each step costs a tenth more (docs/reference/benchmarks.md). What comes of it is the same to the bit.
+A vehicle that steps through a block of ticks alone stays in the processor's cache. If 32 vehicles alternate at every
+tick, each step costs a tenth more (docs/reference/benchmarks.md). The results are bit-for-bit identical.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,9 +14,9 @@ from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
 
 
-def groups(parts: Sequence[Any]) -> list[list[int]]:
-    """The numbers of the parts that step together: those of each vehicle, or of all where one takes what another or
-    nobody here gives."""
+def independent_groups(parts: Sequence[Any]) -> list[list[int]]:
+    """Return the numbers of the blocks of each group: those of each vehicle, or of all if one reads
+    a port of another vehicle or an external port."""
     vehicles = [getattr(part, "vehicle", "") for part in parts]
     giver = {port.name: vehicle for part, vehicle in zip(parts, vehicles, strict=True) for port in part.outputs}
     for part, vehicle in zip(parts, vehicles, strict=True):
@@ -35,41 +35,43 @@ class ExecutionGroup:
     """
 
     def __init__(self, numbers: Sequence[int], parts: Sequence[Any], codes: Sequence[BoundBlock | None]):
-        """Parts `numbers` of all parts of a graph, and their code, None of a part in Python."""
-        self.parts, self.tick, self.over = list(numbers), 0, False
+        """Select the blocks `numbers` of a diagram, with their compiled code (None for Python blocks)."""
+        self.parts, self.tick, self.finished = list(numbers), 0, False
         own = [parts[k] for k in numbers]
         every, vehicles = [getattr(part, "every", 1) for part in own], [getattr(part, "vehicle", "") for part in own]
         plan = schedule([codes[k] for k in numbers], every, vehicles)
         self._plan = plan._replace(done=np.append(plan.done, 1))  # the last: whether they may end
         self._cell = Cell(self._plan)  # the same arrays; a cell is handed over faster
 
-    def advance(self, stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]) -> None:
+    def advance(self, stop: int, on_tick: Callable[[int, int], int], failure: Callable[[int, int], Exception]) -> None:
         """Run up to before the tick `stop`, or until they are over.
 
         Args:
             stop: tick.
-            act: what a part in Python does, by its number and the tick; gives the tick at which it has its next say.
-            failure: the error of a part whose state is not sound at a tick.
+            on_tick: runs the Python block of a number at a tick; returns the tick of its next wake-up.
+            failure: returns the error of a block whose state is invalid at a tick.
         """
         k = 0
-        while not self.over:
+        while not self.finished:
             self.tick, k, signal = run(self._cell, self.tick, k, stop)
             if signal == WAKE_PYTHON:
-                self._plan.next[k] = max(act(self.parts[k], self.tick), self.tick + 1)
+                self._plan.next[k] = max(on_tick(self.parts[k], self.tick), self.tick + 1)
                 k += 1
             elif signal == NON_FINITE:
                 raise failure(self.parts[k], self.tick)
             else:
-                self.over = signal == FINISHED
+                self.finished = signal == FINISHED
                 if signal == CONTINUE:
                     return
 
-    def follow(self, stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]) -> None:
-        """Run up to `stop` although they are over, because others are not; arguments as of `advance`."""
+    def run_past_end(
+        self, stop: int, on_tick: Callable[[int, int], int], failure: Callable[[int, int], Exception]
+    ) -> None:
+        """Run to `stop` after the end, because other groups have not ended. See `advance` for arguments."""
         self._plan.done[-1] = self._plan.ended[0] = 0
-        self.over = False
-        self.advance(stop, act, failure)
-        self.over = True
+        self.finished = False
+        self.advance(stop, on_tick, failure)
+        self.finished = True
 
     def finish(self) -> None:
         """Let the present tick be the last."""
@@ -81,8 +83,11 @@ class ExecutionGroup:
         self._plan.function[k], self._plan.memory[k] = code.function, code.memory
 
 
-def advance_all(
-    turns: Sequence[ExecutionGroup], stop: int, act: Callable[[int, int], int], failure: Callable[[int, int], Exception]
+def advance_groups(
+    turns: Sequence[ExecutionGroup],
+    stop: int,
+    on_tick: Callable[[int, int], int],
+    failure: Callable[[int, int], Exception],
 ) -> tuple[int, bool, LockStepError | None]:
     """Run all up to before the tick `stop`, or until the last of them is over; arguments as of
     `ExecutionGroup.advance`.
@@ -92,19 +97,19 @@ def advance_all(
         first failure, which ends the run at its tick.
     """
     failed: LockStepError | None = None
-    for turn in [turn for turn in turns if not turn.over]:
+    for turn in [turn for turn in turns if not turn.finished]:
         try:
-            turn.advance(stop, act, failure)
+            turn.advance(stop, on_tick, failure)
         except LockStepError as error:
             failed, stop = error, turn.tick
-    if not any(turn.over for turn in turns):
+    if not any(turn.finished for turn in turns):
         return stop, False, failed
-    ended = failed is None and all(turn.over for turn in turns)
+    ended = failed is None and all(turn.finished for turn in turns)
     if ended:
         stop = max(turn.tick for turn in turns)
-    for turn in [turn for turn in turns if turn.over and turn.tick < stop]:
+    for turn in [turn for turn in turns if turn.finished and turn.tick < stop]:
         try:
-            turn.follow(stop, act, failure)
+            turn.run_past_end(stop, on_tick, failure)
         except LockStepError as error:
             failed, stop, ended = error, turn.tick, False
     return stop, ended, failed

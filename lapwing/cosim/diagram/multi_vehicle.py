@@ -1,13 +1,15 @@
-"""Several vehicles in one run: their set-ups joined to one, and the parts of all of them in one graph.
+"""Several vehicles in one run: their run configurations merged into one, and their blocks in one diagram.
 
-Vehicle by vehicle a fleet is what the run of that vehicle alone would be. Here the names of its ports, parts and topics
-get the vehicle's in front; nobody else knows of fleets but who speaks of a vehicle by its name.
+Each vehicle of a fleet behaves as in a run of that vehicle alone. Here the names of its ports, blocks and topics get
+the vehicle's name as a prefix. Other modules handle fleets only where they refer to a vehicle by name.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
+
+import numpy as np
 
 from lapwing.cosim.config.run_config import PerVehicle, RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
@@ -16,7 +18,7 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.messages.topics import CLOCK, Topic, of_vehicle
 
 
-def within(vehicle: str, name: str) -> str:
+def qualified_name(vehicle: str, name: str) -> str:
     """Full name of a port or part of `vehicle` in a fleet.
 
     A name with a leading slash is one of another vehicle and is already full: "/left/truth".
@@ -24,13 +26,13 @@ def within(vehicle: str, name: str) -> str:
     return name[1:] if name.startswith("/") else f"{vehicle}/{name}"
 
 
-def of_other(vehicle: str, name: str) -> str:
-    """What a vehicle calls the port of another one."""
-    return f"/{within(vehicle, name)}"
+def neighbour_port(vehicle: str, name: str) -> str:
+    """Return the name by which a vehicle refers to the port of another vehicle."""
+    return f"/{qualified_name(vehicle, name)}"
 
 
-def joined(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> RunConfig:
-    """The set-up of a fleet.
+def merge_configs(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> RunConfig:
+    """Return the run configuration of a fleet.
 
     Args:
         members: that of each vehicle, as if it flew alone; all with the same scene, seed, ticks and coupling.
@@ -47,14 +49,14 @@ def joined(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> RunConf
             tuple(_port(vehicle, port) for vehicle, share in pairs for port in share.ports),
         )
     beside = {}
-    for name in dict.fromkeys(name for member in members for name in member.beside):
-        having = [member for member in members if name in member.beside]
-        beside[name] = PerVehicle(tuple(m.vehicle for m in having), tuple(m.beside[name] for m in having))
-    return members[0]._replace(vehicle="", services=services, beside=beside, resolved=dict(resolved))
+    for name in dict.fromkeys(name for member in members for name in member.auxiliary):
+        having = [member for member in members if name in member.auxiliary]
+        beside[name] = PerVehicle(tuple(m.vehicle for m in having), tuple(m.auxiliary[name] for m in having))
+    return members[0]._replace(vehicle="", services=services, auxiliary=beside, resolved=dict(resolved))
 
 
 def members(setup: RunConfig) -> tuple[RunConfig, ...]:
-    """The set-up of each vehicle of a run, as if it flew alone; of a run of one vehicle that run itself."""
+    """Return the run configuration of each vehicle, as if it flew alone; of a single vehicle the run itself."""
     if setup.vehicle:
         return (setup,)
     common = {name: table for name, table in setup.resolved.items() if name != "vehicle"}
@@ -62,7 +64,7 @@ def members(setup: RunConfig) -> tuple[RunConfig, ...]:
         setup._replace(
             vehicle=vehicle,
             services=_of(vehicle, {name: service.parameters for name, service in setup.services.items()}),
-            beside=_of(vehicle, setup.beside),
+            auxiliary=_of(vehicle, setup.auxiliary),
             resolved={**common, **entry},
         )
         for vehicle, entry in zip(setup.vehicles, setup.resolved["vehicle"], strict=True)
@@ -70,7 +72,7 @@ def members(setup: RunConfig) -> tuple[RunConfig, ...]:
 
 
 def member(setup: RunConfig, vehicle: str) -> RunConfig:
-    """The set-up of one of the vehicles, as if it flew alone."""
+    """Return the run configuration of one of the vehicles, as if it flew alone."""
     return members(setup)[setup.vehicles.index(vehicle)]
 
 
@@ -80,13 +82,13 @@ def _of(vehicle: str, each: Mapping[str, PerVehicle]) -> dict[str, Any]:
     }
 
 
-def leading(setup: RunConfig, topic: Topic) -> Topic:
-    """The topic of the vehicle that stands for all, where there is room for one."""
+def primary_topic(setup: RunConfig, topic: Topic) -> Topic:
+    """Return the topic of the first vehicle, for displays with room for one vehicle."""
     return topic if setup.vehicle else of_vehicle(topic, setup.vehicles[0])
 
 
 def joined_service(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
-    """A service of a fleet, of those of its vehicles with the set-up of each."""
+    """Merge the services of the vehicles of a fleet, given with their run configurations."""
     whole = Service(name, [], [])
     parts, wires, spoken = [], [], []
     clocks = 0
@@ -96,11 +98,11 @@ def joined_service(name: str, services: Sequence[tuple[RunConfig, Service]]) -> 
         for wire in service.wires:
             clocks += wire.topic is CLOCK
             if wire.topic is not CLOCK or clocks == 1:  # they would all tell the same time
-                topic, port = of_vehicle(wire.topic, vehicle), within(vehicle, wire.port)
+                topic, port = of_vehicle(wire.topic, vehicle), qualified_name(vehicle, wire.port)
                 wires.append(replace(wire, topic=topic, port=port))
         service.messages = _Outbox(whole, vehicle)
-        spoken += [of_vehicle(topic, vehicle) for topic in service.spoken]
-    whole.parts, whole.wires, whole.spoken = parts, wires, spoken
+        spoken += [of_vehicle(topic, vehicle) for topic in service.python_topics]
+    whole.parts, whole.wires, whole.python_topics = parts, wires, spoken
     return whole
 
 
@@ -117,20 +119,20 @@ class _Outbox(list[tuple[Topic, int, bytes]]):
 
 
 def _input(vehicle: str, i: InputPort) -> InputPort:
-    return i._replace(port=within(vehicle, i.port))
+    return i._replace(port=qualified_name(vehicle, i.port))
 
 
 def _port(vehicle: str, port: Port) -> Port:
-    return port._replace(name=within(vehicle, port.name))
+    return port._replace(name=qualified_name(vehicle, port.name))
 
 
 def _part(member: RunConfig, part: Any) -> Any:
     vehicle = member.vehicle
     if not isinstance(part, Block):
-        return VehicleBlock(member, part)
+        return (ConnectedVehicleBlock if hasattr(part, "reports") else VehicleBlock)(member, part)
     return replace(
         part,
-        name=within(vehicle, part.name),
+        name=qualified_name(vehicle, part.name),
         inputs=tuple(_input(vehicle, i) for i in part.inputs),
         outputs=tuple(_port(vehicle, port) for port in part.outputs),
         failure=part.failure and partial(_failure, vehicle, part.failure),
@@ -147,10 +149,10 @@ class VehicleBlock:
     """A part of a vehicle that stays in Python."""
 
     def __init__(self, member: RunConfig, part: Any):
-        """`member`: the set-up of the vehicle."""
+        """Wrap a Python block of the vehicle with the run configuration `member`."""
         self._member, self._part = member, part
         self.vehicle = member.vehicle
-        self.name = within(self.vehicle, part.name)
+        self.name = qualified_name(self.vehicle, part.name)
         self.outputs = tuple(_port(self.vehicle, port) for port in part.outputs)
         self.inputs = tuple(_input(self.vehicle, i) for i in getattr(part, "inputs", ()))
 
@@ -158,38 +160,67 @@ class VehicleBlock:
         """Get the vehicle's own part of the graph."""
         self._part.bind(VehicleDiagram(graph, self._member))
 
-    def act(self, tick: int) -> int:
-        """Do what is to be done at `tick`."""
-        return self._part.act(tick)
+    def on_tick(self, tick: int) -> int:
+        """Run the block at `tick`."""
+        return self._part.on_tick(tick)
+
+
+class ConnectedVehicleBlock(VehicleBlock):
+    """A Python block of a vehicle with a connection to a program outside the run."""
+
+    def open(self, waits: Callable[[str], None]) -> None:
+        """Connect."""
+        self._part.open(waits)
+
+    def close(self) -> None:
+        """End the connection."""
+        self._part.close()
+
+    @property
+    def reports(self) -> dict[str, str]:
+        """Entries of the log's metadata, by vehicle."""
+        return {f"{self.vehicle}/{key}": text for key, text in self._part.reports.items()}
 
 
 class VehicleDiagram:
-    """What a Python part of a vehicle sees of the graph of its fleet: the ports and parts of that vehicle, by the names
-    that they have where it flies alone."""
+    """View of a fleet's block diagram for one vehicle, with the names of a run of that vehicle alone."""
 
     def __init__(self, graph: BlockDiagram, member: RunConfig):
         self._graph, self.setup = graph, member
 
     def part(self, name: str) -> Block:
-        """As of `BlockDiagram`."""
-        return self._graph.part(within(self.setup.vehicle, name))
+        """Return the compiled block of this name."""
+        return self._graph.part(qualified_name(self.setup.vehicle, name))
 
     def prepare(self, part: Block) -> BoundBlock:
-        """As of `BlockDiagram`."""
+        """Compile or load a block that replaces another one later."""
         return self._graph.prepare(part)
 
     def replace(self, part: Block, code: BoundBlock) -> None:
-        """As of `BlockDiagram`."""
+        """Replace the block of the same name by a prepared one."""
         self._graph.replace(part, code)
 
     def has(self, port: str) -> bool:
-        """As of `BlockDiagram`."""
-        return self._graph.has(within(self.setup.vehicle, port))
+        """Return True if a block of the fleet reads or writes the port."""
+        return self._graph.has(qualified_name(self.setup.vehicle, port))
 
     def latest(self, port: str, tick: int) -> Any:
-        """As of `BlockDiagram`."""
-        return self._graph.latest(within(self.setup.vehicle, port), tick)
+        """Return the value of a port at the last tick up to `tick` at which one was due."""
+        return self._graph.latest(qualified_name(self.setup.vehicle, port), tick)
+
+    @property
+    def ports(self) -> dict[str, Port]:
+        """Ports of the vehicle by their names without its own."""
+        return self.setup.ports
+
+    def row(self, port: str, tick: int) -> np.ndarray:
+        """Return the numbers of a port at `tick`."""
+        return self._graph.row(qualified_name(self.setup.vehicle, port), tick)
+
+    def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
+        """Set the numbers of a port at `tick`."""
+        self._graph.put_row(qualified_name(self.setup.vehicle, port), tick, row)
 
     def put(self, port: str, tick: int, value: Any) -> None:
-        """As of `BlockDiagram`."""
-        self._graph.put(within(self.setup.vehicle, port), tick, value)
+        """Set the value of a port at `tick`."""
+        self._graph.put(qualified_name(self.setup.vehicle, port), tick, value)

@@ -1,7 +1,7 @@
-"""Lock step: which message is due on which input at which tick. One rule, for every executor.
+"""Tick schedule: the rule for when a sample is due at an input, for all executors.
 
-A tick is one exchange interval. Every port has a period in ticks; at tick k a part gets exactly the messages that are
-due on its inputs at k (or at k - delay), steps, and gives those of its outputs that are due at k. There is no central
+A tick is one communication interval. A port has a period in ticks; at tick k a block gets exactly the samples that are
+due at its inputs at k (or at k - delay), steps, and writes those of its outputs that are due at k. There is no central
 barrier, and the result does not depend on the order of arrival.
 """
 
@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import always_inline
 
-LATCHED = 0  # period of a port whose value is due at every tick, and stays until another is given
+LATCHED = 0  # period of a port whose value is due at every tick and held until the next one
 
 
 class Port(NamedTuple):
-    """A stream of values that one part gives and others take: a tree of numbers every `period` ticks, or KEPT."""
+    """Stream of values from one block to others: a tree of numbers every `period` ticks, or LATCHED."""
 
     name: str
     like: Any  # a value of this port: fixes the shape and the types
@@ -23,7 +23,7 @@ class Port(NamedTuple):
 
 
 class InputPort(NamedTuple):
-    """A port that a part takes, `delay` ticks after it was stamped (at least 1 where it closes a loop)."""
+    """Input of a block: a port, read `delay` ticks after its stamp (at least 1 in a loop)."""
 
     port: str
     delay: int = 0
@@ -31,17 +31,17 @@ class InputPort(NamedTuple):
 
 @always_inline
 def due(tick: int, period: int, delay: int) -> int:
-    """The tick with which the message due at `tick` is stamped; -1 where none is."""
+    """Return the stamp of the sample that is due at `tick`; -1 if none is."""
     stamp = tick - delay
     return stamp if stamp >= 0 and (period <= 1 or stamp % period == 0) else -1
 
 
 def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str, Iterable[str]]) -> list[str]:
-    """An order in which, within one tick, everybody comes after those whose undelayed messages it needs.
+    """Return an order in which each participant steps after the producers of its undelayed inputs.
 
     Args:
         needs: the inputs of each participant.
-        gives: the names of the ports that each participant gives.
+        gives: names of the output ports of each participant.
 
     Raises:
         LockStepError: a loop has no delay in it, or an input has no producer.
@@ -50,7 +50,7 @@ def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str
     for name, inputs in needs.items():
         for needed in inputs:
             if needed.port not in producer:
-                raise LockStepError(f"{name} needs {needed.port}, which no service of this scene gives")
+                raise LockStepError(f"{name} needs {needed.port}, which no service of this scene publishes")
     waiting = {name: {producer[i.port] for i in inputs if i.delay == 0} - {name} for name, inputs in needs.items()}
     order: list[str] = []
     while waiting:

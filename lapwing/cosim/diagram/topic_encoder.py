@@ -1,6 +1,6 @@
-"""From the rows of a port to the messages of a topic: one description for each topic, in the services' `wire.py`.
+"""Conversion of port rows into messages: one topic encoder for each topic, in the services' `encoders.py`.
 
-A page of rows becomes a page of payloads at once: `fields` gives the columns of the message's numbers, `sample` a
+A batch of rows becomes a batch of payloads at once: `fields` returns the columns of the message's numbers, `sample` a
 message that fixes its texts and the lengths of its sequences. Where texts change during a run, rows hold their numbers
 in the service's table of texts, and a page falls into parts of the same texts.
 """
@@ -17,12 +17,12 @@ from lapwing.kernels.row_packing import columns
 from lapwing.messages.cdr_arrays import Record
 from lapwing.messages.topics import Topic
 
-Fields = Mapping[str, Any]  # by field of the message a column (n,) or (n, k), a scalar, or a function that gives one
+Fields = Mapping[str, Any]  # by field of the message a column (n,) or (n, k), a scalar, or a function that returns one
 
 
 @dataclass(frozen=True)
 class TopicEncoder:
-    """How a topic is made of a port.
+    """Conversion of a port's rows into the messages of a topic.
 
     Attributes:
         topic: the topic.
@@ -52,7 +52,7 @@ class RecordBatch(NamedTuple):
 def encode(
     wire: TopicEncoder, port: Port, setup: RunConfig, ticks: np.ndarray, rows: np.ndarray
 ) -> Iterator[RecordBatch]:
-    """The messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
+    """Yield the messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
     tree = columns(port.like, rows)
     if wire.texts is None:
         yield _page(wire, wire.sample(), tree, ticks, setup)
@@ -70,6 +70,6 @@ def _page(wire: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: 
 
 
 def due_ticks(first: int, stop: int, period: int) -> np.ndarray:
-    """The ticks of [first, stop) at which a message of this period is due, (n,) int64."""
+    """Return the ticks of [first, stop) at which a message of this period is due, (n,) int64."""
     begin = -(-max(first, 0) // period) * period
     return np.arange(begin, stop, period, dtype=np.int64)

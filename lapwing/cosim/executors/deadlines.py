@@ -1,7 +1,7 @@
 """Deadlines of a run that keeps a speed: how often a service, and the run as a whole, is late, and by how much at most.
 
-A service is late at a tick when its own step takes longer than a tick may; whoever owns time is late when it cannot
-begin a tick at its time because the tick before is not done, whoever has caused it.
+A service is late at a tick when its own step takes longer than a tick may; the clock owner is late when it cannot
+begin a tick in time because the previous tick is not complete, whichever service caused it.
 """
 
 import json
@@ -12,7 +12,7 @@ MISSED, WORST = "missed_deadlines", "worst_lateness"  # keys of a log's metadata
 
 
 class Lateness(NamedTuple):
-    """How often and by how much at most one service was late in a run."""
+    """Number of late ticks of a service in a run, and the largest delay."""
 
     ticks: int  # at which it was late
     worst: float  # [s], 0 where it never was
@@ -30,13 +30,13 @@ class Deadlines:
             self._ticks += 1
             self._worst = max(self._worst, late)
 
-    def told(self) -> str:
-        """The counts as text, which `lateness` reads."""
+    def to_text(self) -> str:
+        """Return the counts as text, which `lateness` parses."""
         return json.dumps(Lateness(self._ticks, self._worst))
 
 
 def lateness(told: str) -> Lateness:
-    """What `Deadlines.told` gave.
+    """Parse the result of `Deadlines.to_text`.
 
     Raises:
         ValueError: something else.
@@ -49,7 +49,7 @@ def lateness(told: str) -> Lateness:
 
 
 def entries(found: Mapping[str, Lateness]) -> dict[str, str]:
-    """Entries of a log's metadata, from the lateness of each service; none where no service has told."""
+    """Return entries of a log's metadata from the lateness of each service, empty without reports."""
     if not found:
         return {}
     return {

@@ -1,5 +1,6 @@
 """The lock step of a process: wait for what is due, step, publish."""
 
+import json
 import os
 import time
 from contextlib import suppress
@@ -11,9 +12,9 @@ from lapwing.cosim.executors.deadlines import Deadlines
 from lapwing.cosim.executors.log_backpressure import LogBackpressure
 from lapwing.cosim.executors.participant import Participant, Stopped
 from lapwing.cosim.run_errors import CutShortError, DivergedError
-from lapwing.cosim.transport.bus_keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY
-from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, PacketReceiver, PacketSender, sources
-from lapwing.cosim.transport.packet_schedule import ticks_at_once
+from lapwing.cosim.transport.bus_keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY
+from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, PacketReceiver, PacketSender, packet_receivers
+from lapwing.cosim.transport.packet_schedule import ticks_per_packet
 
 
 def run_lockstep(process: Participant, service: Service, owns_time: bool, recorder: str) -> None:
@@ -23,9 +24,9 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
         process: the participant.
         service: what it steps.
         owns_time: whether it keeps the pace, and says which tick is the last.
-        recorder: the participant whose log whoever owns time does not leave far behind.
+        recorder: the participant for whose log the clock owner waits.
 
-    The end travels along the bundles: an empty one says that there will be no other. Whoever owns time says besides
+    The end travels with the step packets: an empty one is the last. The clock owner publishes in addition
     whether that was the end of the run.
 
     Raises:
@@ -35,9 +36,32 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     setup = process.setup
     graph = BlockDiagram(setup, [service], 2 * PAGE)
     graph.advance(0)  # nothing is stepped, but the loop over the parts is compiled before the clock begins
-    givers = sources(process, graph)
+    givers = packet_receivers(process, graph)
     outlets = PacketSender(process, service, graph)
     backlog = LogBackpressure(process, recorder) if owns_time else None
+
+    def waits(text: str) -> None:
+        if process.stopping:
+            raise Stopped
+        process.waits_outside(text)
+
+    try:
+        graph.open(waits)
+        _run(process, graph, givers, outlets, owns_time, backlog)
+    finally:
+        graph.close()
+
+
+def _run(
+    process: Participant,
+    graph: BlockDiagram,
+    givers: list[PacketReceiver],
+    outlets: PacketSender,
+    owns_time: bool,
+    backlog: LogBackpressure | None,
+) -> None:
+    """Join the others, and step from tick 0 to the last tick of the run."""
+    setup = process.setup
     process.join()
     outlets.refresh_subscribers()
     if process.core is not None:
@@ -47,7 +71,7 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     if process.realtime:
         realtime.enter()
     allowed = setup.interval / process.speed if process.speed is not None else None
-    at_once = ticks_at_once(setup, process.name) if process.bundles_ahead else 1
+    at_once = ticks_per_packet(setup, process.name) if process.packs_ticks else 1
     deadlines = Deadlines()
     started = time.perf_counter()
     try:
@@ -55,9 +79,9 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
             if process.stopping:
                 raise Stopped
             tick = graph.tick
-            known = min([giver.take(tick) for giver in givers], default=tick + 1)
+            known = min([giver.receive(tick) for giver in givers], default=tick + 1)
             if backlog:
-                backlog.hold(tick)
+                backlog.wait_for_log(tick)
             if allowed is not None and owns_time:
                 deadlines.note(_pace(started + tick * allowed))
             begun = time.perf_counter()
@@ -66,33 +90,35 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
             if allowed is not None and not owns_time:
                 deadlines.note(time.perf_counter() - begun - allowed * (graph.tick - tick))
         if owns_time:
-            process.say_last(ENDED_KEY)
+            process.publish_final_status(ENDED_KEY)
     except EndOfRun as end:
         if owns_time:
-            process.say_last(ENDED_KEY, message := f"{end} ended before the run did")
+            process.publish_final_status(ENDED_KEY, message := f"{end} ended before the run did")
             raise CutShortError(message) from None
     except Stopped:
         if process.terminated:
-            process.say_last(ENDED_KEY, f"{process.name} was ended by SIGTERM")
+            process.publish_final_status(ENDED_KEY, f"{process.name} was ended by SIGTERM")
         raise
     except DivergedError as error:  # said before the end is
-        process.say_last(DIVERGED_KEY, str(error))
+        process.publish_final_status(DIVERGED_KEY, str(error))
         raise
     finally:
         if allowed is not None:
-            process.say_last(DEADLINES_KEY, deadlines.told())
+            process.publish_final_status(DEADLINES_KEY, deadlines.to_text())
+        if reports := graph.reports:
+            process.publish_final_status(REPORTS_KEY, json.dumps(reports))
         _leave(process, outlets, graph.tick)
 
 
 def _leave(process: Participant, outlets: PacketSender, stop: int) -> None:
-    """Hand over what is left of the ticks before `stop`, and wait until everybody has received it."""
+    """Publish the remaining ticks before `stop`, and wait until all participants have received them."""
     outlets.end(stop)
     process.confirm()
     process.leave(lambda: outlets.publish_end(stop))
 
 
 class _Rows:
-    """Stands for the parts of a service elsewhere: its ports, whose rows come on the bus."""
+    """Placeholder for the blocks of an external service: its ports, whose rows arrive on the bus."""
 
     def __init__(self, service: str, ports: tuple[Port, ...]):
         self.name, self.outputs = service, ports
@@ -100,13 +126,13 @@ class _Rows:
     def bind(self, graph: BlockDiagram) -> None:
         """Nothing to be known."""
 
-    def act(self, tick: int) -> int:
-        """The rows have come."""
+    def on_tick(self, tick: int) -> int:
+        """Do nothing, because the rows have arrived."""
         return NEVER
 
 
 def run_encoder(process: Participant, service: Service) -> None:
-    """Make the messages of a service that is somebody else's program, and gives rows only.
+    """Encode the messages of an external service, which publishes rows only.
 
     Args:
         process: the participant.
@@ -126,7 +152,7 @@ def run_encoder(process: Participant, service: Service) -> None:
     try:
         while not process.stopping:
             tick = graph.tick
-            giver.take(tick)
+            giver.receive(tick)
             graph.advance(tick + 1)
             outlets.publish(tick, tick + 1)
     except EndOfRun:

@@ -1,4 +1,4 @@
-"""How far a run is ahead of its log: whoever owns time waits for a slow disk, so that memory stays bounded."""
+"""Log backpressure: the clock owner waits for a slow disk, so that memory stays bounded."""
 
 import struct
 
@@ -16,7 +16,7 @@ class LogProgressPublisher:
     """Publishes, for the recorder of a run, how far its log is."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str, name: str):
-        """Of the recorder `name`."""
+        """Publish for the recorder `name`."""
         self._put = bus.publisher(f"{key_prefix}/{RECORDED_KEY}/{name}")
         self._recorded = 0
 
@@ -35,12 +35,12 @@ class LogProgressPublisher:
 
 
 def waits_for_disk(payload: bytes) -> bool:
-    """Whether the recorder waits for the disk, by a payload that a `LogProgressPublisher` has published."""
+    """Return True if the recorder waits for the disk, according to a payload of a `LogProgressPublisher`."""
     return bool(payload) and _PROGRESS.unpack(payload)[1]
 
 
 class LogBackpressure:
-    """Holds the run while it is too far ahead of a log; a run that nobody records is never held."""
+    """Blocks the run while it is too far ahead of its log; a run without a recorder is never blocked."""
 
     def __init__(self, process: Participant, recorder: str):
         """Listen to the recorder of the run that `process` owns the time of."""
@@ -49,7 +49,7 @@ class LogBackpressure:
         self._recorded: int | None = None
         self._ahead = max(LEAST, AHEAD // len(process.setup.vehicles))
 
-    def hold(self, tick: int) -> None:
+    def wait_for_log(self, tick: int) -> None:
         """Return when `tick` may be stepped.
 
         Raises:
@@ -60,5 +60,5 @@ class LogBackpressure:
         while news := self._get(0.0):
             self._recorded = _PROGRESS.unpack(news[1])[0]
         while self._recorded is not None and tick - self._recorded >= self._ahead:
-            news = self._process.patient(self._get, lambda: f"the log, recorded up to tick {self._recorded}")
+            news = self._process.wait_with_status(self._get, lambda: f"the log, recorded up to tick {self._recorded}")
             self._recorded = _PROGRESS.unpack(news[1])[0]

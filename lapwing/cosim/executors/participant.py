@@ -1,55 +1,48 @@
-"""A participant of a run as a process of its own: it joins the others on the bus, and waits with them."""
+"""Participant of a run as a process: joins the other participants on the bus, waits, reports, and leaves."""
 
-import os
-import signal
-import threading
 import time
 from collections.abc import Callable, Collection, Sequence
 from typing import TypeVar
 
-from lapwing.cosim.access.private_sockets import remove
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.config.run_config_message import pack, unpack
-from lapwing.cosim.config.serialise import first_difference, from_json, to_json
+from lapwing.cosim.config.serialise import compress, decompress, first_difference, from_json, to_json
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.run_errors import END_SIGNAL, LockStepError
+from lapwing.cosim.executors.peer_tracker import PeerTracker
+from lapwing.cosim.executors.stop_request import Stopped, StopRequest
+from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
     ALIVE_KEY,
     COMPILING_KEY,
     HEARD_KEY,
-    LOGGED_KEY,
+    OUTSIDE_KEY,
     REFUSED_KEY,
     SETUP_KEY,
     WAITING_KEY,
 )
-from lapwing.cosim.transport.session_settings import LEASE_MS
-from lapwing.cosim.transport.tcp_timeout import limit_silence
+from lapwing.cosim.transport.session_settings import LEASE_MS, limit_silence
 from lapwing.kernels import on_compile
 from lapwing.messages.topics import Topic
 
-POLL = 0.1  # [s] between two looks at whether to stop
-PATIENCE = 1.0  # [s] of waiting after which a service says what it waits for
-JOIN_TIMEOUT = 600.0  # [s] the others get to compile their kernels and to appear
-ANSWER_TIMEOUT = 5.0  # [s] a participant gets to tell its set-up
-CONFIRMED = 60.0  # [s] the others get to confirm a last message; a launcher, which knows who starves, is stricter
-INTERRUPTED = 1.0  # [s] the same where this process was asked to end
-FOREIGN = 2.0  # [s] a program of somebody else's gets to leave after the end
-REPEAT = 0.2  # [s] between two last messages, for those who joined after the first, or whose link was cut
-BRIEF = 0.02  # [s]
-ORPHANED = 10.0  # [s] a process gets to its end whose launcher is gone
-FOUND_OUT = 3.0  # [s] for everybody to find a difference
+__all__ = ["PATIENCE", "POLL", "Participant", "Stopped"]
+
+POLL = 0.1  # [s] between two checks whether to stop
+OUTSIDE_PERIOD = 0.4  # [s] between two messages about a program outside the run
+PATIENCE = 1.0  # [s] of waiting before a service publishes what it waits for
+JOIN_TIMEOUT = 600.0  # [s] for the others to compile their kernels and to appear
+ANSWER_TIMEOUT = 5.0  # [s] for the reply of a participant with its run configuration
+CONFIRMED = 60.0  # [s] for the others to confirm a last message; a launcher, which measures starvation, is stricter
+INTERRUPTED = 1.0  # [s] for the same after a request to stop
+REPEAT = 0.2  # [s] between two last messages, for late subscribers and links that were cut
+BRIEF = 0.02  # [s] between two checks for confirmations
+COMPARE_TIME = 3.0  # [s] for all participants to find a difference
 
 T = TypeVar("T")
 
 
-class Stopped(Exception):
-    """The process was asked to end."""
-
-
-class Participant:
-    """A participant of a run: its bus, its set-up, and whether it was asked to stop."""
+class Participant(StopRequest):
+    """Participant of a run: its bus, its run configuration, and requests to stop."""
 
     def __init__(
         self,
@@ -63,182 +56,89 @@ class Participant:
         compares: Sequence[str] = (),
         realtime: bool = False,
     ):
-        """A participant that is about to join.
+        """Prepare to join.
 
         Args:
-            name: its name among the participants.
-            setup: what is flown.
-            bus: the session.
-            participants: of the run.
+            name: unique in the run.
+            setup: run configuration.
+            bus: session.
+            participants: publisher GIDs of the run.
             others: participants without which the run cannot begin.
-            speed: simulated seconds per second, None for as fast as it goes.
-            core: the core that all services of a sequential lock step share, None to leave it to the system.
-            compares: those of the others who may have another set-up, which is to be found out at joining.
-            realtime: whether it is to run in the scheduler's real-time class.
+            speed: simulated seconds per second; None for as fast as possible.
+            core: processor core that all services of a sequential lock step share; None for any.
+            compares: participants that may have another run configuration, which is compared at joining.
+            realtime: True to run in the scheduler's real-time class.
         """
+        super().__init__()
         self.compares, self.realtime = compares, realtime
         self.name, self.setup, self.bus = name, setup, bus
         self.participants, self.key_prefix = participants, participants.key_prefix
         self.others, self.speed, self.core = others, speed, core
-        self.stopping = False
-        self.terminated = False  # by SIGTERM, which does not come from the launcher
-        self.orphaned = False  # the launcher is gone
-        self.abandoned = ""  # who watched the run, and is gone
         self.create_service: Callable[[str], Service]  # by name, for its topics
         self._compiling = False
-        self._refused = 0
-        self._there = set(others) - {name}  # participants that have joined, or must, and have not left
-        self._confirmed: dict[str, set[str]] = {}  # participants by the key of the token that they have declared
-        self._changed = threading.Event()  # in one of the two
-        self._last_words: list[tuple[str, str]] = []
-        on_compile(self._tell_of_compiling)
-        signal.signal(END_SIGNAL, self._stop)
-        signal.signal(signal.SIGTERM, self._terminate)
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher answers Ctrl-C for everybody
+        self._rejected = 0
+        self._next_outside = 0.0  # [s] of the monotonic clock
+        self._peers = PeerTracker(name, others, participants.external)
+        self._final_status: list[tuple[str, str]] = []
+        on_compile(self._report_compiling)
+        self.handle_signals()
 
     @property
-    def bundles_ahead(self) -> bool:
-        """Whether a service that runs ahead hands over several ticks at once
-        (`lapwing.cosim.transport.packet_schedule`); a program of somebody
-        else's takes one at a time, as do those of several hosts."""
+    def packs_ticks(self) -> bool:
+        """True if a service that runs ahead sends several ticks in a packet (see `packet_schedule`).
+
+        External services and services on several hosts take one tick at a time.
+        """
         return not (self.participants.external or self.compares)
 
-    def _stop(self, *_: object) -> None:
-        self.stopping = True
-
-    def _terminate(self, *_: object) -> None:
-        self.stopping = self.terminated = True
-
-    def _tell_of_compiling(self, _: str) -> None:
-        if not self._compiling:
-            self._compiling = True
-            self.say(COMPILING_KEY)
-
-    def say(self, key: str, text: str = "") -> None:
-        """Tell those who watch the run, on a key of the lock step."""
-        self.bus.publisher(f"{self.key_prefix}/{key}/{self.name}")(text.encode(), 0)
-
-    def say_last(self, key: str, text: str = "") -> None:
-        """The same at the end of this process; repeated until everybody has confirmed it (`leave`)."""
-        self._last_words.append((key, text))
-        self.say(key, text)
-
-    def tell_of_refused(self) -> None:
-        """Say how many messages of strangers were refused, when there are more than before."""
-        if self.bus.refused > self._refused:
-            self._refused = self.bus.refused
-            self.say(REFUSED_KEY, str(self._refused))
-
-    def end_with_parent(self, endpoint: str) -> None:
-        """Stop when the launcher, which holds the other end of standard input, is gone.
-
-        A process that goes on, as one that compiles does, is ended after a while; the folder of its private `endpoint`
-        goes with it.
-        """
-
-        def watch() -> None:
-            while os.read(0, 1):
-                pass
-            self.orphaned = self.stopping = True
-            time.sleep(ORPHANED)
-            remove(endpoint)
-            os._exit(1)
-
-        threading.Thread(target=watch, daemon=True).start()
-
-    def end_with(self, name: str) -> None:
-        """Stop when another participant, who watches the run, is gone."""
-
-        def changed(_: str, alive: bool) -> None:
-            if not (alive or self.stopping):
-                self.abandoned, self.stopping = name, True
-
-        self.bus.watch_alive(f"{self.key_prefix}/{ALIVE_KEY}/{name}", changed)
-
-    def confirm(self) -> None:
-        """Declare that this process has received the last message of everybody whose messages it takes.
-
-        The token stays as long as the session, so that a process whose link was cut sees it later.
-        """
-        self.bus.declare_alive(f"{self.key_prefix}/{HEARD_KEY}/{self.name}")
-
-    def leave(self, repeat: Callable[[], None], key: str = HEARD_KEY, only: Collection[str] | None = None) -> None:
-        """Wait until the others have confirmed the last message of this process, or have left.
-
-        Zenoh does not deliver what is still queued when a session closes, so no process closes its session before.
-
-        Args:
-            repeat: publishes the last message again; called until all have confirmed it.
-            key: of the token that confirms it.
-            only: participants that confirm it, None for all.
-
-        Raises:
-            LockStepError: names who did not confirm it in time.
-        """
-        began = repeated = time.monotonic()
-        while late := self._unconfirmed(key, only, time.monotonic() - began):
-            now = time.monotonic()
-            if now - began > (INTERRUPTED if self.stopping else CONFIRMED):
-                if self.stopping:
-                    return
-                raise LockStepError(f"{self.name}: {', '.join(late)} did not confirm its last message")
-            if now - repeated > REPEAT:
-                for word in self._last_words:
-                    self.say(*word)
-                repeat()
-                repeated = now
-            self._changed.wait(BRIEF)
-            self._changed.clear()
-
-    def _unconfirmed(self, key: str, only: Collection[str] | None, waited: float) -> list[str]:
-        """Who is there and has not confirmed; a program of somebody else's does so by leaving, for which it has less
-        time."""
-        late = self._there.copy() - self._confirmed.get(key, set())
-        if only is not None:
-            late &= set(only)
-        if waited > FOREIGN:
-            late -= set(self.participants.external)
-        return sorted(late)
-
-    def _follow_others(self) -> None:
-        """Keep track of who is there, and of who has confirmed what."""
-
-        def there(key: str, alive: bool) -> None:
-            name = key.rpartition("/")[2]
-            if not alive:
-                self._there.discard(name)
-            elif name != self.name:
-                self._there.add(name)
-            self._changed.set()
-
-        def confirmed(key: str, alive: bool) -> None:
-            head, name = key.split("/")[-2:]
-            if alive:
-                self._confirmed.setdefault(head, set()).add(name)
-            self._changed.set()
-
-        self.bus.watch_alive(f"{self.key_prefix}/{ALIVE_KEY}/*", there)
-        for key in (HEARD_KEY, LOGGED_KEY):
-            self.bus.watch_alive(f"{self.key_prefix}/{key}/*", confirmed)
-
     def key(self, topic: Topic) -> str:
-        """The Zenoh key of a topic in this run."""
+        """Return the Zenoh key of a topic in this run."""
         return topic.zenoh_key(self.setup.vehicle, self.key_prefix)
 
+    def _report_compiling(self, _: str) -> None:
+        if not self._compiling:
+            self._compiling = True
+            self.publish_status(COMPILING_KEY)
+
+    def publish_status(self, key: str, text: str = "") -> None:
+        """Publish a status for the run monitor on a key of the lock step."""
+        self.bus.publisher(f"{self.key_prefix}/{key}/{self.name}")(text.encode(), 0)
+
+    def waits_outside(self, text: str) -> None:
+        """Publish, from time to time, what a block of this service waits for outside the run."""
+        now = time.monotonic()
+        if now >= self._next_outside:
+            self._next_outside = now + OUTSIDE_PERIOD
+            self.publish_status(OUTSIDE_KEY, text)
+
+    def publish_final_status(self, key: str, text: str = "") -> None:
+        """Publish a status at the end of this process. `leave` repeats it until all participants have confirmed it."""
+        self._final_status.append((key, text))
+        self.publish_status(key, text)
+
+    def report_rejected(self) -> None:
+        """Publish the number of rejected messages if it has increased."""
+        if self.bus.refused > self._rejected:
+            self._rejected = self.bus.refused
+            self.publish_status(REFUSED_KEY, str(self._rejected))
+
+    def stop_without(self, name: str) -> None:
+        """Stop when the participant `name`, which monitors the run, has left."""
+        self.stop_when_gone(self.bus, f"{self.key_prefix}/{ALIVE_KEY}/{name}")
+
     def join(self, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Say that everything is subscribed, wait until everybody else has said so, and compare set-ups.
+        """Declare that all is subscribed, wait until the others have declared it, and compare run configurations.
 
         Args:
-            meanwhile: called again and again while it waits.
+            meanwhile: called repeatedly during the wait.
 
         Raises:
-            Stopped: asked to end meanwhile.
-            LockStepError: somebody did not come.
-            ValueError: another participant has resolved something else; names the first difference.
+            Stopped: requested to stop during the wait.
+            LockStepError: a participant did not appear.
+            ValueError: another participant has another run configuration; names the first difference.
         """
-        self._follow_others()
-        packed = pack(self.setup)
-        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", packed)
+        self._peers.watch(self.bus, self.key_prefix)
+        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", compress(self.setup))
         self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
         self._await([other for other in self.others if other != self.name], meanwhile)
         limit_silence(LEASE_MS)
@@ -246,51 +146,85 @@ class Participant:
             self._compare()
 
     def _await(self, names: list[str], meanwhile: Callable[[], None]) -> None:
-        wanted = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in names]
-
         def stop() -> bool:
             meanwhile()
             return self.stopping
 
-        missing = self.bus.wait_alive(wanted, timeout=JOIN_TIMEOUT, stop=stop)
+        keys = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in names]
+        missing = self.bus.wait_alive(keys, timeout=JOIN_TIMEOUT, stop=stop)
         if self.stopping:
             raise Stopped
         if missing:
             absent = ", ".join(key.rsplit("/", 1)[1] for key in missing)
-            raise LockStepError(f"{self.name}: nobody answers as {absent}")
+            raise LockStepError(f"{self.name}: no participant {absent} within {JOIN_TIMEOUT:g} s")
 
     def _compare(self) -> None:
-        """Refuse to fly with those who have resolved another scene."""
+        """Raise ValueError if another participant has another run configuration."""
         own = to_json(self.setup)
         for other in self.compares:
             if other == self.name:
                 continue
-            given = self.bus.ask(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
+            reply = self.bus.query(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
             try:
-                if given is None or (text := unpack(given)) == own:
+                if reply is None or (text := decompress(reply)) == own:
                     continue
-                found = first_difference(self.setup, from_json(text, self.setup.modules))
+                difference = first_difference(self.setup, from_json(text, self.setup.modules))
             except ValueError as error:
-                raise ValueError(f"{self.name}: what {other} flies cannot be read: {error}") from None
-            key, here, there = found or ("set-up", "?", "?")
+                raise ValueError(f"{self.name}: run configuration of {other} cannot be read: {error}") from None
+            key, here, there = difference or ("run configuration", "?", "?")
             if self.name in self.compares:
-                time.sleep(FOUND_OUT)  # this participant must still answer those who compare later
-            raise ValueError(f"{key} is {here!r} here, {there!r} for {other}: resolve the same scene")
+                time.sleep(COMPARE_TIME)  # answer participants that compare later
+            raise ValueError(f"{key} is {here!r} here but {there!r} in {other}; start all services from the same scene")
 
-    def patient(self, get: Callable[[float], T | None], waiting_for: Callable[[], str]) -> T:
-        """What `get(timeout)` gives; says on the bus what is waited for when that takes long.
+    def wait_with_status(self, get: Callable[[float], T | None], waiting_for: Callable[[], str]) -> T:
+        """Return the first result of `get(timeout)`. Publish what is waited for if that takes long.
 
         Raises:
-            Stopped: asked to end.
+            Stopped: requested to stop.
         """
         waited = 0.0
         while not self.stopping:
-            found = get(POLL)
-            if found is not None:
-                return found
+            result = get(POLL)
+            if result is not None:
+                return result
             waited += POLL
             if waited >= PATIENCE:
-                self.say(WAITING_KEY, waiting_for())
-                self.tell_of_refused()
+                self.publish_status(WAITING_KEY, waiting_for())
+                self.report_rejected()
                 waited = 0.0
         raise Stopped
+
+    def confirm(self) -> None:
+        """Declare that this process has received the last message of each participant that it subscribes to.
+
+        The token lives as long as the session, so that a participant whose link was cut receives it later.
+        """
+        self.bus.declare_alive(f"{self.key_prefix}/{HEARD_KEY}/{self.name}")
+
+    def leave(self, repeat: Callable[[], None], key: str = HEARD_KEY, only: Collection[str] | None = None) -> None:
+        """Wait until the others have confirmed the last message of this process, or have left.
+
+        Zenoh drops queued messages when a session closes, so no process closes its session earlier.
+
+        Args:
+            repeat: publishes the last message again; called until all have confirmed it.
+            key: of the token that confirms it.
+            only: participants that confirm it; None for all.
+
+        Raises:
+            LockStepError: names the participants that did not confirm in time.
+        """
+        began = repeated = time.monotonic()
+        while late := self._peers.unconfirmed(key, only, time.monotonic() - began):
+            now = time.monotonic()
+            if now - began > (INTERRUPTED if self.stopping else CONFIRMED):
+                if self.stopping:
+                    return
+                raise LockStepError(f"{self.name}: {', '.join(late)} did not confirm its last message")
+            if now - repeated > REPEAT:
+                for status in self._final_status:
+                    self.publish_status(*status)
+                repeat()
+                repeated = now
+            self._peers.changed.wait(BRIEF)
+            self._peers.changed.clear()

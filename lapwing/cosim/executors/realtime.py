@@ -6,7 +6,7 @@ PRIORITY = 10  # of SCHED_FIFO: before all ordinary programs, behind the kernel'
 
 
 def why_not() -> str:
-    """Why this process cannot have the real-time class; "" where it can."""
+    """Return the reason why this process cannot use the real-time class; "" if it can."""
     if not hasattr(os, "sched_setscheduler"):
         return "this system has no real-time class"
     before, priority = os.sched_getscheduler(0), os.sched_getparam(0)

@@ -22,13 +22,13 @@ def run_single(
 
     Args:
         graph: all services of the run, at its beginning, on rows that keep a `PAGE`.
-        recording: takes the messages, None where nobody wants them.
+        recording: receives the messages; None without a log.
         speed: simulated seconds per second, None for as fast as it goes.
         observe: called now and then; says whether to stop.
         last: the tick after which to stop, None for the end of the run.
 
     Raises:
-        LockStepError: a state is not sound; what was flown before is recorded.
+        LockStepError: a state is invalid; all earlier ticks are recorded.
     """
     setup = graph.setup
     page = PAGE if speed is None else max(1, min(PAGE, round(PACED * speed / setup.interval)))
@@ -41,7 +41,7 @@ def run_single(
                 time.sleep(max(0.0, started + graph.tick * setup.interval / speed - time.perf_counter()))
             graph.advance(min(graph.tick + page, end))
             if recording:
-                recording.write(graph.pages(recorded, graph.tick), graph.tick - 1)
+                recording.write(graph.record_batches(recorded, graph.tick), graph.tick - 1)
             recorded = graph.tick
             if time.perf_counter() >= next_look:
                 next_look += LOOK
@@ -50,5 +50,5 @@ def run_single(
         observe(graph)
     finally:
         if recording:
-            recording.write(graph.pages(recorded, graph.tick), graph.tick - 1)
+            recording.write(graph.record_batches(recorded, graph.tick), graph.tick - 1)
             recording.finish()

@@ -27,18 +27,18 @@ class Rows(NamedTuple):
 
     topic: WrittenTopic
     records: np.ndarray  # MCAP message records, shape (n,); their sequence numbers are filled in later
-    order: np.ndarray  # int64, shape (n,): the messages of a chunk stand in ascending order
+    order: np.ndarray  # int64, shape (n,): ascending order of the messages of a chunk
 
 
 class Index(NamedTuple):
-    """Where the messages of a channel are."""
+    """Times and positions of the messages of a channel."""
 
     channel_id: int
     times_ns: np.ndarray  # int64, shape (n,)
     offsets: np.ndarray  # [bytes] from the first message of the chunk, int64, shape (n,)
 
     def record(self, shift: int) -> bytes:
-        """The MCAP message index record, with offsets from `shift` [bytes] further ahead."""
+        """Return the MCAP message index record, with offsets increased by `shift` [bytes]."""
         entries = np.column_stack([self.times_ns, self.offsets + shift]).astype("<u8").tobytes()
         return _INDEX.pack(Opcode.MESSAGE_INDEX, 6 + len(entries), self.channel_id, len(entries)) + entries
 
@@ -72,15 +72,15 @@ def rows(topic: WrittenTopic, times_ns: np.ndarray, payloads: np.ndarray, order:
 
 
 def rows_of(entries: list[tuple[WrittenTopic, int, bytes]]) -> list[Rows]:
-    """Rows of single messages (topic, time [ns], payload), in their order: one `Rows` for each topic and size."""
+    """Return rows of single messages (topic, time [ns], payload): one `Rows` for each topic and size."""
     groups: dict[tuple[WrittenTopic, int], list[int]] = {}
     for k, (topic, _, payload) in enumerate(entries):
         groups.setdefault((topic, len(payload)), []).append(k)
-    found = []
+    result = []
     for (topic, size), places in groups.items():
         payloads = np.frombuffer(b"".join([entries[k][2] for k in places]), np.uint8).reshape(len(places), size)
-        found.append(rows(topic, np.array([entries[k][1] for k in places]), payloads, np.array(places)))
-    return found
+        result.append(rows(topic, np.array([entries[k][1] for k in places]), payloads, np.array(places)))
+    return result
 
 
 def add_to_digest(digest: Digest, parts: list[Rows]) -> None:
@@ -117,7 +117,7 @@ def arrange(parts: list[Rows]) -> Messages:
         sizes[places] = part.records.itemsize
     ends = np.cumsum(sizes)
     data = np.empty(ends[-1], np.uint8)
-    found: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
+    result: dict[int, list[tuple[np.ndarray, np.ndarray]]] = {}
     for part, places in zip(parts, all_places, strict=True):
         size = part.records.itemsize
         offsets = ends[places] - size
@@ -125,9 +125,9 @@ def arrange(parts: list[Rows]) -> Messages:
         windows = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
         windows[offsets] = part.records.view(f"V{size}")
         times_ns = part.records["log_time"].astype(np.int64)
-        found.setdefault(part.topic.channel_id, []).append((times_ns, offsets))
+        result.setdefault(part.topic.channel_id, []).append((times_ns, offsets))
     indexes = []
-    for channel_id, pieces in found.items():
+    for channel_id, pieces in result.items():
         times, starts = (np.concatenate(column) for column in zip(*pieces, strict=True))
         by_offset = np.argsort(starts)
         indexes.append(Index(channel_id, times[by_offset], starts[by_offset]))
@@ -138,20 +138,20 @@ def arrange(parts: list[Rows]) -> Messages:
 
 @cache
 def _record_dtype(size: int) -> np.dtype:
-    """An MCAP message record with a payload of this size."""
+    """Return the layout of an MCAP message record with a payload of this size."""
     numbers = [("opcode", "u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
     return np.dtype([*numbers, ("log_time", "<u8"), ("publish_time", "<u8"), ("payload", "u1", (size,))])
 
 
 def _by_topic(parts: list[Rows]) -> dict[WrittenTopic, list[Rows]]:
-    found: dict[WrittenTopic, list[Rows]] = {}
+    result: dict[WrittenTopic, list[Rows]] = {}
     for part in parts:
-        found.setdefault(part.topic, []).append(part)
-    return found
+        result.setdefault(part.topic, []).append(part)
+    return result
 
 
 def _places(parts: list[Rows]) -> list[np.ndarray]:
-    """The place of every message among all of the parts, by part."""
+    """Return the place of every message among all parts, by part."""
     order = np.concatenate([part.order for part in parts])
     places = np.empty(len(order), np.int64)
     places[np.argsort(order, kind="stable")] = np.arange(len(order))

@@ -1,4 +1,4 @@
-"""Where a log's chunks are, kept for its end: as bytes, in a file without a name where they are many."""
+"""Chunk indexes of a log until its summary is written: bytes in memory, or in an unnamed file if there are many."""
 
 from pathlib import Path
 from tempfile import SpooledTemporaryFile
@@ -8,7 +8,7 @@ IN_MEMORY = 1 << 16  # [bytes]: some 170 chunks and as many wall times
 
 
 class Extent(NamedTuple):
-    """How many chunks count, the bytes of their records, and the times of the first and last message."""
+    """Number of valid chunk indexes, bytes of their records, and times of the first and last message."""
 
     chunks: int = 0
     size: int = 0  # [bytes]
@@ -24,7 +24,7 @@ class ChunkIndexes:
     """
 
     def __init__(self, folder: Path) -> None:
-        """None as yet; those that memory is too small for go into `folder`, the log's: it has the room for them."""
+        """Create an empty list; large lists are in an unnamed file in `folder`, the log's."""
         self.extent = Extent()
         self._file = SpooledTemporaryFile(IN_MEMORY, dir=str(folder), prefix="lapwing-")  # noqa: SIM115 (closed in close)
 
@@ -41,7 +41,7 @@ class ChunkIndexes:
         self.extent = Extent(chunks + 1, size + len(record), first_ns, max(last_ns, end_ns))
 
     def records(self) -> bytes:
-        """All that count, in order. Raises OSError where they cannot be read."""
+        """Return all valid indexes in order. Raise OSError if they cannot be read."""
         self._file.seek(0)
         return self._file.read(self.extent.size)
 

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from lapwing.cosim.config.former_names import present_metadata
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.log.mcap_contents import Contents
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC
@@ -45,7 +46,7 @@ class LogReader:
         except BaseException:
             self._file.close()
             raise
-        self.metadata, self.recorded_names = self._contents.metadata, self._contents.recorded_names
+        self.metadata, self.recorded_names = present_metadata(self._contents.metadata), self._contents.recorded_names
         self.attachments = self._contents.attachments
         self.complete, self.damaged = self._contents.complete, self._contents.damaged
 
@@ -55,7 +56,7 @@ class LogReader:
         return {channel.topic: self._contents.schemas[channel.schema_id] for channel in channels}
 
     def check_topics(self, topics: Iterable[str] | None) -> set[str]:
-        """The topics that are named; all where None is given.
+        """Return the named topics; all for None.
 
         Raises:
             ValueError: the log has no such topic; names those that it has.
@@ -67,16 +68,16 @@ class LogReader:
             raise ValueError(f"{self.path}: the log has no topic {missing}; it has {', '.join(names)}")
         return wanted
 
-    def of_other_versions(self, topics: Iterable[str] | None = None) -> dict[str, str]:
-        """What the type of a topic has otherwise than this version's, by topic (None: of all); empty where none has."""
+    def incompatible_types(self, topics: Iterable[str] | None = None) -> dict[str, str]:
+        """Return the first difference of each topic's type from this version's, by topic; empty if there is none."""
         labels, channels = self._labels(topics), self._contents.channels
         texts = {topic: self._contents.definitions.get(channels[i].schema_id, "") for i, (topic, _) in labels.items()}
-        found = {topic: otherwise(kind, texts[topic]) for topic, kind in labels.values()}
-        return {topic: f"{dict(labels.values())[topic]} {how}" for topic, how in found.items() if how}
+        result = {topic: otherwise(kind, texts[topic]) for topic, kind in labels.values()}
+        return {topic: f"{dict(labels.values())[topic]} {how}" for topic, how in result.items() if how}
 
     @property
     def versions(self) -> str:
-        """Which version reads, and which one wrote."""
+        """Text that names the version that reads and the one that wrote."""
         wrote = self.metadata.get("version")
         return f"Lapwing {package_version()}, got one of {f'Lapwing {wrote}' if wrote else 'another program'}"
 
@@ -86,13 +87,13 @@ class LogReader:
         Raises:
             ValueError: names the first, what is otherwise, and both versions.
         """
-        for topic, how in self.of_other_versions(topics).items():
+        for topic, how in self.incompatible_types(topics).items():
             raise ValueError(f"{self.path}: {topic}: {how}; expected a log of this version, {self.versions}")
 
     def messages(
         self, topics: Iterable[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
     ) -> Iterator[tuple[str, str, int, bytes]]:
-        """Messages in order of time, and of writing within the same time.
+        """Yield messages in order of time, and in order of writing within equal times.
 
         Args:
             topics: only these; None: all.
@@ -122,7 +123,7 @@ class LogReader:
             del waiting[:ready]
 
     def history(self, topic: str) -> tuple[np.ndarray, TopicColumns]:
-        """A whole topic as columns.
+        """Return all messages of a topic as columns.
 
         Returns:
             simulation times [ns], int64, shape (n,), in order; the messages' columns by dotted field name.
@@ -134,7 +135,7 @@ class LogReader:
         return self.histories([topic])[topic]
 
     def histories(self, topics: Iterable[str] | None = None) -> dict[str, tuple[np.ndarray, TopicColumns]]:
-        """The same of several topics (None: all), reading the file only once.
+        """Return the columns of several topics (None: all), reading the file once. See `history` for the values.
 
         Raises:
             ValueError: as `history`.
@@ -148,7 +149,7 @@ class LogReader:
         return {topic: messages.history() for topic, messages in gathered.items()}
 
     def deterministic_topics(self) -> set[str]:
-        """The topics that enter the digest."""
+        """Return the topics that enter the digest."""
         return {c.topic for c in self._contents.channels.values() if c.metadata.get(DETERMINISTIC) != "false"}
 
     def digest(self, current_names: bool = False) -> str:

@@ -20,7 +20,7 @@ SPARED = 10.0  # times as long as bringing it there has taken, where that is lon
 
 
 def chunk(setup: RunConfig) -> int:
-    """Ticks of a chunk: chunks begin at multiples of it, so that a run gives the same file whenever its pages come."""
+    """Return the ticks of a chunk. Chunks begin at multiples of it, so the file does not depend on packet timing."""
     return max(SHORTEST, CHUNK // len(setup.vehicles))
 
 
@@ -28,7 +28,7 @@ class Recording:
     """Writes pages, and with every chunk the wall time. Call `finish` after the last page."""
 
     def __init__(self, writer: LogWriter, setup: RunConfig):
-        """Into `writer`, the messages of the run `setup`."""
+        """Record the messages of the run `setup` with `writer`."""
         self._writer, self._setup = writer, setup
         self._started = time.monotonic()
         self._flushed = self._started
@@ -77,7 +77,7 @@ class Recording:
     def _parts(self, pages: list[RecordBatch]) -> list[tuple]:
         interval, vehicles = self._setup.interval_ns, self._setup.vehicles
         parts = []
-        for page in sorted(pages, key=lambda page: place(page.topic)):  # whoever's pages come first
+        for page in sorted(pages, key=lambda page: place(page.topic)):  # in any order of arrival
             which = vehicles.index(page.topic.vehicle) if page.topic.vehicle else 0
             order = (page.ticks * (len(TOPICS) + 1) + place(page.topic)) * len(vehicles) + which
             name = page.topic.key(self._setup.vehicle)

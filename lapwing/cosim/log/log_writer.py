@@ -23,9 +23,9 @@ Part = tuple[str, Any, np.ndarray, np.ndarray, np.ndarray]
 
 
 class LogWriter:
-    """Writes one log; a context manager. A thread of its own hashes, arranges, compresses and writes chunks.
+    """Writer of one log; a context manager. A separate thread hashes, arranges, compresses and writes chunks.
 
-    Pages and single messages may be mixed; they stand in the file in the order of the calls. Every page is a chunk;
+    Record batches and single messages may be mixed; they are written in the order of the calls. Every batch is a chunk;
     single messages are collected into chunks of at most `CHUNK_SIZE` and 0.5 s of wall time. So a log that is written
     by pages has the same bytes whenever it is written from the same pages, attachments and metadata with the same
     version of zstd; the wall clock shows only in how single messages are parted into chunks.
@@ -76,7 +76,7 @@ class LogWriter:
             self._file.close()
             raise self._error(fault) from None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="log")
-        self._due = time.monotonic()  # the first message makes a chunk of its own: even a short log is readable
+        self._due = time.monotonic()  # the first message gets its own chunk: even a short log is readable
 
     def write(self, topic: str, message: Any, payload: bytes, time_ns: int, deterministic: bool = True) -> None:
         """Record one message.
@@ -103,7 +103,7 @@ class LogWriter:
         """Record messages that enter the digest as one chunk, in ascending order over all parts.
 
         A topic may come in several parts, if its messages differ in size; where orders are equal, the earlier part
-        goes first. The arrays may be reused after the call. Who wants to lose no more than 0.5 s when killed writes a
+        goes first. The arrays may be reused after the call. To lose at most 0.5 s when the process is killed, write a
         page at least so often.
 
         Raises:
@@ -197,7 +197,7 @@ class LogWriter:
         if (times_ns < 0).any():
             raise ValueError(f"{topic}: time {times_ns.min()} ns is negative")
         if len(payloads):
-            message.layouts.measure(payloads[0].tobytes())  # refuses what is laid out in another way
+            message.layouts.measure(payloads[0].tobytes())  # rejects other layouts
         written = self._topics.get(topic) or self._declare(topic, message, True)
         return rows(written, times_ns, payloads, np.array(order, np.int64))
 
@@ -235,7 +235,7 @@ class LogWriter:
     def _write_tail(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
         began = time.monotonic()
         counts = {part.topic: part.topic.count for part in parts}
-        self._container.add_tail(declarations, arrange(parts))
+        self._container.write_provisional_chunk(declarations, arrange(parts))
         for topic, count in counts.items():  # its messages come again
             topic.count = count
         self.tail_took = time.monotonic() - began

@@ -21,7 +21,7 @@ from lapwing.messages.former_names import current_topic, current_type
 
 _RECORD = struct.Struct("<BQ")  # opcode, length of what follows
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the payload
-_TIMES = struct.Struct("<QQ")
+_CHUNK = struct.Struct("<QQQ")  # times of the first and last message, unpacked size
 _CHANNEL = struct.Struct("<H")
 _DECLARATIONS: dict[int, Any] = {
     Opcode.SCHEMA: records.Schema,
@@ -32,10 +32,18 @@ _DECLARATIONS: dict[int, Any] = {
 
 ROS2 = "ros2msg"  # encoding of schemas
 LARGEST = 1 << 28  # [bytes] of a chunk; those of the usual writers have some millions
+RATIO = 200  # most unpacked bytes of all chunks over the size of the file, beyond one chunk; Lapwing's own logs: 2 to 5
+
+
+def has_footer(path: Path) -> bool:
+    """Return True if a file ends as its writer ends it, behind the index. Raises OSError if it cannot be read."""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - len(MCAP0_MAGIC)))
+        return file.read() == MCAP0_MAGIC
 
 
 class ChunkInfo(NamedTuple):
-    """Where a chunk is, the times of its first and last message, and whose messages it holds."""
+    """Position of a chunk, times of its first and last message, and its channels."""
 
     offset: int  # [bytes]
     start_ns: int
@@ -43,12 +51,12 @@ class ChunkInfo(NamedTuple):
     channels: set[int]  # as the index behind the chunk says; empty: not known
 
     def may_hold(self, channels: Collection[int]) -> bool:
-        """Whether a message of these channels can be in it."""
+        """Return True if it can hold a message of these channels."""
         return not self.channels or not self.channels.isdisjoint(channels)
 
 
 class Contents:
-    """What is in a file.
+    """Contents of a file.
 
     Attributes:
         metadata: of the records `lapwing` and `lapwing_end`.
@@ -101,7 +109,7 @@ class Contents:
             raise ValueError(f"{self._path}: damaged chunk at byte {offset}: {fault}") from None
 
     def _messages(self, data: bytes, size: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
-        found = []
+        result = []
         place = 0
         while place < size:
             opcode, length = _RECORD.unpack_from(data, place)
@@ -109,11 +117,11 @@ class Contents:
             if opcode == Opcode.MESSAGE:
                 channel, _, time_ns, _ = _MESSAGE.unpack_from(data, place)
                 if channel in channels:
-                    found.append((time_ns, channel, data[place + _MESSAGE.size : place + length]))
+                    result.append((time_ns, channel, data[place + _MESSAGE.size : place + length]))
             elif opcode in _DECLARATIONS:
                 self._declare(opcode, data[place : place + length])
             place += length
-        return found
+        return result
 
     def _scan(self) -> None:
         """Walk over the records, noting where the chunks are without reading them."""
@@ -121,7 +129,7 @@ class Contents:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             raise ValueError(f"{self._path}: not an MCAP file")
-        offset = len(MCAP0_MAGIC)
+        offset, unpacked = len(MCAP0_MAGIC), 0
         while offset + _RECORD.size <= size:
             opcode, length = _RECORD.unpack(file.read(_RECORD.size))
             if opcode == 0 or offset + _RECORD.size + length > size:
@@ -130,7 +138,11 @@ class Contents:
                 self.complete = True
                 break
             if opcode == Opcode.CHUNK:
-                start_ns, end_ns = _TIMES.unpack(file.read(_TIMES.size))
+                start_ns, end_ns, chunk_size = _CHUNK.unpack(file.read(_CHUNK.size))
+                unpacked += chunk_size
+                if unpacked > RATIO * size + LARGEST:
+                    message = f"its chunks unpack to over {unpacked / 1e6:.0f} MB"
+                    raise ValueError(f"{self._path}: {message}; expected at most {RATIO} times the size of the file")
                 self.chunks.append(ChunkInfo(offset, start_ns, end_ns, set()))
             elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
                 self.chunks[-1].channels.add(*_CHANNEL.unpack(file.read(_CHANNEL.size)))
@@ -144,7 +156,7 @@ class Contents:
             self.chunks[-1].channels.clear()  # its index may lack channels
 
     def _read_declarations(self, skip_damaged: bool) -> None:
-        """Those that stand in chunks; chunks that cannot be read are left out, or are an error."""
+        """Read the declarations inside chunks. Leave out chunks that cannot be read, or raise ValueError."""
         for chunk in list(self.chunks):
             try:
                 self.read_chunk(chunk.offset, ())

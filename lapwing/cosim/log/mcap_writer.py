@@ -42,7 +42,7 @@ _CRC = 4  # [bytes] of the footer's checksum, which it does not cover itself
 
 
 class _State(NamedTuple):
-    """What a file had before its tail."""
+    """State of a file before its provisional last chunk."""
 
     offset: int  # [bytes]
     schemas: int
@@ -62,7 +62,7 @@ class Container:
 
     @classmethod
     def resume(cls, file: FileIO, summary: Summary, offset: int) -> Self:
-        """Go on with a file that has its end: from `offset` on [bytes], where the record DATA_END stands."""
+        """Continue a finished file at `offset` [bytes], the position of its DATA_END record."""
         self = cls.__new__(cls)
         self._begin(file)
         self._offset = offset
@@ -111,7 +111,7 @@ class Container:
         self._metadata.append(MetadataIndex(length=len(record), name=name, offset=self._offset))
         self._write(record)
 
-    def add_tail(self, declarations: list[Schema | Channel], messages: Messages) -> None:
+    def write_provisional_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
         """Write a chunk that the next record takes the place of: what a reader finds if that never comes."""
         self._drop_tail()
         before = _State(self._offset, len(self._schemas), len(self._channels), self._chunks.extent, self._counts.copy())
@@ -233,7 +233,7 @@ class Container:
         self._length = 0
 
     def _write(self, data: bytes) -> None:
-        """All of it, or nothing: a file whose disk is full ends where it could be read so far."""
+        """Write all data or none: a file on a full disk ends with its last complete record."""
         left = memoryview(data)
         try:
             while left:
@@ -251,7 +251,7 @@ def _joined(records: Sequence[McapRecord]) -> bytes:
 
 
 def encoded(record: McapRecord) -> bytes:
-    """A record's bytes."""
+    """Return the bytes of a record."""
     builder = RecordBuilder()
     record.write(builder)
     return builder.end()

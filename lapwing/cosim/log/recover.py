@@ -1,4 +1,4 @@
-"""What is left of a log whose recorder was killed, or that was damaged: as a whole log again."""
+"""Recovery of a damaged log, or of one whose recorder was killed, into a complete log."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -10,7 +10,7 @@ RECOVERED = "recovered"  # key in the metadata: from which file, and what it lac
 
 
 class RecoveryResult(NamedTuple):
-    """What `recover` has saved of a damaged log."""
+    """Messages that `recover` has saved from a damaged log."""
 
     messages: int
     end_ns: int  # time of the last message

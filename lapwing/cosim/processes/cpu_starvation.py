@@ -1,4 +1,4 @@
-"""How long processes have waited for a processor: one that gets none is silent, but it is not frozen.
+"""CPU starvation: time that ready processes have waited for a processor, during which silence is no stall.
 
 Linux counts for each thread how long it was ready to run and did not (`/proc/PID/task/TID/schedstat`, second number
 [ns]); that of a thread that is stopped, sleeps or runs does not grow.
@@ -11,7 +11,7 @@ QUIET = 0.5  # [s] without news from which on it is measured
 
 
 def waited(pid: int) -> float:
-    """Time [s] that the threads of a process have waited for a processor; 0 where the system does not tell."""
+    """Return the time [s] that the threads of a process have waited for a processor; 0 if the system has no count."""
     total = 0
     try:
         for thread in Path(f"/proc/{pid}/task").iterdir():
@@ -22,7 +22,7 @@ def waited(pid: int) -> float:
 
 
 class Starvation:
-    """What processes of this machine have waited for a processor since there was news."""
+    """Time that local processes have waited for a processor since the last message."""
 
     def __init__(self) -> None:
         self._before: dict[str, float] = {}
@@ -37,5 +37,5 @@ class Starvation:
             self._before = {name: waited(pid) for name, pid in pids.items()}
 
     def of(self, names: Iterable[str]) -> float:
-        """Time [s] that those of these names have waited since then, together."""
+        """Return the total time [s] that the named processes have waited since then."""
         return sum(max(0.0, waited(self._pids[name]) - self._before[name]) for name in names if name in self._before)

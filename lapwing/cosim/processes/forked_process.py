@@ -10,6 +10,8 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import IO, NoReturn
 
+from lapwing.cosim.processes.out_of_memory import prefer_as_victim
+
 POLL = 0.005  # [s] between two checks whether it has exited
 
 
@@ -75,6 +77,7 @@ def _run(run: Callable[[], None], standard_input: int, output: int) -> NoReturn:
     code = 1
     try:
         os.setsid()
+        prefer_as_victim()
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, signal.SIG_DFL)
         signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -1,14 +1,14 @@
-"""How a process of this project looks for garbage."""
+"""Garbage-collector settings of Lapwing processes."""
 
 import atexit
 import gc
 
-OBJECTS = 50_000  # new ones between two looks; with Python's 700, they take a sixth of the processor time of a start
+OBJECTS = 50_000  # new objects between two collections; with Python's 700, collections take 1/6 of the start-up time
 
 
-def leave_garbage() -> None:
-    """Let this process look for garbage seldom, and not at its end: numba leaves so much that the last look takes a
-    third of a start."""
+def relax_gc() -> None:
+    """Collect garbage rarely, and not at exit: numba leaves so many objects that the last collection takes a third of
+    the start-up time."""
     gc.set_threshold(OBJECTS)
     atexit.unregister(gc.freeze)
     atexit.register(gc.freeze)

@@ -57,8 +57,11 @@ def end_at_once() -> None:
         signal.signal(number, raise_)
 
 
-def say_end(interrupted: Interrupted) -> int:
-    """Tell of it in one line, and give the exit code. More signals do not disturb that; later ones end what hangs."""
+def report_interrupt(interrupted: Interrupted) -> int:
+    """Print the interrupt in one line and return the exit code.
+
+    Further signals do not disturb this; later ones end a hanging process.
+    """
     for number in (SIGINT, SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     signal.setitimer(signal.ITIMER_REAL, 0.0)

@@ -64,7 +64,7 @@ def launch(
                     send_spec(name, endpoints, stream)
 
         listen, connect = mesh(MONITOR, endpoints)
-        with ZenohBus(listen, connect, mark=publisher_ids.mark(MONITOR), awaits=False) as bus:
+        with ZenohBus(listen, connect, gid=publisher_ids.gid(MONITOR), awaits=False) as bus:
             try:
                 monitor = RunMonitor(bus, publisher_ids, [*required, *optional, *external], services=services)
                 bus.declare_alive(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # all others wait for it

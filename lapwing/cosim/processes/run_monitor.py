@@ -1,4 +1,4 @@
-"""What somebody who watches a run sees of it on the bus."""
+"""Run monitor: progress, stalls and end of a run, as observed on the bus."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -15,21 +15,22 @@ from lapwing.cosim.transport.bus_keys import (
     ENDED_KEY,
     HEARD_KEY,
     LOGGED_KEY,
+    OUTSIDE_KEY,
     RECORDED_KEY,
     REFUSED_KEY,
     WAITING_KEY,
 )
-from lapwing.cosim.transport.packets import unpack_batch
+from lapwing.cosim.transport.packets import unpack_log_packet
 from lapwing.messages.topics import Topic
 
-STALL = 2.5  # [s] without any message after which somebody is held to be frozen
-LONGEST = 60.0  # [s] the same where processes wait for a processor
-MONITOR = "mission"  # whoever watches, among the participants
-HEARD = (BATCH_KEY, WAITING_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
+STALL = 2.5  # [s] without a message after which a participant counts as stalled
+LONGEST = 60.0  # [s] for the same while processes wait for a processor
+MONITOR = "mission"  # name of the run monitor among the participants
+HEARD = (BATCH_KEY, WAITING_KEY, OUTSIDE_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
 
 
 class RunMonitor:
-    """What a launcher sees of a run: who is there, how far it is, what it waits for."""
+    """Observed state of a run: present participants, progress, and what they wait for."""
 
     def __init__(
         self,
@@ -46,7 +47,7 @@ class RunMonitor:
             participants: of the run.
             names: of the participants.
             patience: time [s] without news after which one counts as frozen.
-            services: those that hand over messages; each waits until its last one is confirmed.
+            services: publishers of log packets; each waits until its last one is confirmed.
         """
         self._going = set(services)  # those of which the last message has not come
         self.confirmed: set[str] = set()  # participants that have received the last message of every service
@@ -56,18 +57,18 @@ class RunMonitor:
         self.newest: dict[Topic, bytes] = {}
         self.listen: Callable[[list[RecordBatch]], None] | None = None  # is given all messages
         self.waiting: dict[str, str] = {}
-        self.compiling = False  # somebody compiles kernels
-        self.diverged = False  # a state is no longer sound: the run ends, and its log says why
+        self.compiling = False  # a participant compiles kernels
+        self.diverged = False  # a state is invalid: the run ends, and its log has the reason
         self.slow_disk = False  # the recorder has waited for the disk
         self.present: set[str] = set()
         self.gone: set[str] = set()
-        self.time_ns = 0  # up to which everybody who has spoken has come
+        self.time_ns = 0  # up to which all reporting services have stepped
         self._times: dict[str, int] = {}
         self.began: float | None = None  # [s] of the monotonic clock, at the first batch
         self.wall = 0.0  # [s] from the first batch to the newest
-        self.ended = False  # somebody has handed over the last tick
+        self.ended = False  # a service has published its last log packet
         self.outcome: str | None = None  # "" when the run has come to its end, else why it ended before; None: unknown
-        self._refused: dict[str, int] = {}  # messages of strangers, by who refused them
+        self._refused: dict[str, int] = {}  # numbers of rejected messages by participant
         self.last_news = time.monotonic()
         senders: dict[str, bytes | None] = {}
         for key in HEARD:
@@ -105,6 +106,8 @@ class RunMonitor:
                 self.diverged = True
             elif head == WAITING_KEY:
                 self.waiting[name] = payload.decode(errors="replace")
+            elif head == OUTSIDE_KEY:
+                self.last_news = time.monotonic()  # the service has its own time-out
             elif head == RECORDED_KEY:
                 self.last_news = time.monotonic()
                 self.slow_disk = self.slow_disk or waits_for_disk(payload)
@@ -126,7 +129,7 @@ class RunMonitor:
         self.wall = self.last_news - self.began
         self._times[name] = max(time_ns, self._times.get(name, 0))
         self.time_ns = min(self._times.values())
-        _, _, pages = unpack_batch(payload)
+        _, _, pages = unpack_log_packet(payload)
         for page in pages:
             self.newest[page.topic] = page.payloads[-1].tobytes()
         if self.listen:
@@ -142,39 +145,44 @@ class RunMonitor:
         self.ended = True
 
     def _declare(self, key: str) -> None:
-        """Confirm last messages, to whoever waits for that before it leaves."""
+        """Confirm last messages; their senders wait for that before they leave."""
         self._bus.declare_alive(f"{self._key_prefix}/{key}/{MONITOR}")
 
     def publish(self, key: str, time_ns: int, payload: bytes) -> None:
-        """Say something to the run's viewers, on a key behind the run's prefix."""
+        """Publish a message for viewers, on a key below the prefix of the run."""
         self._bus.publisher(f"{self._key_prefix}/{key}", drops=True)(payload, time_ns)
 
     @property
+    def complete(self) -> bool:
+        """True if the last message of every service has arrived."""
+        return self.ended and not self._going
+
+    @property
     def reporting_services(self) -> set[str]:
-        """The services that have handed over messages."""
+        """Services that have published log packets."""
         return set(self._times)
 
     @property
     def refused(self) -> int:
-        """How many messages of strangers all participants have refused, as far as they have told."""
+        """Number of messages that all participants have rejected, as far as they have reported it."""
         return sum(self._refused.values()) + self._bus.refused
 
     def abort_message(self) -> str | None:
-        """A sentence about a run that ended before its time, None where it came to its end or diverged."""
+        """Return a sentence about a run that ended early, None if it completed or diverged."""
         if self.outcome == "" or self.diverged:
             return None
         why = f": {self.outcome}" if self.outcome else ""
-        return f"the run ended before its time, at t = {self.time_ns * 1e-9:.3f} s{why}"
+        return f"the run ended early at t = {self.time_ns * 1e-9:.3f} s{why}"
 
     def stall_message(
         self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0
     ) -> str | None:
-        """A sentence that names who holds up the run, None while it goes on.
+        """Return a sentence that names the participants that block the run, None while it proceeds.
 
         Args:
-            names: of the participants without whom it does not.
-            starved: how long [s] those of some names have waited for a processor since the last news; that is not held
-                against them.
+            names: participants that the run requires.
+            starved: returns the time [s] that the named processes have waited for a processor since the last message,
+                which does not count as silence.
         """
         silence = time.monotonic() - self.last_news
         if self.ended or silence < self._patience:
@@ -185,4 +193,4 @@ class RunMonitor:
         where = f"at t = {self.time_ns * 1e-9:.3f} s"
         if silent:
             return f"{', '.join(silent)}: no answer for {self._patience:g} s, {where}"
-        return f"the run stands still {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())
+        return f"the run is blocked {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())

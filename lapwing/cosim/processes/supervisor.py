@@ -1,10 +1,12 @@
 """Supervision of the processes of a run: detects the end, and names the process that fails."""
 
 import os
+import signal
 import time
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 
+from lapwing.cosim.processes import out_of_memory
 from lapwing.cosim.processes.child_process import Child, ChildProcess
 from lapwing.cosim.processes.cpu_starvation import Starvation
 from lapwing.cosim.processes.run_monitor import LONGEST, STALL, RunMonitor
@@ -60,6 +62,7 @@ class RunSupervisor:
         self._stopped_since: dict[str, float] = {}
         self._ending_since = 0.0
         self._updated = clock()
+        self._killed_before = out_of_memory.kills()
 
     def supervise(self, observe: Callable[[RunMonitor], bool]) -> None:
         """Update until the run has ended, or `observe` returns True.
@@ -189,7 +192,9 @@ class RunSupervisor:
 
     def _unexpected_end(self, name: str, code: int) -> RunFailed:
         words = self._children[name].last_line()
-        return RunFailed(f"{name} ended unexpectedly ({reason(code)}) {self._at()}{words}")
+        short = code == -signal.SIGKILL and out_of_memory.kills() > self._killed_before
+        memory = "; the system killed it for lack of memory" if short else ""
+        return RunFailed(f"{name} ended unexpectedly ({reason(code)}) {self._at()}{words}{memory}")
 
     def _at(self) -> str:
         return f"at t = {self._monitor.time_ns * 1e-9:.3f} s"

@@ -1,4 +1,4 @@
-"""Who wrote a key: which line of which file, or which override."""
+"""Origin of a key in a scene: the line of a file, or an override."""
 
 import re
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from lapwing.cosim.scene.scene_error import KeyOrigin
 
 
 def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: Files) -> KeyOrigin:
-    """Who gave a key its value: the one who wrote most of its path.
+    """Return the origin of a key: the file or override with the longest part of its path.
 
     Args:
         key: dotted key.
@@ -35,14 +35,14 @@ def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: 
 
 
 def line_of(text: str, key: str) -> tuple[int | None, int]:
-    """The line of a dotted key in TOML text, or of the nearest table around it, as far as a plain search finds it.
+    """Return the line of a dotted key in TOML text, or of the nearest table around it, by a plain search.
 
     Returns:
         The line, None if there is none, and the length of the part of the key that was found.
     """
     table = ""
     entries: dict[str, int] = {}  # how many entries of each array of tables have begun
-    best, found = 0, None
+    best, result = 0, None
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*(\[\[?)\s*([\w.]+)\s*\]", line):
             table = _numbered(header[2], entries, last=header[1] == "[")
@@ -55,12 +55,12 @@ def line_of(text: str, key: str) -> tuple[int | None, int]:
         else:
             continue
         if f"{key}.".startswith(f"{full}.") and len(full) > best:
-            best, found = len(full), number
-    return found, best
+            best, result = len(full), number
+    return result, best
 
 
 def _numbered(table: str, entries: dict[str, int], last: bool) -> str:
-    """A table's name with the number of the newest entry behind each array of tables in it, the last only if asked."""
+    """Return a table's name with the number of the newest entry after each array of tables, the last if `last`."""
     *parents, name = table.split(".")
     full = ""
     for parent in parents:

@@ -8,10 +8,11 @@ from typing import Any
 
 from pydantic import ValidationError
 
+from lapwing.cosim.config.former_names import present_tables
 from lapwing.cosim.scene import vehicle_scenes
 from lapwing.cosim.scene.files import Files, copied, parse_toml
 from lapwing.cosim.scene.key_origin import line_of, source_of
-from lapwing.cosim.scene.overrides import Override, Overrides, apply, parsed, reaches_into_text
+from lapwing.cosim.scene.overrides import Override, Overrides, apply, is_below_file_name, parsed
 from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
@@ -37,12 +38,12 @@ def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shippe
 
 
 def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
-    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
+    """Load a scene from text; `path` determines its name and the folder of its files. See `load` for errors."""
     return _parse(path, text, parsed(overrides), vocabulary)
 
 
-def again(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
-    """A loaded scene with more overrides, of which the later ones hold; the files that it names are read again.
+def with_overrides(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
+    """Return a loaded scene with further overrides, the last of which win; the files that it names are read again.
 
     Raises:
         SceneError: what is wrong with which key, and what would be right.
@@ -68,12 +69,12 @@ def _parse(path: Path, text: str, given: list[Override], vocabulary: Vocabulary)
 
 
 def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, KeyOrigin]:
-    """The key and where it was said."""
+    """Return the key and its origin."""
     return key, source_of(key, path, text, keys, files)
 
 
 def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, KeyOrigin]:
-    """`_locate` of a key of one of several vehicles, which may be its own or common to all."""
+    """Return the full key and origin of a key of one of several vehicles; it may be common to all."""
     full = vehicle_scenes.own_key(key, vehicle)
     said = line_of(text, full)[1] > len(f"{vehicle_scenes.VEHICLE}.{vehicle}.")
     if said or key.partition(".")[0] == vehicle_scenes.VEHICLE or any(f"{full}.".startswith(f"{k}.") for k in keys):
@@ -84,7 +85,7 @@ def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], 
 def _member(
     path: Path, text: str, tree: dict[str, Any], i: int, given: list[Override], vocabulary: Vocabulary
 ) -> Scene:
-    """The scene of vehicle i of several."""
+    """Return the scene of vehicle i of several."""
     files, keys = Files(path.parent), [o.key for o in given]
     own = vehicle_scenes.overrides_of(given, i, vehicle_scenes.count(tree), vocabulary)
     locate = partial(_locate_own, vehicle=i, path=path, text=text, keys=keys, files=files)
@@ -111,11 +112,12 @@ def _scene(
 
 
 def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) -> Scene:
-    """The scene whose `resolved` is `tree`. Opens no file.
+    """Return the scene whose `resolved` is `tree`, without opening a file.
 
     Raises:
         SceneError: it is no longer a sound scene.
     """
+    tree = present_tables(tree)
     with Scene(Path(name), {}, vocabulary).located():
         if isinstance(entries := tree.get(vehicle_scenes.VEHICLE), list):
             shared = {name: table for name, table in tree.items() if name != vehicle_scenes.VEHICLE}
@@ -128,7 +130,7 @@ def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) ->
 
 
 def _find(scene: str | Path, shipped: Path) -> Path:
-    """The file of a scene; SceneError that names the nearest if there is none."""
+    """Return the file of a scene. Raise SceneError with the nearest name if there is none."""
     path = Path(scene)
     if path.exists() or path.suffix or len(path.parts) > 1:
         return path
@@ -160,7 +162,7 @@ def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary
     embedded = {name for name, section in vocabulary.sections.items() if section.FROM_FILE}
     later = []
     for override in given:
-        if override.key.partition(".")[0] in embedded or reaches_into_text(tree, override.key):
+        if override.key.partition(".")[0] in embedded or is_below_file_name(tree, override.key):
             later.append(override)
         else:
             apply(tree, override)
@@ -171,7 +173,7 @@ def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary
 
 
 def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[SceneTable], SceneTable]:
-    """Every table, validated by itself."""
+    """Return the tables, each validated separately."""
     known = vocabulary.sections
     for name in tree:
         if name not in known:

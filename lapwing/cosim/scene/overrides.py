@@ -13,7 +13,7 @@ Overrides = Iterable[str] | Mapping[str, Any]
 
 
 class Override(NamedTuple):
-    """A key of a scene and the value that the user gives it: KEY=VALUE."""
+    """A key of a scene and its new value: KEY=VALUE."""
 
     key: str
     value: Any
@@ -21,7 +21,7 @@ class Override(NamedTuple):
 
 
 def parsed(overrides: Overrides) -> list[Override]:
-    """Every override; SceneError for one that is not KEY=VALUE."""
+    """Parse the overrides. Raise SceneError for one that is not KEY=VALUE."""
     if isinstance(overrides, str):
         raise SceneError("", f"got {overrides!r}", 'overrides as a dictionary or a list: ["KEY=VALUE"]')
     if isinstance(overrides, Mapping):
@@ -43,17 +43,19 @@ def _parsed(text: str) -> Override:
 
 
 def value_of(text: str) -> Any:
-    """The value of a text in TOML; a bare word, as one types it in a shell, is a text. ValueError for anything else."""
+    """Parse a TOML value; a bare word, as typed in a shell, is a text. Raise ValueError for any other text."""
     try:
         return tomllib.loads(f"value = {text}")["value"]
     except tomllib.TOMLDecodeError:
         if not re.fullmatch(r"[\w./:+-]+", text):
             raise ValueError(f"{text} is not a TOML value; quote a text") from None
         return text
+    except RecursionError:
+        raise ValueError(f"{text[:20]}... is nested too deeply; use fewer brackets") from None
 
 
 def _plain(value: Any) -> Any:
-    """A value of Python or numpy as TOML would have given it."""
+    """Convert a value of Python or numpy to the types of TOML."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if hasattr(value, "tolist"):
@@ -61,14 +63,22 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
-def reaches_into_text(tree: Any, key: str) -> bool:
-    """Whether a key lies below a text: the name of a file, perhaps, that has yet to be read."""
+def is_below_file_name(tree: Any, key: str) -> bool:
+    """Return True if a key is below a text, which may name a file that is not read yet."""
     for part in key.split(".")[:-1]:
         if isinstance(tree, list):
             tree = tree[int(part)] if part.isdigit() and int(part) < len(tree) else None
         else:
             tree = tree.get(part) if isinstance(tree, dict) else None
     return isinstance(tree, str)
+
+
+def with_values(tree: dict[str, Any], overrides: Overrides) -> dict[str, Any]:
+    """Return the tables of a resolved scene with overrides. See `apply` for errors."""
+    result = copy.deepcopy(tree)
+    for override in parsed(overrides):
+        apply(result, override)
+    return result
 
 
 def apply(tree: dict[str, Any], override: Override) -> None:

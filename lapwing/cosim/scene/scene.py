@@ -36,16 +36,16 @@ class SceneTable(BaseModel):
         """
 
     @classmethod
-    def numbered(cls, i: int) -> dict[str, Any]:
-        """What its keys are by default for vehicle i (from 0) of several, where that goes by the number."""
+    def defaults_of(cls, i: int) -> dict[str, Any]:
+        """Return the defaults that depend on the number `i` (from 0) of the vehicle."""
         return {}
 
     def resolved(self) -> dict[str, Any]:
-        """All its keys, also those left at their defaults, as plain data that validates to the same table."""
+        """Return all keys, including defaults, as plain data that validates to the same table."""
         return self.model_dump(exclude_none=True)
 
     def lookup(self, keys: list[str]) -> Any:
-        """The value of a key of this table, or of a table within it."""
+        """Return the value of a key of this table, or of a table within it."""
         value: Any = self
         for key in keys:
             value = getattr(value, key)
@@ -60,16 +60,16 @@ class SceneTable(BaseModel):
 
 
 class Vocabulary(NamedTuple):
-    """What a scene may say: its tables by name, and checks beyond those of single tables."""
+    """Tables that a scene may have, by name, and checks across tables."""
 
     sections: Mapping[str, type[SceneTable]]
     checks: tuple[Callable[["Scene"], None], ...] = ()
 
     @classmethod
     def of(cls, modules: Iterable[ModuleType], *checks: Callable[["Scene"], None]) -> "Vocabulary":
-        """The tables that some modules declare or import."""
-        found = [value for module in modules for value in vars(module).values()]
-        sections = [v for v in found if isinstance(v, type) and issubclass(v, SceneTable) and hasattr(v, "TABLE")]
+        """Return the vocabulary of the tables that some modules declare or import."""
+        result = [value for module in modules for value in vars(module).values()]
+        sections = [v for v in result if isinstance(v, type) and issubclass(v, SceneTable) and hasattr(v, "TABLE")]
         return cls({section.TABLE: section for section in sections}, checks)
 
 
@@ -78,7 +78,7 @@ T = TypeVar("T")
 
 
 class _Found(NamedTuple):
-    """What a function has found in a scene, and the tables that it has asked for."""
+    """Result of a function of a scene, and the tables that it has read."""
 
     value: Any
     read: set[type[SceneTable] | None]
@@ -98,37 +98,37 @@ class Scene:
         vehicles: Sequence["Scene"] = (),
     ):
         self.path = path  # where it was read from
-        self.sources = dict(sources or {})  # every file that was read, by what it says: airframe.toml
+        self.sources = dict(sources or {})  # every file that was read, by file name: airframe.toml
         self.given = given  # overrides; None where the scene is more than its file and these
         self.vehicles = tuple(vehicles)  # a scene of each vehicle, where the file lists them; its own tables are common
-        self._locate = locate  # what a key is called in the file, and who gave it its value
+        self._locate = locate  # returns the key in the file, and the origin of its value
         self._tables = dict(tables)
         self._vocabulary = vocabulary
         self._found: dict[Callable[[Scene], Any], _Found] = {}
         self._reading: list[set[type[SceneTable] | None]] = []  # the tables that functions under way have asked for
 
-    def once(self, of: Callable[["Scene"], T]) -> T:
-        """What a function finds in the scene, which never changes: called once, and remembered.
+    def cached(self, of: Callable[["Scene"], T]) -> T:
+        """Return the result of a function of the scene; it is called once, and its result is kept.
 
-        It is to look at the tables alone, by `[]`, `has`, `section`, `tables` and `lookup`.
+        The function may read the tables only, by `[]`, `has`, `section`, `tables` and `lookup`.
         """
-        found = self._found.get(of)
-        if found is None:
+        result = self._found.get(of)
+        if result is None:
             self._reading.append(set())
             try:
                 value = of(self)
             finally:
                 read = self._reading.pop()
-            found = self._found[of] = _Found(value, read)
+            result = self._found[of] = _Found(value, read)
         if self._reading:
-            self._reading[-1] |= found.read
-        return found.value
+            self._reading[-1] |= result.read
+        return result.value
 
     def __getitem__(self, section: type[S]) -> S:
         return self._known(section)._tables[section]  # type: ignore[return-value]
 
     def _known(self, section: type[SceneTable] | None) -> "Scene":
-        """This scene; SceneError where that is one of several vehicles, who each have such a table of their own."""
+        """Return this scene; raise SceneError for a table that each of several vehicles has separately."""
         if self._reading:
             self._reading[-1].add(section)
         if self.vehicles and section is not None and not section.SHARED:
@@ -146,21 +146,21 @@ class Scene:
     __hash__ = None  # type: ignore[assignment]
 
     def has(self, section: type[SceneTable] | str) -> bool:
-        """Whether there is this table, by its class or name: always, unless it is optional."""
+        """Return True if the scene has this table, given by its class or name; only optional tables can be missing."""
         known = self._vocabulary.sections.get(section) if isinstance(section, str) else section
         return known in self._known(known)._tables
 
     def replaced(self, section: SceneTable) -> "Scene":
-        """The same scene with this table in the place of its own; not checked against the others."""
+        """Return the scene with another version of a table, which is not checked against the other tables."""
         tables = {**self._tables, type(section): section}
         vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
         scene = Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
-        scene._found = {of: found for of, found in self._found.items() if type(section) not in found.read}
+        scene._found = {of: result for of, result in self._found.items() if type(section) not in result.read}
         return scene
 
     @contextmanager
     def located(self) -> Iterator[None]:
-        """What is found wrong with a key of the scene within the context is told with who gave it its value."""
+        """Add the origin of the key to a ConfigError that is raised within the context."""
         try:
             yield
         except SceneError:
@@ -184,7 +184,7 @@ class Scene:
 
     @property
     def resolved(self) -> dict[str, Any]:
-        """All that the scene says and names, as dicts, lists, texts and numbers; `from_resolved` gives it back."""
+        """Return the scene and its files as dicts, lists, texts and numbers; `from_resolved` restores it."""
         tables: dict[str, Any] = {section.TABLE: table.resolved() for section, table in self._tables.items()}
         if self.vehicles:
             tables["vehicle"] = [
@@ -193,15 +193,15 @@ class Scene:
         return _plain({name: tables[name] for name in sorted(tables)})
 
     def section(self, name: str) -> Any:
-        """A table by its name; for those who do not know its class."""
+        """Return a table by name, for callers that do not import its class."""
         return self[self._vocabulary.sections[name]]
 
     def tables(self, name: str) -> Mapping[str, Any]:
-        """The tables inside a table whose keys are names, for example each sensor's of "sensors"."""
+        """Return the subtables of a table whose keys are names, for example each sensor's of "sensors"."""
         return self.section(name).tables
 
     def lookup(self, dotted: str) -> Any:
-        """The value of a dotted key, for example "sensors.imu.rate"."""
+        """Return the value of a dotted key, for example "sensors.imu.rate"."""
         table, *rest = dotted.split(".")
         return self.section(table).lookup(rest)
 

@@ -1,4 +1,4 @@
-"""A fault in a scene: what is wrong with which key, and who wrote it."""
+"""Error in a scene: the key, the fault, and the origin of the key."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -7,7 +7,7 @@ from lapwing.dynamics.config_error import ConfigError
 
 
 class KeyOrigin(NamedTuple):
-    """Who gave a key its value: a line of a file, or an override."""
+    """Origin of a key's value: a line of a file, or an override."""
 
     path: Path | None = None
     line: int | None = None

@@ -1,4 +1,4 @@
-"""A scene of several vehicles: each entry of `[[vehicle]]` is a scene of its own, of the common tables and its own.
+"""Scenes of several vehicles: each entry of `[[vehicle]]` is a scene of the common tables and those of the entry.
 
 What an entry says of a table is laid over the common one, key by key. A text in the place of a table's name is a key of
 the vehicle: `airframe = "quad_x"` names a file, `[vehicle.airframe.mass]` changes what the file says.
@@ -7,7 +7,7 @@ the vehicle: `airframe = "quad_x"` names a file, `[vehicle.airframe.mass]` chang
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from lapwing.cosim.scene.files import copied, laid_over
+from lapwing.cosim.scene.files import copied, merge_tables
 from lapwing.cosim.scene.overrides import Override
 from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
@@ -18,7 +18,7 @@ MOST = 50  # vehicles
 
 
 def count(tree: Mapping[str, Any]) -> int:
-    """How many vehicles a scene lists; 0 where it has a table `[vehicle]`, or none.
+    """Return the number of vehicles that a scene lists; 0 if it has a table `[vehicle]`, or none.
 
     Raises:
         KeyedError: too many, or an entry is no table.
@@ -35,7 +35,7 @@ def count(tree: Mapping[str, Any]) -> int:
 
 
 def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str, Any]:
-    """The tables of vehicle i of a scene as of a scene of that vehicle alone, not yet validated.
+    """Return the tables of vehicle i, as in a scene of that vehicle alone, not yet validated.
 
     Raises:
         KeyedError: it has a table that all vehicles share.
@@ -48,21 +48,21 @@ def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str,
             own[name] = value
         else:
             own[VEHICLE][name] = value
-    defaults = {name: keys for name, section in vocabulary.sections.items() if (keys := section.numbered(i))}
-    return copied(laid_over(defaults, laid_over(common, own)))
+    defaults = {name: keys for name, section in vocabulary.sections.items() if (keys := section.defaults_of(i))}
+    return copied(merge_tables(defaults, merge_tables(common, own)))
 
 
 def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: Vocabulary) -> list[Override]:
-    """Those of the overrides that reach vehicle i: its own, with the keys of a scene of it alone, and the common ones.
+    """Return the overrides of vehicle i: its own, with the keys of a scene of that vehicle alone, and the common ones.
 
     Raises:
         SceneError: a key of `vehicle` without the vehicle's number, or of a table that all share.
     """
-    found = []
+    result = []
     for override in given:
         table, *rest = override.key.split(".")
         if table != VEHICLE:
-            found.append(override)
+            result.append(override)
             continue
         if len(rest) < 2 or not rest[0].isdigit() or int(rest[0]) >= vehicles:
             known = {*vocabulary.sections, *vocabulary.sections[VEHICLE].model_fields}
@@ -74,17 +74,17 @@ def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: V
             if inner and name in vocabulary.sections:
                 _check_own(name, override.key, vocabulary)
             key = ".".join([name, *inner] if inner else [VEHICLE, name])
-            found.append(override._replace(key=key))
-    return found
+            result.append(override._replace(key=key))
+    return result
 
 
 def own_key(key: str, i: int) -> str:
-    """The key of the whole scene for one of a scene of vehicle i alone."""
+    """Return the full key for a key in the scene of vehicle i alone."""
     return f"{VEHICLE}.{i}.{key.removeprefix(f'{VEHICLE}.')}"
 
 
 def common_tables(members: Iterable[Scene], vocabulary: Vocabulary) -> dict[Any, Any]:
-    """The tables that all vehicles share.
+    """Return the tables that all vehicles share.
 
     Raises:
         KeyedError: two vehicles have the same name, or another value that each has its own of.
@@ -93,14 +93,14 @@ def common_tables(members: Iterable[Scene], vocabulary: Vocabulary) -> dict[Any,
     for section in vocabulary.sections.values():
         if section.DISTINCT:
             _check_distinct([scene[section].lookup([section.DISTINCT]) for scene in members], section)
-    found = {}
+    result = {}
     for section in vocabulary.sections.values():
         if section.SHARED and (tables := [scene[section] for scene in members if scene.has(section)]):
-            merged: dict[str, Any] = {}  # what files say may be known to some of them only
+            merged: dict[str, Any] = {}  # files may be known to some of the scenes only
             for table in tables:
-                merged = laid_over(merged, table.resolved())
-            found[section] = section.model_validate(merged) if tables.count(tables[0]) < len(tables) else tables[0]
-    return found
+                merged = merge_tables(merged, table.resolved())
+            result[section] = section.model_validate(merged) if tables.count(tables[0]) < len(tables) else tables[0]
+    return result
 
 
 def _check_own(table: str, key: str, vocabulary: Vocabulary) -> None:

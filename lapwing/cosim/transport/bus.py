@@ -27,13 +27,13 @@ os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
 
 INBOX = 4096  # messages; far more than come in lock step before one is taken
-WAKE = 0.05  # [s] between two looks at whether somebody has waited long enough
+WAKE = 0.05  # [s] between two checks of the deadlines of waiting threads
 
 _opened = False
 
 
 def in_use() -> bool:
-    """Whether this process has had a session: Zenoh keeps threads and files for the next one, which no fork has."""
+    """Return True if this process has opened a session: a fork does not inherit Zenoh's threads and files."""
     return _opened
 
 
@@ -41,7 +41,7 @@ class ZenohBus:
     """A session with explicit endpoints, publishers by key, and subscriptions that are queues.
 
     Attributes:
-        refused: how many messages were not taken: without a sound attachment, or not of their sender.
+        refused: number of rejected messages: without a valid attachment, or from another sender.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class ZenohBus:
         listen: Iterable[str] = (),
         connect: Iterable[str] = (),
         mode: str = "peer",
-        mark: bytes = b"",
+        gid: bytes = b"",
         security: Mapping[str, Any] = MappingProxyType({}),
         awaits: bool = True,
     ):
@@ -59,7 +59,7 @@ class ZenohBus:
             listen: endpoints that others connect to.
             connect: endpoints of others.
             mode: of Zenoh: "peer", "client" or "router".
-            mark: 16 bytes that every message carries; made up where there are none.
+            gid: 16 bytes that every message carries; made up where there are none.
             security: further entries of the Zenoh configuration, by key.
             awaits: wait until a peer is there, half a second at most; else they are met as they come.
 
@@ -76,12 +76,12 @@ class ZenohBus:
             endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)
             action = "connect to" if mode == "client" else "listen on"
             raise BusError(f"cannot {action} {endpoints}: {str(error).partition(' at /')[0]}") from None
-        self._mark = mark or uuid.uuid4().bytes
+        self._gid = gid or uuid.uuid4().bytes
         self.refused = 0
         self._publishers: dict[str, tuple[zenoh.Publisher, Callable[[bytes, int], None]]] = {}
         self._held: list = []  # subscribers and tokens live as long as the session
         self._inboxes: dict[str, Inbox] = {}  # by key
-        self._waker = uuid.uuid4().bytes  # the mark of what this bus says to its own inboxes
+        self._waker = uuid.uuid4().bytes  # the gid of what this bus says to its own inboxes
         self._closed = threading.Event()
 
     @property
@@ -89,57 +89,57 @@ class ZenohBus:
         """Zenoh's own identifier of this session, hexadecimal."""
         return str(self._session.info.zid())
 
-    def publisher(self, key: str, mark: bytes = b"", drops: bool = False) -> Callable[[bytes, int], None]:
-        """A function `put(payload, time_ns)` that publishes on `key`; messages of one key keep their order.
+    def publisher(self, key: str, gid: bytes = b"", drops: bool = False) -> Callable[[bytes, int], None]:
+        """Return a function `put(payload, time_ns)` that publishes on `key`; messages of one key keep their order.
 
         Args:
             key: Zenoh key.
-            mark: 16 bytes that its messages carry instead of the bus's.
+            gid: 16 bytes that its messages carry instead of the bus's.
             drops: leave out what a slow subscriber has no room for, instead of waiting for it.
         """
         if key not in self._publishers:
             control = zenoh.CongestionControl.DROP if drops else zenoh.CongestionControl.BLOCK
             declared = self._session.declare_publisher(key, congestion_control=control)
             sequence = 0
-            mark = mark or self._mark
+            gid = gid or self._gid
 
             def put(payload: bytes, time_ns: int) -> None:
                 nonlocal sequence
                 sequence += 1
-                declared.put(payload, attachment=pack(sequence, time_ns, mark))
+                declared.put(payload, attachment=pack(sequence, time_ns, gid))
 
             self._publishers[key] = (declared, put)
         return self._publishers[key][1]
 
     def has_audience(self, keys: Iterable[str]) -> bool:
-        """Whether somebody subscribes to one of the keys that this bus has a publisher for."""
+        """Return True if one of the keys, for which this bus has publishers, has a subscriber."""
         statuses = (self._publishers[key][0].matching_status for key in keys)
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
 
     def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> Subscription:
-        """Receive what whoever publishes on any of the keys, in order of arrival.
+        """Subscribe to any sender on any of the keys, in order of arrival.
 
-        `notify` is called from another thread after each arrival, for those who wait for other things besides.
+        `notify` is called from another thread after each arrival, for callers that also wait for other events.
         """
         return self._receive(key_expressions, Subscription(_message, None, self._refuse, notify))
 
     def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> Subscription:
-        """The same of known senders: by key the mark that a message must carry, None for that of the first."""
+        """Subscribe to known senders: by key the GID of a message, None to accept that of the first message."""
         return self._receive(senders, Subscription(_message, dict(senders), self._refuse, notify))
 
     def inbox(self, key: str, sender: bytes | None) -> Inbox:
-        """Receive what the sender with this mark publishes on `key`, where it is taken soon after it comes: a message
-        keeps the 64 kB alive into which it was read, and the oldest of too many are lost. None as of `receive`."""
+        """Subscribe to the sender with this GID on `key`, for messages that are read soon after they arrive: a message
+        keeps 64 kB of memory alive, and a full ring drops its oldest. None accepts the GID of the first message."""
         subscriber = self._session.declare_subscriber(key, zenoh.handlers.RingChannel(INBOX))
         self._held.append(subscriber)
-        found = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._refuse)
+        result = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._refuse)
         if not self._inboxes:
             threading.Thread(target=self._wake, daemon=True).start()
-        self._inboxes[key] = found
-        return found
+        self._inboxes[key] = result
+        return result
 
     def _wake(self) -> None:
-        """Let those who wait at an inbox know when they have waited long enough: Zenoh's queues have no time-out."""
+        """Wake threads whose deadline at an inbox has passed: Zenoh's queues have no time-out."""
         while not self._closed.wait(WAKE):
             for key, inbox in list(self._inboxes.items()):
                 if time.monotonic() >= inbox.until:
@@ -156,8 +156,8 @@ class ZenohBus:
         self.refused += 1
 
     def declare_alive(self, key: str) -> Callable[[], None]:
-        """Say that this participant is there, until what is returned is called. Call it after `subscribe`: whoever sees
-        it may publish."""
+        """Declare that this participant is present, until the returned function is called. Call it after `subscribe`: a
+        participant that sees it may publish."""
         token = self._session.liveliness().declare_token(key)
         self._held.append(token)
         return token.undeclare
@@ -175,13 +175,13 @@ class ZenohBus:
         """Reply with `payload` to every query for `key`."""
 
         def reply(query: zenoh.Query) -> None:
-            query.reply(key, payload, attachment=pack(0, 0, self._mark))
+            query.reply(key, payload, attachment=pack(0, 0, self._gid))
 
-        # In a thread of its own: on Zenoh's only one, a reply of several fragments would wait for itself
+        # In a separate thread: in Zenoh's only thread, a reply of several fragments would wait for itself
         handler: Any = zenoh.handlers.Callback(reply, indirect=True)
         self._held.append(self._session.declare_queryable(key, handler))
 
-    def ask(self, key: str, timeout: float) -> bytes | None:
+    def query(self, key: str, timeout: float) -> bytes | None:
         """Return the first reply to a query for `key`, None after `timeout` seconds."""
         for reply in self._session.get(key, timeout=timeout):
             if reply.ok is not None:
@@ -205,9 +205,11 @@ class ZenohBus:
         return sorted(missing)
 
     def close(self) -> None:
-        """Close the session. What was put just before may be lost (`tests/cosim/test_close.py`): whoever publishes what
-        must arrive waits until the others have confirmed it, as
-        `lapwing.cosim.executors.participant.Participant.leave` does."""
+        """Close the session.
+
+        Messages put just before may be lost (`tests/cosim/test_close.py`). A publisher whose messages must arrive waits
+        for their confirmation, as `lapwing.cosim.executors.participant.Participant.leave` does.
+        """
         self._closed.set()
         with suppress(zenoh.ZError):  # it has waited for one of these
             self._session.close()
@@ -227,22 +229,22 @@ def _configured(settings: Mapping[str, Any]) -> zenoh.Config:
 
 
 def _message(sample: zenoh.Sample) -> Message | None:
-    """What a sample says; None where it has no sound attachment, or deletes a key."""
+    """Return the message of a sample; None if its attachment is invalid, or if it deletes a key."""
     attachment = sample.attachment
     if attachment is None:
         return None
     try:
-        time_ns, mark = time_and_gid(attachment.to_bytes())
+        time_ns, gid = time_and_gid(attachment.to_bytes())
     except ValueError:
         return None
     payload = sample.payload.to_bytes()
     if not payload and sample.kind != zenoh.SampleKind.PUT:
         return None
-    return time_ns, mark, payload
+    return time_ns, gid, payload
 
 
 def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:
-    """Where participant `name` listens and connects so that all are joined pairwise exactly once.
+    """Return the endpoints on which participant `name` listens and to which it connects: each pair is linked once.
 
     It does not depend on the order of `endpoints`, which need not be the same for all of them.
     """

@@ -2,16 +2,18 @@
 
 STEP_KEY = "_step"  # bundles
 BATCH_KEY = "_batch"  # what the recorder is given
-WAITING_KEY = "_waiting"  # what somebody has long waited for
-ALIVE_KEY = "_alive"  # who is there
-SETUP_KEY = "_setup"  # what somebody flies, to those who ask
-DIVERGED_KEY = "_diverged"  # why a state is no longer sound
+WAITING_KEY = "_waiting"  # what a participant has waited for
+OUTSIDE_KEY = "_outside"  # program outside the run that a service waits for, with its own time-out
+REPORTS_KEY = "_reports"  # entries of the log's metadata, as a JSON object
+ALIVE_KEY = "_alive"  # token: the participant is present
+SETUP_KEY = "_setup"  # run configuration of a participant, as reply to a query
+DIVERGED_KEY = "_diverged"  # reason why a state is invalid
 ENDED_KEY = "_ended"  # of the owner of time: that the run has come to its end, or why it ended before
-REFUSED_KEY = "_refused"  # how many messages of strangers somebody has refused
-DEADLINES_KEY = "_deadlines"  # of a run that keeps a speed: how late somebody was
-COMPILING_KEY = "_compiling"  # somebody compiles kernels
+REFUSED_KEY = "_refused"  # number of messages that a participant has rejected
+DEADLINES_KEY = "_deadlines"  # lateness of a participant in a paced run
+COMPILING_KEY = "_compiling"  # a participant compiles kernels
 RECORDED_KEY = "_log_progress"  # how far the log is; an empty message: it is complete
-HEARD_KEY = "_heard"  # a token: somebody has received the last message of every service that it takes messages from
-LOGGED_KEY = "_logged"  # a token: somebody has received the last message of the recorder
+HEARD_KEY = "_heard"  # token: the participant has received the last message of each of its producers
+LOGGED_KEY = "_logged"  # token: the participant has received the last message of the recorder
 
-ENCODER = "_messages"  # ending of the name of a process that makes the messages of a program of somebody else's
+ENCODER = "_messages"  # suffix of the name of the process that encodes an external service's messages

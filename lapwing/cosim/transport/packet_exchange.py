@@ -1,5 +1,7 @@
 """Exchange of step packets with other participants over the bus."""
 
+import math
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,14 +11,14 @@ from lapwing.cosim.diagram.tick_schedule import due
 from lapwing.cosim.executors.participant import PATIENCE, POLL, Participant
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.bus_keys import BATCH_KEY, WAITING_KEY
-from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, way, ways
-from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_batch
-from lapwing.cosim.transport.publish_watchdog import PublishWatchdog
+from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, packet_schedule, packet_schedules
+from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_log_packet
 from lapwing.kernels import python_function
 from lapwing.messages.topics import Topic
 
 BATCH = 0.1  # [s] of wall time between two batches
-PAGE = 1024  # ticks after which a batch is handed over in any case
+LOOK = 0.2  # [s] between two looks
+PAGE = 1024  # ticks in a log packet at most
 
 _due = python_function(due)
 
@@ -26,20 +28,20 @@ class EndOfRun(Exception):
 
 
 class PacketReceiver:
-    """A service that gives something that this one takes."""
+    """A service with outputs that this service reads."""
 
     def __init__(self, process: Participant, name: str, taken: list[tuple[str, int, int]], graph: BlockDiagram):
-        """`taken`: (port, period, delay) of each input that it gives."""
+        """Subscribe to the service `name`; `taken` has (port, period, delay) of each input that it produces."""
         self._process, self._name, self._taken, self._graph = process, name, taken, graph
-        self._way = way(process.setup, name, process.name) if process.bundles_ahead else EACH_TICK
+        self._way = packet_schedule(process.setup, name, process.name) if process.packs_ticks else EACH_TICK
         self._bundles = StepPacketCodec(self._way.ports(process.setup.services[name].ports), self._way.ticks)
-        ((key, mark),) = process.participants.senders(self._way.key, [name]).items()
-        self._inbox = process.bus.inbox(key, mark)
+        ((key, gid),) = process.participants.senders(self._way.key, [name]).items()
+        self._inbox = process.bus.inbox(key, gid)
         self._needs = {(period, delay) for _, period, delay in taken}
         self._newest = -1  # tick up to which bundles are taken
         self._known = 0  # tick before which nothing more is needed
 
-    def take(self, tick: int) -> int:
+    def receive(self, tick: int) -> int:
         """Take bundles up to the newest that is needed at `tick`; the tick before which nothing more is needed.
 
         Raises:
@@ -54,7 +56,7 @@ class PacketReceiver:
             while not self._bundles.due(stamp):
                 stamp += self._way.every
             due_ns = stamp * self._process.setup.interval_ns
-            time_ns, payload = self._inbox.get(POLL) or self._process.patient(
+            time_ns, payload = self._inbox.get(POLL) or self._process.wait_with_status(
                 self._inbox.get, lambda: self._describe(needed)
             )
             if not payload:
@@ -74,8 +76,8 @@ class PacketReceiver:
         return f"{', '.join(ports)} of tick {tick} from {self._name}"
 
 
-def sources(process: Participant, graph: BlockDiagram) -> list[PacketReceiver]:
-    """Who gives what the service of this process takes."""
+def packet_receivers(process: Participant, graph: BlockDiagram) -> list[PacketReceiver]:
+    """Return a receiver for each producer of an input of this process's service."""
     setup = process.setup
     taken: dict[str, list[tuple[str, int, int]]] = {}
     for needed in setup.services[process.name].inputs:
@@ -117,9 +119,42 @@ class _TopicPublisher:
     def publish(self, graph: BlockDiagram, first: int, stop: int, interval_ns: int) -> None:
         """Publish the messages of the ticks [first, stop)."""
         if self._subscribed:
-            for page in graph.pages(first, stop, self._subscribed, keep=True):
+            for page in graph.record_batches(first, stop, self._subscribed, keep=True):
                 for at, payload in zip(page.ticks, page.payloads, strict=True):
                     self.puts[page.topic](payload.tobytes(), int(at) * interval_ns)
+
+
+class PublishWatchdog:
+    """Reports from a separate thread that a publishing thread is blocked.
+
+    The run monitor then names the consumer that accepts no data, and not the producer that waits for it.
+    """
+
+    def __init__(self, say: Callable[[], None], patience: float):
+        """Call `say` each time when what is done within this context has taken `patience` [s] more."""
+        self._say, self._patience = say, patience
+        self._begun = self._said = math.inf  # [s] of the monotonic clock; infinite while nothing is published
+        self._closed = threading.Event()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def __enter__(self) -> None:
+        self._begun = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        self._begun = math.inf
+
+    def close(self) -> None:
+        """Watch no longer."""
+        self._closed.set()
+
+    def _watch(self) -> None:
+        while not self._closed.wait(LOOK):
+            begun, now = self._begun, time.monotonic()
+            if now - begun < self._patience:
+                self._said = -math.inf
+            elif now - self._said >= self._patience:
+                self._said = now
+                self._say()
 
 
 class PacketSender:
@@ -131,7 +166,7 @@ class PacketSender:
         self._process, self._graph = process, graph
         self._outlets = []
         if hands_over:
-            for schedule in ways(process.setup, service.name) if process.bundles_ahead else {EACH_TICK}:
+            for schedule in packet_schedules(process.setup, service.name) if process.packs_ticks else {EACH_TICK}:
                 put = bus.publisher(f"{key_prefix}/{schedule.key}/{service.name}")
                 codec = StepPacketCodec(schedule.ports(process.setup.services[service.name].ports), schedule.ticks)
                 self._outlets.append(_StepOutlet(schedule, codec, put))
@@ -141,7 +176,9 @@ class PacketSender:
         self._log_due = 0.0  # [s] of the monotonic clock
         self._interval_ns = process.setup.interval_ns
         bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared while there is room
-        self._watchdog = PublishWatchdog(lambda: process.say(WAITING_KEY, "room on the way to somebody"), PATIENCE)
+        self._watchdog = PublishWatchdog(
+            lambda: process.publish_status(WAITING_KEY, "a consumer that accepts no data"), PATIENCE
+        )
 
     def refresh_subscribers(self) -> None:
         """Find out which topics have subscribers."""
@@ -155,21 +192,21 @@ class PacketSender:
             self._topics.publish(self._graph, first, stop, self._interval_ns)
             if stop - self._logged >= PAGE or time.monotonic() > self._log_due:
                 self._publish_log(stop)
-                self._process.tell_of_refused()
+                self._process.report_rejected()
                 self.refresh_subscribers()
 
     def _publish_log(self, stop: int) -> None:
         self._log_due = time.monotonic() + BATCH
         if stop > self._logged:
-            pages = self._graph.pages(self._logged, stop)
-            self._put_log(pack_batch(pages, self._logged, stop), (stop - 1) * self._interval_ns)
+            pages = self._graph.record_batches(self._logged, stop)
+            self._put_log(pack_log_packet(pages, self._logged, stop), (stop - 1) * self._interval_ns)
             self._logged = stop
 
     def end(self, stop: int) -> None:
         """Publish what is left of the ticks before `stop`, then the end (`publish_end`)."""
         self._watchdog.close()
         self._publish_log(stop)
-        self._process.tell_of_refused()
+        self._process.report_rejected()
         self.publish_end(stop)
 
     def publish_end(self, stop: int) -> None:

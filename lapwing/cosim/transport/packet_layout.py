@@ -1,4 +1,4 @@
-"""What the bundles of a run hold, for programs of other languages: every column of every port by its name."""
+"""Layout of the step packets of a run for programs in other languages: every column of every port by name."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, SETUP_KEY, ST
 
 
 def columns(like: Any, name: str = "") -> list[str]:
-    """The columns of a port in their order: "position_world.0", "armed"."""
+    """Return the columns of a port in their order: "position_world.0", "armed"."""
     if not isinstance(like, tuple):
         return [name]
     fields = getattr(like, "_fields", range(len(like)))
@@ -17,7 +17,7 @@ def columns(like: Any, name: str = "") -> list[str]:
 
 
 def layout(setup: RunConfig) -> dict[str, Any]:
-    """Ports, periods and columns of all services, as a tree for JSON.
+    """Return ports, periods and columns of all services as a tree for JSON.
 
     Returns:
         "rate" [Hz], "interval_ns", "last_tick", "order" (of the services within a tick), "keys" (the first parts of

@@ -1,10 +1,10 @@
-"""What goes into one bundle on its way from one service to another, and how many ticks.
+"""Packet schedule: ticks per packet and ticks between packets from one service to another.
 
-A service all of whose inputs are d ticks old runs ahead of the others by up to d ticks, as the trajectory does. Nobody
-waits for its single ticks: what it takes and what it gives goes in bundles of d / 2 ticks. Every loop through it has
-those d ticks in it, and the two bundles delay a message by less, so that the lock step cannot come to a stop.
+A service whose inputs all have a delay of d ticks runs ahead of the others by up to d ticks, as the trajectory does. No
+service waits for its single ticks, so its packets hold d / 2 ticks. Every loop through it contains those d ticks, and
+the two packets delay a message by less, so that the lock step cannot stop.
 
-A service that takes only what is due every n ticks gets a bundle every n ticks, as the autopilot the battery's.
+A consumer that reads only ports with a period of n ticks gets a packet every n ticks, as the autopilot the battery's.
 """
 
 import math
@@ -16,45 +16,45 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.transport.bus_keys import STEP_KEY
 
 
-def ticks_at_once(setup: RunConfig, name: str) -> int:
-    """The ticks that a service steps, and hands over, at once."""
+def ticks_per_packet(setup: RunConfig, name: str) -> int:
+    """Return the number of ticks that a service steps and publishes at once."""
     delays = [i.delay for i in setup.services[name].inputs]
     return max(1, min(delays, default=0) // 2)
 
 
 class PacketSchedule(NamedTuple):
-    """How bundles go from one service to another."""
+    """Schedule of the packets from one service to another."""
 
     ticks: int  # of a bundle
     every: int  # ticks from the first of a bundle to that of the next; only ports whose period is a multiple
 
     @property
     def key(self) -> str:
-        """The key of its bundles, before the name of the service that gives them."""
+        """The key of its packets, without the name of the sending service."""
         if self.ticks > 1:
             return f"{STEP_KEY}_{self.ticks}"
         return STEP_KEY if self.every == 1 else f"{STEP_KEY}_every_{self.every}"
 
     def ports(self, given: Iterable[Port]) -> list[Port]:
-        """Those in its bundles, of what a service gives."""
+        """Return the ports of a service that its packets contain."""
         return [port for port in given if self.ticks > 1 or port.period % self.every == 0]
 
 
 EACH_TICK = PacketSchedule(1, 1)
-"""A bundle at each tick, of all that a service gives."""
+"""A packet at each tick with all outputs of a service."""
 
 
-def way(setup: RunConfig, producer: str, consumer: str) -> PacketSchedule:
-    """How bundles go from one service to another that takes something of it."""
-    if (ticks := max(ticks_at_once(setup, producer), ticks_at_once(setup, consumer))) > 1:
+def packet_schedule(setup: RunConfig, producer: str, consumer: str) -> PacketSchedule:
+    """Return the schedule of the packets from one service to a consumer."""
+    if (ticks := max(ticks_per_packet(setup, producer), ticks_per_packet(setup, consumer))) > 1:
         return PacketSchedule(ticks, ticks)
     taken = {i.port for i in setup.services[consumer].inputs}
     periods = [port.period for port in setup.services[producer].ports if port.name in taken]
     return PacketSchedule(1, math.gcd(*periods))
 
 
-def ways(setup: RunConfig, producer: str) -> set[PacketSchedule]:
-    """How the bundles of a service go; those of one whose rows nobody takes at each tick."""
+def packet_schedules(setup: RunConfig, producer: str) -> set[PacketSchedule]:
+    """Return the packet schedules of a service; one packet per tick if it has no consumer."""
     given = {port.name for port in setup.services[producer].ports}
     takers = [name for name, service in setup.services.items() if any(i.port in given for i in service.inputs)]
-    return {way(setup, producer, taker) for taker in takers} or {EACH_TICK}
+    return {packet_schedule(setup, producer, taker) for taker in takers} or {EACH_TICK}

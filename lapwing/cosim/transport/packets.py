@@ -1,10 +1,9 @@
-"""What services send one another: a bundle a tick, with the rows of all that a service gives at that tick; and batches
-of encoded messages for those who record.
+"""Packets between services: step packets with the rows of a tick, and log packets of encoded messages.
 
 A bundle is the rows of the service's ports that are due at the tick, in the order of its set-up, one after the other:
 little-endian float64, nothing between them. One of several ticks (`lapwing.cosim.transport.packet_schedule`) has,
 port by port, all rows that are
-due in them. A service that gives nothing in these ticks sends none. An empty bundle says that there will be no other.
+due in them. A service without outputs in these ticks sends no packet. An empty packet is the last one.
 
 A batch is the ticks [start, stop) of which it has all messages (two int64), then pages: length of the topic's
 name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
@@ -44,7 +43,7 @@ class StepPacketCodec:
     """The bundles of one service: which rows they hold."""
 
     def __init__(self, ports: Sequence[Port], ticks: int = 1):
-        """Of a service that gives these ports, in their order; a bundle is of so many ticks from its first one on."""
+        """Codec of a service with these ports, in their order; a packet holds `ticks` ticks."""
         self._ports = [(port.name, port.period, row_width(port.like)) for port in ports]
         self._periods = sorted({port.period for port in ports})
         self._cycle = math.lcm(*self._periods)  # [ticks] after which bundles hold the same rows again
@@ -53,22 +52,22 @@ class StepPacketCodec:
         self._known: dict[tuple[int, ...], tuple[_Rows, ...]] = {}  # by the number of rows for each period
 
     def due(self, first: int) -> bool:
-        """Whether there is a bundle from the tick `first` on."""
+        """Return True if a packet starts at the tick `first`."""
         return bool(self._rows(first))
 
     def size(self, first: int) -> int:
-        """Bytes of the bundle from the tick `first` on."""
+        """Return the size [bytes] of the packet that starts at the tick `first`."""
         rows = self._rows(first)
         return 8 * rows[-1].place.stop if rows else 0
 
     def pack(self, graph: BlockDiagram, first: int) -> bytes:
-        """The bundle from the tick `first` on, from the rows of a graph."""
+        """Return the packet that starts at the tick `first`, from the rows of a diagram."""
         if self._ticks == 1:
             return b"".join([graph.row(rows.port, first).tobytes() for rows in self._rows(first)])
         return b"".join([graph.rows(rows.port, self._due(rows, first)).tobytes() for rows in self._rows(first)])
 
     def unpack(self, payload: bytes, graph: BlockDiagram, first: int) -> None:
-        """Put the rows of the bundle from the tick `first` on into those of a graph that uses them.
+        """Store the rows of the packet that starts at the tick `first` in a diagram that uses them.
 
         Raises:
             BundleError: it has not the size that is due.
@@ -98,17 +97,17 @@ class StepPacketCodec:
         numbers = tuple([last // period - (first - 1) // period for period in self._periods])
         if numbers not in self._known:
             by_period = dict(zip(self._periods, numbers, strict=True))
-            found, place = [], 0
+            result, place = [], 0
             for name, period, columns in self._ports:
                 if number := by_period[period]:
-                    found.append(_Rows(name, period, number, slice(place, place + number * columns)))
+                    result.append(_Rows(name, period, number, slice(place, place + number * columns)))
                     place += number * columns
-            self._known[numbers] = tuple(found)
+            self._known[numbers] = tuple(result)
         return self._known[numbers]
 
 
-def pack_batch(pages: Iterable[RecordBatch], start: int, stop: int) -> bytes:
-    """A batch of pages, which have all messages of the ticks [start, stop)."""
+def pack_log_packet(pages: Iterable[RecordBatch], start: int, stop: int) -> bytes:
+    """Return a log packet of record batches with all messages of the ticks [start, stop)."""
     parts = [_TICKS.pack(start, stop)]
     for page in pages:
         payloads = np.ascontiguousarray(page.payloads)
@@ -118,8 +117,8 @@ def pack_batch(pages: Iterable[RecordBatch], start: int, stop: int) -> bytes:
     return b"".join(parts)
 
 
-def unpack_batch(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
-    """The ticks [start, stop) of which it has all messages, and the pages, payloads of shape (n, size).
+def unpack_log_packet(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
+    """Return the ticks [start, stop) of a log packet, and its record batches with payloads of shape (n, size).
 
     Raises:
         BundleError: no batch.

@@ -1,4 +1,4 @@
-"""What one sender publishes on one key, kept by Zenoh itself until it is taken.
+"""Ring-buffer subscription to one sender on one key; Zenoh itself holds the messages.
 
 Zenoh's thread runs no Python for such a message and waits for no lock of Python's
 (docs/explanation/decisions/0018-inboxes.md).
@@ -15,7 +15,7 @@ class Inbox:
     """Messages in order of arrival; what is not of the sender is left out. For one thread.
 
     Attributes:
-        until: when `get` has waited long enough, on the monotonic clock; infinite while nobody waits.
+        until: when `get` has waited long enough, on the monotonic clock; infinite while no thread waits.
     """
 
     def __init__(
@@ -31,8 +31,8 @@ class Inbox:
         Args:
             receive: waits for the next sample of the bus, however long that takes.
             read: what a sample says, None where it is no message.
-            sender: the mark that a message must carry, None for that of the first.
-            waker: the mark of a message that says that `until` has passed.
+            sender: the gid that a message must carry, None for that of the first.
+            waker: the gid of a message that says that `until` has passed.
             refuse: called for each message that is left out.
         """
         self._receive, self._read, self._refuse = receive, read, refuse
@@ -40,7 +40,7 @@ class Inbox:
         self.until = float("inf")
 
     def get(self, timeout: float) -> tuple[int, bytes] | None:
-        """Simulation time [ns] and payload of the next message, None after `timeout` seconds or little more."""
+        """Return simulation time [ns] and payload of the next message, None after about `timeout` seconds."""
         until = self.until = time.monotonic() + timeout
         try:
             while True:
@@ -48,14 +48,14 @@ class Inbox:
                 if message is None:
                     self._refuse()
                     continue
-                time_ns, mark, payload = message
-                if mark == self._sender:
+                time_ns, gid, payload = message
+                if gid == self._sender:
                     return time_ns, payload
-                if mark == self._waker:
+                if gid == self._waker:
                     if time.monotonic() >= until:
                         return None
                 elif self._sender is None:
-                    self._sender = mark
+                    self._sender = gid
                     return time_ns, payload
                 else:
                     self._refuse()

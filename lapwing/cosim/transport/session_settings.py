@@ -1,6 +1,10 @@
-"""How the Zenoh sessions of a run are configured."""
+"""Zenoh session settings, and the time-out of TCP connections."""
 
+import os
+import socket
+import stat
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 LEASE_MS = 10_000  # after this long without a sign of life a peer counts as gone; the launcher finds out sooner
@@ -9,7 +13,7 @@ LARGEST = 1 << 26  # [bytes] of a message that is put together from fragments; a
 
 
 def session_settings(listen: Sequence[str], connect: Sequence[str], mode: str, awaits: bool) -> dict[str, Any]:
-    """Entries of the Zenoh configuration, by key; the arguments are those of `lapwing.cosim.transport.bus.ZenohBus`."""
+    """Return entries of the Zenoh configuration by key; see `lapwing.cosim.transport.bus.ZenohBus` for arguments."""
     return {
         "mode": mode,
         "listen/endpoints": listen,
@@ -26,3 +30,22 @@ def session_settings(listen: Sequence[str], connect: Sequence[str], mode: str, a
         "transport/link/tx/queue/congestion_control/block/wait_before_close": 1000 * LEASE_MS,
         "transport/link/rx/max_message_size": LARGEST,
     }
+
+
+_LINUX = hasattr(socket, "TCP_USER_TIMEOUT")
+
+
+def limit_silence(milliseconds: int) -> None:
+    """Have the system end each connection that is open now once what it sent is not confirmed for so long.
+
+    Without, it tries for a quarter of an hour (tcp(7), tcp_retries2); Zenoh waits for that where it closes a link over
+    TLS that still has something to send, and until then counts its peer as there.
+    """
+    if not _LINUX:
+        return
+    for name in os.listdir("/proc/self/fd"):
+        with suppress(OSError):  # gone meanwhile, or no TCP
+            descriptor = int(name)
+            if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+                with socket.socket(fileno=os.dup(descriptor)) as result:
+                    result.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)

@@ -1,11 +1,11 @@
-"""What has arrived on some keys and was not taken yet; what is not of its sender is left out."""
+"""Subscription: a queue of messages that rejects those of a wrong sender."""
 
 import queue
 from collections.abc import Callable
 from typing import Any
 
 Message = tuple[int, bytes, bytes]
-"""Simulation time [ns], mark of the sender (16 bytes) and payload."""
+"""Simulation time [ns], gid of the sender (16 bytes) and payload."""
 
 
 class Subscription:
@@ -22,21 +22,21 @@ class Subscription:
 
         Args:
             read: what a sample says, None where it is no message.
-            senders: as of `ZenohBus.receive`, None for anybody.
+            senders: see `ZenohBus.receive`; None to accept all senders.
             refuse: called for each message that is left out.
             notify: called after each arrival.
         """
         self._read, self._senders, self._refuse, self._notify = read, senders, refuse, notify
-        self._only_mark = next(iter(senders.values())) if senders and len(senders) == 1 else None
+        self._only_gid = next(iter(senders.values())) if senders and len(senders) == 1 else None
         self._arrived: queue.SimpleQueue[tuple[str, int, bytes]] = queue.SimpleQueue()
 
     def get(self, timeout: float) -> tuple[int, bytes] | None:
-        """Simulation time [ns] and payload of the next message, None after `timeout` seconds."""
-        found = self.get_with_key(timeout)
-        return found and found[1:]
+        """Return simulation time [ns] and payload of the next message, None after `timeout` seconds."""
+        result = self.get_with_key(timeout)
+        return result and result[1:]
 
     def get_with_key(self, timeout: float) -> tuple[str, int, bytes] | None:
-        """Key, simulation time [ns] and payload of the next message, None after `timeout` seconds."""
+        """Return key, simulation time [ns] and payload of the next message, None after `timeout` seconds."""
         try:
             return self._arrived.get(timeout=timeout)
         except queue.Empty:
@@ -52,11 +52,11 @@ class Subscription:
         if self._notify:
             self._notify()
 
-    def _is_of_its_sender(self, sample: Any, mark: bytes) -> bool:
-        if self._only_mark or self._senders is None:  # the text of a key takes longer than all else
-            return self._only_mark in (None, mark)
+    def _is_of_its_sender(self, sample: Any, gid: bytes) -> bool:
+        if self._only_gid or self._senders is None:  # the text of a key takes longer than all else
+            return self._only_gid in (None, gid)
         key = str(sample.key_expr)
         expected = self._senders.get(key, b"")
         if expected is None:
-            expected = self._senders[key] = mark
-        return expected == mark
+            expected = self._senders[key] = gid
+        return expected == gid

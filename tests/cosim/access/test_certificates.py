@@ -1,7 +1,11 @@
 """Certificates of participants: what is written, and who may read and write it."""
 
 import os
+import re
+import ssl
 import stat
+import subprocess
+import sys
 
 import pytest
 import zenoh
@@ -11,7 +15,7 @@ from lapwing.cosim.transport.bus import ZenohBus
 from tests.endpoints import loopback_endpoints
 
 
-def test_nobody_else_can_write_them_whatever_the_umask(tmp_path):
+def test_files_are_private_with_any_umask(tmp_path):
     umask = os.umask(0)
     try:
         make(tmp_path / "keys", ["plant"], 1)
@@ -22,8 +26,34 @@ def test_nobody_else_can_write_them_whatever_the_umask(tmp_path):
     assert modes == {"plant": 0o700, **files}
 
 
+@pytest.mark.parametrize(
+    ("place", "time", "message"),
+    [(1, "200101000000Z", "expired on 2020-01-01"), (0, "490101000000Z", "is valid from 2049")],
+)
+def test_run_names_certificate_that_is_not_valid(tmp_path, place, time, message):
+    make(tmp_path / "keys", ["mission", "router", "plant"], 1)
+    path = tmp_path / "keys" / "router" / "certificate.pem"
+    der = ssl.PEM_cert_to_DER_cert(path.read_text())
+    period = re.search(rb"\d{12}Z..\d{12}Z", der).group()
+    times = [period[:13], period[-13:]]
+    times[place] = time.encode()
+    path.write_text(ssl.DER_cert_to_PEM_cert(der.replace(period, times[0] + period[13:15] + times[1])))
+    (end,) = loopback_endpoints(["a"]).values()
+    command = [sys.executable, "-m", "lapwing", "run", "hover", "--listen", end.replace("tcp/", "tls/")]
+    result = subprocess.run(
+        [*command, "--keys", tmp_path / "keys", "--log", tmp_path / "a.mcap"],
+        capture_output=True,
+        text=True,
+        timeout=600,
+    )
+    assert result.returncode == 2, result.stderr
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert f"router/certificate.pem: {message}" in result.stderr
+    assert not (tmp_path / "a.mcap").exists()
+
+
 @pytest.mark.long
-def test_a_configuration_serves_wherever_it_is_taken(tmp_path):
+def test_client_configuration_is_independent_of_its_folder(tmp_path):
     make(tmp_path / "keys", ["plant", "viewer"], 1)
     taken = (tmp_path / "keys" / "viewer" / "zenoh.json5").rename(tmp_path / "taken.json5")
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["plant"]).values())

@@ -13,7 +13,7 @@ from tests.golden.cases import CASES
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_the_set_up_of_every_scene_is_read_back_as_it_was_written(name):
+def test_run_configuration_of_each_scene_round_trips(name):
     setup = CASES[name].resolve()
     text = to_json(setup)
     again = from_json(text)
@@ -23,7 +23,7 @@ def test_the_set_up_of_every_scene_is_read_back_as_it_was_written(name):
     assert digest(again) == digest(setup)
 
 
-def test_resolving_a_scene_twice_gives_the_same_and_an_override_another():
+def test_resolution_is_deterministic_and_overrides_change_it():
     def resolved(*overrides):
         return resolve(load("hover", [*overrides]))
 
@@ -34,7 +34,7 @@ def test_resolving_a_scene_twice_gives_the_same_and_an_override_another():
     assert after == 9.5 != before
 
 
-def test_a_set_up_from_its_text_flies_to_the_same_digest():
+def test_set_up_from_its_text_flies_to_same_digest():
     setup = resolve(load("hover", ["run.duration=0.4", "effects.random_wind_force.sigma=1.0"]))
     assert fly(from_json(to_json(setup))).digest == fly(setup).digest
 
@@ -45,11 +45,11 @@ def test_ports_and_their_producers_are_found_by_name():
     assert setup.port("wind") == port
     assert setup.producers == {"wind": "test"}
     assert (setup.interval, setup.duration) == (0.01, 100.0)
-    with pytest.raises(LockStepError, match=r"^no service of this scene gives rain$"):
+    with pytest.raises(LockStepError, match=r"^no service of this scene publishes rain$"):
         setup.port("rain")
 
 
-def test_the_order_of_the_services_follows_their_ports():
+def test_order_of_services_follows_their_ports():
     services = {
         "controller": ServiceConfig(None, (InputPort("wind"),), ()),
         "weather": ServiceConfig(None, (), (Port("wind", 0.0),)),

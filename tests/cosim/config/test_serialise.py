@@ -67,7 +67,7 @@ def types_of(tree):
 
 
 @given(TREES)
-def test_what_is_written_is_read_back(tree):
+def test_tree_round_trips(tree):
     text = to_json(tree)
     again = from_json(text)
     assert to_json(again) == text
@@ -78,12 +78,12 @@ def test_what_is_written_is_read_back(tree):
 
 @given(TREES, TREES)
 def test_trees_differ_where_their_digests_do(a, b):
-    found = first_difference(a, b)
-    assert (found is None) == (digest(a) == digest(b))
+    result = first_difference(a, b)
+    assert (result is None) == (digest(a) == digest(b))
 
 
 @given(st.dictionaries(st.text(), st.integers(), min_size=2))
-def test_the_order_of_keys_does_not_matter(table):
+def test_order_of_keys_does_not_matter(table):
     assert to_json(dict(reversed(table.items()))) == to_json(table)
 
 
@@ -94,7 +94,7 @@ def test_numbers_are_exact(value):
     json.loads(to_json(value), parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
-def test_a_class_is_named_and_found_again():
+def test_class_is_named_and_found_again():
     text = to_json(Gravity(9.81))
     assert text == '{"$":"lapwing.dynamics.effects.gravity:Gravity","acceleration":9.81}'
     assert from_json(text) == Gravity(9.81)
@@ -113,12 +113,12 @@ def test_a_class_is_named_and_found_again():
         ("{", "Expecting"),
     ],
 )
-def test_what_cannot_be_read_is_said(text, said):
+def test_invalid_text_is_rejected_with_message(text, said):
     with pytest.raises(ValueError, match=said):
         from_json(text)
 
 
-def test_what_cannot_be_written_is_said_with_its_place():
+def test_unsupported_value_is_rejected_with_path():
     class Local(NamedTuple):
         x: float
 
@@ -133,7 +133,7 @@ def test_what_cannot_be_written_is_said_with_its_place():
             to_json(tree)
 
 
-def test_the_first_difference_has_its_path():
+def test_first_difference_has_its_path():
     a = {"vehicle": Pair((1.0, [Gravity(9.81)])), "wind": 1}
     b = {"vehicle": Pair((1.0, [Gravity(9.82)])), "wind": 2}
     assert first_difference(a, b) == ("vehicle.left.1.0.acceleration", 9.81, 9.82)
@@ -145,7 +145,7 @@ def test_the_first_difference_has_its_path():
     assert first_difference(math.nan, math.nan) is None
 
 
-def test_it_is_imported_without_what_is_slow():
+def test_import_avoids_slow_modules():
     code = (
         "import lapwing.cosim.config.serialise, sys; print([m for m in ('pydantic', 'scipy', 'numba') if m in "
         "sys.modules])"
@@ -154,7 +154,7 @@ def test_it_is_imported_without_what_is_slow():
     assert result.stdout.strip() == "[]"
 
 
-def test_nothing_is_imported_for_a_text_but_what_is_declared(tmp_path, monkeypatch):
+def test_text_imports_declared_modules_only(tmp_path, monkeypatch):
     (tmp_path / "somebodys.py").write_text("from typing import NamedTuple\nclass Thing(NamedTuple):\n    x: float\n")
     monkeypatch.syspath_prepend(tmp_path)
     text = '{"$":"somebodys:Thing","x":0.5}'

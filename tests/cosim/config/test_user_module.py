@@ -13,15 +13,15 @@ from lapwing.cosim.config.user_module import find, load
 from lapwing.dynamics.config_error import ConfigError
 
 
-def test_a_module_is_found_beside_the_scene_with_what_it_imports_from_there(tmp_path):
+def test_module_and_its_imports_are_found_in_scene_folder(tmp_path):
     (tmp_path / "own_law.py").write_text("import math\nfrom own_helper import two\nimport own_missing\n")
     (tmp_path / "own_helper.py").write_text("import own_law\ntwo = 2\n")
-    found = find("key", "own_law", tmp_path)
-    assert list(found) == ["own_law", "own_helper"]
-    assert found["own_helper"] == tmp_path / "own_helper.py"
+    result = find("key", "own_law", tmp_path)
+    assert list(result) == ["own_law", "own_helper"]
+    assert result["own_helper"] == tmp_path / "own_helper.py"
 
 
-def test_a_module_is_found_on_pythons_path(tmp_path, monkeypatch):
+def test_module_is_found_on_pythons_path(tmp_path, monkeypatch):
     (tmp_path / "own_elsewhere.py").write_text("x = 1")
     monkeypatch.syspath_prepend(tmp_path)
     assert find("key", "own_elsewhere", tmp_path / "scenes") == {"own_elsewhere": tmp_path / "own_elsewhere.py"}
@@ -31,12 +31,12 @@ def test_a_module_is_found_on_pythons_path(tmp_path, monkeypatch):
     ("name", "said"),
     [
         ("own_nowhere", "key: no module own_nowhere; expected"),
-        ("numpy", "another module has this name; expected a name of its own"),
+        ("numpy", "another module has this name; expected a unique name"),
         ("math", "another module has this name"),
         ("a-b", "expected a name that Python can import, got module 'a-b'"),
     ],
 )
-def test_a_module_that_cannot_be_is_refused(tmp_path, name, said):
+def test_invalid_module_is_rejected(tmp_path, name, said):
     for taken in ("numpy", "math"):
         (tmp_path / f"{taken}.py").write_text("")
     with pytest.raises(ConfigError) as caught:
@@ -44,18 +44,18 @@ def test_a_module_that_cannot_be_is_refused(tmp_path, name, said):
     assert said in str(caught.value)
 
 
-def test_the_text_is_what_is_run_with_its_neighbours():
+def test_stored_text_is_executed_with_neighbours():
     texts = {"own_first": "from own_second import value\n", "own_second": "value = 3\n"}
     assert load("own_first", texts).value == 3
     assert load("own_first", texts) is sys.modules["own_first"]
 
 
-def test_another_text_under_the_same_name_is_run_anew():
+def test_another_text_under_same_name_is_run_anew():
     load("own_first", {"own_first": "from own_second import value\n", "own_second": "value = 3\n"})
     assert load("own_first", {"own_first": "from own_second import value\n", "own_second": "value = 4\n"}).value == 4
 
 
-def test_a_damaged_file_of_the_cache_is_mended():
+def test_damaged_file_of_cache_is_mended():
     module = load("own_kept", {"own_kept": "value = 5\n"})
     for damage in (b"value = 6\n", b"\xff"):
         Path(module.__file__).write_bytes(damage)
@@ -64,14 +64,14 @@ def test_a_damaged_file_of_the_cache_is_mended():
 
 
 @pytest.mark.parametrize("kept", [None, Path("/dev/null/none")])
-def test_without_a_cache_there_is_a_folder_of_the_process_which_nobody_else_can_enter(kept, monkeypatch):
+def test_private_folder_replaces_missing_cache(kept, monkeypatch):
     monkeypatch.setattr(user_module, "cache_folder", lambda: kept)
     module = load("own_homeless", {"own_homeless": f"value = 7\nkept = {str(kept)!r}\n"})
     assert module.value == 7
     assert stat.S_IMODE(Path(module.__file__).parents[1].stat().st_mode) == 0o700
 
 
-def test_what_others_could_have_planted_is_not_run(monkeypatch, tmp_path):
+def test_files_writable_by_others_are_not_executed(monkeypatch, tmp_path):
     monkeypatch.setattr(user_module, "cache_folder", lambda: tmp_path)
     text = "value = 8\n"
     file = Path(load("own_planted", {"own_planted": text}).__file__)

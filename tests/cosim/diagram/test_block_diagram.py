@@ -33,7 +33,7 @@ class Acting:
     def bind(self, graph):
         self._graph = graph
 
-    def act(self, tick):
+    def on_tick(self, tick):
         self.ticks.append(tick)
         self._does(self._graph, tick)
         return self._following(tick)
@@ -43,7 +43,7 @@ def readings(**signals):
     return Block("readings", Readings(2.0, **signals), Cell(0), (), (READINGS,))
 
 
-def test_a_python_part_acts_first_at_tick_0_and_then_at_the_ticks_that_it_names():
+def test_python_block_runs_at_requested_ticks():
     seldom, once, always = Acting("a", lambda t: t + 7), Acting("b"), Acting("c", lambda t: t)
     graph = graph_of(seldom, readings(), once, always, page=32)
     graph.advance(3)
@@ -53,7 +53,7 @@ def test_a_python_part_acts_first_at_tick_0_and_then_at_the_ticks_that_it_names(
     assert always.ticks == list(range(30))  # a tick that has been is the next one
 
 
-def test_a_part_that_calls_is_heard_by_the_python_parts_after_it_at_that_tick():
+def test_wake_up_reaches_later_python_blocks_at_same_tick():
     before, after, last = Acting("before"), Acting("after"), Acting("last", lambda t: t + 4)
     graph = graph_of(before, readings(look_every=10), after, last, page=32)
     graph.advance(31)
@@ -62,7 +62,7 @@ def test_a_part_that_calls_is_heard_by_the_python_parts_after_it_at_that_tick():
     assert last.ticks == [0, 4, 8, 10, 14, 18, 20, 24, 28, 30]
 
 
-def test_a_python_part_acts_between_the_parts_before_and_after_it():
+def test_python_block_runs_in_block_order():
     def number(graph, tick):
         graph.put("numbers", tick, Number(graph.latest("readings", tick).number))
 
@@ -73,7 +73,7 @@ def test_a_python_part_acts_between_the_parts_before_and_after_it():
     assert graph.latest("total", 19).value == sum(2.0 * tick for tick in range(20))
 
 
-def test_a_part_that_is_replaced_hands_its_state_on():
+def test_replacement_block_keeps_state():
     total = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("numbers"),), (TOTAL,))
 
     def exchange(graph, tick):
@@ -88,7 +88,7 @@ def test_a_part_that_is_replaced_hands_its_state_on():
     assert graph.part("total").parameters == RunningSum(-1.0)
 
 
-def test_between_two_messages_the_latest_is_the_one_before():
+def test_latest_between_samples_is_previous_sample():
     slow = Port("readings", LIKE, 5)
     graph = graph_of(Block("readings", Readings(2.0), Cell(0), (), (slow,), 5), page=16)
     graph.advance(13)
@@ -96,9 +96,9 @@ def test_between_two_messages_the_latest_is_the_one_before():
     assert graph.latest("readings", 12) == expected(2.0, 10, 3)
 
 
-def test_what_nobody_gives_is_named():
+def test_port_without_producer_is_named():
     part = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("wind"),), (TOTAL,))
-    with pytest.raises(LockStepError, match=r"^no service of this scene gives wind$"):
+    with pytest.raises(LockStepError, match=r"^no service of this scene publishes wind$"):
         graph_of(part)
 
 
@@ -115,21 +115,21 @@ def wire(topic=SETPOINT, period=1):
 
 def messages(pages):
     """{topic name: [(tick, payload)]} in order."""
-    found = {}
+    result = {}
     for page in pages:
-        of_topic = found.setdefault(page.topic.name, [])
+        of_topic = result.setdefault(page.topic.name, [])
         of_topic += [(int(t), p.tobytes()) for t, p in zip(page.ticks, page.payloads, strict=True)]
-    return {name: sorted(of_topic) for name, of_topic in found.items()}
+    return {name: sorted(of_topic) for name, of_topic in result.items()}
 
 
-def test_pages_are_the_same_whatever_their_lengths():
+def test_pages_are_equal_for_any_length():
     def flown(stops):
         graph = graph_of(readings(end=50), wires=[wire(), wire(COMMAND_ACKS, 4)], page=64)
         pages = []
         for stop in stops:
             first = graph.tick
             graph.advance(stop)
-            pages += graph.pages(first, graph.tick)
+            pages += graph.record_batches(first, graph.tick)
         return messages(pages)
 
     whole = flown([64])
@@ -142,24 +142,24 @@ def test_pages_are_the_same_whatever_their_lengths():
         )
 
 
-def test_only_what_is_recorded_is_given_unless_a_topic_is_asked_for():
+def test_unrecorded_topics_need_explicit_request():
     graph = graph_of(readings(), wires=[wire(), wire(TRAJECTORY)], page=16)
     graph.advance(4)
-    assert [page.topic for page in graph.pages(2, 4)] == [SETPOINT]
-    assert {page.topic for page in graph.pages(0, 4, [TRAJECTORY])} == {TRAJECTORY}
+    assert [page.topic for page in graph.record_batches(2, 4)] == [SETPOINT]
+    assert {page.topic for page in graph.record_batches(0, 4, [TRAJECTORY])} == {TRAJECTORY}
 
 
-def test_single_messages_come_once_and_in_the_ticks_asked_for():
+def test_python_messages_are_returned_once_within_ticks():
     def say(graph, tick):
         graph.services[0].messages.append((CLOCK, tick, Clock().encode()))
         graph.services[0].messages.append((COMMAND_ACKS, tick, bytes(8 + tick)))
 
     graph = graph_of(Acting("talker", lambda t: t + 2, (), say), page=16)
     graph.advance(8)
-    assert list(messages(graph.pages(0, 3, keep=True))) == [CLOCK.name, COMMAND_ACKS.name]
-    assert [tick for tick, _ in messages(graph.pages(0, 3))[CLOCK.name]] == [0, 2]
-    assert [(tick, len(p)) for tick, p in messages(graph.pages(3, 8))[COMMAND_ACKS.name]] == [(4, 12), (6, 14)]
-    assert graph.pages(0, 8) == []
+    assert list(messages(graph.record_batches(0, 3, keep=True))) == [CLOCK.name, COMMAND_ACKS.name]
+    assert [tick for tick, _ in messages(graph.record_batches(0, 3))[CLOCK.name]] == [0, 2]
+    assert [(tick, len(p)) for tick, p in messages(graph.record_batches(3, 8))[COMMAND_ACKS.name]] == [(4, 12), (6, 14)]
+    assert graph.record_batches(0, 8) == []
 
 
 class Pair(NamedTuple):

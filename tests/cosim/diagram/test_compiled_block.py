@@ -25,7 +25,7 @@ def echo(port=READINGS, delay=0, name="echo"):
     return Block(name, Echo(1.0), Cell(0), (InputPort(port.name, delay),), (Port(name, Heard(False, LIKE, 0.0)),))
 
 
-def test_trees_of_floats_integers_and_booleans_come_out_as_they_went_in():
+def test_trees_survive_round_trip_through_rows():
     graph = graph_of(readings())
     for tick in range(12):
         graph.advance(tick + 1)
@@ -36,17 +36,17 @@ def test_trees_of_floats_integers_and_booleans_come_out_as_they_went_in():
 
 
 @pytest.mark.parametrize("number", [math.inf, -math.inf, -0.0, 5e-324, 2.0**53, -(2.0**53)])
-def test_a_part_receives_what_was_put(number):
+def test_block_reads_value_that_was_put(number):
     graph = graph_of(echo(), ports=(READINGS,))
-    given = expected(1.5, 7, 3)._replace(number=number, good=True, rest=(2**53, -(2**53)))
-    graph.put("readings", 0, given)
+    values = expected(1.5, 7, 3)._replace(number=number, good=True, rest=(2**53, -(2**53)))
+    graph.put("readings", 0, values)
     graph.advance(1)
     heard = graph.latest("echo", 0)
-    assert heard == Heard(True, given, 1.0)
+    assert heard == Heard(True, values, 1.0)
     assert math.copysign(1.0, heard.value.number) == math.copysign(1.0, number)
 
 
-def test_not_a_number_stays_one():
+def test_nan_is_preserved():
     graph = graph_of(echo(), ports=(READINGS,))
     graph.put("readings", 0, LIKE._replace(number=math.nan))
     graph.advance(1)
@@ -54,7 +54,7 @@ def test_not_a_number_stays_one():
 
 
 @pytest.mark.parametrize("delay", [0, 1, 5, 23])
-def test_a_delayed_message_is_due_its_delay_later_however_short_the_page(delay):
+def test_delayed_message_is_due_after_delay_for_any_page(delay):
     graph = graph_of(readings(), echo(delay=delay), page=2)
     for tick in range(100):
         graph.advance(tick + 1)
@@ -65,7 +65,7 @@ def test_a_delayed_message_is_due_its_delay_later_however_short_the_page(delay):
 
 
 @pytest.mark.parametrize("delay", [0, 1, 7])
-def test_of_a_slower_port_a_message_is_due_at_its_ticks_only(delay):
+def test_of_slower_port_message_is_due_at_its_ticks_only(delay):
     slow = Port("readings", LIKE, 5)
     graph = graph_of(readings(5, slow), echo(slow, delay), page=4)
     for tick in range(60):
@@ -76,18 +76,18 @@ def test_of_a_slower_port_a_message_is_due_at_its_ticks_only(delay):
             assert heard.value == expected(2.0, tick - delay, (tick - delay) // 5 + 1)
 
 
-def test_what_is_kept_is_due_at_every_tick_until_another_is_given():
+def test_latched_port_is_due_at_every_tick():
     kept = Port("kept", LIKE, LATCHED)
     graph = graph_of(echo(kept), ports=(kept,))
     for tick in range(20):
         if tick in (0, 7, 13):
-            given = expected(3.0, tick, 1)
-            graph.put("kept", tick, given)
+            values = expected(3.0, tick, 1)
+            graph.put("kept", tick, values)
         graph.advance(tick + 1)
-        assert graph.latest("echo", tick) == Heard(True, given, 1.0)
+        assert graph.latest("echo", tick) == Heard(True, values, 1.0)
 
 
-def test_a_part_that_steps_more_often_than_its_port_is_due_writes_at_its_ticks_only():
+def test_fast_block_writes_slow_port_at_due_ticks_only():
     port = Port("readings", LIKE, 4)
     graph = graph_of(readings(1, port), page=8)
     graph.advance(8)
@@ -95,7 +95,7 @@ def test_a_part_that_steps_more_often_than_its_port_is_due_writes_at_its_ticks_o
     assert graph.latest("readings", 7) == expected(2.0, 4, 5)
 
 
-def test_the_ring_keeps_the_ticks_of_a_page_whatever_has_gone_before():
+def test_ring_keeps_history_ticks():
     graph = graph_of(readings(), page=8)
     for stop in range(8, 400, 8):
         graph.advance(stop)
@@ -105,7 +105,7 @@ def test_the_ring_keeps_the_ticks_of_a_page_whatever_has_gone_before():
         assert (-rows[:, 2]).tolist() == (ticks + 1.0).tolist()
 
 
-def test_the_last_tick_is_stepped_by_all_and_followed_by_none():
+def test_no_block_steps_after_last_tick():
     graph = graph_of(readings(end=6), echo(), page=16)
     graph.advance(16)
     assert (graph.tick, graph.ended) == (7, True)
@@ -114,17 +114,20 @@ def test_the_last_tick_is_stepped_by_all_and_followed_by_none():
     assert graph.tick == 7
 
 
-def test_a_failure_is_the_parts_own_error_or_names_it():
-    for error, said in ((None, "readings: the state is not sound at tick 4"), (lambda tick: ValueError(tick), "4")):
+def test_failure_is_error_of_block_or_names_block():
+    for error, output in (
+        (None, "readings: non-finite or invalid state at tick 4"),
+        (lambda tick: ValueError(tick), "4"),
+    ):
         part = readings(failure=4)
         part.failure = error
         graph = graph_of(part, page=16)
-        with pytest.raises(LockStepError if error is None else ValueError, match=f"^{said}$"):
+        with pytest.raises(LockStepError if error is None else ValueError, match=f"^{output}$"):
             graph.advance(16)
         assert graph.tick == 4  # the ticks before it can be recorded
 
 
-def test_parts_of_one_kind_have_states_and_parameters_of_their_own():
+def test_equal_blocks_have_separate_states_and_parameters():
     numbers = Port("numbers", Number(0.0))
     parts = [
         Block(f"sum{i}", RunningSum(weight), Cell(0.0), (InputPort("numbers"),), (Port(f"sum{i}", Number(0.0)),))
@@ -138,7 +141,7 @@ def test_parts_of_one_kind_have_states_and_parameters_of_their_own():
     assert [read(part.state) for part in parts] == [15.0, -150.0]
 
 
-def test_parts_that_are_given_one_cell_share_their_state():
+def test_blocks_with_common_cell_share_state():
     numbers, shared = Port("numbers", Number(0.0)), Cell(0.0)
     parts = [
         Block(f"sum{i}", RunningSum(1.0), shared, (InputPort("numbers"),), (Port(f"sum{i}", Number(0.0)),))
@@ -150,7 +153,7 @@ def test_parts_that_are_given_one_cell_share_their_state():
     assert [graph.latest(f"sum{i}", 0).value for i in range(2)] == [3.0, 6.0]
 
 
-def test_a_part_may_be_bound_in_two_graphs():
+def test_part_may_be_bound_in_two_graphs():
     part = readings()
     first, second = graph_of(part), graph_of(part)
     for tick in range(6):

@@ -4,7 +4,7 @@ import pytest
 
 from lapwing.cosim.diagram.block_diagram import NEVER
 from lapwing.cosim.diagram.compiled_block import Block
-from lapwing.cosim.diagram.execution_groups import groups
+from lapwing.cosim.diagram.execution_groups import independent_groups
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.kernels.cell import Cell
@@ -27,28 +27,28 @@ def counters(together, **parameters):
 
 
 def counted(graph, *names):
-    """What each has given at every tick before the graph's."""
+    """Return the outputs of each block at every tick before the diagram's."""
     return [[graph.latest(name, tick) for tick in range(max(0, graph.tick - 8), graph.tick)] for name in names]
 
 
-def test_who_steps_together():
+def test_coupled_blocks_share_execution_group():
     alone = counters(False, a=Counter(3), b=Counter(3))
-    assert groups(alone) == [[0], [1]]
-    assert groups(counters(True, a=Counter(3), b=Counter(3), c=Counter(3))) == [[0, 1, 2]]
+    assert independent_groups(alone) == [[0], [1]]
+    assert independent_groups(counters(True, a=Counter(3), b=Counter(3), c=Counter(3))) == [[0, 1, 2]]
     elsewhere = Block("c", Counter(3), Cell(0), (InputPort("from another process"),), vehicle="a")
-    assert groups([*alone, elsewhere]) == [[0, 1, 2]]
+    assert independent_groups([*alone, elsewhere]) == [[0, 1, 2]]
     fleet, carried = (
         [part for service in create_all(resolve(load(name))) for part in service.parts]
         for name in ("fleet", "carried_load")
     )
-    assert len(groups(fleet)) == 3
-    assert len(groups(carried)) == 1
+    assert len(independent_groups(fleet)) == 3
+    assert len(independent_groups(carried)) == 1
 
 
 @pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
 @pytest.mark.parametrize("last", [(7, 9), (9, 7), (3, 9), (9, 3)])
 @pytest.mark.parametrize("pages", [(100,), (4, 8, 12), range(1, 20)])
-def test_the_run_ends_with_the_last_vehicle_and_all_have_come_as_far(last, pages, together):
+def test_run_ends_with_last_vehicle_at_equal_ticks(last, pages, together):
     graph = graph_of(*counters(together, a=Counter(last[0]), b=Counter(last[1])), page=16)
     for stop in pages:
         graph.advance(stop)
@@ -68,7 +68,7 @@ def test_the_run_ends_with_the_last_vehicle_and_all_have_come_as_far(last, pages
         (Counter(2, 5), Counter(20, 7), Counter(20)),
     ],
 )
-def test_the_first_failure_is_told_and_all_have_come_as_far(a, b, c, together):
+def test_first_failure_is_raised_at_equal_ticks(a, b, c, together):
     graph = graph_of(*counters(together, a=a, b=b, c=c), page=16)
     failing = next(name for name, p in (("a", a), ("b", b), ("c", c)) if p.fails == 5)
     with pytest.raises(DivergedError, match=f"^{failing}: .* at tick 5$"):
@@ -89,21 +89,21 @@ class Speaker:
     def bind(self, graph):
         pass
 
-    def act(self, tick):
+    def on_tick(self, tick):
         self._messages.append((self.vehicle, tick, b""))
         return tick + 3 if tick < 9 else NEVER
 
 
 @pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
-def test_what_is_said_is_in_the_order_of_ticks(together):
+def test_messages_are_in_order_of_ticks(together):
     graph = graph_of(*counters(together, a=Counter(20), b=Counter(20)))
-    said = graph.services[0].messages
-    speakers = [Speaker(name, said) for name in "ab"]
+    output = graph.services[0].messages
+    speakers = [Speaker(name, output) for name in "ab"]
     graph = graph_of(*counters(together, a=Counter(20), b=Counter(20)), *speakers)
-    graph.services[0].messages = said
+    graph.services[0].messages = output
     graph.advance(6)
     graph.advance(12)
-    assert said == [(name, tick, b"") for tick in (0, 3, 6, 9) for name in "ab"]
+    assert output == [(name, tick, b"") for tick in (0, 3, 6, 9) for name in "ab"]
 
 
 class Clock:
@@ -117,13 +117,13 @@ class Clock:
     def bind(self, graph):
         self._graph = graph
 
-    def act(self, tick):
+    def on_tick(self, tick):
         if tick == self._last:
             self._graph.finish()
         return tick + 1
 
 
-def test_a_part_in_python_that_owns_time_ends_the_run():
+def test_python_clock_owner_ends_run():
     graph = graph_of(Clock(3), Block("a", Counter(20), Cell(0), (), (Port("a", 0),)), page=16)
     graph.advance(100)
     assert (graph.ended, graph.tick) == (True, 4)

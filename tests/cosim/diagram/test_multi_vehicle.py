@@ -55,7 +55,7 @@ def flown(setup):
 
 
 @pytest.mark.parametrize("vehicle", ["left", "right", "scout"])
-def test_a_vehicle_says_in_a_fleet_what_it_says_alone(vehicle, setup, flown):
+def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
     alone = fly(member(setup, vehicle))
     own = {name: topic for name, topic in alone.topics.items() if topic not in (CLOCK, TF)}
     assert {name for name in flown.topics if name.startswith(f"{vehicle}/")} == {f"{vehicle}/{name}" for name in own}
@@ -66,26 +66,26 @@ def test_a_vehicle_says_in_a_fleet_what_it_says_alone(vehicle, setup, flown):
     assert [payload for _, payload in alone.payloads("tf")] == transforms[setup.vehicles.index(vehicle) :: 3]
 
 
-def test_random_numbers_go_by_the_vehicle(flown):
+def test_random_numbers_go_by_vehicle(flown):
     """Two of one type under the same law: what differs beside their place is the wind, drawn for each."""
     left, right = (flown.view(f"{name}/ground_truth").wind for name in ("left", "right"))
     assert (left != right).any()
 
 
-def test_a_vehicle_stands_where_it_starts_and_its_path_begins_there(flown):
+def test_vehicle_and_path_start_at_initial_position(flown):
     for name, (x, y) in {"left": (0.0, 3.0), "right": (0.0, -3.0), "scout": (-3.0, 0.0)}.items():
         assert flown.view(f"{name}/ground_truth").position[0, :2] == pytest.approx((x, y))
         assert flown.view(f"{name}/setpoint").position[0, :2] == pytest.approx((x, y))
     assert flown.view("scout/estimate").position[0, :2] == pytest.approx((-3.0, 0.0), abs=0.1)
 
 
-def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
+def test_diagram_per_service_gives_equal_results(setup, flown):
     apart = fly_apart(setup, None)
     assert apart.topics.keys() == flown.topics.keys()
     assert apart.digest == flown.digest
 
 
-def test_more_vehicles_of_a_type_compile_nothing_more(tmp_path):
+def test_second_vehicle_of_type_compiles_no_kernel(tmp_path):
     two, three = (resolve(fleet_of(n, tmp_path)) for n in (2, 3))
     BlockDiagram(two, create_all(two), PAGE).advance(1)
     compiled = []
@@ -105,31 +105,31 @@ class Asked:
     def bind(self, graph):
         pass
 
-    def act(self, tick):
+    def on_tick(self, tick):
         self.ticks.append(tick)
         return NEVER
 
 
-def test_a_vehicle_calls_its_own_python_and_the_run_ends_with_the_last_vehicle():
-    asked = Asked("a"), Asked("b")
+def test_python_blocks_are_per_vehicle_and_last_one_ends_run():
+    requested = Asked("a"), Asked("b")
     signals = {"a": Signals(5, 7), "b": Signals(2, 9)}
     compiled = [Block(name, p, Cell(0.0), vehicle=name) for name, p in signals.items()]
-    graph = graph_of(*compiled, *asked)
+    graph = graph_of(*compiled, *requested)
     graph.advance(100)
     assert (graph.ended, graph.tick) == (True, 10)
-    assert [part.ticks for part in asked] == [[0, 5], [0, 2]]
+    assert [part.ticks for part in requested] == [[0, 5], [0, 2]]
 
 
-def test_a_set_up_is_that_of_its_vehicles_and_survives_text_and_another_seed(setup):
+def test_fleet_config_survives_text_and_another_seed(setup):
     scene = load("fleet", SHORT)
-    for vehicle, found in zip(scene.vehicles, members(setup), strict=True):
-        assert first_difference(found, resolve(vehicle)) is None
+    for vehicle, result in zip(scene.vehicles, members(setup), strict=True):
+        assert first_difference(result, resolve(vehicle)) is None
     assert first_difference(from_json(to_json(setup)), setup) is None
     assert first_difference(resolve(from_resolved(setup.resolved, "fleet")), setup) is None
     assert first_difference(reseed(setup, 7), resolve(load("fleet", [*SHORT, "run.seed=7"]))) is None
 
 
-def test_a_state_that_is_not_sound_is_told_with_its_vehicle(setup):
+def test_invalid_state_error_names_vehicle(setup):
     part = Block("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
     joined = joined_service("plant", [(member(setup, "right"), Service("plant", [part], []))])
     error = joined.parts[0].failure(3)
@@ -139,10 +139,10 @@ def test_a_state_that_is_not_sound_is_told_with_its_vehicle(setup):
 def test_names_and_systems_are_numbered(tmp_path):
     scene = fleet_of(3, tmp_path)
     assert [vehicle.lookup("vehicle.name") for vehicle in scene.vehicles] == ["drone1", "drone2", "drone3"]
-    assert [vehicle.lookup("mavlink.system") for vehicle in scene.vehicles] == [1, 2, 3]
+    assert [vehicle.lookup("mavlink.system_id") for vehicle in scene.vehicles] == [1, 2, 3]
 
 
-def test_topics_of_a_vehicle_of_a_fleet():
+def test_topics_of_vehicle_of_fleet():
     assert of_vehicle(IMU, "left") is topic_named("left/imu")
     assert (topic_named("left/imu").key(), of_vehicle(TF, "left")) == ("/left/imu", TF)
     assert topic_named("left/custom_sensor/x") is of_vehicle(custom_sensor("x"), "left")
@@ -161,7 +161,7 @@ WRONG = {
     "vehicle.name=x": "--set vehicle.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
     "vehicle.1.run.seed=3": "--set vehicle.1.run.seed: all vehicles share it; expected a table [run] of the scene",
     "vehicle.1.name=left": "--set vehicle.1.name: left is also that of vehicle.0; expected another",
-    "vehicle.1.mavlink.system=1": "--set vehicle.1.mavlink.system: 1 is also that of vehicle.0; expected another",
+    "vehicle.1.mavlink.system_id=1": "--set vehicle.1.mavlink.system_id: 1 is also that of vehicle.0; expected another",
     "vehicle.2.autopilot.gains=x": "--set vehicle.2.autopilot.gains: unknown gain set 'x'",
     "vehicle.0.nam=3": "--set vehicle.0.nam: unknown key 'nam'; did you mean name?",
     "vehicle.0.airframe.mass.total=-3": "--set vehicle.0.airframe.mass.total: expected a number above 0 [kg], got -3",
@@ -170,7 +170,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("override", WRONG)
-def test_a_fault_names_the_vehicle_and_the_key(override):
+def test_fault_names_vehicle_and_key(override):
     with pytest.raises(SceneError, match=f"^{re.escape(WRONG[override])}"):
         load("fleet", [override])
 
@@ -184,12 +184,12 @@ def test_a_fault_names_the_vehicle_and_the_key(override):
         ("[[vehicle]]\n" * 50, "vehicle: 51 vehicles; expected 1 to 50"),
     ],
 )
-def test_a_fault_is_told_with_its_line(entry, said, tmp_path):
+def test_fault_names_line(entry, said, tmp_path):
     with pytest.raises(SceneError) as error:
         parse(tmp_path / "many.toml", COMMON + '[[vehicle]]\nairframe = "delivery_drone"\n' + entry)
     assert said in str(error.value)
 
 
-def test_what_is_for_one_vehicle_only_says_so():
+def test_function_for_single_vehicle_rejects_fleet():
     with pytest.raises(SceneError, match=r"vehicle: there are 3; expected a scene of one vehicle"):
         load("fleet").tables("effects")

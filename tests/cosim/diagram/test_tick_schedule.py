@@ -20,12 +20,12 @@ def stamps(period, stop):
 
 
 @given(st.integers(0, 5000), st.integers(0, 60), st.integers(0, 60))
-def test_a_message_is_due_its_delay_after_its_stamp(tick, period, delay):
+def test_message_is_due_its_delay_after_its_stamp(tick, period, delay):
     expected = tick - delay if tick - delay in stamps(period, tick + 1) else -1
     assert due.py_func(tick, period, delay) == expected
 
 
-def test_compiled_and_in_python_it_is_the_same():
+def test_compiled_and_python_rule_agree():
     random = np.random.default_rng(3)
     for tick, period, delay in random.integers(0, 200, (500, 3)).tolist():
         for p in (period, LATCHED, 1):
@@ -57,36 +57,36 @@ def order(needs, gives):
 GIVES = {"plant": ["truth"], "sensors": ["imu"], "autopilot": ["actuators"]}
 
 
-def test_everybody_comes_after_those_whose_undelayed_messages_it_needs():
+def test_service_steps_after_producers_of_undelayed_inputs():
     loop = {"autopilot": [("imu",)], "sensors": [("truth",)], "plant": [("actuators", 1)]}
     assert order(loop, GIVES) == ["plant", "sensors", "autopilot"]
     beside = loop | {"formation": [("truth",)]}
     assert order(beside, GIVES | {"formation": []}) == ["plant", "formation", "sensors", "autopilot"]
 
 
-def test_the_order_does_not_depend_on_who_is_named_first():
+def test_execution_order_is_independent_of_naming_order():
     loop = {"autopilot": [("imu",)], "sensors": [("truth",)], "plant": [("actuators", 1)]}
     assert order(dict(reversed(loop.items())), dict(reversed(GIVES.items()))) == order(loop, GIVES)
 
 
-def test_what_a_service_gives_itself_holds_nobody_up():
+def test_own_port_as_input_is_no_loop():
     assert order({"plant": [("truth",)]}, {"plant": ["truth"]}) == ["plant"]
 
 
-def test_a_loop_without_delay_names_those_in_it():
+def test_algebraic_loop_is_named():
     loop = {"autopilot": [("imu",)], "sensors": [("truth",)], "plant": [("actuators",)], "clock": []}
     with pytest.raises(LockStepError, match=r"^a loop without delay: autopilot, plant, sensors$"):
         order(loop, GIVES | {"clock": ["time"]})
 
 
-def test_an_input_that_nobody_gives_is_named_with_who_needs_it():
-    with pytest.raises(LockStepError, match=r"^sensors needs wind, which no service of this scene gives$"):
+def test_input_without_producer_is_named_with_consumer():
+    with pytest.raises(LockStepError, match=r"^sensors needs wind, which no service of this scene publishes$"):
         order({"sensors": [("wind", 1)]}, {"sensors": ["imu"]})
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("coupling", ["gauss_seidel", "jacobi"])
-def test_every_scene_has_an_order(path, coupling):
+def test_every_scene_has_order(path, coupling):
     setup = resolve(load(path, [f"communication.coupling={coupling}"]))
     assert sorted(setup.order) == sorted(setup.services)
     place = {name: i for i, name in enumerate(setup.order)}

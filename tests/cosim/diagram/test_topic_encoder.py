@@ -55,21 +55,24 @@ def random_value(like, random):
 
 
 def known(setup, services):
-    """What messages say besides values, as the set-up has it."""
-    given = {name: service.parameters for name, service in setup.services.items()}
+    """Return the constant contents of messages from the run configuration."""
+    values = {name: service.parameters for name, service in setup.services.items()}
     commander = next((p for s in services for p in s.parts if p.name == "autopilot.commander"), None)
-    phases, words = given["trajectory"].phases if "trajectory" in given else (), WORDS
+    phases, words = values["trajectory"].phases if "trajectory" in values else (), WORDS
     if commander is not None:
         for words in WORDS:
-            commander.words.number(words)
+            commander.status_texts.number(words)
         for text in ("up", "along", "down"):
             commander.phases.number(text)
-        phases, words = commander.phases.table, commander.words.table
-    wiring = given["plant"].wiring
-    sensors = [instrument.sensor for instrument in given["sensors"].instruments] if "sensors" in given else []
+        phases, words = commander.phases.table, commander.status_texts.table
+    if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # of a foreign firmware
+        link.words.table += WORDS
+        phases, words = phases or ("",), link.words.table
+    wiring = values["plant"].wiring
+    sensors = [instrument.sensor for instrument in values["sensors"].instruments] if "sensors" in values else []
     return SimpleNamespace(
         vehicle=setup.vehicle, cells=wiring.cells, capacity=wiring.capacity, bodies=wiring.bodies,
-        sonar=given["sensors"].sonar if "sensors" in given else None, phases=phases, words=words,
+        sonar=values["sensors"].sonar if "sensors" in values else None, phases=phases, words=words,
         rangefinder=next((sensor for sensor in sensors if isinstance(sensor, Rangefinder)), None),
     )  # fmt: skip
 
@@ -82,39 +85,41 @@ def fitting(value, texts, random):
 
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
-def test_every_topic_of_a_scene_is_its_values_one_by_one(path):
+def test_columnar_encoding_equals_scalar_encoding(path):
     for setup in members(resolve(load(path))):
         check_every_topic(setup, np.random.default_rng(5))
 
 
 def check_every_topic(setup, random):
     services = create_all(setup)
-    given = known(setup, services)
+    inputs = known(setup, services)
     for wire in (wire for service in services for wire in service.wires):
         ticks = due_ticks(FIRST, FIRST + COUNT * wire.period, wire.period)
         port = setup.port(wire.port)
         trajectory = setup.services.get("trajectory")
-        texts = trajectory.parameters.phases if wire.port == "trajectory" else given.phases
+        texts = trajectory.parameters.phases if wire.port == "trajectory" else inputs.phases
         values = [fitting(random_value(port.like, random), texts, random) for _ in ticks]
         rows = np.array([pack_row(value) for value in values])
         pages = list(encode(wire, port, setup, ticks, rows))
-        found = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
-        assert sum(len(page.ticks) for page in pages) == len(found) == len(ticks)
+        result = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
+        assert sum(len(page.ticks) for page in pages) == len(result) == len(ticks)
         for tick, value in zip(ticks, values, strict=True):
             assert row_unpacker(port.like)(pack_row(value)) == value
-            expected = BUILDERS[wire.topic](given, int(tick) * setup.interval_ns, value)
-            assert found[tick] == expected.encode(), wire.topic.name
+            expected = BUILDERS[wire.topic](inputs, int(tick) * setup.interval_ns, value)
+            assert result[tick] == expected.encode(), wire.topic.name
 
 
-def test_forces_on_feet_are_their_values_one_by_one():
+def test_contact_forces_equal_scalar_encoding():
     check_every_topic(resolve(load("hover", ["rates.contact_forces=50"])), np.random.default_rng(5))
 
 
-def test_the_scenes_that_ship_and_one_that_is_asked_for_more_speak_on_every_topic():
-    asked = load(
+def test_scenes_cover_all_topics():
+    requested = load(
         "bridge", ["autopilot.accept_commands=true", "rates.contact_forces=50"]
     )  # tells what it got of the airspeed, too
-    scenes = [*map(load, SCENES), asked]
+    clouds = load("bridge", ["sensors.lidar.preset=vlp16", "sensors.depth_camera.preset=ideal"])
+    rings = load("bridge", ["sensors.lidar.preset=rplidar_a2"])
+    scenes = [*map(load, SCENES), requested, clouds, rings]
     spoken = {of_all(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics}
     assert spoken == set(TOPICS) - {WALL_TIME, EVENTS}
 
@@ -126,7 +131,7 @@ class Named(NamedTuple):
     text: int
 
 
-def test_a_page_falls_into_parts_of_the_same_texts_each_in_order():
+def test_page_falls_into_parts_of_same_texts_each_in_order():
     texts = ["climb", "on the way", "climb again"]
     setup = SimpleNamespace(interval_ns=4_000_000)
     wire = TopicEncoder(
@@ -137,15 +142,15 @@ def test_a_page_falls_into_parts_of_the_same_texts_each_in_order():
     )  # fmt: skip
     rows = np.array([(0.5, 1), (1.5, 0), (2.5, 1), (3.5, 2), (4.5, 0)])
     pages = list(encode(wire, Port("it", Named(0.0, 0)), setup, np.arange(7, 12), rows))
-    found = [
+    result = [
         (int(tick), Setpoint.decode(payload.tobytes()))
         for page in pages
         for tick, payload in zip(page.ticks, page.payloads, strict=True)
     ]
-    assert [(tick, m.phase, m.yaw) for tick, m in found] == [
+    assert [(tick, m.phase, m.yaw) for tick, m in result] == [
         (8, "climb", 1.5), (11, "climb", 4.5), (7, "on the way", 0.5), (9, "on the way", 2.5), (10, "climb again", 3.5)
     ]  # fmt: skip
-    assert all(m.header == header(4_000_000 * tick, "world") for tick, m in found)
+    assert all(m.header == header(4_000_000 * tick, "world") for tick, m in result)
 
 
 @pytest.mark.parametrize(
@@ -159,5 +164,5 @@ def test_a_page_falls_into_parts_of_the_same_texts_each_in_order():
         (3, 3, 1, []),
     ],
 )
-def test_ticks_at_which_a_message_is_due(first, stop, period, ticks):
+def test_ticks_at_which_message_is_due(first, stop, period, ticks):
     assert due_ticks(first, stop, period).tolist() == ticks

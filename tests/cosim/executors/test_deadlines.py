@@ -1,4 +1,4 @@
-"""What is late is counted, by service; a run in real time has it in its log and its report."""
+"""Missed deadlines are counted by service, in the log and report of a real-time run."""
 
 import subprocess
 import sys
@@ -13,11 +13,11 @@ from lapwing.studies.report.flight_header import facts
 pytestmark = pytest.mark.long
 
 
-def test_ticks_that_are_late_are_counted_and_the_worst_is_kept():
+def test_ticks_that_are_late_are_counted_and_worst_is_kept():
     deadlines = Deadlines()
     for late in (-1e-3, 2e-3, 0.0, 5e-3, 1e-3):
         deadlines.note(late)
-    assert lateness(deadlines.told()) == Lateness(3, 5e-3)
+    assert lateness(deadlines.to_text()) == Lateness(3, 5e-3)
     assert entries({"plant": Lateness(3, 5e-3), "autopilot": Lateness(0, 0.0)}) == {
         MISSED: "autopilot 0, plant 3",
         WORST: "autopilot 0.00 ms, plant 5.00 ms",
@@ -26,13 +26,13 @@ def test_ticks_that_are_late_are_counted_and_the_worst_is_kept():
 
 
 @pytest.mark.parametrize("told", ["", "1", "[1]", "[1, 2, 3]", '["a", 1]', "null"])
-def test_what_is_no_lateness_is_refused(told):
+def test_invalid_lateness_is_rejected(told):
     with pytest.raises(ValueError):
         lateness(told)
 
 
 @pytest.mark.parametrize(("more", "paced"), [(("--realtime",), True), ((), False)], ids=["real time", "full speed"])
-def test_a_log_says_how_late_who_was_where_a_speed_was_kept(tmp_path, more, paced):
+def test_log_has_lateness_of_paced_run(tmp_path, more, paced):
     log = tmp_path / "log.mcap"
     command = ["run", "gyrostat_blocked", "--set", "run.duration=1.0", *more, "--log", log]
     done = subprocess.run([sys.executable, "-m", "lapwing", *command], capture_output=True, text=True, check=False)

@@ -1,4 +1,4 @@
-"""How the scheduler is asked to treat the processes of a lock step."""
+"""Scheduler settings of lock-step processes."""
 
 import os
 import subprocess
@@ -18,13 +18,13 @@ print(*{os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="no such class")
-def test_all_threads_of_an_ordinary_process_are_batch_work():
-    told = subprocess.run([sys.executable, "-c", TOLD], capture_output=True, text=True, check=True).stdout
-    assert told.split() == [str(os.SCHED_BATCH)]
+def test_all_threads_of_ordinary_process_are_batch_work():
+    reported = subprocess.run([sys.executable, "-c", TOLD], capture_output=True, text=True, check=True).stdout
+    assert reported.split() == [str(os.SCHED_BATCH)]
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="no such class")
-def test_what_somebody_has_set_is_left(monkeypatch):
+def test_scheduling_class_of_user_is_kept(monkeypatch):
     monkeypatch.setattr(os, "sched_getscheduler", lambda process: os.SCHED_IDLE)
     monkeypatch.setattr(os, "sched_setscheduler", lambda *_: pytest.fail("it was changed"))
     batch()

@@ -47,42 +47,42 @@ class Process:
         self.bus, self.waits = Bus(), []
         self.setup = SimpleNamespace(vehicles=["drone"] * vehicles)
 
-    def patient(self, get, waiting_for):
+    def wait_with_status(self, get, waiting_for):
         self.waits.append(waiting_for())
         return 0, struct.pack("<q?", 3000 * len(self.waits), True)
 
 
-def test_a_run_is_held_until_its_log_has_come_nearer():
+def test_run_waits_while_log_is_behind():
     process = Process()
     held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
     for tick in range(0, 10 * AHEAD, LOOK):  # nobody records
-        held.hold(tick)
+        held.wait_for_log(tick)
     assert process.waits == []
     teller.recorded(0)
-    held.hold(AHEAD - LOOK)
+    held.wait_for_log(AHEAD - LOOK)
     assert process.waits == []
-    held.hold(AHEAD)
+    held.wait_for_log(AHEAD)
     assert process.waits == ["the log, recorded up to tick 0"]
-    held.hold(AHEAD + 6144)
+    held.wait_for_log(AHEAD + 6144)
     assert process.waits[1:] == ["the log, recorded up to tick 3000", "the log, recorded up to tick 6000"]
 
 
 @pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
-def test_the_more_vehicles_a_run_has_the_fewer_ticks_wait_for_its_log(vehicles, ahead):
+def test_more_vehicles_run_has_fewer_ticks_wait_for_its_log(vehicles, ahead):
     process = Process(vehicles)
     held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
     teller.recorded(0)
-    held.hold(ahead - LOOK)
+    held.wait_for_log(ahead - LOOK)
     assert process.waits == []
-    held.hold(ahead)
+    held.wait_for_log(ahead)
     assert process.waits
 
 
-def test_who_waits_has_been_handed_all_that_the_log_needs_to_come_nearer():
+def test_waiting_run_has_published_all_needed_log_packets():
     assert LEAST >= PAGE + LOOK + SHORTEST  # a batch that is not yet handed over, and a chunk that is not yet full
 
 
-def test_progress_says_whether_the_disk_is_waited_for():
+def test_progress_reports_waiting_for_disk():
     bus = Bus()
     teller = LogProgressPublisher(bus, "test", "recorder")
     teller.recorded(7)
@@ -91,10 +91,10 @@ def test_progress_says_whether_the_disk_is_waited_for():
     assert log_backpressure._PROGRESS.unpack(bus.said[1])[0] == 7
 
 
-def test_a_writer_whose_disk_is_slow_says_so_and_keeps_one_chunk_at_most(tmp_path, monkeypatch):
+def test_slow_disk_is_reported_and_one_chunk_is_buffered(tmp_path, monkeypatch):
     monkeypatch.setattr("lapwing.cosim.log.log_writer.FLUSH_PERIOD", 0.01)
-    go_on, told = threading.Event(), threading.Event()
-    with LogWriter(tmp_path / "log", {}, {}, told.set) as writer:
+    go_on, reported = threading.Event(), threading.Event()
+    with LogWriter(tmp_path / "log", {}, {}, reported.set) as writer:
         write = writer._container.add_chunk
         monkeypatch.setattr(writer._container, "add_chunk", lambda *given: (go_on.wait(), write(*given)))
 
@@ -105,7 +105,7 @@ def test_a_writer_whose_disk_is_slow_says_so_and_keeps_one_chunk_at_most(tmp_pat
         say(0)
         waiting = threading.Thread(target=say, args=(1,))
         waiting.start()
-        assert told.wait(30.0)
+        assert reported.wait(30.0)
         assert waiting.is_alive()  # the second chunk waits for the first
         go_on.set()
         waiting.join(30.0)

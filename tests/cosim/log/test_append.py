@@ -23,7 +23,7 @@ def log(tmp_path):
     return path
 
 
-def test_what_is_added_stands_in_order_of_time_in_every_reader(log):
+def test_added_topic_is_in_time_order_in_all_readers(log):
     with LogReader(log) as before:
         digest = before.digest()
     append(log, "/drone1/events", Log, EVENTS)
@@ -43,11 +43,11 @@ def test_what_is_added_stands_in_order_of_time_in_every_reader(log):
         assert (statistics.message_count, statistics.message_end_time, statistics.channel_count) == (104, 99, 2)
     with AnyReader([log]) as reader:
         connections = [c for c in reader.connections if c.topic == "/drone1/events"]
-        found = [(t, reader.deserialize(raw, c.msgtype).msg) for c, t, raw in reader.messages(connections)]
-        assert found == [(k, f"event {k}") for k, _ in EVENTS]
+        result = [(t, reader.deserialize(raw, c.msgtype).msg) for c, t, raw in reader.messages(connections)]
+        assert result == [(k, f"event {k}") for k, _ in EVENTS]
 
 
-def test_a_log_that_cannot_be_written_stays_as_it_was(log, monkeypatch):
+def test_failed_append_leaves_log_unchanged(log, monkeypatch):
     whole, calls = log.read_bytes(), []
 
     def full(container, data):
@@ -63,7 +63,7 @@ def test_a_log_that_cannot_be_written_stays_as_it_was(log, monkeypatch):
     assert log.read_bytes() == whole
 
 
-def test_a_log_without_an_end_or_with_the_topic_is_refused(log):
+def test_log_without_end_or_with_topic_is_refused(log):
     with pytest.raises(ValueError, match="has a topic /clock already"):
         append(log, "/clock", Clock, [(1, Clock().encode())])
     log.write_bytes(log.read_bytes()[:-20])

@@ -27,7 +27,7 @@ def write(path, pages):
     return path
 
 
-def test_many_chunks_have_the_index_of_few(tmp_path, monkeypatch):
+def test_many_chunks_have_index_of_few(tmp_path, monkeypatch):
     few = write(tmp_path / "few.mcap", 50)
     monkeypatch.setattr(chunk_indexes, "IN_MEMORY", 100)
     assert write(tmp_path / "many.mcap", 50).read_bytes() == few.read_bytes()
@@ -39,7 +39,7 @@ def test_many_chunks_have_the_index_of_few(tmp_path, monkeypatch):
     assert (summary.statistics.message_start_time, summary.statistics.message_end_time) == (0, 199 * TICK)
 
 
-def test_memory_does_not_grow_with_the_chunks(tmp_path, monkeypatch):
+def test_memory_does_not_grow_with_chunks(tmp_path, monkeypatch):
     monkeypatch.setattr(chunk_indexes, "IN_MEMORY", 1000)
     tracemalloc.start()
     try:
@@ -55,7 +55,7 @@ def test_memory_does_not_grow_with_the_chunks(tmp_path, monkeypatch):
     assert taken[1] - taken[0] < 10_000  # [bytes] for 300 chunks
 
 
-def test_what_cannot_be_kept_does_not_count(tmp_path, monkeypatch):
+def test_index_that_cannot_be_written_is_not_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(chunk_indexes, "IN_MEMORY", 4)
     indexes = ChunkIndexes(tmp_path / "missing")
     indexes.add(b"abc", 5, 7)

@@ -35,8 +35,8 @@ def record(path, stops, shuffle=False):
     with LogWriter(path, {"seed": "1"}, {"scene.toml": b"a = 1\n"}) as writer:
         recording = Recording(writer, SETUP)
         for first, stop in zip([0, *stops], stops, strict=False):
-            found = [page for page in pages(first, stop) if len(page.ticks)]
-            recording.write(reversed(found) if shuffle else found, stop - 1)
+            result = [page for page in pages(first, stop) if len(page.ticks)]
+            recording.write(reversed(result) if shuffle else result, stop - 1)
         recording.finish()
     return path.read_bytes()
 
@@ -48,7 +48,7 @@ def stopped_clock(monkeypatch):
 
 
 @pytest.mark.usefixtures("stopped_clock")
-def test_the_file_is_the_same_whenever_pages_come(tmp_path):
+def test_file_is_same_whenever_pages_come(tmp_path):
     whole = record(tmp_path / "a", [1000, 2000, TICKS])
     rng = random.Random(1)
     for k in range(3):
@@ -56,7 +56,7 @@ def test_the_file_is_the_same_whenever_pages_come(tmp_path):
         assert record(tmp_path / "b", stops, shuffle=bool(k % 2)) == whole
 
 
-def test_two_files_differ_in_the_wall_time_only(tmp_path, monkeypatch):
+def test_two_files_differ_in_wall_time_only(tmp_path, monkeypatch):
     """Also where what has come is brought into the file, again and again, before a chunk is complete."""
     one = record(tmp_path / "a", [1000, 2000, TICKS])
     monkeypatch.setattr("lapwing.cosim.log.log_sequencer.FLUSH_PERIOD", -1.0)
@@ -74,7 +74,7 @@ def test_two_files_differ_in_the_wall_time_only(tmp_path, monkeypatch):
     assert all(any(first <= place < stop for first, stop in wall) for place in differing.tolist())
 
 
-def test_what_has_come_is_in_the_file_before_its_chunk_is_complete(tmp_path, monkeypatch):
+def test_incomplete_chunk_is_in_file(tmp_path, monkeypatch):
     now = [0.0]
     monkeypatch.setattr("lapwing.cosim.log.log_sequencer.time.monotonic", lambda: now[0])
     path = tmp_path / "log"
@@ -96,15 +96,15 @@ def test_what_has_come_is_in_the_file_before_its_chunk_is_complete(tmp_path, mon
     writer.close()
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
-        found = [(m.log_time // TICK, m.sequence) for _, c, m in reader.iter_messages() if c.topic == "/drone1/imu"]
-        assert found == [(k, k) for k in range(CHUNK + 60)]
+        result = [(m.log_time // TICK, m.sequence) for _, c, m in reader.iter_messages() if c.topic == "/drone1/imu"]
+        assert result == [(k, k) for k in range(CHUNK + 60)]
         assert reader.get_summary().statistics.chunk_count == 2 + 3  # of pages, and of the wall time
     with LogReader(path) as log:
         assert log.complete
         assert log.digest() == log.metadata["digest"]
 
 
-def test_a_beginning_that_takes_long_is_written_seldom(tmp_path, monkeypatch):
+def test_slow_provisional_chunk_is_written_rarely(tmp_path, monkeypatch):
     """Else a recorder that has fallen behind writes the same chunk again and again, and never catches up."""
     now, tails = [0.0], []
     monkeypatch.setattr("lapwing.cosim.log.log_sequencer.time.monotonic", lambda: now[0])

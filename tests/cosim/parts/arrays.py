@@ -22,7 +22,7 @@ class Last(NamedTuple):
 
 
 class Sum(NamedTuple):
-    """What it gives."""
+    """Output of the block."""
 
     number: float
 

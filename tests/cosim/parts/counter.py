@@ -7,7 +7,7 @@ from lapwing.kernels import always_inline
 
 
 class Counter(NamedTuple):
-    """When it signals what."""
+    """Parameters: ticks and their statuses."""
 
     last: int  # tick
     fails: int = 10_000  # tick

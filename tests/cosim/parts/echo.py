@@ -13,7 +13,7 @@ class Echo(NamedTuple):
 
 
 class Heard(NamedTuple):
-    """What was received at a tick."""
+    """Samples received at a tick."""
 
     due: bool
     value: Any

@@ -28,7 +28,7 @@ LIKE = Reading(0.0, False, 0, (Place((0.0,) * 3, False),) * 2, (0, 0))
 
 
 class Readings(NamedTuple):
-    """What is given, and when something is said besides."""
+    """Parameters: outputs and statuses."""
 
     factor: float
     look_every: int = 0  # ticks; 0: never
@@ -37,7 +37,7 @@ class Readings(NamedTuple):
 
 
 def expected(factor, tick, count):
-    """What the `count`th step at `tick` gives."""
+    """Return the output of the `count`th step at `tick`."""
     t = float(tick)
     near, far = Place((factor * t, -t, 0.5), tick % 2 == 0), Place((0.25, t * t, 1e-300), tick % 3 == 0)
     return Reading(factor * t, tick % 5 == 0, -count, (near, far), (count, 3 - tick))
@@ -48,10 +48,10 @@ def step(p, s, tick, inputs):
     """Count, and give what comes of the tick and the count."""
     n, t = s + 1, float(tick)
     near, far = Place((p.factor * t, -t, 0.5), tick % 2 == 0), Place((0.25, t * t, 1e-300), tick % 3 == 0)
-    given = Reading(p.factor * t, tick % 5 == 0, -n, (near, far), (n, 3 - tick))
+    values = Reading(p.factor * t, tick % 5 == 0, -n, (near, far), (n, 3 - tick))
     signal = WAKE_PYTHON if p.look_every > 0 and tick % p.look_every == 0 else CONTINUE
     if tick == p.end:
         signal = FINISHED
     if tick == p.failure:
         signal = NON_FINITE
-    return n, (given,), signal
+    return n, (values,), signal

@@ -7,7 +7,7 @@ from lapwing.kernels import always_inline
 
 
 class Signals(NamedTuple):
-    """When it signals what."""
+    """Parameters: ticks and their statuses."""
 
     look: int  # tick
     last: int  # tick

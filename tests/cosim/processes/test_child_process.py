@@ -14,7 +14,7 @@ from lapwing.cosim.processes.child_process import started_early
 from lapwing.cosim.processes.forked_process import Forked
 
 
-def test_one_that_nobody_needs_ends_with_the_context_and_one_that_is_taken_goes_on():
+def test_unused_early_child_is_terminated():
     with started_early(["mavlink", "recorder"]) as early:
         taken, left = early.pop("mavlink"), early["recorder"]
         assert taken.process.poll() is None
@@ -33,15 +33,15 @@ def test_one_that_nobody_needs_ends_with_the_context_and_one_that_is_taken_goes_
 
 
 def code_of(run):
-    with tempfile.TemporaryFile() as said:
-        child = Forked(run, said)
+    with tempfile.TemporaryFile() as output:
+        child = Forked(run, output)
         code = child.wait(60.0)
         child.stdin.close()
-        said.seek(0)
-        return code, said.read().decode()
+        output.seek(0)
+        return code, output.read().decode()
 
 
-def test_a_fork_ends_as_a_program_of_its_own_would():
+def test_fork_exits_like_separate_program():
     def leave(value):
         raise SystemExit(value)
 
@@ -55,22 +55,22 @@ def test_a_fork_ends_as_a_program_of_its_own_would():
     assert code_of(lambda: None) == (0, "")
     assert code_of(lambda: leave(2)) == (2, "")
     assert code_of(lambda: leave(None)) == (0, "")
-    code, said = code_of(fail)
+    code, output = code_of(fail)
     assert code == 1
-    assert "KeyError" in said
-    with tempfile.TemporaryFile() as said:
-        child = Forked(say, said)
+    assert "KeyError" in output
+    with tempfile.TemporaryFile() as output:
+        child = Forked(say, output)
         assert child.poll() is None
         child.stdin.close()
         assert child.wait(60.0) == child.poll() == child.returncode == 0
-        said.seek(0)
-        assert said.read() == b"own session\nend of input"
+        output.seek(0)
+        assert output.read() == b"own session\nend of input"
 
 
 @pytest.mark.parametrize(("end", "number"), [("kill", signal.SIGKILL), ("send_signal", signal.SIGTERM)])
-def test_a_fork_is_ended_by_a_signal_and_then_let_alone(end, number):
-    with tempfile.TemporaryFile() as said:
-        child = Forked(lambda: time.sleep(60.0), said)
+def test_fork_is_ended_by_signal_and_then_let_alone(end, number):
+    with tempfile.TemporaryFile() as output:
+        child = Forked(lambda: time.sleep(60.0), output)
         child.stdin.close()
         with pytest.raises(subprocess.TimeoutExpired):
             child.wait(0.05)
@@ -79,7 +79,7 @@ def test_a_fork_is_ended_by_a_signal_and_then_let_alone(end, number):
         child.kill()
 
 
-def test_a_fork_has_no_other_files_open():
+def test_fork_has_no_other_files_open():
     """Its launcher's end of the standard input of another one would keep that one waiting when the launcher is gone."""
     with tempfile.TemporaryFile() as first_said, tempfile.TemporaryFile() as second_said:
         first = Forked(lambda: os.read(0, 1), first_said)
@@ -94,7 +94,7 @@ def test_a_fork_has_no_other_files_open():
 @pytest.mark.parametrize(
     ("arguments", "word"), [(["nowhere.toml"], "nowhere.toml"), (["lapwing/scenes/hover.toml", "--mavlink", "x"], "x")]
 )
-def test_an_error_of_the_user_is_one_line_also_where_a_link_has_been_started(arguments, word):
+def test_user_error_is_one_line_after_link_start(arguments, word):
     command = [sys.executable, "-m", "lapwing", "run", *arguments, "--mavlink", "udpout:127.0.0.1:14550"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], timeout=120)
     assert done.returncode == 2

@@ -49,7 +49,7 @@ def measured(pid, seconds=1.5):
 
 
 @pytest.mark.long
-def test_a_starved_process_waits_and_one_that_is_stopped_or_sleeps_does_not(start):
+def test_only_starved_process_extends_wait(start):
     core = min(os.sched_getaffinity(0))
     for _ in range(2):
         start(SPIN, core, 0)
@@ -61,13 +61,13 @@ def test_a_starved_process_waits_and_one_that_is_stopped_or_sleeps_does_not(star
     assert measured(stopped) < 0.1
 
 
-def test_who_has_ended_has_waited_for_nothing():
+def test_exited_process_has_no_waiting_time():
     child = subprocess.Popen([sys.executable, "-c", ""])
     child.wait()
     assert waited(child.pid) == 0.0
 
 
-def test_it_counts_from_when_there_was_no_news(monkeypatch):
+def test_starvation_counts_from_last_message(monkeypatch):
     times = {1: 5.0, 2: 7.0}
     monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.waited", times.__getitem__)
     starvation, pids = Starvation(), {"plant": 1, "sensors": 2}
@@ -96,7 +96,7 @@ def silent_for(watch, seconds):
     watch.last_news = time.monotonic() - seconds
 
 
-def test_a_starved_service_is_not_held_to_be_frozen_and_others_are_as_soon_as_ever(watch):
+def test_starved_service_is_not_stalled(watch):
     names = ["plant", "sensors"]
     silent_for(watch, 2.4)
     assert watch.stall_message(names) is None
@@ -109,14 +109,14 @@ def test_a_starved_service_is_not_held_to_be_frozen_and_others_are_as_soon_as_ev
     assert watch.stall_message(names, lambda who: 17.0)
 
 
-def test_who_waits_for_a_frozen_one_does_not_excuse_it(watch):
+def test_waiting_service_does_not_hide_stalled_service(watch):
     silent_for(watch, 2.6)
     watch.waiting["sensors"] = "the truth"
     starved = {"plant": 0.0, "sensors": 2.0}
-    found = watch.stall_message(starved, lambda who: sum(starved[name] for name in who))
-    assert found == "plant: no answer for 2.5 s, at t = 0.000 s"
+    result = watch.stall_message(starved, lambda who: sum(starved[name] for name in who))
+    assert result == "plant: no answer for 2.5 s, at t = 0.000 s"
 
 
-def test_nobody_is_excused_for_ever(watch):
+def test_starvation_excuse_is_bounded(watch):
     silent_for(watch, LONGEST + 0.1)
     assert watch.stall_message(["plant"], lambda who: LONGEST)

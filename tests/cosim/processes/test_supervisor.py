@@ -100,7 +100,7 @@ def test_states_follow_start_end_and_exit(run):
     assert run.state is RunState.ENDED
 
 
-def test_supervision_ends_when_the_observer_says_so(run):
+def test_supervision_ends_on_request_of_observer(run):
     run.start().supervisor.supervise(lambda monitor: run.now > 101.0)
     assert run.state is RunState.RUNNING
 
@@ -115,26 +115,26 @@ def test_unexpected_exit_is_named_with_reason(run, code, reason):
         run.update()
 
 
-def test_rejected_configuration_of_any_process_ends_the_run(run):
+def test_rejected_configuration_of_any_process_ends_run(run):
     run.start().exit("mavlink", code=ExitCode.REJECTED)
     with pytest.raises(ValueError, match="mavlink: cause"):
         run.update()
 
 
-def test_failed_start_of_optional_process_ends_the_run(run):
+def test_failed_start_of_optional_process_ends_run(run):
     run.update()
     run.exit("mavlink", code=1)
     with pytest.raises(ValueError, match=r"^mavlink: cannot start \(exit code 1\): cause$"):
         run.update()
 
 
-def test_exit_of_optional_process_does_not_end_the_run(run):
+def test_exit_of_optional_process_does_not_end_run(run):
     run.start().exit("mavlink", code=-9)
     run.update_for(1.0)
     assert run.state is RunState.RUNNING
 
 
-def test_completed_processes_need_no_message_of_the_end(run):
+def test_completed_processes_need_no_message_of_end(run):
     """The messages are lost if the launcher was stopped while the run ended."""
     run.start().pass_time(60.0)
     run.exit(*NAMES)
@@ -142,7 +142,7 @@ def test_completed_processes_need_no_message_of_the_end(run):
     assert run.state is RunState.ENDED
 
 
-def test_late_messages_after_a_pause_of_the_launcher_are_no_stall(run):
+def test_late_messages_after_pause_of_launcher_are_no_stall(run):
     run.start().exit("mavlink")
     run.update(60.0)
     run.update_for(STALL - 0.4)
@@ -150,7 +150,7 @@ def test_late_messages_after_a_pause_of_the_launcher_are_no_stall(run):
         run.update_for(1.0)
 
 
-def test_exit_without_end_of_the_others_is_named(run):
+def test_exit_without_end_of_others_is_named(run):
     run.start().exit("sensors")
     run.update()
     assert run.state is RunState.ENDING
@@ -183,22 +183,22 @@ def test_process_that_does_not_exit_is_named(run):
         run.update_for(1.0)
 
 
-def test_first_cause_of_an_early_end_is_reported(run):
+def test_first_cause_of_early_end_is_reported(run):
     run.start()
     run.monitor.ended, run.monitor.outcome = True, "sensors was ended by SIGTERM"
     run.exit(*NAMES)
-    with fails("the run ended before its time, at t = 0.000 s: sensors was ended by SIGTERM"):
+    with fails("the run ended early at t = 0.000 s: sensors was ended by SIGTERM"):
         run.supervisor.supervise(lambda monitor: False)
 
 
 def test_cut_short_process_reports_its_cause(run):
     run.start().exit(*NAMES)
     run.exit("plant", code=ExitCode.CUT_SHORT)
-    with fails("the run ended before its time, at t = 0.000 s: cause"):
+    with fails("the run ended early at t = 0.000 s: cause"):
         run.supervisor.supervise(lambda monitor: False)
 
 
-def test_divergence_is_an_orderly_end(run):
+def test_divergence_is_orderly_end(run):
     run.start().exit("plant", code=ExitCode.DIVERGED)
     run.exit("sensors", code=ExitCode.FAILED)
     run.update()

@@ -56,7 +56,7 @@ def line(text, part):
 
 
 @pytest.mark.parametrize("path", SCENES, ids=str)
-def test_every_scene_is_valid_and_has_a_title(path):
+def test_every_scene_is_valid_and_has_title(path):
     scene = load(path)
     assert isinstance(scene, Scene)
     assert scene[Run].title
@@ -88,7 +88,7 @@ def test_overrides_change_values_add_tables_and_reach_into_lists():
     assert scene.overrides == tuple(overrides)
 
 
-def test_a_whole_number_will_do_for_a_real_one_and_spaces_around_the_sign_do_no_harm():
+def test_override_accepts_integer_for_float_and_spaces():
     assert load(HOVER, ["run.duration = 3"])[Run].duration == 3.0
 
 
@@ -99,7 +99,7 @@ def test_values_by_key_do_as_well_as_texts():
         assert load(HOVER, values) == load(HOVER, texts)
 
 
-def test_overrides_reach_into_the_files_that_a_scene_names(tmp_path):
+def test_overrides_reach_into_files_that_scene_names(tmp_path):
     parameters = tmp_path / "mine.params"
     parameters.write_text("MPC_XY_CRUISE 3.0\nNAV_ACC_RAD 2.0\n")
     overrides = [
@@ -109,7 +109,7 @@ def test_overrides_reach_into_the_files_that_a_scene_names(tmp_path):
         "airframe.mass.total=9.5",
         "airframe.propeller.diameter=0.5",
         "airframe.rotors.position.0=[0.4, 0.4, 0.0]",
-        "sensors.imu.gyro.turn_on_dps=1",
+        "sensors.imu.gyro.turn_on_bias_dps=1",
         "autopilot.parameters.NAV_ACC_RAD=4",
     ]
     scene = load(DELIVERY, overrides)
@@ -118,19 +118,19 @@ def test_overrides_reach_into_the_files_that_a_scene_names(tmp_path):
     assert airframe(scene).mass.total == 9.5
     assert airframe(scene).propeller.diameter == 0.5
     assert airframe(scene).rotors.position[0] == (0.4, 0.4, 0.0)
-    assert scene.lookup("sensors.imu.gyro").turn_on_dps == 1.0
+    assert scene.lookup("sensors.imu.gyro").turn_on_bias_dps == 1.0
     assert table(scene)["MPC_XY_CRUISE"].default == 3.0
     assert table(scene)["NAV_ACC_RAD"].default == 4.0
 
 
-def test_a_scene_may_lay_its_own_values_over_a_file(write):
+def test_scene_may_lay_its_own_values_over_file(write):
     scene = load(write(TEXT + "\n[airframe.mass]\ntotal = 9.5\n[gains]\ntilt_limit = 0.3\n"), ["gains.yaw=[1, 2, 3]"])
     assert airframe(scene).mass.total == 9.5
     assert airframe(scene).mass.payload == 2.0
     assert (scene[GainSet].tilt_limit, scene[GainSet].yaw) == (0.3, (1.0, 2.0, 3.0))
 
 
-def test_a_scene_remembers_every_file_that_it_was_read_from(write, tmp_path):
+def test_scene_stores_all_its_source_files(write, tmp_path):
     (tmp_path / "climb.csv").write_text("time,value\n0,0\n2,1\n")
     path = write(
         TEXT.replace(
@@ -148,7 +148,7 @@ def test_a_scene_remembers_every_file_that_it_was_read_from(write, tmp_path):
 
 
 @pytest.mark.parametrize("path", SCENES, ids=str)
-def test_a_resolved_scene_gives_the_same_scene_without_a_file(path):
+def test_resolved_scene_restores_scene_without_files(path):
     scene = load(path)
     tree = from_json(to_json(scene.resolved))
     again = from_resolved(tree, path.stem)
@@ -157,7 +157,7 @@ def test_a_resolved_scene_gives_the_same_scene_without_a_file(path):
     assert list(tree) == sorted(tree)
 
 
-def test_nothing_is_read_after_loading(write, tmp_path, monkeypatch):
+def test_no_file_is_read_after_loading(write, tmp_path, monkeypatch):
     (tmp_path / "climb.csv").write_text("time,value\n0,0\n2,1\n")
     path = write(
         TEXT.replace(
@@ -175,7 +175,7 @@ def test_nothing_is_read_after_loading(write, tmp_path, monkeypatch):
         assert table(one)["MPC_TILTMAX_AIR"].default == math.degrees(one[GainSet].tilt_limit)
 
 
-def test_a_scene_that_leaves_its_step_open_is_still_open_when_it_is_resolved():
+def test_open_solver_step_stays_open_after_resolution():
     scene = load(HOVER, ["solver.accuracy=1e-3"])
     again = from_resolved(scene.resolved, scene.name)
     assert scene.section("solver").undecided
@@ -184,7 +184,7 @@ def test_a_scene_that_leaves_its_step_open_is_still_open_when_it_is_resolved():
     assert not load(HOVER, ["solver.accuracy=1e-3", "solver.step=0.001"]).section("solver").undecided
 
 
-def test_what_ships_is_found_by_name_from_anywhere(tmp_path, monkeypatch):
+def test_shipped_scene_is_found_by_name_from_any_folder(tmp_path, monkeypatch):
     here = load("hover")
     assert here == load(HOVER)
     monkeypatch.chdir(tmp_path)
@@ -195,7 +195,7 @@ def test_what_ships_is_found_by_name_from_anywhere(tmp_path, monkeypatch):
         load("hovr")
 
 
-def test_what_lies_beside_the_scene_comes_first(write, tmp_path):
+def test_neighbouring_file_precedes_shipped_file(write, tmp_path):
     path = write(TEXT)
     vehicle = tmp_path / "vehicles" / "delivery_drone.toml"
     vehicle.write_text(vehicle.read_text().replace("total = 10.0224", "total = 9.5"))
@@ -241,7 +241,7 @@ def test_what_lies_beside_the_scene_comes_first(write, tmp_path):
         ),
     ],
 )
-def test_a_fault_is_named_with_its_line_and_key(write, old, new, at, expected):
+def test_fault_is_named_with_its_line_and_key(write, old, new, at, expected):
     assert old in TEXT
     text = TEXT.replace(old, new, 1)
     fault = said(write(text))
@@ -249,7 +249,7 @@ def test_a_fault_is_named_with_its_line_and_key(write, old, new, at, expected):
     assert expected in fault
 
 
-def test_a_fault_is_a_value(write):
+def test_fault_is_value(write):
     text = TEXT.replace("duration = 20.0", "duration = -1")
     path = write(text)
     fault = refused(path)
@@ -313,11 +313,11 @@ def test_choices_are_listed():
         ("autopilot.follow_trajectory=false", "--set autopilot.follow_trajectory: false leaves no source of setpoints"),
     ],
 )
-def test_a_bad_override_is_named(override, expected):
+def test_bad_override_is_named(override, expected):
     assert expected in said(HOVER, override)
 
 
-def test_a_fault_in_a_file_that_a_scene_names_is_named_with_its_line(write, tmp_path):
+def test_fault_in_file_that_scene_names_is_named_with_its_line(write, tmp_path):
     path = write(TEXT)
     vehicle = tmp_path / "vehicles" / "delivery_drone.toml"
     sound = vehicle.read_text()
@@ -348,21 +348,21 @@ def test_a_fault_in_a_file_that_a_scene_names_is_named_with_its_line(write, tmp_
         ("time,value\n0,0\n", ":2: expected at least two points, got '1'"),
     ],
 )
-def test_a_fault_in_a_table_of_a_trajectory_is_named_with_its_line(write, tmp_path, text, expected):
+def test_fault_in_table_of_trajectory_is_named_with_its_line(write, tmp_path, text, expected):
     csv = tmp_path / "climb.csv"
     csv.write_text(text)
     fault = said(write(TEXT), 'trajectory.phase.0.z={kind="table", file="climb.csv"}')
     assert fault == f"{csv}{expected}"
 
 
-def test_tables_of_a_trajectory_may_be_missing_or_given_in_place():
+def test_trajectory_tables_may_be_missing_or_inline():
     missing = said(HOVER, 'trajectory.phase.0.z={kind="table", file="none.csv"}')
     assert missing == "--set trajectory.phase.0.z.file: lapwing/scenes/none.csv: no such file or directory"
-    given = 'trajectory.phase.0.z={kind="table", points=[[0.0, 0.0], [1.0, 1.0]]}'
-    assert load(HOVER, [given])[Trajectory].phase[0].z[0].points == ((0.0, 0.0), (1.0, 1.0))
-    later = given.replace("[0.0, 0.0]", "[0.5, 0.0]")
+    values = 'trajectory.phase.0.z={kind="table", points=[[0.0, 0.0], [1.0, 1.0]]}'
+    assert load(HOVER, [values])[Trajectory].phase[0].z[0].points == ((0.0, 0.0), (1.0, 1.0))
+    later = values.replace("[0.0, 0.0]", "[0.5, 0.0]")
     assert "trajectory.phase.0.z.points.0.0: expected times that start at 0, got 0.5" in said(HOVER, later)
-    above = given.replace("[0.0, 0.0]", "[0.0, 5.0]")
+    above = values.replace("[0.0, 0.0]", "[0.0, 5.0]")
     assert "put a ramp or a step before it" in said(HOVER, above)
 
 
@@ -376,12 +376,12 @@ def test_files_that_are_no_scenes(tmp_path):
     assert "not valid TOML: not a UTF-8 text file" in said(tmp_path / "binary.toml")
 
 
-def test_an_airframe_may_be_a_file_beside_the_scene(write):
+def test_airframe_may_be_file_in_scene_folder(write):
     path = write(TEXT.replace('"delivery_drone"', '"vehicles/delivery_drone.toml"'))
     assert load(path)[Vehicle].airframe == "vehicles/delivery_drone.toml"
 
 
-def test_a_recorded_scene_that_is_none_is_named():
+def test_invalid_recorded_scene_is_named():
     tree = load(HOVER).resolved
     del tree["airframe"]
     with pytest.raises(SceneError, match=r"^hover: vehicle\.airframe: missing"):
@@ -402,35 +402,35 @@ def test_each_table_is_declared_once():
     } <= set(vocabulary().sections)
 
 
-def test_what_is_found_in_a_scene_is_found_once():
+def test_cached_function_is_called_once():
     scene, calls = load("hover"), []
-    assert [scene.once(calls.append), scene.once(calls.append)] == [None, None]
+    assert [scene.cached(calls.append), scene.cached(calls.append)] == [None, None]
     assert calls == [scene]
 
 
-def test_a_text_that_is_read_again_gives_tables_of_its_own(tmp_path):
+def test_repeated_load_returns_independent_tables(tmp_path):
     path = tmp_path / "a.toml"
     first = parse_toml("x = { y = [1] }", path)
     first["x"]["y"].append(2)
     assert parse_toml("x = { y = [1] }", path) == {"x": {"y": [1]}}
 
 
-def test_what_was_found_in_other_tables_stays_where_one_is_replaced():
-    asked = []
+def test_replaced_table_keeps_other_cached_results():
+    requested = []
 
     def name(scene):
-        asked.append("name")
+        requested.append("name")
         return scene[Vehicle].name
 
     def title(scene):
-        asked.append("title")
-        return f"{scene.once(name)} of {scene[Run].title}"
+        requested.append("title")
+        return f"{scene.cached(name)} of {scene[Run].title}"
 
     scene = load("hover")
-    assert scene.once(title) == scene.once(title) == f"drone1 of {scene[Run].title}"
+    assert scene.cached(title) == scene.cached(title) == f"drone1 of {scene[Run].title}"
     retitled = scene.replaced(scene[Run].model_copy(update={"title": "another"}))
-    assert retitled.once(title) == "drone1 of another"
-    assert asked == ["title", "name", "title"]
+    assert retitled.cached(title) == "drone1 of another"
+    assert requested == ["title", "name", "title"]
     renamed = retitled.replaced(scene[Vehicle].model_copy(update={"name": "scout"}))
-    assert renamed.once(title) == "scout of another"
-    assert asked[3:] == ["title", "name"]
+    assert renamed.cached(title) == "scout of another"
+    assert requested[3:] == ["title", "name"]

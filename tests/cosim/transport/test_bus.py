@@ -1,4 +1,4 @@
-"""What waits on the bus takes the memory of its bytes, not of the buffers in which they came."""
+"""Messages waiting on the bus use the memory of their bytes, not of the receive buffers."""
 
 import re
 import sys
@@ -22,7 +22,7 @@ def anonymous():
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is told by Linux's /proc")
 def test_messages_that_wait_take_little_memory():
     (endpoint,) = loopback_endpoints(["a"]).values()
-    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], mark=MARK) as here:
+    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], gid=MARK) as here:
         arrived, put = there.receive({KEY: MARK}), here.publisher(KEY)
         while arrived.get(timeout=0.1) is None:  # until the subscription has come
             put(b"first", 0)

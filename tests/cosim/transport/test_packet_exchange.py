@@ -1,4 +1,4 @@
-"""What a service gives arrives where it is taken, whatever the periods of its ports and the delays."""
+"""Outputs of a service arrive at its consumers for all periods and delays."""
 
 from collections import defaultdict, deque
 from types import SimpleNamespace
@@ -10,7 +10,7 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port, due
-from lapwing.cosim.transport.packet_exchange import PacketSender, sources
+from lapwing.cosim.transport.packet_exchange import PacketSender, packet_receivers
 from lapwing.kernels import python_function
 
 LAST = 120  # [tick]
@@ -49,7 +49,7 @@ class Counts:
     def bind(self, graph):
         self.graph = graph
 
-    def act(self, tick):
+    def on_tick(self, tick):
         for port in self.outputs:
             if due(tick, port.period, 0) >= 0:
                 self.graph.put(port.name, tick, float(tick))
@@ -64,7 +64,7 @@ class Takes(Counts):
     def __init__(self, inputs):
         self.inputs, self.noted = inputs, []
 
-    def act(self, tick):
+    def on_tick(self, tick):
         for i in self.inputs:
             stamp = due(tick, PERIODS[NAMES.index(i.port)], i.delay)
             if stamp >= 0:
@@ -73,7 +73,7 @@ class Takes(Counts):
 
 
 def exchanged(inputs):
-    """What the consumer of these inputs notes, and how many bundles came by key."""
+    """Return the samples received by the consumer, and the number of packets by key."""
     ports = tuple(Port(name, 0.0, period) for name, period in zip(NAMES, PERIODS, strict=True))
     services = {"giver": ServiceConfig(None, (), ports), "taker": ServiceConfig(None, inputs, ())}
     setup = RunConfig("", "", 1, LAST, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
@@ -82,20 +82,23 @@ def exchanged(inputs):
     def process(name):
         return SimpleNamespace(
             setup=setup, name=name, bus=bus, participants=PublisherIds("test"), key_prefix="test",
-            tell_of_refused=lambda: None, key=str, bundles_ahead=True, abandoned="",
+            report_rejected=lambda: None, key=str, packs_ticks=True, abandoned="",
         )  # fmt: skip
 
     giver, taker = Service("giver", [Counts(ports)], []), Service("taker", [Takes(inputs)], [])
     given_rows, taken_rows = BlockDiagram(setup, [giver], 2048), BlockDiagram(setup, [taker], 2048)
-    outlets, (source,) = PacketSender(process("giver"), giver, given_rows), sources(process("taker"), taken_rows)
+    outlets, (source,) = (
+        PacketSender(process("giver"), giver, given_rows),
+        packet_receivers(process("taker"), taken_rows),
+    )
     for tick in range(LAST + 1):
         given_rows.advance(tick + 1)
         outlets.publish(tick, tick + 1)
-    counts = {key: len(found) for key, found in bus.messages.items() if "_step" in key}
+    counts = {key: len(result) for key, result in bus.messages.items() if "_step" in key}
     outlets.end(LAST + 1)
     tick = 0
     while tick <= LAST:
-        known = source.take(tick)
+        known = source.receive(tick)
         assert known > tick
         taken_rows.advance(min(known, LAST + 1))
         tick = known
@@ -105,13 +108,13 @@ def exchanged(inputs):
 @given(st.dictionaries(st.sampled_from(NAMES), st.integers(0, 30), min_size=1))
 @example({"port3": 0})
 @example({"port2": 7, "port3": 0})
-def test_each_row_arrives_when_it_is_due(delays):
+def test_rows_arrive_at_their_due_tick(delays):
     noted, _ = exchanged(tuple(InputPort(port, delay) for port, delay in delays.items()))
     assert noted
     assert all(value == stamp for _, stamp, value in noted)
 
 
-def test_who_takes_seldom_is_given_seldom():
+def test_packet_period_is_gcd_of_consumed_port_periods():
     assert exchanged((InputPort("port3"),))[1] == {"test/_step_every_25/giver": 5}
     assert exchanged((InputPort("port3"), InputPort("port2")))[1] == {"test/_step_every_5/giver": 25}
     assert exchanged((InputPort("port3"), InputPort("port4")))[1] == {"test/_step/giver": LAST + 1}

@@ -11,7 +11,7 @@ from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 
 
-def test_columns_are_named_in_the_order_of_a_row():
+def test_columns_are_named_in_order_of_row():
     like = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
     named = dict(zip(columns(like), pack_row(like), strict=True))
     assert named["motor_voltage.2"] == 3.0
@@ -20,13 +20,13 @@ def test_columns_are_named_in_the_order_of_a_row():
     assert columns(EXACT)[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
 
 
-def test_a_bundle_is_as_long_as_the_layout_says():
+def test_packet_length_equals_layout():
     setup = resolve(load("hover"))
-    told = layout(setup)
-    assert told["setup"] == to_json(setup)
+    reported = layout(setup)
+    assert reported["setup"] == to_json(setup)
     graph = BlockDiagram(setup, create_all(setup), 64)
     graph.advance(26)
-    for name, service in told["services"].items():
+    for name, service in reported["services"].items():
         for tick in (24, 25):
             expected = 8 * sum(len(p["columns"]) for p in service["ports"] if tick % p["period"] == 0)
             assert len(StepPacketCodec(setup.services[name].ports).pack(graph, tick)) == expected

@@ -6,7 +6,13 @@ from hypothesis import strategies as st
 from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, ticks_at_once, way, ways
+from lapwing.cosim.transport.packet_schedule import (
+    EACH_TICK,
+    PacketSchedule,
+    packet_schedule,
+    packet_schedules,
+    ticks_per_packet,
+)
 from lapwing.services.scene_resolver import load, resolve
 
 LAST = 120  # [tick]
@@ -37,10 +43,12 @@ def end(setup):
     while moved and min(stepped.values()) <= LAST:
         moved = False
         for name, service in setup.services.items():
-            given = {i.port: stepped[i.port] // (n := way(setup, i.port, name).ticks) * n for i in service.inputs}
+            values = {
+                i.port: stepped[i.port] // (n := packet_schedule(setup, i.port, name).ticks) * n for i in service.inputs
+            }
             ready = stepped[name]
-            while ready < stepped[name] + ticks_at_once(setup, name) and all(
-                newest_needed(setup, producer, name, ready) < there for producer, there in given.items()
+            while ready < stepped[name] + ticks_per_packet(setup, name) and all(
+                newest_needed(setup, producer, name, ready) < there for producer, there in values.items()
             ):
                 ready += 1
             ready = min(ready, LAST + 50)
@@ -59,7 +67,7 @@ pairs = st.tuples(st.sampled_from(NAMES), st.sampled_from(NAMES)).filter(lambda 
 @example({("plant", "trajectory"): 2, ("trajectory", "plant"): 0})
 @example({("plant", "trajectory"): 9, ("trajectory", "another"): 9, ("another", "plant"): 0})
 @example({("plant", "trajectory"): 25, ("trajectory", "another"): 3, ("another", "plant"): 1})
-def test_it_never_comes_to_a_stop(links):
+def test_packet_schedule_cannot_deadlock(links):
     setup = setup_of(links)
     try:
         assert setup.order
@@ -68,24 +76,24 @@ def test_it_never_comes_to_a_stop(links):
     assert min(end(setup).values()) > LAST
 
 
-def test_only_who_runs_ahead_hands_over_several_ticks_at_once():
+def test_only_leading_service_packs_several_ticks():
     setup = resolve(load("delivery_mission"))
-    assert {name: ticks_at_once(setup, name) for name in setup.services} == {
+    assert {name: ticks_per_packet(setup, name) for name in setup.services} == {
         "plant": 1, "sensors": 1, "autopilot": 1, "trajectory": 25,
     }  # fmt: skip
-    assert ways(setup, "plant") == {EACH_TICK, PacketSchedule(25, 25), PacketSchedule(1, 25)}
-    assert ways(setup, "trajectory") == {PacketSchedule(25, 25)}
-    assert ways(setup, "sensors") == ways(setup, "autopilot") == {EACH_TICK}
+    assert packet_schedules(setup, "plant") == {EACH_TICK, PacketSchedule(25, 25), PacketSchedule(1, 25)}
+    assert packet_schedules(setup, "trajectory") == {PacketSchedule(25, 25)}
+    assert packet_schedules(setup, "sensors") == packet_schedules(setup, "autopilot") == {EACH_TICK}
 
 
-def test_every_way_has_a_key_of_its_own():
-    found = [EACH_TICK, PacketSchedule(1, 2), PacketSchedule(1, 25), PacketSchedule(2, 2), PacketSchedule(25, 25)]
+def test_packet_schedules_have_unique_keys():
+    result = [EACH_TICK, PacketSchedule(1, 2), PacketSchedule(1, 25), PacketSchedule(2, 2), PacketSchedule(25, 25)]
     assert EACH_TICK.key == "_step"
-    assert len({w.key for w in found}) == len(found)
+    assert len({w.key for w in result}) == len(result)
 
 
-def test_the_battery_goes_to_the_autopilot_by_itself():
+def test_battery_has_separate_packets():
     setup = resolve(load("delivery_mission"))
-    taken = way(setup, "plant", "autopilot")
+    taken = packet_schedule(setup, "plant", "autopilot")
     assert [port.name for port in taken.ports(setup.services["plant"].ports)] == ["battery"]
-    assert way(setup, "plant", "sensors") == EACH_TICK
+    assert packet_schedule(setup, "plant", "sensors") == EACH_TICK

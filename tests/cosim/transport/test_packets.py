@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
-from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_batch, unpack_batch
+from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_log_packet, unpack_log_packet
 from lapwing.messages.topics import COMMAND_ACKS, OPERATOR, STATUS, TRUTH
 from tests.cosim.small_graph import graph_of
 
@@ -50,15 +50,15 @@ def graph(*names):
 
 def filled(tick):
     """A graph in which the ports that are due at `tick` have a value of that tick."""
-    found = graph("pair", "slow", "slower")
+    result = graph("pair", "slow", "slower")
     for port in PORTS:
         if tick % port.period == 0:
-            found.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
-    return found
+            result.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+    return result
 
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
-def test_a_bundle_holds_the_rows_that_are_due_one_after_the_other(tick, numbers):
+def test_step_packet_holds_due_rows_in_order(tick, numbers):
     bundles, giver, taker = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
     payload = bundles.pack(giver, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
@@ -69,14 +69,14 @@ def test_a_bundle_holds_the_rows_that_are_due_one_after_the_other(tick, numbers)
             assert taker.latest(port.name, tick) == giver.latest(port.name, tick)
 
 
-def test_who_uses_some_of_the_ports_gets_those():
+def test_diagram_stores_ports_in_use_only():
     taker = graph("slow")
     StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), taker, 10)
     assert taker.latest("slow", 10) == Single(10.5, True)
     assert not taker.has("pair")
 
 
-def test_a_service_has_no_bundle_where_none_of_its_ports_is_due():
+def test_service_without_due_port_has_no_packet():
     assert [tick for tick in range(12) if StepPacketCodec(PORTS[1:]).due(tick)] == [0, 5, 10]
     assert all(StepPacketCodec(PORTS).due(tick) for tick in range(12))
     assert not StepPacketCodec(()).due(0)
@@ -84,15 +84,15 @@ def test_a_service_has_no_bundle_where_none_of_its_ports_is_due():
 
 def run_of(ticks):
     """A graph whose ports have values at each of the ticks [0, ticks) at which they are due."""
-    found = graph("pair", "slow", "slower")
+    result = graph("pair", "slow", "slower")
     for port in PORTS:
         for tick in range(0, ticks, port.period):
-            found.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
-    return found
+            result.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+    return result
 
 
 @pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
-def test_a_bundle_of_several_ticks_holds_what_the_bundles_of_each_do(ticks):
+def test_packet_of_several_ticks_equals_single_packets(ticks):
     giver, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
     for ports in (PORTS, PORTS[1:]):
         single, several = StepPacketCodec(ports), StepPacketCodec(ports, ticks)
@@ -111,13 +111,13 @@ def test_a_bundle_of_several_ticks_holds_what_the_bundles_of_each_do(ticks):
 
 
 @pytest.mark.parametrize("size", [0, 64, 72, 81])
-def test_a_bundle_of_several_ticks_of_the_wrong_size_is_refused(size):
+def test_packet_of_several_ticks_with_wrong_size_is_rejected(size):
     with pytest.raises(PacketError, match=rf"^a bundle of {size} bytes at tick 4, expected 80$"):
         StepPacketCodec(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
 
 
 @pytest.mark.parametrize("size", [0, 8, 15, 17, 24, 40, 48])
-def test_a_bundle_of_the_wrong_size_is_refused(size):
+def test_packet_with_wrong_size_is_rejected(size):
     with pytest.raises(PacketError, match=rf"^a bundle of {size} bytes at tick 5, expected 32$"):
         StepPacketCodec(PORTS).unpack(bytes(size), graph("pair", "slow"), 5)
 
@@ -130,34 +130,34 @@ def page(topic, first, n, size, seed=0):
 def records(n):
     """A page whose payloads are records, as `Wire` makes them."""
     dtype = np.dtype({"names": ["x", "all"], "formats": ["<f8", "V12"], "offsets": [4, 0], "itemsize": 12})
-    found = np.zeros(n, dtype)
-    found["x"] = np.arange(n)
-    return RecordBatch(STATUS, np.arange(0, 5 * n, 5), found)
+    result = np.zeros(n, dtype)
+    result["x"] = np.arange(n)
+    return RecordBatch(STATUS, np.arange(0, 5 * n, 5), result)
 
 
-def test_a_batch_comes_out_as_it_went_in():
+def test_log_packet_round_trips():
     pages = [page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3), records(4), page(COMMAND_ACKS, 10, 2, 0)]
-    start, stop, found = unpack_batch(pack_batch(pages, 20, 27))
+    start, stop, result = unpack_log_packet(pack_log_packet(pages, 20, 27))
     assert (start, stop) == (20, 27)
-    for before, after in zip(pages, found, strict=True):
+    for before, after in zip(pages, result, strict=True):
         assert after.topic is before.topic
         assert after.ticks.tolist() == before.ticks.tolist()
         assert [p.tobytes() for p in after.payloads] == [p.tobytes() for p in before.payloads]
 
 
-def test_a_batch_without_messages_says_how_far_it_goes():
-    assert unpack_batch(pack_batch([], 3, 5)) == (3, 5, [])
+def test_empty_log_packet_has_ticks():
+    assert unpack_log_packet(pack_log_packet([], 3, 5)) == (3, 5, [])
 
 
-WHOLE = pack_batch([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 0, 27)
+WHOLE = pack_log_packet([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 0, 27)
 
 
 @given(st.integers(0, len(WHOLE) - 1).filter(lambda n: n not in (16, 16 + 10 + 20 * (8 + 256))))
-def test_a_batch_cut_short_is_refused(size):
+def test_truncated_log_packet_is_rejected(size):
     with pytest.raises(PacketError, match=rf"^a batch of {size} bytes: "):
-        unpack_batch(WHOLE[:size])
+        unpack_log_packet(WHOLE[:size])
 
 
-def test_a_batch_of_an_unknown_topic_is_refused():
+def test_log_packet_with_unknown_topic_is_rejected():
     with pytest.raises(PacketError, match=r"^a batch of "):
-        unpack_batch(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])
+        unpack_log_packet(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])

@@ -1,11 +1,11 @@
-"""Who stands still since a message finds no room says so; who publishes at leisure says nothing."""
+"""A blocked publisher reports itself; an unblocked one does not."""
 
 import threading
 import time
 
 import pytest
 
-from lapwing.cosim.transport.publish_watchdog import LOOK, PublishWatchdog
+from lapwing.cosim.transport.packet_exchange import LOOK, PublishWatchdog
 
 PATIENCE = 0.5  # [s]
 
@@ -13,35 +13,35 @@ PATIENCE = 0.5  # [s]
 @pytest.fixture
 def delivery(request):
     """One that watches, and what it has said."""
-    said = []
-    delivery = PublishWatchdog(lambda: said.append(threading.current_thread()), getattr(request, "param", PATIENCE))
-    yield delivery, said
+    output = []
+    delivery = PublishWatchdog(lambda: output.append(threading.current_thread()), getattr(request, "param", PATIENCE))
+    yield delivery, output
     delivery.close()
 
 
-def test_a_message_without_room_is_told_again_and_again_from_another_thread(delivery):
-    watched, said = delivery
+def test_blocked_publisher_is_reported_repeatedly(delivery):
+    watched, output = delivery
     deadline = time.monotonic() + 60.0
     with watched:
-        while len(said) < 2 and time.monotonic() < deadline:
+        while len(output) < 2 and time.monotonic() < deadline:
             time.sleep(0.1)
-    assert len(said) >= 2
-    assert threading.current_thread() not in said
+    assert len(output) >= 2
+    assert threading.current_thread() not in output
 
 
 @pytest.mark.parametrize("delivery", [60.0], indirect=True)  # [s] for which a busy machine does not stop a thread
-def test_what_takes_no_time_is_not_told(delivery):
-    watched, said = delivery
+def test_fast_publication_is_not_reported(delivery):
+    watched, output = delivery
     until = time.monotonic() + 2 * LOOK
     while time.monotonic() < until:
         with watched:
             pass
-    assert not said
+    assert not output
 
 
-def test_nothing_is_told_while_nothing_is_published(delivery):
-    watched, said = delivery
+def test_watchdog_is_silent_without_publications(delivery):
+    watched, output = delivery
     with watched:
         pass
     time.sleep(PATIENCE + 2 * LOOK)
-    assert not said
+    assert not output

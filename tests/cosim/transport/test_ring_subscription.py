@@ -1,4 +1,4 @@
-"""What one sender publishes on one key: in order, of that sender alone, and waited for no longer than asked."""
+"""Subscription to one sender and key: order, rejection of others, bounded waiting."""
 
 import time
 from itertools import count
@@ -17,7 +17,7 @@ KEY, MARK, OTHER, WAKER = "test-inbox/_step/plant", bytes(16), b"o" * 16, b"w" *
 def joined():
     """A bus with an inbox, another that publishes, and the inbox."""
     (endpoint,) = loopback_endpoints(["a"]).values()
-    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], mark=MARK) as here:
+    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], gid=MARK) as here:
         inbox = there.inbox(KEY, MARK)
         put = here.publisher(KEY)
         while inbox.get(0.1) is None:  # until the subscription has come
@@ -34,7 +34,7 @@ def test_messages_come_in_order(joined):
     assert [inbox.get(5.0) for _ in range(200)] == [(i, b"%d" % i) for i in range(200)]
 
 
-def test_without_a_message_it_waits_as_long_as_asked(joined):
+def test_empty_inbox_waits_for_timeout(joined):
     _, here, inbox = joined
     for timeout in (0.0, 0.1, 0.3):
         begun = time.monotonic()
@@ -57,7 +57,7 @@ def test_others_are_refused_and_counted(joined):
     assert there.refused - before >= 4
 
 
-def test_one_that_is_full_loses_the_oldest_and_holds_nobody_up(joined):
+def test_full_ring_drops_oldest_without_blocking(joined):
     _, here, inbox = joined
     put = here.publisher(KEY)
     for i in range(INBOX + 500):
@@ -65,8 +65,8 @@ def test_one_that_is_full_loses_the_oldest_and_holds_nobody_up(joined):
     put(b"last", 0)
     time.sleep(1.0)  # all have come
     arrived = []
-    while found := inbox.get(0.2):
-        arrived.append(found)
+    while result := inbox.get(0.2):
+        arrived.append(result)
     assert len(arrived) == INBOX
     assert arrived[0] == (501, bytes(8))
     assert arrived[-1] == (0, b"last")
@@ -79,13 +79,13 @@ def inbox_of(messages, sender=MARK):
     return Inbox(lambda: next(samples, (0, WAKER, b"")), lambda m: m, sender, WAKER, lambda: next(refused)), refused
 
 
-def test_a_waker_that_comes_too_late_is_passed_over():
+def test_waker_that_comes_too_late_is_passed_over():
     inbox, _ = inbox_of([(0, WAKER, b""), (0, WAKER, b""), (3, MARK, b"it")])
     assert inbox.get(5.0) == (3, b"it")
     assert inbox.until == float("inf")
 
 
-def test_the_first_comer_is_the_sender_where_nobody_is_known():
+def test_first_sender_is_accepted_without_known_gid():
     inbox, refused = inbox_of([(1, OTHER, b"one"), (2, MARK, b"two"), None, (3, OTHER, b"three")], sender=None)
     assert [inbox.get(1.0), inbox.get(1.0), inbox.get(0.0)] == [(1, b"one"), (3, b"three"), None]
     assert next(refused) == 2

@@ -3,10 +3,10 @@
 import os
 import socket
 
-from lapwing.cosim.transport.tcp_timeout import limit_silence
+from lapwing.cosim.transport.session_settings import limit_silence
 
 
-def test_open_connections_are_limited_and_nothing_else_is_touched(tmp_path):
+def test_timeout_is_set_on_tcp_sockets_only(tmp_path):
     file = (tmp_path / "a").open("w")
     with socket.create_server(("127.0.0.1", 0)) as door, socket.create_connection(door.getsockname()) as client:
         server, _ = door.accept()

@@ -1,0 +1,15 @@
+"""A run that the kernel takes a process from names it, and leaves nothing behind."""
+
+import pytest
+
+from tests.faults import memory_pressure
+
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(not memory_pressure.available(), reason="needs permission to create memory cgroups"),
+]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_run_without_memory_names_killed_process(seed):
+    assert memory_pressure.fly(seed, 180.0).wrong == []
