@@ -1,0 +1,1 @@
+"""Adapter of ArduPilot's software-in-the-loop program over its JSON interface (UDP)."""

@@ -1,0 +1,203 @@
+"""Link to ArduPilot SITL: lock step over UDP, and MAVLink over TCP for the mission.
+
+ArduPilot sends a servo packet and waits for the state after that step, so that every exchange is an answer to the last
+packet followed by the wait for the next one.
+"""
+
+import socket
+import time
+
+from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
+from lapwing.services.ardupilot.modes import CONVENTIONS
+from lapwing.services.ardupilot.resolve import LOOP_RATE, ArduPilotSetup
+from lapwing.services.ardupilot.sample import extras, vehicle_state
+from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttle
+from lapwing.services.ardupilot.state_message import encode
+from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
+from lapwing.services.common.firmware.mavlink_transport import TcpTransport
+from lapwing.services.common.firmware.mission import mission_messages, uploaded
+from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.patience import Patience
+from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
+
+PORT, MAVLINK_PORT, STRIDE = 9002, 5760, 10
+INSTANCES = 100
+WAIT = 0.2  # [s] of one wait for a datagram
+FORGOTTEN = 2.0  # [s] without an answer after which packets from another address are a restarted firmware
+MARGIN = 1e-9  # [s] added to each step: ArduPilot cuts steps to whole microseconds
+PARAMETERS_FILE = "lapwing.parm"
+PWM_MIN, PWM_MAX = 1000.0, 2000.0  # [us] MOT_PWM_MIN and MOT_PWM_MAX
+OUTPUTS = 4
+PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
+
+
+class ArduPilotLink:
+    """Connection to one ArduPilot SITL."""
+
+    def __init__(self, setup: FirmwareSetup) -> None:
+        """Store the configuration."""
+        self._setup = setup
+        self._own: ArduPilotSetup = setup.own
+        self.report = LinkReport("ardupilot")
+        self._sequence = FrameSequence()
+        self._program: Program | None = None
+        self._socket: socket.socket | None = None
+        self._client: MissionClient | None = None
+        self._status: FlightStatus | None = None
+        self._peer: tuple[str, int] | None = None
+        self._sent = 0.0  # [s] of the wall clock at the last answer
+        self._answer = b""  # last state message
+        self._time = 0.0  # [s] of the simulation
+        self._packet: ServoPacket | None = None
+
+    @property
+    def address(self) -> tuple[str, int]:
+        """Address of the lock step, of this link's socket."""
+        return self._setup.host, self._setup.port_at(PORT, STRIDE)
+
+    def open(self, waits: Waits) -> None:
+        """Start or await ArduPilot, and receive its first servo packet."""
+        self._setup, self._socket = first_free(self._setup, INSTANCES, _claim)
+        setup = self._setup
+        items = uploaded(setup.plan)
+        parameters = {**PARAMETERS, **setup.parameters} if items else dict(setup.parameters)
+        if setup.command:
+            text = "".join(f"{name} {value:.9g}\n" for name, value in {**PARAMETERS, **parameters}.items())
+            files = {PARAMETERS_FILE: setup.parameter_text + "\n" + text}
+            self._program = Program(setup, self._arguments(), files)
+            parameters = {}
+        port = MAVLINK_PORT + STRIDE * setup.instance
+        self._client = MissionClient(
+            TcpTransport(setup.host, port), CONVENTIONS, mission_messages(items, self._own.datum), parameters
+        )
+        self._status = FlightStatus("ardupilot", self._client)
+        patience = Patience(setup.start_timeout, self._program.pid if self._program else None)
+        while self._packet is None:
+            waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
+            self._client.read()  # ArduPilot waits for a connection before it starts
+            self._receive(resend=False)
+            self._check(patience, "no servo packet", "start arducopter with --model JSON:127.0.0.1")
+
+    def _arguments(self) -> list[str]:
+        """Return the arguments of the program that the scene does not have."""
+        home, instance = self._own.datum.home, self._setup.instance
+        place = f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.height:.3f},0"
+        known = {
+            "--model": f"JSON:{self._setup.host}",
+            "--home": place,
+            "--instance": str(instance),
+            "--sim-port-out": str(self.address[1]) if self._setup.port else "",
+            "--defaults": PARAMETERS_FILE,
+        }
+        given = set(self._setup.command)
+        return [text for name, value in known.items() if value and name not in given for text in (name, value)]
+
+    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
+        """Answer the last servo packet with the state at the tick, and wait for the next packet."""
+        self._time = tick * self._setup.interval
+        self._answer = encode(self._time + tick * MARGIN, vehicle_state(self._own, read), extras(self._own, read))
+        self._packet, begun, self._sent = None, time.perf_counter(), time.monotonic()
+        self._send()
+        patience: Patience | None = None
+        while self._packet is None:
+            self._receive(resend=True)
+            if self._packet is None:
+                patience = patience or self._patience()
+                waits("ardupilot")
+                self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
+        self.report.waiting += time.perf_counter() - begun
+        assert self._status is not None
+        self._status.poll(self._time)
+        self.report.version = self._status.version
+        motors = tuple(throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS])
+        return self._status.output(motors, running=max(motors) > 0.0)  # a heartbeat comes only once a second
+
+    def cpu(self) -> float:
+        """Return the CPU time [s] of the program, 0 if somebody else has started it."""
+        return self._program.cpu() if self._program else 0.0
+
+    def close(self) -> None:
+        """End the connections, and the program."""
+        if self._client:
+            self._client.close()
+        if self._socket:
+            self._socket.close()
+        if self._program:
+            self._program.close()
+        self._program = self._socket = self._client = None
+
+    def _patience(self) -> Patience:
+        return Patience(self._setup.step_timeout, self._program.pid if self._program else None)
+
+    def _check(self, patience: Patience, what: str, advice: str) -> None:
+        """Raise FirmwareError if the program has ended or the patience is over."""
+        at = f" at t = {self._time:.3f} s"
+        if self._program:
+            self._program.check(at)
+        if patience.over:
+            timeout = self._setup.step_timeout if self._answer else self._setup.start_timeout
+            raise FirmwareError(f"ardupilot: {what} for {timeout:g} s{at}; {advice}")
+
+    def _send(self) -> None:
+        if self._socket and self._peer and self._answer:
+            try:
+                self._socket.sendto(self._answer, self._peer)
+            except OSError as error:
+                self.report.note(f"cannot send to ArduPilot ({error.strerror})")
+
+    def _receive(self, resend: bool) -> None:
+        """Wait for one datagram, and take it in; answer a resent frame if `resend`."""
+        assert self._socket is not None
+        try:
+            data, sender = self._socket.recvfrom(2048)
+        except OSError:  # none, or the port of a firmware that has ended
+            return
+        try:
+            packet = decode(data)
+        except ValueError as error:
+            self._reject(f"packet from {sender[0]}:{sender[1]} is no servo packet: {error}")
+            return
+        if self._peer not in (None, sender):
+            if time.monotonic() < self._sent + FORGOTTEN:
+                self._reject(f"another ArduPilot sends from {sender[0]}:{sender[1]}")
+                return
+            self._sequence.restart()
+        self._peer = sender
+        meaning = self._sequence.receive(packet.frame_count)
+        self.report.resent, self.report.missed = self._sequence.resent, self._sequence.skipped
+        self.report.reconnected = self._sequence.restarts
+        if meaning is Frame.RESENT:
+            if resend:
+                self._send()
+            return
+        self._rate(packet.frame_rate)
+        self._packet = packet
+
+    def _rate(self, rate: int) -> None:
+        """Warn of a loop rate that ArduPilot cannot keep."""
+        if rate <= LOOP_RATE:
+            self.report.note(f"SIM_RATE_HZ is {rate}; set it above the loop rate of {LOOP_RATE} Hz")
+
+    def _reject(self, text: str) -> None:
+        self.report.rejected += 1
+        self.report.note(text)
+
+
+def _claim(setup: FirmwareSetup) -> socket.socket:
+    """Open the port of an instance.
+
+    Raises:
+        FirmwareError: it is in use.
+    """
+    address = setup.host, setup.port_at(PORT, STRIDE)
+    result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        result.bind(address)
+    except OSError as error:
+        result.close()
+        message = f"ardupilot: cannot listen on udp {address[0]}:{address[1]} ({error.strerror})"
+        raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
+    result.settimeout(WAIT)
+    return result

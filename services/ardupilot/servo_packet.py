@@ -1,0 +1,48 @@
+"""Servo packets of ArduPilot's JSON interface.
+
+A packet is little-endian: magic, rate [Hz], frame count, and 16 pulse widths [us], or 32 with SERVO_32_ENABLE.
+Source: ArduPilot, libraries/SITL/examples/JSON/readme.md.
+"""
+
+import struct
+from typing import NamedTuple
+
+MAGIC_16, MAGIC_32 = 18458, 29569
+_HEAD = struct.Struct("<HHI")
+_LAYOUTS = {MAGIC_16: struct.Struct("<HHI16H"), MAGIC_32: struct.Struct("<HHI32H")}
+PULSE_MAX = 3000  # [us] longest plausible pulse; 0: the channel is unused
+
+
+class ServoPacket(NamedTuple):
+    """One output of ArduPilot."""
+
+    frame_rate: int  # [Hz] requested steps per second, SIM_RATE_HZ
+    frame_count: int  # increases by 1 per step
+    pwm: tuple[int, ...]  # [us] 16 or 32 channels
+
+
+def decode(data: bytes) -> ServoPacket:
+    """Return the packet in a datagram.
+
+    Raises:
+        ValueError: (one line) the datagram is no servo packet; the text says why.
+    """
+    if len(data) < _HEAD.size:
+        raise ValueError(f"{len(data)} bytes, a servo packet has 40 or 72")
+    magic, rate, count = _HEAD.unpack_from(data)
+    layout = _LAYOUTS.get(magic)
+    if layout is None:
+        raise ValueError(f"magic number {magic}, expected {MAGIC_16} or {MAGIC_32}")
+    if len(data) != layout.size:
+        raise ValueError(f"{len(data)} bytes with magic number {magic}, expected {layout.size}")
+    pwm = layout.unpack(data)[3:]
+    if rate == 0:
+        raise ValueError("frame rate 0")
+    if max(pwm) > PULSE_MAX:
+        raise ValueError(f"pulse width of {max(pwm)} us, expected at most {PULSE_MAX}")
+    return ServoPacket(rate, count, pwm)
+
+
+def throttle(pwm: int, low: float, high: float) -> float:
+    """Return the fraction, 0 to 1, of a pulse width [us]; `low` and `high` [us] are MOT_PWM_MIN and MOT_PWM_MAX."""
+    return min(max((pwm - low) / (high - low), 0.0), 1.0)

@@ -1,0 +1,164 @@
+"""Start of Betaflight SITL: configuration by its command line, restart, and calibration at rest."""
+
+import socket
+import time
+from collections.abc import Callable
+
+from lapwing.services.betaflight import msp
+from lapwing.services.betaflight.cli_lines import lines
+from lapwing.services.betaflight.msp import FirmwareStatus, Msp
+from lapwing.services.betaflight.packets import Ports
+from lapwing.services.common.firmware.link import FirmwareError, Waits
+from lapwing.services.common.firmware.patience import Patience
+from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.setup import FirmwareSetup
+
+FEED_EVERY = 0.004  # [s] between two packets at rest
+POLL_EVERY = 0.2  # [s]
+IGNORED = ("arm switch", "not disarmed")  # reasons that are none once the arm switch opens
+PROMPT = "# "  # of the command line
+DEAF = ("starting",)  # reasons of a firmware that got RC channels before it was ready: it ignores them for good
+DEAF_TIMEOUT = 15.0  # [s]; it is ready after 5 s
+REPEAT = 2.0  # [s] without an answer after which the command line is asked for again
+SAVE_TIMEOUT = 30.0  # [s] from `save` to the exit of the program
+
+
+class Deaf(FirmwareError):
+    """The firmware has started, but not all of it: another start helps."""
+
+
+def start(setup: FirmwareSetup, waits: Waits) -> Program | None:
+    """Start and configure the program; None if it is started elsewhere.
+
+    Raises:
+        FirmwareError: it cannot be started, another one runs, or it rejects a line of the configuration.
+    """
+    if not setup.command:
+        return None
+    port = Ports.of(setup).msp
+    if _listens(setup.host, port):
+        message = f"betaflight: TCP port {port} is in use: another Betaflight runs"
+        raise FirmwareError(f"{message}; end it, or leave autopilot.command out to use it")
+    program = Program(setup)
+    try:
+        _configure(setup, program, waits)
+        program.restart()
+    except BaseException:
+        program.close()
+        raise
+    return program
+
+
+def connect(setup: FirmwareSetup, program: Program | None, waits: Waits) -> Msp:
+    """Return an MSP connection to the running firmware.
+
+    Raises:
+        FirmwareError: nothing listens within `start_timeout`.
+    """
+    port = Ports.of(setup).msp
+    patience = Patience(setup.start_timeout, program.pid if program else None)
+    while not patience.over:
+        waits(f"Betaflight at {setup.host}:{port}")
+        if program:
+            program.check(" at its start")
+            if f"bind port {port} for UART1 failed" in program.text():
+                raise Deaf(f"betaflight: cannot open TCP port {port}")
+        try:
+            return Msp(setup.host, port)
+        except OSError:
+            time.sleep(0.05)
+    how = "check autopilot.command" if program else f"start betaflight_SITL.elf {setup.host}, or set autopilot.command"
+    raise FirmwareError(f"betaflight: nothing listens at {setup.host}:{port} after {setup.start_timeout:g} s; {how}")
+
+
+def settle(
+    setup: FirmwareSetup,
+    link: Msp,
+    program: Program | None,
+    feed: Callable[[bool], None],
+    waits: Waits,
+    again: bool = False,
+) -> FirmwareStatus:
+    """Feed the firmware with a vehicle at rest until it can be armed.
+
+    Args:
+        setup: time-out.
+        link: connection for the status.
+        program: the program, if Lapwing runs it.
+        feed: sends the state, and RC channels if its argument is True.
+        waits: see `FirmwareLink`.
+        again: the program can be started again.
+
+    Raises:
+        Deaf: it does not receive RC channels, and `again` is True.
+        FirmwareError: it cannot be armed within `start_timeout`; the text has its reasons.
+    """
+    patience = Patience(setup.start_timeout, program.pid if program else None)
+    deaf = Patience(DEAF_TIMEOUT, program.pid if program else None)
+    status, next_poll = None, 0.0
+    while not patience.over:
+        waits("Betaflight's calibration")
+        if program:
+            program.check(" at its start")
+        feed(status is not None)  # RC before the firmware has started makes it deaf to RC
+        for command, payload in link.poll():
+            if command == msp.STATUS:
+                status = msp.parse_status(payload)
+        if status and not set(status.blockers).difference(IGNORED):
+            return status
+        if again and deaf.over and (status is None or status.blockers == DEAF):
+            raise Deaf(f"betaflight: does not {'hear RC channels' if status else 'answer by MSP'}")
+        if (now := time.monotonic()) >= next_poll:
+            next_poll = now + POLL_EVERY
+            link.send(msp.request(msp.STATUS))
+        time.sleep(FEED_EVERY)
+    why = ", ".join(status.blockers) if status else "no answer by MSP"
+    raise FirmwareError(f"betaflight: cannot be armed after {setup.start_timeout:g} s ({why}); check its configuration")
+
+
+def _listens(host: str, port: int) -> bool:
+    try:
+        socket.create_connection((host, port), timeout=0.5).close()
+    except OSError:
+        return False
+    return True
+
+
+def _configure(setup: FirmwareSetup, program: Program, waits: Waits) -> None:
+    """Write the configuration by the command line; `save` ends the program."""
+    link = connect(setup, program, waits)
+    try:
+        _command(link, "#", program, waits)  # alone: a further byte would cancel it
+        _command(link, "version\n", program, waits)  # takes a second "#" with it, which begins a comment
+        for line in lines(setup):
+            answer = _command(link, f"{line}\n", program, waits)
+            if "###ERROR" in answer or "Invalid" in answer:
+                text = " ".join(answer.replace("\r", "").split())
+                raise FirmwareError(f"betaflight: rejects the line {line!r} ({text}); check autopilot.parameters")
+        link.send(b"save\n")
+        patience = Patience(SAVE_TIMEOUT, program.pid)
+        while program.running:
+            waits("Betaflight's configuration")
+            if patience.over:
+                raise FirmwareError(f"betaflight: does not restart within {SAVE_TIMEOUT:g} s after `save`")
+            time.sleep(0.02)
+    finally:
+        link.close()
+
+
+def _command(link: Msp, line: str, program: Program, waits: Waits) -> str:
+    """Send a line and return the answer up to the next prompt."""
+    link.send(line.encode())
+    answer, patience = "", Patience(SAVE_TIMEOUT, program.pid)
+    sent = time.monotonic()
+    while not answer.endswith(PROMPT):
+        waits("Betaflight's command line")
+        program.check(" at its configuration")
+        if patience.over:
+            raise FirmwareError(f"betaflight: no answer to {line!r} of its command line within {SAVE_TIMEOUT:g} s")
+        time.sleep(0.005)
+        answer += link.text()
+        if line == "#" and not answer and time.monotonic() - sent > REPEAT:  # a firmware that starts may lose it
+            link.send(line.encode())
+            sent = time.monotonic()
+    return answer

@@ -1,0 +1,249 @@
+"""Link to Betaflight SITL: real time, UDP for state, RC and motors, MSP for status.
+
+The firmware would set the rate of its clock by the wall time between two packets of increasing time, which on a busy
+machine jumps by a factor of 100. All packets therefore carry the same time, and its clock keeps to the wall's. A late
+packet shifts all later ones: a simulation that catches up would be faster than the firmware.
+"""
+
+import math
+import socket
+import time
+from contextlib import suppress
+
+from lapwing.services.betaflight import boot, msp
+from lapwing.services.betaflight.packets import (
+    Ports,
+    parse_motors,
+    rc_packet,
+    state_packet,
+)
+from lapwing.services.betaflight.pilot import OFF, Pilot, Sticks
+from lapwing.services.betaflight.resolve import PilotSetup
+from lapwing.services.betaflight.state_source import StateSource
+from lapwing.services.common import ports
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
+from lapwing.services.common.firmware.patience import Patience
+from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.setup import FirmwareSetup
+
+TIME = 1.0  # [s] in all packets
+RC_EVERY = 0.01  # [s]
+STARTS = 3  # starts of the program while it does not receive RC channels
+STATUS_EVERY = 0.2  # [s]
+RUNNING = 0.02  # motor output of an armed vehicle, at least
+LATE = 1.0  # ticks after its time at which a packet counts as late
+FASTEST = 0.8  # shortest fraction of a tick between two packets
+REPLY = 0.05  # [s] that the firmware has for its motor outputs; the simulation waits for them
+FORGOTTEN = 1.0  # [s] of silence after which another firmware may take over
+
+
+class BetaflightLink:
+    """Connection to one Betaflight SITL."""
+
+    def __init__(self, setup: FirmwareSetup) -> None:
+        """Store the configuration."""
+        self._setup, self._ports = setup, Ports.of(setup)
+        pilot: PilotSetup = setup.own
+        self.report = LinkReport("betaflight", reproducible=False)
+        self._source, self._pilot = StateSource(pilot, setup.start_world), Pilot(pilot, setup.start_world)
+        self._program: Program | None = None
+        self._msp: msp.Msp | None = None
+        self._socket: socket.socket | None = None
+        self._status = msp.FirmwareStatus(False, (), 0.0)
+        self._outputs: tuple[float, ...] = (0.0,) * 4
+        self._sender: tuple[str, int] | None = None  # of the motor outputs
+        self._armed = False
+        self._next = self._sent = self._heard = 0.0  # [s] of the wall clock
+        self._intervals = [0.0, 0.0, 0.0]  # count, sum [s], sum of squares [s^2] of the time between packets
+        self._rc_at = self._asked_at = -math.inf  # [s] simulation time
+        self._sticks = OFF
+
+    def open(self, waits: Waits) -> None:
+        """Start or await the firmware, and calibrate it."""
+        setup = self._setup
+        self._socket = _bound(setup.host, self._ports.motors)
+        self._program = boot.start(setup, waits)
+        self._calibrate(waits)
+
+    def _calibrate(self, waits: Waits) -> None:
+        """Connect to the firmware and calibrate it; start it again if it does not receive RC channels."""
+        setup = self._setup
+        assert self._socket is not None
+        self._socket.settimeout(0.0)
+        with suppress(OSError):
+            while self._socket.recv(2048):  # of the program before its restart
+                pass
+
+        def feed(with_rc: bool) -> None:
+            self._send(OFF if with_rc else None)
+            self._drain(0.0)
+
+        for left in reversed(range(STARTS if self._program else 1)):
+            try:
+                self._msp = boot.connect(setup, self._program, waits)
+                self._status = boot.settle(setup, self._msp, self._program, feed, waits, left > 0)
+                return
+            except boot.Deaf as error:
+                if not left:
+                    raise
+                assert self._program is not None
+                self.report.note(f"started again: {error}")
+                if self._msp:
+                    self._msp.close()
+                self._program.stop()
+                self._program.restart()
+                self._sender = None
+
+    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
+        """Send state and sticks at the time of the tick, and return the newest motor outputs."""
+        interval = self._setup.interval
+        t = tick * interval
+        motion = self._source.update(t, read)
+        self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), motion)
+        self._pace(interval)
+        self._drain(0.0)  # what has come since the last reply is older than this tick
+        if t >= self._rc_at + RC_EVERY:
+            self._rc_at = t
+            self._send(self._sticks)
+        else:
+            self._send(None)
+        begun = time.monotonic()
+        if not self._drain(REPLY):
+            self.report.missed += 1
+            self._repeat(t, waits)
+        self.report.waiting += time.monotonic() - begun
+        self._poll_status(t)
+        return self._output()
+
+    def cpu(self) -> float:
+        """Return the CPU time [s] of the program, 0 if somebody else has started it."""
+        return self._program.cpu() if self._program else 0.0
+
+    def close(self) -> None:
+        """End the connections, and the program."""
+        if self._msp:
+            self._msp.close()
+        if self._socket:
+            self._socket.close()
+        if self._program:
+            self._program.close()
+        self._program = self._msp = self._socket = None
+
+    def _pace(self, interval: float) -> None:
+        """Wait for the time of the packet, and count its lateness."""
+        now = time.monotonic()
+        if self._sent == 0.0:
+            self._next = now
+        if now < self._next:
+            time.sleep(self._next - now)
+            now = time.monotonic()
+        if now - self._next > LATE * interval:
+            self.report.late += 1
+        self.report.skew_max = max(self.report.skew_max, now - self._next)
+        if self._sent > 0.0:
+            gap = now - self._sent
+            n, total, squares = self._intervals
+            self._intervals = [n + 1, total + gap, squares + gap * gap]
+            mean = self._intervals[1] / self._intervals[0]
+            self.report.jitter = math.sqrt(max(0.0, self._intervals[2] / self._intervals[0] - mean * mean))
+        self._sent = now
+        self._next = max(self._next + interval, now + FASTEST * interval)
+
+    def _send(self, sticks: Sticks | None) -> None:
+        assert self._socket is not None
+        with suppress(OSError):  # it is not there yet, or gone: silence shows that
+            self._socket.sendto(state_packet(TIME, self._source.state), (self._setup.host, self._ports.state))
+            if sticks:
+                self._socket.sendto(rc_packet(TIME, tuple(sticks)), (self._setup.host, self._ports.rc))
+
+    def _drain(self, timeout: float) -> bool:
+        """Take in the motor outputs that have come, and wait for one at most `timeout` [s]; False if none came."""
+        assert self._socket is not None
+        deadline, result = time.monotonic() + timeout, False
+        while True:
+            left = deadline - time.monotonic()
+            self._socket.settimeout(max(left, 0.0) if not result else 0.0)
+            try:
+                data, sender = self._socket.recvfrom(2048)
+            except OSError:  # none left, or the firmware's port is closed
+                if result or time.monotonic() >= deadline:
+                    return result
+                continue
+            result = self._accept(data, sender) or result
+
+    def _accept(self, data: bytes, sender: tuple[str, int]) -> bool:
+        """Store motor outputs; count and ignore what is malformed or comes from a second firmware."""
+        now = time.monotonic()
+        if self._sender not in (None, sender):
+            if now - self._heard < FORGOTTEN:
+                self.report.rejected += 1
+                self.report.note(f"a second Betaflight ({sender[0]}:{sender[1]}) sent motor outputs, which are ignored")
+                return False
+            self.report.reconnected += 1
+        try:
+            self._outputs = parse_motors(data)
+        except ValueError as error:
+            self.report.rejected += 1
+            self.report.note(f"malformed motor outputs: {error}")
+            return False
+        self._sender, self._heard = sender, now
+        return True
+
+    def _repeat(self, t: float, waits: Waits) -> None:
+        """Send the state again until motor outputs come: the simulation pauses while the firmware gets no CPU.
+
+        Raises:
+            FirmwareError: the firmware has been silent for too long, or has ended.
+        """
+        patience = Patience(self._setup.step_timeout, self._program.pid if self._program else None)
+        while True:
+            waits("Betaflight's motor outputs")
+            if self._program:
+                self._program.check(f" at t = {t:.3f} s")
+            if patience.over:
+                message = f"betaflight: no motor outputs for {self._setup.step_timeout:g} s at t = {t:.3f} s"
+                raise FirmwareError(f"{message}; the firmware has stalled or ended")
+            self.report.resent += 1
+            self._send(self._sticks)
+            if self._drain(REPLY):
+                return
+
+    def _poll_status(self, t: float) -> None:
+        assert self._msp is not None
+        if t < self._asked_at + STATUS_EVERY:
+            return
+        self._asked_at = t
+        for command, payload in self._msp.poll():
+            if command == msp.STATUS:
+                with suppress(ValueError):
+                    self._status = msp.parse_status(payload)
+        self._msp.send(msp.request(msp.STATUS))
+
+    def _output(self) -> FirmwareOutput:
+        armed = max(self._outputs) > RUNNING
+        stage = self._pilot.stage
+        text = ""
+        if stage in ("flying", "landing") and not armed:
+            text = "disarmed in flight"
+        blockers = tuple(b for b in self._status.blockers if b not in boot.IGNORED)
+        landed = stage in ("waiting", "landed")
+        finished = self._pilot.finished and not armed
+        return FirmwareOutput(
+            self._outputs, armed, landed, finished, f"angle ({stage})", text, blockers, self._pilot.attitude_reference
+        )
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    """Return the socket of the motor outputs.
+
+    Raises:
+        FirmwareError: the port is in use.
+    """
+    result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        result.bind((host, port))
+    except OSError as error:
+        result.close()
+        message = f"betaflight: UDP port {port} of {host} cannot be opened ({error.strerror})"
+        raise FirmwareError(f"{message}; end the other simulator that uses it") from None
+    return result

@@ -1,0 +1,131 @@
+"""Pilot of Betaflight: flies a trajectory by the sticks, in ANGLE mode, as a companion computer with GPS would."""
+
+import math
+from typing import NamedTuple
+
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.services.betaflight.packets import RC_HIGH, RC_LOW, RC_MIDDLE
+from lapwing.services.betaflight.resolve import PilotSetup
+from lapwing.services.common.ports import Setpoint
+
+ARM_AT = 0.5  # [s] at which the arm switch is closed, with the throttle low
+LIFTED = 0.02  # [m] of the reference above the start, from which the pilot flies
+LOW = 0.5  # [m] above the start, below which the landing begins
+DESCENT = 0.4  # [m/s] below the end of the trajectory, until the vehicle rests
+RESTED = 0.6  # [s] without vertical motion, after which it has landed
+NEAR = 0.1  # [m] above the start
+TOUCHED = 0.3  # [s] near the ground, after which a vehicle that bounces has landed
+STILL = 0.12  # [m/s]
+DISARMED = 0.5  # [s] of low throttle before the run ends
+REACH = 2.0  # [m] of position error that the pilot corrects at once
+CLIMB_LIMIT = 6.0  # [m/s^2]
+IDLE = 0.055  # output of an armed motor at low throttle
+LOWEST = 1050  # [us] throttle channel from which on the output rises (min_check)
+
+
+class Motion(NamedTuple):
+    """Measured motion of the vehicle."""
+
+    position_world: Vec3  # [m]
+    velocity_world: Vec3  # [m/s]
+    yaw: float  # [rad] ENU, counter-clockwise from east
+
+
+class Sticks(NamedTuple):
+    """RC channels in the firmware's default order, AETR, and the switches for ARM and ANGLE."""
+
+    roll: int
+    pitch: int
+    throttle: int
+    yaw: int
+    arm: int
+    angle: int = RC_HIGH
+
+
+OFF = Sticks(RC_MIDDLE, RC_MIDDLE, RC_LOW, RC_MIDDLE, RC_LOW)
+
+
+class Pilot:
+    """State of the pilot.
+
+    Attributes:
+        attitude_reference: roll, pitch, yaw that the sticks command [rad].
+        stage: "waiting", "flying", "landing" or "landed".
+        finished: True once the vehicle is disarmed after the landing.
+    """
+
+    def __init__(self, setup: PilotSetup, start_world: Vec3):
+        """Create a pilot for a vehicle that rests at `start_world`."""
+        self._setup, self._start = setup, start_world
+        self._integral: Vec3 = ZERO
+        self._still = self._near = self._landed = 0.0  # [s]
+        self._descent = 0.0  # [m] of the setpoint below the trajectory's end
+        self.attitude_reference: Vec3 = ZERO
+        self.stage, self.finished = "waiting", False
+
+    def step(self, time: float, interval: float, wanted: Setpoint, motion: Motion) -> Sticks:
+        """Return the sticks at `time` [s], `interval` [s] after the last step."""
+        if self.stage == "waiting":
+            if time > ARM_AT and wanted.position_world[2] > self._start[2] + LIFTED:
+                self.stage = "flying"
+            return OFF._replace(arm=RC_HIGH if time > ARM_AT else RC_LOW)
+        low = motion.position_world[2] < self._start[2] + LOW
+        if self.stage == "flying" and wanted.final and low and self._ends(wanted):
+            self.stage = "landing"
+        if self.stage == "landing":
+            self._descent += DESCENT * interval
+            velocity = motion.velocity_world[2]
+            self._still = self._still + interval if self._descent > 0.2 and abs(velocity) < STILL else 0.0
+            if motion.position_world[2] < self._start[2] + NEAR:
+                self._near += interval
+            if self._still > RESTED or self._near > TOUCHED:
+                self.stage = "landed"
+        if self.stage == "landed":
+            self._landed += interval
+            self.finished = self._landed > DISARMED
+            return OFF._replace(arm=RC_HIGH if self._landed < 0.5 * DISARMED else RC_LOW)
+        return self._fly(interval, wanted, motion)
+
+    def _ends(self, wanted: Setpoint) -> bool:
+        """Return True if the reference has come to the ground and rests there."""
+        return wanted.position_world[2] < self._start[2] + LIFTED and abs(wanted.velocity_world[2]) < 0.05
+
+    def _fly(self, interval: float, wanted: Setpoint, motion: Motion) -> Sticks:
+        s = self._setup
+        down = (0.0, 0.0, min(self._descent, REACH))
+        target = tuple(w - d for w, d in zip(wanted.position_world, down, strict=True))
+        error = [max(-REACH, min(REACH, a - b)) for a, b in zip(target, motion.position_world, strict=True)]
+        slower = [a - b for a, b in zip(wanted.velocity_world, motion.velocity_world, strict=True)]
+        if self.stage == "landing":
+            slower[2] -= DESCENT
+        else:
+            self._integral = tuple(  # type: ignore[assignment]
+                max(-3.0, min(3.0, i + s.integral_gain * e * interval))
+                for i, e in zip(self._integral, error, strict=True)
+            )
+        ax, ay, az = (
+            feed + s.position_gain * e + s.velocity_gain * v + i
+            for feed, e, v, i in zip(wanted.acceleration_world, error, slower, self._integral, strict=True)
+        )
+        az = max(-0.6 * s.gravity, min(CLIMB_LIMIT, az)) + s.gravity
+        c, sine = math.cos(motion.yaw), math.sin(motion.yaw)
+        forward, left = c * ax + sine * ay, c * ay - sine * ax
+        pitch, roll = math.atan2(forward, az), math.atan2(-left, math.hypot(forward, az))  # nose down, to the right
+        limit = math.radians(s.tilt_limit_deg)
+        self.attitude_reference = (max(-limit, min(limit, roll)), max(-limit, min(limit, pitch)), wanted.yaw)
+        thrust = math.sqrt(forward * forward + left * left + az * az) / s.gravity
+        output = min(s.hover_output * math.sqrt(thrust), 1.0)
+        turn = (wanted.yaw - motion.yaw + math.pi) % (2.0 * math.pi) - math.pi
+        rate = wanted.yaw_rate + s.yaw_gain * turn
+        return Sticks(
+            _stick(roll / limit),
+            _stick(pitch / limit),
+            round(LOWEST + (RC_HIGH - LOWEST) * max(0.0, (output - IDLE) / (1.0 - IDLE))),
+            _stick(-rate / math.radians(s.yaw_rate_limit_deg)),
+            RC_HIGH,
+        )
+
+
+def _stick(deflection: float) -> int:
+    """Return the channel [us] of a deflection from -1 to 1."""
+    return round(RC_MIDDLE + (RC_HIGH - RC_MIDDLE) * max(-1.0, min(1.0, deflection)))

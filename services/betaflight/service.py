@@ -1,0 +1,14 @@
+"""The service of Betaflight's adapter."""
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.services.betaflight.link import BetaflightLink
+from lapwing.services.common.firmware.playback import Recorded
+from lapwing.services.common.firmware.service import firmware_service
+
+NAME = "betaflight"
+
+
+def create(setup: RunConfig, recorded: Recorded | None = None) -> Service:
+    """Return the adapter of a run; `recorded`: messages of a log to fly again."""
+    return firmware_service(setup, NAME, BetaflightLink, recorded)

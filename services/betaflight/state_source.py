@@ -1,0 +1,69 @@
+"""Samples of Lapwing's ports as Betaflight's state packet, and as the motion that the pilot sees."""
+
+import math
+
+from lapwing.dynamics.geodesy import enu_to_geodetic, geodetic_to_enu
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, conjugate, rotate
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.kernels import python_function
+from lapwing.services.betaflight.packets import State
+from lapwing.services.betaflight.pilot import Motion
+from lapwing.services.betaflight.resolve import PilotSetup
+from lapwing.services.common import ports
+from lapwing.services.common.firmware.link import Read
+
+STANDARD_PRESSURE = 101325.0  # [Pa] without a barometer
+_to_geodetic, _to_enu = python_function(enu_to_geodetic), python_function(geodetic_to_enu)
+_rotate, _conjugate = python_function(rotate), python_function(conjugate)
+
+
+class StateSource:
+    """Newest samples; a sensor without a reading leaves its last one."""
+
+    def __init__(self, setup: PilotSetup, start_world: Vec3):
+        """Begin with the vehicle at rest at `start_world`, level and heading east."""
+        self._setup = setup
+        latitude, longitude, height = _to_geodetic(setup.home, start_world)
+        force = (0.0, 0.0, setup.gravity)
+        self.state = State(ZERO, force, NO_ROTATION, ZERO, latitude, longitude, height, STANDARD_PRESSURE)
+        self._position, self._velocity, self._fixed_at = start_world, (0.0, 0.0, 0.0), 0.0
+
+    def update(self, time: float, read: Read) -> Motion:
+        """Take the samples at `time` [s]."""
+        s, truth = self._setup, read(ports.TRUTH)
+        state = self.state._replace(attitude=truth.attitude)
+        if not s.imu:
+            state = state._replace(omega_body=truth.omega_body, specific_force_body=_specific_force(truth, s.gravity))
+        elif (imu := read(ports.IMU)).valid:
+            state = state._replace(omega_body=imu.omega_body, specific_force_body=imu.specific_force_body)
+        if s.barometer and (baro := read(ports.BAROMETER)).valid:
+            state = state._replace(pressure=baro.pressure)
+        if not s.gps:
+            self._position, self._velocity, self._fixed_at = truth.position_world, truth.velocity_world, time
+            place = _to_geodetic(s.home, truth.position_world)
+            state = state._replace(velocity_world=truth.velocity_world)._replace(
+                latitude_deg=place[0], longitude_deg=place[1], height=place[2]
+            )
+        elif (gps := read(ports.GPS)).valid and gps != getattr(self, "_gps", None):
+            self._gps = gps
+            self._position = tuple(_to_enu(s.home, gps.latitude_deg, gps.longitude_deg, gps.height))
+            self._velocity, self._fixed_at = gps.velocity_world, time - gps.age
+            state = state._replace(
+                velocity_world=gps.velocity_world,
+                latitude_deg=gps.latitude_deg, longitude_deg=gps.longitude_deg, height=gps.height,
+            )  # fmt: skip
+        self.state = state
+        elapsed = min(time - self._fixed_at, 1.0)
+        position = tuple(p + v * elapsed for p, v in zip(self._position, self._velocity, strict=True))
+        return Motion(position, self._velocity, _yaw(state.attitude))  # type: ignore[arg-type]
+
+
+def _specific_force(truth: ports.TrueState, gravity: float) -> Vec3:
+    ax, ay, az = truth.acceleration_world
+    result: Vec3 = _rotate(_conjugate(truth.attitude), (ax, ay, az + gravity))
+    return result
+
+
+def _yaw(q: Quaternion) -> float:
+    w, x, y, z = q
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -1,0 +1,29 @@
+"""A foreign autopilot firmware in the autopilot's place: everything that its adapters have in common.
+
+An adapter is a service `services/FIRMWARE/` with the usual files. It is a line in `services/process_table.py`, a name
+in `schema.FIRMWARES`, and:
+
+- `resolve.py`: `resolve(scene)` returns None unless `firmware_of(scene) == NAME`, else
+  `setup.firmware_config(scene, inputs, period, own)`. `inputs` are the ports that the firmware consumes (sensors,
+  truth, battery, trajectory), `period` [ticks] the time between two exchanges, `own` the adapter's NamedTuple of
+  resolved values. `from lapwing.services.common.firmware.setup import fleet` numbers the instances of a fleet.
+- `schema.py` (optional): a `SceneTable` with the adapter's own keys, for example `[px4]`.
+- `service.py`: `create(setup, recorded=None)` returns `service.firmware_service(setup, NAME, Link, recorded)`.
+- `link.py`: a class with the methods of `link.FirmwareLink`, constructed with a `setup.FirmwareSetup`.
+
+Life of a link, in this order:
+
+1. `open(waits)`, before the first tick and outside the time of the run: start the program (`program.Program`) or wait
+   for it, and connect. Every wait calls `waits(text)` at least every 0.2 s; it raises if the run is ended. Use
+   `patience.Patience` for time-outs: it does not count time in which the firmware got no CPU. A firmware that does not
+   come or stalls raises `link.FirmwareError("px4: no HIL_ACTUATOR_CONTROLS for 10 s at t = 3.2 s; ...")`.
+2. `step(tick, read, waits)` every `period` ticks: `read("imu")` returns the port's newest sample as its NamedTuple of
+   `services/common/ports.py` (SI, ENU, FLU). Return a `FirmwareOutput`: the firmware's own outputs in its own order
+   (0 to 1), and its state.
+3. `close()` once, always: ends the program if this link started it.
+
+The block (`block.FirmwareBlock`) reorders the outputs to the airframe's rotors (`motor_order`), and a compiled block
+(`hold`) makes volts of them at every tick: output times battery voltage, or times `airframe.motor.max_voltage` if no
+effect models the battery. `link.report` (a `LinkReport`) goes to the log's metadata as "firmware" and to the summary.
+`lapwing resimulate` does not open a link: it flies the recorded actuator commands (`playback`).
+"""

@@ -1,0 +1,87 @@
+"""Python block that exchanges samples with a firmware, and writes its outputs to the port of `hold`."""
+
+import math
+import time
+from collections.abc import Callable
+
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
+from lapwing.services.common.firmware.hold import COMMAND, FirmwareCommand
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareLink, FirmwareOutput, Waits
+from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.common.firmware.status_words import StatusWords
+
+
+class FirmwareBlock:
+    """Steps a link every `period` ticks."""
+
+    def __init__(
+        self,
+        name: str,
+        setup: FirmwareSetup,
+        inputs: tuple[InputPort, ...],
+        create: Callable[[FirmwareSetup], FirmwareLink],
+    ):
+        """Create the block; `create` is the class of the link."""
+        self.name, self.inputs = f"{name}.link", inputs
+        self._setup, self._link = setup, create(setup)
+        self._none = FirmwareCommand((0.0,) * len(setup.order))
+        self.outputs = (Port(COMMAND, self._none, LATCHED),)
+        self.words = StatusWords()
+        self._before: FirmwareCommand | None = None
+        self._waits: Waits = lambda text: None
+        self._opened = False
+        self._cpu = self._own_cpu = 0.0  # [s] before the first exchange
+
+    def bind(self, graph: BlockDiagram) -> None:
+        """Store the diagram."""
+        self._graph = graph
+
+    def open(self, waits: Waits) -> None:
+        """Connect to the firmware, before the first tick."""
+        self._waits, self._opened = waits, True
+        self._link.open(waits)
+        self._cpu, self._own_cpu = self._link.cpu(), time.process_time()
+
+    def close(self) -> None:
+        """End the connection."""
+        if self._opened:
+            self._link.close()
+        self._opened = False
+
+    @property
+    def reports(self) -> dict[str, str]:
+        """Entries of the log's metadata."""
+        report, cpu = self._link.report, self._link.cpu()
+        if self._opened and cpu > 0.0:
+            report.cpu, report.own_cpu = cpu - self._cpu, time.process_time() - self._own_cpu
+        result = {"firmware": str(report)}
+        if report.notes:
+            result["firmware_notes"] = "; ".join(report.notes)
+        if not report.reproducible:
+            result["reproducible"] = f"no: {report.firmware} has no lock step"
+        return result
+
+    def on_tick(self, tick: int) -> int:
+        """Exchange samples and outputs at `tick`. Return the tick of the next exchange."""
+        if not self._opened:
+            self.open(self._waits)
+        graph, report = self._graph, self._link.report
+        begun = time.perf_counter()
+        output = self._link.step(tick, lambda port: graph.latest(port, tick), self._waits)
+        report.wall += time.perf_counter() - begun
+        report.steps += 1
+        command = self._command(tick, output)
+        if command != self._before:
+            graph.put(COMMAND, tick, command)
+            self._before = command
+        return tick + self._setup.period
+
+    def _command(self, tick: int, output: FirmwareOutput) -> FirmwareCommand:
+        values = output.outputs
+        if len(values) < len(self._setup.order) or not all(map(math.isfinite, values)):
+            at = f"at t = {tick * self._setup.interval:.3f} s"
+            raise FirmwareError(f"{self._setup.firmware}: invalid motor outputs {values} {at}; check its motor setup")
+        duty = tuple(min(max(values[i], 0.0), 1.0) for i in self._setup.order) if output.armed else self._none.duty
+        words, attitude = self.words.number(output), output.attitude_reference
+        return FirmwareCommand(duty, output.armed, output.landed, output.finished, words, attitude)

@@ -1,0 +1,42 @@
+"""Selection of MAVLink frames by message id, before they are decoded.
+
+A firmware sends hundreds of messages a second; decoding all took three times as long as the plant (PX4, onboard link).
+"""
+
+from collections.abc import Collection
+
+V1, V2 = 0xFE, 0xFD
+_SIGNED, _SIGNATURE, _CHECKSUM = 0x01, 13, 2  # flag; [bytes]
+
+
+class FrameFilter:
+    """Passes the frames of some messages of a stream of bytes; checksums are left to the decoder."""
+
+    def __init__(self, numbers: Collection[int]):
+        """Create a filter that passes the message ids `numbers`."""
+        self._numbers = frozenset(numbers)
+        self._rest = b""
+
+    def select(self, data: bytes) -> bytes:
+        """Return the wanted frames that `data` completes; bytes that begin no frame are dropped."""
+        data, result = self._rest + data, []
+        at, end = 0, len(data)
+        while at < end:
+            mark = data[at]
+            if mark not in (V1, V2):
+                at += 1
+                continue
+            head = 10 if mark == V2 else 6
+            if at + head > end:
+                break
+            length = head + data[at + 1] + _CHECKSUM
+            if mark == V2 and data[at + 2] & _SIGNED:
+                length += _SIGNATURE
+            if at + length > end:
+                break
+            number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16 if mark == V2 else data[at + 5]
+            if number in self._numbers:
+                result.append(data[at : at + length])
+            at += length
+        self._rest = data[at:]
+        return b"".join(result)

@@ -1,0 +1,52 @@
+"""Compiled block: holds a firmware's last outputs between exchanges, as motor voltages and status at every tick."""
+
+from typing import NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
+from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, PerRotor
+
+COMMAND = "firmware"  # port of `FirmwareCommand`
+
+
+class FirmwareCommand(NamedTuple):
+    """Last outputs of the firmware, latched."""
+
+    duty: PerRotor  # fraction of the supply voltage, in the airframe's order
+    armed: bool = False
+    landed: bool = True
+    finished: bool = False
+    status_text_id: int = 0  # index of the status texts
+    attitude_reference: Vec3 = ZERO  # [rad] roll, pitch, yaw
+
+
+class Hold(NamedTuple):
+    """Parameters of the block; its inputs are command and battery."""
+
+    voltage_max: float  # [V] of the supply before the first reading of the battery
+    none: PerRotor  # zero for each rotor
+
+
+class HeldState(NamedTuple):
+    """State of the block."""
+
+    supply: float  # [V]
+
+
+@always_inline
+def _volts(supply: float, duty: float, _: float) -> float:
+    return duty * supply
+
+
+@always_inline
+def step(p: Hold, s: HeldState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[HeldState, tuple, int]:
+    """Return the motor command and the status at `tick`."""
+    command, battery = inputs[0].value, inputs[1]
+    supply = battery.value.voltage if battery.due else s.supply
+    motors = MotorCommand(
+        map_tuple(_volts, supply, command.duty, p.none), command.armed, p.none, command.attitude_reference
+    )
+    status = AutopilotStatus(0, command.status_text_id, command.armed, command.landed, command.finished)
+    return HeldState(supply), (motors, status), CONTINUE

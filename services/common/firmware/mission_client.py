@@ -1,0 +1,280 @@
+"""Client of a firmware's MAVLink link: sets parameters, uploads a mission, arms, and follows the flight.
+
+It is polled from the lock step and never waits. All its times are simulation times, so that it does not depend on the
+speed of the run. Source: MAVLink guide, "Mission Protocol", "Parameter Protocol", "Command Protocol".
+"""
+
+import math
+import re
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum, auto
+from typing import Any, NamedTuple
+
+from lapwing.services.common.firmware.frame_filter import FrameFilter
+from lapwing.services.common.firmware.mavlink_transport import Transport
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import saturated
+
+SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
+RETRY = 1.0  # [s] until an unanswered message is sent again
+POLL_EVERY = 0.02  # [s] between two looks at the link
+REJECTIONS = 20  # uploads, one per second, after which the mission is wrong
+CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
+BLOCKERS = 5  # last status texts kept while arming is rejected
+FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNORECASE)  # in status texts
+NEEDED = (  # messages with a handler
+    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
+    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
+    mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
+    mavlink.MAVLINK_MSG_ID_MISSION_ACK,
+    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
+    mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
+    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
+    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+)
+INTEGERS = {  # `struct` format by MAV_PARAM_TYPE
+    mavlink.MAV_PARAM_TYPE_UINT8: "<Bxxx",
+    mavlink.MAV_PARAM_TYPE_INT8: "<bxxx",
+    mavlink.MAV_PARAM_TYPE_UINT16: "<Hxx",
+    mavlink.MAV_PARAM_TYPE_INT16: "<hxx",
+    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
+    mavlink.MAV_PARAM_TYPE_INT32: "<i",
+}
+
+
+class Stage(Enum):
+    """Progress of the client."""
+
+    CONNECTING = auto()
+    PARAMETERS = auto()
+    UPLOADING = auto()
+    ARMING = auto()
+    FLYING = auto()
+    FINISHED = auto()
+
+
+class Conventions(NamedTuple):
+    """Differences between firmwares."""
+
+    mission_mode: tuple[float, float]  # parameters 2 and 3 of MAV_CMD_DO_SET_MODE
+    home_first: bool  # item 0 of a mission is the home position
+    open_value: float  # replaces NaN in the parameters of an item
+    bytewise: bool  # integer parameters keep their bytes in the float field
+    mode_name: Callable[[int], str]  # of a heartbeat's custom_mode
+
+
+class MissionClient:
+    """Uploads a mission, arms, and follows the flight.
+
+    Attributes:
+        stage: progress.
+        armed: state of the last heartbeat.
+        landed: state of the last EXTENDED_SYS_STATE.
+        mode: name of the flight mode.
+        text: last status text of the level error or worse.
+        failsafe: last status text about a failsafe since arming.
+        blockers: status texts since arming was rejected.
+        error: reason why the flight is impossible, "" as long as it is possible.
+        version: of the firmware, "" until it has told it.
+        reached: number of the last item that the vehicle has reached, -1: none.
+    """
+
+    def __init__(
+        self, transport: Transport, conventions: Conventions, items: Sequence[Any], parameters: Mapping[str, float]
+    ):
+        """Create the client.
+
+        Args:
+            transport: link to the firmware.
+            conventions: of the firmware.
+            items: MISSION_ITEM_INT messages; empty: only follow the flight.
+            parameters: firmware parameters to set before the upload.
+        """
+        self._transport, self._conventions, self._items = transport, conventions, list(items)
+        self._parameters = dict(parameters)
+        self._types: dict[str, int] = {}
+        self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
+        self._codec.robust_parsing = True
+        self._filter = FrameFilter(NEEDED)
+        self._target = 0  # system id of the firmware
+        self._next = self._beat = self._sent = -1.0  # [s] of the next poll, heartbeat, last request
+        self._in_mode = False
+        self._rejections = 0
+        self.stage = Stage.CONNECTING
+        self.armed, self.landed, self.mode, self.text, self.error = False, True, "", "", ""
+        self.failsafe = self.version = ""
+        self.blockers: list[str] = []
+        self.reached = -1
+
+    def poll(self, time: float) -> None:
+        """Read and answer messages at simulation `time` [s]."""
+        if time < self._next:
+            return
+        self._next = time + POLL_EVERY
+        self.read()
+        if time >= self._beat:
+            self._beat = time + 1.0
+            self._send(
+                mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
+            )
+        if time >= self._sent + RETRY or self._sent < 0.0:
+            self._sent = time
+            self._request()
+
+    def read(self) -> None:
+        """Connect if there is no connection, and take in the messages that have come."""
+        for message in self._codec.parse_buffer(self._filter.select(self._transport.receive())) or ():
+            self._handle(message)
+
+    def send_battery(self, voltage: float, current: float, charge: float) -> None:
+        """Send the state of the battery [V], [A], fraction, as a battery of the same vehicle does."""
+        if not self._target:
+            return
+        cells = [saturated(1e3 * voltage, 16, True), *(CELLS_UNKNOWN,) * 9]
+        percent = min(max(round(100.0 * charge), 0), 100)
+        message = mavlink.MAVLink_battery_status_message(
+            0, 0, 0, TEMPERATURE_UNKNOWN, cells, saturated(100.0 * current, 16), -1, -1, percent
+        )
+        codec = mavlink.MAVLink(None, srcSystem=self._target, srcComponent=mavlink.MAV_COMP_ID_BATTERY)
+        self._transport.send(message.pack(codec))
+
+    def close(self) -> None:
+        """Close the link."""
+        self._transport.close()
+
+    def _send(self, message: Any) -> None:
+        self._transport.send(message.pack(self._codec))
+
+    def _advance(self, stage: Stage) -> None:
+        """Enter a stage, and send its first request at once."""
+        self.stage, self._sent = stage, -1.0
+
+    def _request(self) -> None:
+        """Send what the stage needs next."""
+        if self.stage is Stage.PARAMETERS:
+            if not self._parameters:
+                self._advance(Stage.UPLOADING if self._items else Stage.FLYING)
+                return
+            name, value = next(iter(self._parameters.items()))
+            self._send(self._parameter(name, value))
+        elif self.stage is Stage.UPLOADING:
+            count = len(self._items) + self._conventions.home_first
+            self._send(mavlink.MAVLink_mission_count_message(self._target, 1, count))
+        elif self.stage is Stage.ARMING:
+            if not self._in_mode:
+                main, sub = self._conventions.mission_mode
+                flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+                self._command(mavlink.MAV_CMD_DO_SET_MODE, flag, main, sub)
+            else:
+                self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+
+    def _command(self, command: int, *parameters: float) -> None:
+        padded = (*parameters, *(0.0,) * (7 - len(parameters)))
+        self._send(mavlink.MAVLink_command_long_message(self._target, 1, command, 0, *padded))
+
+    def _parameter(self, name: str, value: float) -> Any:
+        """Return the message that sets a parameter, or reads its type first."""
+        kind = self._types.get(name)
+        if kind is None:
+            return mavlink.MAVLink_param_request_read_message(self._target, 1, name.encode(), -1)
+        if self._conventions.bytewise and kind in INTEGERS:
+            value = struct.unpack("<f", struct.pack(INTEGERS[kind], round(value)))[0]
+        return mavlink.MAVLink_param_set_message(self._target, 1, name.encode(), value, kind)
+
+    def _handle(self, message: Any) -> None:
+        handler = getattr(self, f"_on_{message.get_type().lower()}", None)
+        if handler is not None and message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
+            handler(message)
+
+    def _on_heartbeat(self, message: Any) -> None:
+        if message.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
+            return
+        if self.stage is Stage.CONNECTING:
+            self._target = message.get_srcSystem()
+            every = 200_000.0  # [us]
+            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, every)
+            self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
+            self._advance(Stage.PARAMETERS)
+        was, self.armed = self.armed, bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        self.mode = self._conventions.mode_name(message.custom_mode)
+        if self.armed and self.stage is Stage.ARMING:
+            self.blockers.clear()
+            self.failsafe = ""
+            self._advance(Stage.FLYING)
+        if was and not self.armed and self.stage is Stage.FLYING:
+            self._advance(Stage.FINISHED)
+
+    def _on_autopilot_version(self, message: Any) -> None:
+        number = message.flight_sw_version
+        self.version = f"{number >> 24}.{number >> 16 & 0xFF}.{number >> 8 & 0xFF}"
+
+    def _on_extended_sys_state(self, message: Any) -> None:
+        self.landed = message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+
+    def _on_param_value(self, message: Any) -> None:
+        name = message.param_id
+        if name not in self._parameters:
+            return
+        value, wanted = message.param_value, self._parameters[name]
+        if self._conventions.bytewise and message.param_type in INTEGERS:
+            value = struct.unpack(INTEGERS[message.param_type], struct.pack("<f", value))[0]
+        if abs(value - wanted) <= 1e-6 * max(1.0, abs(wanted)):
+            del self._parameters[name]
+        self._types[name] = message.param_type
+        self._sent = -1.0
+
+    def _on_mission_request(self, message: Any) -> None:
+        number = message.seq - self._conventions.home_first
+        if self.stage is not Stage.UPLOADING or not -1 <= number < len(self._items):
+            return
+        item = self._items[max(number, 0)]
+        given = (item.param1, item.param2, item.param3, item.param4)
+        parameters = (self._conventions.open_value if math.isnan(value) else value for value in given)
+        fields = (item.frame, item.command, 0, 1, *parameters)
+        place = (item.x, item.y, item.z)
+        if number < 0:
+            frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+            fields, place = (frame, mavlink.MAV_CMD_NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0), (0, 0, 0.0)
+        self._send(mavlink.MAVLink_mission_item_int_message(self._target, 1, message.seq, *fields, *place))
+
+    _on_mission_request_int = _on_mission_request
+
+    def _on_mission_ack(self, message: Any) -> None:
+        if self.stage is not Stage.UPLOADING:
+            return
+        if message.type == mavlink.MAV_MISSION_ACCEPTED:
+            self._advance(Stage.ARMING)
+            return
+        self._rejections += 1  # ArduPilot has no space for a mission until it has started
+        if self._rejections > REJECTIONS:
+            self.error = f"the mission is rejected ({_name('MAV_MISSION_RESULT', message.type)}) {self.text}".rstrip()
+
+    def _on_mission_item_reached(self, message: Any) -> None:
+        self.reached = message.seq - self._conventions.home_first
+
+    def _on_command_ack(self, message: Any) -> None:
+        if self.stage is not Stage.ARMING:
+            return
+        accepted = message.result == mavlink.MAV_RESULT_ACCEPTED
+        if message.command == mavlink.MAV_CMD_DO_SET_MODE and accepted and not self._in_mode:
+            self._in_mode, self._sent = True, -1.0
+        elif message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not accepted:
+            self._in_mode = False  # a rejected mode change may have restored the mode
+
+    def _on_statustext(self, message: Any) -> None:
+        text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
+        if message.severity <= mavlink.MAV_SEVERITY_ERROR:
+            self.text = text
+        if self.armed and FAILSAFE.search(text):
+            self.failsafe = text
+        if self.stage is Stage.ARMING and message.severity <= mavlink.MAV_SEVERITY_WARNING:
+            self.blockers = [*[old for old in self.blockers if old != text], text][-BLOCKERS:]
+
+
+def _name(enum: str, value: int) -> str:
+    """Return the name of an enum's value without the enum's name."""
+    entry = mavlink.enums[enum].get(value)
+    return entry.name.lower() if entry else str(value)

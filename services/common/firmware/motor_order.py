@@ -1,0 +1,49 @@
+"""Outputs of a firmware and the rotors of the airframe: which drives which."""
+
+from typing import NamedTuple
+
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.kernels import math
+
+
+class Output(NamedTuple):
+    """One motor output of a firmware, in its numbering."""
+
+    forward: float  # body x of its rotor, any positive scale
+    left: float  # body y of its rotor
+    spin: str  # "cw" or "ccw", seen from above
+
+
+def motor_order(frame: Airframe, layout: tuple[Output, ...], firmware: str) -> tuple[int, ...]:
+    """Return for each rotor of the airframe the number (from 0) of the firmware's output that drives it.
+
+    A rotor belongs to the output in the same quarter (or, for more rotors, in the nearest direction).
+
+    Raises:
+        ConfigError: other numbers of rotors, two rotors for one output, or another spin direction.
+    """
+    places, spins = frame.rotors.position, frame.rotors.spin_direction
+    if len(places) != len(layout):
+        message = f"{firmware} drives {len(layout)} rotors, the airframe has {len(places)}"
+        raise ConfigError("airframe.rotors.position", message, f"an airframe with {len(layout)} rotors")
+    order = tuple(_nearest(place[0], place[1], layout) for place in places)
+    if sorted(order) != list(range(len(layout))):
+        outputs = ", ".join(str(i + 1) for i in order)
+        message = f"rotors belong to the outputs {outputs} of {firmware}"
+        raise ConfigError("airframe.rotors.position", message, "one rotor for each output")
+    for k, i in enumerate(order):
+        if spins[k] != layout[i].spin:
+            message = f"rotor {k + 1} turns {spins[k]}, output {i + 1} of {firmware} expects {layout[i].spin}"
+            raise ConfigError("airframe.rotors.spin_direction", message)
+    return order
+
+
+def _nearest(x: float, y: float, layout: tuple[Output, ...]) -> int:
+    """Return the output whose direction from the centre is nearest to (x, y)."""
+
+    def cosine(output: Output) -> float:
+        length = math.sqrt((x * x + y * y) * (math.square(output.forward) + math.square(output.left)))
+        return (x * output.forward + y * output.left) / length
+
+    return max(range(len(layout)), key=lambda i: cosine(layout[i]))

@@ -1,0 +1,42 @@
+"""Time-outs that do not count time in which a firmware, or this process, got no CPU."""
+
+import os
+import time
+from collections.abc import Callable
+
+from lapwing.cosim.processes.cpu_starvation import waited
+from lapwing.kernels import math
+
+LONGEST = 6.0  # times the time-out after which starvation is no excuse
+
+
+class Patience:
+    """A time-out that starts when it is created."""
+
+    def __init__(self, timeout: float, pid: int | None = None, clock: Callable[[], float] = time.monotonic):
+        """Start to count.
+
+        Args:
+            timeout: [s].
+            pid: process of the firmware, None if another host or user runs it.
+            clock: time [s].
+        """
+        self._timeout, self._clock = timeout, clock
+        self._pids = [os.getpid(), *([pid] if pid else [])]
+        self.restart()
+
+    def restart(self) -> None:
+        """Count from now."""
+        self._began = self._clock()
+        self._before: dict[int, float] = {}
+
+    @property
+    def over(self) -> bool:
+        """True once the time-out has passed."""
+        passed = self._clock() - self._began
+        if passed > 0.5 * self._timeout and not self._before:  # reading it costs, and most waits are short
+            self._before = {pid: waited(pid) for pid in self._pids}
+        if passed <= self._timeout:
+            return False
+        starved = math.total(max(0.0, waited(pid) - before) for pid, before in self._before.items())
+        return passed > LONGEST * self._timeout or passed - starved > self._timeout

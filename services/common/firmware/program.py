@@ -1,0 +1,128 @@
+"""Program of a firmware, started in its own process group and terminated with the group."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.setup import FirmwareSetup
+
+GRACE = 2.0  # [s] from the request to end to SIGKILL
+TAIL = 3  # last lines of the output in a message
+_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
+
+
+class Program:
+    """The firmware's program, if Lapwing starts it."""
+
+    def __init__(self, setup: FirmwareSetup, arguments: Sequence[str] = (), files: dict[str, str] | None = None):
+        """Start it.
+
+        Args:
+            setup: command, working directory and environment.
+            arguments: further arguments.
+            files: content of files to write into the working directory, by name.
+
+        Raises:
+            FirmwareError: the program or the directory does not exist.
+        """
+        self._firmware = setup.firmware
+        self._temporary = None if setup.directory else tempfile.TemporaryDirectory(prefix=f"lapwing_{setup.firmware}_")
+        self.directory = Path(setup.directory or self._temporary.name)  # type: ignore[union-attr]
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115 (closed by `close`)
+        try:
+            for name, content in (files or {}).items():
+                (self.directory / name).write_text(content)
+            self._start: partial[subprocess.Popen[Any]] = partial(
+                subprocess.Popen,
+                [*setup.command, *arguments],
+                cwd=self.directory,
+                env={**os.environ, **setup.environment},
+                stdin=subprocess.DEVNULL,
+                stdout=self._output,
+                stderr=subprocess.STDOUT,
+                start_new_session=True,
+                preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+            )
+            self._process = self._start()
+        except OSError as error:
+            self._discard()
+            where = error.filename or setup.command[0]
+            message = f"{setup.firmware}: cannot start {where} ({error.strerror})"
+            raise FirmwareError(f"{message}; check autopilot.command and autopilot.directory") from None
+
+    @property
+    def pid(self) -> int:
+        """Process id, also of its process group."""
+        return self._process.pid
+
+    @property
+    def running(self) -> bool:
+        """True until the program ends."""
+        return self._process.poll() is None
+
+    def restart(self) -> None:
+        """Start the program again, after it has ended."""
+        self._process.wait()
+        self._process = self._start()
+
+    def check(self, when: str = "") -> None:
+        """Raise FirmwareError if the program has ended."""
+        code = self._process.poll()
+        if code is not None:
+            how = f"signal {-code}" if code < 0 else f"exit code {code}"
+            last = " | ".join(self.text().splitlines()[-TAIL:])
+            raise FirmwareError(f"{self._firmware}: the program ended ({how}){when}: {last or 'no output'}")
+
+    def text(self) -> str:
+        """Return its output so far."""
+        self._output.seek(0)
+        return self._output.read().decode(errors="replace").strip()
+
+    def cpu(self) -> float:
+        """Return the CPU time [s] that it has used, or 0 if the system does not report it."""
+        try:
+            fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
+            return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        except (OSError, IndexError, ValueError):
+            return 0.0
+
+    def close(self) -> None:
+        """End the program and its children, and remove its temporary folder."""
+        self.stop()
+        self._discard()
+
+    def stop(self) -> None:
+        """End the program and its children, by request, then by force."""
+        self._signal(signal.SIGTERM)
+        deadline = time.monotonic() + GRACE
+        while self._process.poll() is None and time.monotonic() < deadline:
+            time.sleep(0.01)
+        self._signal(signal.SIGKILL)
+        self._process.wait()
+
+    def _signal(self, number: int) -> None:
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(self.pid, number)
+
+    def _discard(self) -> None:
+        self._output.close()
+        if self._temporary:
+            self._temporary.cleanup()
+
+
+def _end_with_parent() -> None:
+    """Let the kernel end this process when its parent is killed."""
+    _PRCTL(_DEATH_SIGNAL, signal.SIGKILL)
+
+
+_PRCTL: Callable[[int, int], int] = ctypes.CDLL(None, use_errno=True).prctl if sys.platform == "linux" else lambda *_: 0

@@ -1,0 +1,56 @@
+"""Keys of `[autopilot]` that choose a foreign firmware."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from lapwing.cosim.scene import Files, Scene, SceneTable
+from lapwing.cosim.scene.files import named
+from lapwing.dynamics.config_error import ConfigError
+
+OWN = "lapwing"
+FIRMWARES = ("px4", "ardupilot", "betaflight")
+TABLE = "autopilot"
+
+
+class FirmwareKeys(SceneTable):
+    """Firmware in the loop, and the program that runs it."""
+
+    firmware: Literal["lapwing", "px4", "ardupilot", "betaflight"] = "lapwing"  # program that flies the vehicle
+    command: list[str] = Field(default_factory=list)  # program and arguments; empty: wait for one started elsewhere
+    directory: str | None = None  # its working directory; unset: a temporary one
+    environment: dict[str, str] = Field(default_factory=dict)  # environment variables of the program
+    host: str = "127.0.0.1"  # address of the firmware's links
+    port: int | None = Field(default=None, gt=0, lt=65536)  # first port of its links; unset: the firmware's default
+    instance: int | None = Field(default=None, ge=0, lt=100)  # shifts ports; unset: number of the vehicle
+    start_timeout: float = Field(default=60.0, gt=0.0)  # [s] until the firmware answers, without time it had no CPU
+    step_timeout: float = Field(default=10.0, gt=0.0)  # [s] of silence in flight, without time it had no CPU
+    parameter_text: str = ""  # content of the file that `parameters` names
+
+    @classmethod
+    def embed_parameters(cls, tree: dict[str, Any], files: Files) -> None:
+        """Store the content of a foreign firmware's parameter file."""
+        if isinstance(file := named(tree, TABLE, "parameters"), str):
+            text = files.text("autopilot.parameters", "autopilot.parameters", files.folder / file)
+            tree[TABLE] |= {"parameters": {}, "parameter_text": text}
+
+    def check_own(self) -> None:
+        """Raise ConfigError if a key of a foreign firmware is given for Lapwing's own autopilot."""
+        for key in ("command", "directory", "environment", "port", "instance", "parameter_text"):
+            if getattr(self, key):
+                raise ConfigError(f"{TABLE}.{key}", "is not used", f"{TABLE}.firmware = one of {', '.join(FIRMWARES)}")
+
+
+def is_foreign(tree: dict[str, Any]) -> bool:
+    """Return True if a scene's data, not yet validated, names a foreign firmware."""
+    return named(tree, TABLE, "firmware", OWN) in FIRMWARES
+
+
+def firmware_of(scene: Scene) -> str:
+    """Return the firmware that flies the vehicle, "" without an autopilot."""
+    return str(scene.lookup(f"{TABLE}.firmware")) if scene.has(TABLE) else ""
+
+
+def flown_by_firmware(scene: Scene) -> bool:
+    """Return True if a foreign firmware flies the vehicle."""
+    return firmware_of(scene) in FIRMWARES

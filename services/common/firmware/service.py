@@ -1,0 +1,55 @@
+"""The service of a firmware adapter: link, hold and encoders, or the playback of a log."""
+
+from collections.abc import Callable
+from typing import Any
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort
+from lapwing.kernels.cell import Cell
+from lapwing.messages import topics as topic
+from lapwing.services.common import ports
+from lapwing.services.common.command_encoder import actuators_wire, status_wire
+from lapwing.services.common.firmware.block import FirmwareBlock
+from lapwing.services.common.firmware.hold import COMMAND, HeldState, Hold
+from lapwing.services.common.firmware.hold_reference import HoldReference
+from lapwing.services.common.firmware.link import FirmwareLink
+from lapwing.services.common.firmware.playback import TOPICS, Playback, Recorded
+from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.common.setpoint_encoder import setpoint_encoder
+
+
+def firmware_service(
+    setup: RunConfig, name: str, create: Callable[[FirmwareSetup], FirmwareLink], recorded: Recorded | None = None
+) -> Service:
+    """Return the service of an adapter.
+
+    Args:
+        setup: run configuration of one vehicle.
+        name: name of the service.
+        create: class of the link.
+        recorded: messages of a log to fly again; None: fly the firmware.
+    """
+    config = setup.services[name]
+    given: FirmwareSetup = config.parameters
+    if recorded is not None:
+        service = Service(name, [], [])
+        service.parts = [Playback(name, config.ports, recorded, service)]
+        service.python_topics = TOPICS if given.phases else TOPICS[:2]
+        return service
+    link = FirmwareBlock(name, given, config.inputs, create)
+    none = (0.0,) * len(given.order)
+    held: Any = Hold(given.voltage_max, none)
+    inputs = [InputPort(COMMAND), InputPort(ports.BATTERY)]
+    if given.phases:
+        held = HoldReference(held)
+        inputs.append(InputPort(ports.TRAJECTORY))
+    hold = Block(f"{name}.hold", held, Cell(HeldState(given.voltage_max)), tuple(inputs), config.ports)
+    phases = given.phases or ("",)
+    wires = [
+        actuators_wire(setup.port(ports.ACTUATORS)),
+        status_wire(given.status_every, phases, link.words.table),
+        *([setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases)] if given.phases else []),
+    ]
+    return Service(name, [link, hold], wires)

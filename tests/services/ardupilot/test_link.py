@@ -1,0 +1,206 @@
+"""Link to ArduPilot against a scripted peer: lock step, resent frames, restarts, stalls and hostile packets."""
+
+import math
+import socket
+import time
+
+import pytest
+
+from lapwing.services.ardupilot.link import FORGOTTEN, MAVLINK_PORT, PORT, STRIDE, ArduPilotLink
+from lapwing.services.ardupilot.resolve import ArduPilotSetup
+from lapwing.services.common import ports
+from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.mavlink.geo_coordinates import Datum
+from lapwing.services.common.ports import BatteryReading, TrueState
+from tests.services.ardupilot.peer import ArduPilotPeer, servo_packet
+from tests.services.firmware_links import Background, firmware_setup, free_instance, never
+
+OWN = ArduPilotSetup(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False)
+
+
+def read(port):
+    return {ports.TRUTH: TrueState(position_world=(1.0, 2.0, 3.0)), ports.BATTERY: BatteryReading(1.0, 11.1, 2.0)}[port]
+
+
+BROKEN = {ports.TRUTH: {"position_world": (math.nan, 0.0, 0.0)}}
+
+
+@pytest.fixture
+def link():
+    instance = free_instance((socket.SOCK_DGRAM, PORT, STRIDE), (socket.SOCK_STREAM, MAVLINK_PORT, STRIDE))
+    link = ArduPilotLink(firmware_setup("ardupilot", OWN, instance))
+    yield link
+    link.close()
+
+
+def fly(link, steps, begin=0):
+    return [link.step(tick, read, never) for tick in range(begin, begin + steps)]
+
+
+def begun(link, script):
+    """Run a script with a peer in the background, and open the link."""
+    peer = ArduPilotPeer(link.address[1])
+    background = Background(script, peer)
+    link.open(never)
+    return background
+
+
+def test_every_step_is_answered(link):
+    def script(peer):
+        return [peer.exchange((1000 + k,) * 4 + (0,) * 12) for k in range(101)]
+
+    background = begun(link, script)
+    outputs = fly(link, 100)
+    link._send()  # answers the last frame
+    states = background.join()
+    assert [s["timestamp"][0] for s in states[:100]] == pytest.approx([0.004 * k for k in range(100)], abs=1e-6)
+    assert states[0]["position"] == [2.0, 1.0, -3.0]
+    assert states[0]["accel_body"] == pytest.approx([0.0, 0.0, -9.80665])
+    assert [o.outputs[0] for o in outputs] == pytest.approx([1e-3 * k for k in range(1, 101)])
+    assert (link.report.resent, link.report.missed, link.report.rejected, link.report.skew_max) == (0, 0, 0, 0.0)
+
+
+def test_clock_of_whole_microseconds_does_not_drift(link):
+    """ArduPilot adds the difference of two timestamps to a clock of whole microseconds, and cuts the rest."""
+
+    def script(peer):
+        clock, last = 0, 0.0
+        for _ in range(2001):
+            time_s = peer.exchange()["timestamp"][0]
+            clock, last = int(clock + (time_s - last) * 1e6), time_s
+        return clock
+
+    background = begun(link, script)
+    fly(link, 2000)
+    link._send()
+    assert background.join() in (1999 * 4000, 2000 * 4000)
+
+
+def test_resent_frame_is_answered_without_step(link):
+    def script(peer):
+        peer.exchange()
+        states = []
+        for _ in range(3):  # the frame of count 1 three times
+            peer.send(servo_packet(1))
+            states.append(peer.receive(5.0))
+        peer.count = 2
+        peer.exchange()
+        return states
+
+    background = begun(link, script)
+    fly(link, 2)
+    link._send()
+    states = background.join()
+    assert len(set(states)) <= 2
+    assert link.report.resent == 2
+
+
+def test_malformed_packets_are_counted_and_named(link):
+    def script(peer):
+        peer.exchange()
+        for data in (b"x", servo_packet(9, magic=1), servo_packet(9)[:-1], servo_packet(9, (65535,) * 16)):
+            peer.send(data)
+        peer.exchange()
+        peer.exchange()
+
+    background = begun(link, script)
+    fly(link, 2)
+    link._send()
+    background.join()
+    assert link.report.rejected == 4
+    assert "magic number 1, expected 18458 or 29569" in " ".join(link.report.notes)
+
+
+def test_restart_with_same_address_is_counted(link):
+    def script(peer):
+        for _ in range(5):
+            peer.exchange()
+        peer.count = 0
+        for _ in range(5):
+            peer.exchange()
+
+    background = begun(link, script)
+    fly(link, 9)
+    link._send()
+    background.join()
+    assert link.report.reconnected == 1
+
+
+def test_second_firmware_is_rejected_while_first_lives(link):
+    def script(peer):
+        peer.exchange()
+        other = ArduPilotPeer(link.address[1])
+        other.send(servo_packet(0))
+        time.sleep(0.05)
+        peer.exchange()
+        peer.exchange()
+        return other.receive(0.1)
+
+    background = begun(link, script)
+    fly(link, 2)
+    link._send()
+    assert background.join() is None
+    assert link.report.rejected == 1
+    assert "another ArduPilot" in link.report.notes[0]
+
+
+def test_restarted_firmware_with_new_address_takes_over(link):
+    def script(peer):
+        peer.exchange()
+        peer.exchange()
+        peer.close()
+        time.sleep(FORGOTTEN + 0.1)
+        other = ArduPilotPeer(link.address[1])
+        return [other.exchange() for _ in range(3)]
+
+    background = begun(link, script)
+    fly(link, 4)
+    link._send()
+    states = background.join()
+    assert link.report.reconnected == 1
+    assert states[0]["timestamp"][0] >= 0.004 - 1e-6  # the plant goes on where it was
+
+
+def test_stall_is_named(link):
+    link._setup = link._setup._replace(step_timeout=0.5)
+    background = begun(link, lambda peer: peer.exchange())
+    with pytest.raises(FirmwareError, match=r"ardupilot: no servo packet for 0.5 s at t = 0.00[04] s"):
+        fly(link, 3)
+    background.join()
+
+
+def test_absent_firmware_is_named(link):
+    link._setup = link._setup._replace(start_timeout=0.5)
+    with pytest.raises(FirmwareError, match=r"no servo packet for 0.5 s at t = 0.000 s; start arducopter"):
+        link.open(never)
+
+
+def test_mavlink_port_is_tried_until_it_listens(link):
+    """ArduPilot starts only once a client has connected to its first MAVLink port."""
+
+    def script(peer):
+        time.sleep(1.0)
+        with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE * link._setup.instance)) as server:
+            server.settimeout(20.0)
+            server.accept()[0].close()
+        return peer.exchange()
+
+    begun(link, script)
+
+
+def test_port_in_use_is_named(link):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
+        other.bind(link.address)
+        with pytest.raises(FirmwareError, match=r"cannot listen on udp 127.0.0.1:.*in use"):
+            link.open(never)
+
+
+def test_slow_loop_rate_is_noted(link):
+    begun(link, lambda peer: peer.exchange(rate=400))
+    assert "SIM_RATE_HZ is 400" in link.report.notes[0]
+
+
+def test_non_finite_state_ends_run(link):
+    begun(link, lambda peer: peer.exchange())
+    with pytest.raises(ValueError, match="not finite"):
+        link.step(0, lambda port: read(port)._replace(**BROKEN.get(port, {})), never)

@@ -1,0 +1,67 @@
+"""Start of Betaflight: its command line, by a scripted one."""
+
+import pytest
+
+from lapwing.services.betaflight import boot
+from lapwing.services.betaflight.cli_lines import lines
+from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.scene_resolver import load, resolve
+
+
+class CommandLine:
+    """Answers lines with a prompt; the first `lost` attempts to enter it are lost."""
+
+    def __init__(self, lost=0, rejects=""):
+        self._lost, self._rejects, self._answer = lost, rejects, ""
+        self.received = []
+
+    def send(self, data):
+        self.received.append(data.decode())
+        if data == b"#" and self._lost:
+            self._lost -= 1
+        elif self._rejects and self._rejects in data.decode():
+            self._answer = "###ERROR IN set: INVALID NAME###\r\n# "
+        elif data != b"save\n":
+            self._answer = "answer\r\n# "
+
+    def text(self):
+        result, self._answer = self._answer, ""
+        return result
+
+    def close(self):
+        pass
+
+
+class Running:
+    """A program that ends at once after `save`."""
+
+    pid = 1
+    running = False
+
+    def check(self, when):
+        pass
+
+
+def configure(monkeypatch, line, overrides=()):
+    monkeypatch.setattr(boot, "connect", lambda *_: line)
+    monkeypatch.setattr(boot, "REPEAT", 0.0)
+    setup = resolve(load("betaflight_quad", list(overrides))).services["betaflight"].parameters
+    boot._configure(setup, Running(), lambda text: None)
+    return setup
+
+
+def test_lost_entry_to_command_line_is_repeated(monkeypatch):
+    line = CommandLine(lost=2)
+    setup = configure(monkeypatch, line)
+    assert line.received[:4] == ["#", "#", "#", "version\n"]
+    assert line.received[4:] == [*(f"{text}\n" for text in lines(setup)), "save\n"]
+
+
+def test_lines_of_scene_come_last():
+    setup = resolve(load("betaflight_quad", ["autopilot.parameters={thrust_linear=20}"]))
+    assert lines(setup.services["betaflight"].parameters)[-1] == "set thrust_linear = 20"
+
+
+def test_rejected_line_is_named(monkeypatch):
+    with pytest.raises(FirmwareError, match=r"rejects the line 'set no_such = 1' .*check autopilot.parameters"):
+        configure(monkeypatch, CommandLine(rejects="no_such"), ["autopilot.parameters={no_such=1}"])

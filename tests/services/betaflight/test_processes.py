@@ -1,0 +1,147 @@
+"""Betaflight's adapter as a process of a run, with a scripted firmware."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from betaflight_peer import Peer, free_ports
+
+from lapwing import Simulator
+from lapwing.cosim.log import LogReader
+from lapwing.cosim.scene import SceneError
+from lapwing.flight import Flight
+from lapwing.runs.resimulate import resimulate
+from lapwing.services.scene_resolver import load
+
+TIMEOUT = 900  # [s]
+FLEET = """
+[run]
+duration = 2.0
+
+[communication]
+rate = 250
+
+[effects.gravity]
+[effects.rotor_thrust]
+[effects.ground_contact]
+
+[[vehicle]]
+name = "left"
+airframe = "racer_250"
+initial_position = [0.0, 5.0]
+[vehicle.autopilot]
+firmware = "betaflight"
+port = {0}
+start_timeout = 300.0
+step_timeout = 300.0
+
+[[vehicle]]
+name = "right"
+airframe = "racer_250"
+[vehicle.autopilot]
+firmware = "betaflight"
+port = {1}
+start_timeout = 300.0
+step_timeout = 300.0
+
+[[trajectory.phase]]
+name = "arm"
+duration = 0.6
+[[trajectory.phase]]
+name = "climb"
+z = {{ kind = "minimum_jerk", to = 1.0, duration = 1.5 }}
+"""
+
+
+def options(first, **keys):
+    keys = {"port": first, "start_timeout": 300.0, "step_timeout": 300.0} | keys
+    return [part for key, value in keys.items() for part in ("--set", f"autopilot.{key}={value}")]
+
+
+def lapwing(*arguments):
+    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
+
+
+def test_run_of_processes_reports_firmware_and_flies_again(tmp_path):
+    first, log = free_ports(), tmp_path / "flight.mcap"
+    with Peer(first):
+        done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=3", *options(first))
+    assert "betaflight: 1501 steps" in done.stdout, done.stderr
+    assert Flight.read(log).truth.position[-1, 2] > 0.1
+    with LogReader(log) as read:
+        assert read.metadata["reproducible"] == "no: betaflight has no lock step"
+    before, after = resimulate(log)
+    assert before == after
+
+
+def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
+    first, log = free_ports(), tmp_path / "flight.mcap"
+    with Peer(first, lambda n, own: [own] if n < 900 else []):
+        done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=20",
+                       *options(first, step_timeout=4.0))  # fmt: skip
+    assert done.returncode == 1
+    assert "betaflight: no motor outputs for 4 s at t = " in done.stderr
+    assert len(Flight.read(log).truth) > 10
+
+
+def test_firmware_ends_with_killed_run(tmp_path):
+    """The kernel ends a firmware whose service was killed."""
+    script = tmp_path / "firmware.py"
+    script.write_text("import os, time\nopen('pid', 'w').write(str(os.getpid()))\ntime.sleep(600)\n")
+    first = free_ports()
+    command = [sys.executable, "-m", "lapwing", "run", "betaflight_quad", "--mode", "single-process",
+               "--log", str(tmp_path / "flight.mcap"), *options(first, directory=f'"{tmp_path}"'),
+               "--set", f'autopilot.command=["{sys.executable}", "{script}"]']  # fmt: skip
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        pid = int(_content(tmp_path / "pid"))
+    finally:
+        os.kill(run.pid, signal.SIGKILL)
+        run.wait()
+    deadline = time.monotonic() + TIMEOUT
+    state = Path(f"/proc/{pid}/stat")
+    while state.exists() and ") Z " not in state.read_text():
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def _content(path):
+    deadline = time.monotonic() + TIMEOUT
+    while not (path.exists() and path.read_text()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    return path.read_text()
+
+
+def test_each_vehicle_of_fleet_has_its_firmware(tmp_path):
+    one, log = free_ports(), tmp_path / "flight.mcap"
+    two = one + 4
+    scene = tmp_path / "fleet.toml"
+    scene.write_text(FLEET.format(one, two))
+    with Peer(one) as left, Peer(two) as right:
+        done = lapwing("run", scene, "--mode", "single-process", "--log", log)
+    assert done.stdout.count("betaflight: 501 steps") == 2, done.stderr
+    assert len(left.states) > 500
+    assert len(right.states) > 500
+    assert all(flight.truth.position[-1, 2] > 0.1 for flight in Flight.read_all(log))
+    with LogReader(log) as read:
+        assert {"left/firmware", "right/firmware"} <= set(read.metadata)
+
+
+def test_two_firmwares_of_same_ports_are_rejected(tmp_path):
+    scene = tmp_path / "fleet.toml"
+    scene.write_text(FLEET.format(9002, 9002))
+    done = lapwing("run", scene)
+    assert done.returncode == 2
+    assert "vehicle.1.autopilot.port" in done.stderr
+    assert "fixed ports, which left uses already" in done.stderr
+
+
+def test_simulator_names_firmware():
+    with pytest.raises(SceneError, match="betaflight flies the vehicle"):
+        Simulator(load("betaflight_quad"))

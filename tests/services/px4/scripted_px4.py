@@ -1,0 +1,107 @@
+"""Program that stands for PX4 in whole runs: takes a mission, arms, climbs to 2 m, descends and disarms.
+
+It is started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops to answer in the air; with `--starts
+FILE` it appends its instance and process id to a file.
+"""
+
+import argparse
+import os
+import socket
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+
+from pymavlink.dialects.v20 import all as mavlink
+
+from tests.services.px4.peer import Px4Peer
+
+HOVER, HEIGHT = 0.62, 2.0  # duty that carries the vehicle; [m]
+
+
+class VehicleSide:
+    """Vehicle's end of the mission link."""
+
+    def __init__(self, instance):
+        """Open the socket."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._to = ("127.0.0.1", 14540 + instance)
+        self.codec = mavlink.MAVLink(None, srcSystem=1 + instance, srcComponent=1)
+        self.armed, self.count, self.items = False, 0, {}
+        self.mode = 0
+
+    def poll(self, beat):
+        """Answer what has come; send a heartbeat if `beat`."""
+        if beat:
+            self._send(mavlink.MAVLink_heartbeat_message(2, 12, 128 * self.armed | 1, self.mode, 4, 3))
+        while True:
+            try:
+                data = self._socket.recv(4096)
+            except OSError:
+                return
+            for message in self.codec.parse_buffer(data) or ():
+                self._handle(message)
+
+    def _send(self, message):
+        self._socket.sendto(message.pack(self.codec), self._to)
+
+    def _handle(self, message):
+        kind = message.get_type()
+        if kind == "MISSION_COUNT":
+            self.count, self.items = message.count, {}
+            self._send(mavlink.MAVLink_mission_request_int_message(245, 190, 0))
+        elif kind == "MISSION_ITEM_INT":
+            self.items[message.seq] = message
+            if len(self.items) < self.count:
+                self._send(mavlink.MAVLink_mission_request_int_message(245, 190, len(self.items)))
+            else:
+                self._send(mavlink.MAVLink_mission_ack_message(245, 190, 0))
+        elif kind == "COMMAND_LONG":
+            if message.command == mavlink.MAV_CMD_DO_SET_MODE:
+                self.mode = int(message.param2) << 16 | int(message.param3) << 24
+            if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+                self.armed = True
+            self._send(mavlink.MAVLink_command_ack_message(message.command, 0))
+
+
+def main():
+    """Fly."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("-i", type=int)
+    parser.add_argument("--stall", action="store_true")
+    parser.add_argument("--starts", type=Path)
+    options = parser.parse_args()
+    if options.starts:
+        with options.starts.open("a") as file:
+            file.write(f"{options.i} {os.getpid()}\n")
+    peer, vehicle = Px4Peer(4560 + options.i), VehicleSide(options.i)
+    message = peer.start()
+    ground = height = rate = 0.0
+    armed_at = None
+    while message is not None:
+        for other in peer.passed:
+            if other.get_type() == "HIL_GPS":
+                ground = ground or other.alt * 1e-3
+                height, rate = other.alt * 1e-3 - ground, -other.vd * 1e-2
+        peer.passed.clear()
+        time_us = message.time_usec
+        vehicle.poll(time_us % 200_000 == 0)
+        peer.armed = vehicle.armed
+        duty = 0.0
+        if vehicle.armed:
+            armed_at = armed_at or time_us
+            elapsed = (time_us - armed_at) * 1e-6
+            target = HEIGHT if elapsed < 5.0 else HEIGHT - 0.5 * (elapsed - 5.0)
+            duty = min(max(HOVER + 0.1 * (target - height) - 0.08 * rate, 0.0), 1.0)
+            if elapsed > 12.0:
+                vehicle.armed, duty = False, 0.0
+                peer.armed = False
+            if options.stall and elapsed > 3.0:
+                peer.receive("NEVER")
+        peer.answer(time_us, (duty,) * 4)
+        message = peer.receive()
+
+
+if __name__ == "__main__":
+    main()

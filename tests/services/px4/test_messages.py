@@ -1,0 +1,121 @@
+"""Units, frames and masks of PX4's simulator messages, read back by pymavlink."""
+
+import math
+
+import numpy as np
+import pytest
+from pymavlink.dialects.v20 import all as mavlink
+
+from lapwing.dynamics.environment import STANDARD
+from lapwing.services.common.ports import GpsReading
+from lapwing.services.px4.framing import frame
+from lapwing.services.px4.messages import (
+    HIL_GPS,
+    HIL_SENSOR,
+    Sensors,
+    actuator_controls,
+    gps_values,
+    pressure_altitude,
+    sensor_values,
+)
+
+
+def sensor(time_us=4000, **readings):
+    return mavlink.MAVLink(None).parse_buffer(frame(HIL_SENSOR, 0, sensor_values(time_us, Sensors(**readings)), 1, 1))[
+        0
+    ]
+
+
+def gps(reading, time_us=4000):
+    return mavlink.MAVLink(None).parse_buffer(frame(HIL_GPS, 0, gps_values(time_us, reading), 1, 1))[0]
+
+
+def test_level_at_rest_accelerates_up_in_frd():
+    result = sensor(specific_force_body=(0.0, 0.0, 9.81), omega_body=(0.0, 0.0, 0.0))
+    assert (result.xacc, result.yacc) == (0.0, 0.0)
+    assert result.zacc == pytest.approx(-9.81)
+    assert result.time_usec == 4000
+    assert result.id == 0
+
+
+def test_rates_turn_right_and_nose_up_in_frd():
+    result = sensor(omega_body=(0.1, 0.2, 0.3))  # FLU: y to the left, z up
+    assert [result.xgyro, result.ygyro, result.zgyro] == pytest.approx([0.1, -0.2, -0.3])
+
+
+def test_field_of_nose_to_north_points_forward_and_down():
+    """Naples: about 0.24 gauss to the north, 0.39 gauss down; the nose to the north makes FLU (n, w, up)."""
+    east, north, up = STANDARD.magnetic_field_world
+    result = sensor(field_body=(north, -east, up))
+    assert result.xmag == pytest.approx(1e4 * north)
+    assert 0.2 < result.xmag < 0.3
+    assert result.ymag == pytest.approx(1e4 * east)
+    assert result.zmag == pytest.approx(-1e4 * up)
+    assert 0.3 < result.zmag < 0.5
+
+
+def test_pressure_is_in_hectopascal():
+    result = sensor(pressure=98000.0, dynamic_pressure=50.0)
+    assert result.abs_pressure == pytest.approx(980.0)
+    assert result.diff_pressure == pytest.approx(0.5)
+    assert result.pressure_alt == pytest.approx(pressure_altitude(98000.0))
+
+
+@pytest.mark.parametrize(("pressure", "altitude"), [(101325.0, 0.0), (89874.6, 1000.0), (54019.9, 5000.0)])
+def test_pressure_altitude_of_standard_atmosphere(pressure, altitude):
+    """U.S. Standard Atmosphere 1976, geopotential altitudes."""
+    assert pressure_altitude(pressure) == pytest.approx(altitude, abs=1.0)
+
+
+@pytest.mark.parametrize(
+    ("readings", "mask"),
+    [
+        ({}, 0),
+        ({"specific_force_body": (1.0, 2.0, 3.0)}, 0x7),
+        ({"omega_body": (1.0, 2.0, 3.0)}, 0x38),
+        ({"field_body": (1e-5, 2e-5, 3e-5)}, 0x1C0),
+        ({"pressure": 1e5}, 0x1A00),
+        ({"dynamic_pressure": 10.0}, 0x400),
+    ],
+)
+def test_mask_names_updated_fields(readings, mask):
+    bits = {0x7: "ACC", 0x38: "GYRO", 0x1C0: "MAG"}
+    assert sensor(**readings).fields_updated == mask
+    if mask in bits:
+        expected = sum(getattr(mavlink, f"HIL_SENSOR_UPDATED_{axis}{bits[mask]}") for axis in "XYZ")
+        assert mask == expected
+
+
+def test_gps_units():
+    reading = GpsReading(40.7686, 14.7907, 281.5, (0.3, 0.4, 1.0), (3.0, 4.0, -1.0), 0.01, 0.1, True)
+    result = gps(reading)
+    assert (result.lat, result.lon, result.alt) == (407686000, 147907000, 281500)
+    assert (result.vn, result.ve, result.vd, result.vel) == (400, 300, 100, 500)
+    assert result.cog == round(math.degrees(math.atan2(3.0, 4.0)) * 100)
+    assert result.eph == round(100 * math.sqrt(0.7))
+    assert result.epv == 100
+    assert result.fix_type == 3
+    assert result.satellites_visible >= 6
+
+
+@pytest.mark.parametrize(
+    ("velocity", "course"),
+    [((0.0, 1.0, 0.0), 0), ((1.0, 0.0, 0.0), 9000), ((0, -1.0, 0), 18000), ((-1.0, 0, 0), 27000)],
+)
+def test_gps_course_counts_from_north_to_east(velocity, course):
+    assert gps(GpsReading(valid=True, velocity_world=velocity)).cog == course
+
+
+def test_gps_outage_has_no_fix():
+    result = gps(GpsReading(40.0, 14.0, 10.0, valid=False))
+    assert (result.fix_type, result.satellites_visible, result.eph) == (0, 0, 65535)
+
+
+def test_actuator_controls_of_armed_vehicle():
+    values = (4000, 1, *np.linspace(0.0, 0.75, 16).tolist(), 129)
+    result = actuator_controls(values)
+    assert result.time_us == 4000
+    assert result.lock_step
+    assert result.armed
+    assert result.controls[15] == 0.75
+    assert not actuator_controls((4000, 0, *(0.0,) * 16, 1)).armed

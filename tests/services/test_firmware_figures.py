@@ -1,0 +1,19 @@
+"""Figures of flights with firmwares: geometry of the square, output in hover."""
+
+import math
+
+import numpy as np
+import pytest
+
+from tests.services.firmware_figures import distance_from_square, hover_duty
+
+
+def test_distance_from_square_is_that_to_nearest_side():
+    points = np.array([(5.0, 0.5), (11.0, 5.0), (5.0, 5.0), (-3.0, -4.0), (0.0, 10.0)])
+    assert distance_from_square(points) == pytest.approx([0.5, 1.0, 5.0, 5.0, 0.0])
+
+
+def test_output_in_hover_balances_weight():
+    density = 1.225 * (1.0 - 0.0065 * 280.0 / 288.15) ** 4.2559  # standard atmosphere at home
+    speed = math.sqrt(1.5 * 9.80665 / 4.0 / (5.84e-6 * density / 1.225))
+    assert hover_duty("px4_quad") == pytest.approx(speed * 60.0 / (2.0 * math.pi * 946.0) / 11.1, rel=2e-3)
