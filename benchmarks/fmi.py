@@ -1,0 +1,154 @@
+"""Cost of exported and imported FMUs in free fall: `python -m benchmarks.fmi [SCENE [RATE]]`."""
+
+import ctypes
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.compiled_block import run
+from lapwing.fmi.fmu import export_fmu
+from lapwing.fmi.memory_image import image_of
+from lapwing.fmi.native_build import compiler
+from lapwing.services import scene_resolver
+from lapwing.services.fmu.host_process import HostProcess
+from lapwing.services.fmu.service_config import CO_SIMULATION, FmuConfig
+from lapwing.services.process_table import create_all
+
+STEPS, REPEATS = 500, 200  # short, so that some repeats are not interrupted
+LOOP = """
+#include <stdbool.h>
+#include <time.h>
+typedef int do_step(void *, double, double, bool, bool *, bool *, bool *, double *);
+double loop(do_step *step, void *instance, long first, double h, long n) {
+    struct timespec a, b;
+    bool event, terminate, early;
+    double reached;
+    clock_gettime(CLOCK_MONOTONIC, &a);
+    for (long k = first; k < first + n; k++) step(instance, k * h, h, true, &event, &terminate, &early, &reached);
+    clock_gettime(CLOCK_MONOTONIC, &b);
+    return (b.tv_sec - a.tv_sec) + 1e-9 * (b.tv_nsec - a.tv_nsec);
+}
+"""
+HEIGHT = 1000.0  # [m]
+
+
+def best(function: Callable[[], float]) -> float:
+    return min(function() for _ in range(REPEATS))
+
+
+def in_the_air(diagram: BlockDiagram) -> None:
+    """Put the vehicle to its start height."""
+    blocks = zip(diagram._parts, diagram._codes, strict=True)
+    image = image_of([(part.name, bound.cell) for part, bound in blocks if bound], diagram._rows)
+    (leaf,) = (leaf for leaf in image.leaves if leaf.path == "plant|state.vehicle.motion.position_world[2]")
+    (region,) = (r for r in image.regions if r.offset <= leaf.offset < r.offset + r.size)
+    ctypes.c_double.from_address(region.address + leaf.offset - region.offset).value = HEIGHT
+
+
+def step_in_run(setup: RunConfig) -> float:
+    """Return the time of a plant step in the compiled loop of a run [us]: full inputs, zero motor voltage."""
+
+    def once() -> float:
+        services = [s for s in create_all(setup) if s.name == "plant"]
+        diagram = BlockDiagram(setup, services, 1)  # owns the memory of the group
+        in_the_air(diagram)
+        (group,) = diagram._turns
+        run(group._cell, 0, 0, 10)
+        began = time.perf_counter()
+        run(group._cell, 10, 0, 10 + STEPS)
+        return (time.perf_counter() - began) / STEPS * 1e6
+
+    return best(once)
+
+
+def timed_steps(folder: Path) -> Any:
+    """Return a compiled function (doStep, instance, first step, interval, steps) -> seconds."""
+    source, library = folder / "loop.c", folder / "loop.so"
+    source.write_text(LOOP)
+    subprocess.run([*compiler(), "-O2", "-shared", "-fPIC", str(source), "-o", str(library)], check=True)
+    function = ctypes.CDLL(str(library)).loop
+    function.restype = ctypes.c_double
+    function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_long, ctypes.c_double, ctypes.c_long]
+    return function
+
+
+def main(scene: str, rate: str = "1000") -> None:
+    import fmpy
+
+    settings = [f"communication.rate={rate}", f"solver.step={1.0 / int(rate)!r}"]
+    setup = scene_resolver.resolve(scene_resolver.load(scene, settings))
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "plant.fmu"
+        export_fmu(setup, "plant", path)
+        folder = fmpy.extract(str(path))
+        model = fmpy.read_model_description(str(path))
+        binary = next(Path(folder).glob("binaries/*/*.so"))
+        library = ctypes.CDLL(str(binary))
+        make, end = library.fmi3InstantiateCoSimulation, library.fmi3FreeInstance
+        make.restype = ctypes.c_void_p
+        end.argtypes = [ctypes.c_void_p]
+        enter = library.fmi3EnterInitializationMode
+        enter.argtypes = [
+            ctypes.c_void_p,
+            ctypes.c_bool,
+            ctypes.c_double,
+            ctypes.c_double,
+            ctypes.c_bool,
+            ctypes.c_double,
+        ]
+        library.fmi3ExitInitializationMode.argtypes = [ctypes.c_void_p]
+        place = {v.name: v.valueReference for v in model.modelVariables}["state.plant.vehicle.motion.position_world[2]"]
+        one = ctypes.c_size_t(1)
+        reference, height = ((ctypes.c_uint32 * 1)(place), one), ((ctypes.c_double * 1)(HEIGHT), one)
+
+        def instantiate() -> int:
+            token = model.guid.encode()
+            return make(b"a", token, None, False, False, False, False, None, ctypes.c_size_t(0), None, None, None)
+
+        loop, address = timed_steps(Path(name)), ctypes.cast(library.fmi3DoStep, ctypes.c_void_p)
+
+        def once() -> float:
+            instance = instantiate()
+            library.fmi3SetFloat64(ctypes.c_void_p(instance), *reference, *height)
+            enter(instance, False, 0.0, 0.0, False, 0.0)
+            library.fmi3ExitInitializationMode(instance)
+            loop(address, instance, 0, setup.interval, 10)
+            result = loop(address, instance, 10, setup.interval, STEPS) / STEPS * 1e6
+            end(instance)
+            return result
+
+        inside, outside = step_in_run(setup), best(once)
+        began = time.perf_counter()
+        end(instantiate())
+        print(f"{scene}: tick {setup.interval * 1e3:g} ms, free fall")
+        print(f"  step in the run {inside:.2f} us, doStep {outside:.2f} us, ratio {outside / inside:.2f}")
+        print(
+            f"  instantiate {1e3 * (time.perf_counter() - began):.3f} ms, binary {binary.stat().st_size / 1e6:.3f} MB"
+        )
+
+        import hashlib
+
+        digest = hashlib.sha256(path.read_bytes()).hexdigest()
+        host = HostProcess(FmuConfig("a", str(path), digest, "", 3, CO_SIMULATION, "", 0.0, (), (), (), 0, 60.0))
+        host.step(0.0, -1.0, ())
+        times = np.empty(20 * STEPS)
+        for k in range(len(times)):
+            began = time.perf_counter()
+            host.step(k * setup.interval, setup.interval, ())
+            times[k] = time.perf_counter() - began
+        median, least = (1e6 * np.quantile(times, q) - outside for q in (0.5, 0.1))
+        print(
+            f"  import: median {median:.1f} us a step beyond the FMU's own time, in a tenth of the steps {least:.1f} us"
+        )
+
+
+if __name__ == "__main__":
+    main(*(sys.argv[1:] or ["delivery_mission"]))

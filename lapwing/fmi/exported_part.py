@@ -1,0 +1,116 @@
+"""The part of a scene to export: its blocks, the ports at its boundary, and the image of its memory."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
+from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
+from lapwing.fmi.memory_image import MemoryImage, image_of
+from lapwing.fmi.python_actions import Action, record_actions
+from lapwing.services.process_table import create_all
+
+VEHICLE = "vehicle"
+PARTS = ("plant", "sensors", "autopilot", "trajectory", VEHICLE)
+
+
+class ScheduledBlock(NamedTuple):
+    """A block in the order of execution; a Python block has neither code nor memory."""
+
+    part: Any  # `Block` or Python block
+    bound: BoundBlock | None
+    every: int  # [ticks]
+    vehicle: int  # index
+
+
+class BoundaryPort(NamedTuple):
+    """A port that the part reads from outside or publishes."""
+
+    port: Port
+    lag: int  # [ticks] of an input: 0 if its value belongs to the tick that is computed, else 1
+    depth: int  # rows in the ring
+
+
+@dataclass
+class ExportedPart:
+    """A part of a scene.
+
+    Attributes:
+        name: of the part, "plant".
+        setup: configuration of the run.
+        blocks: in the order of execution.
+        inputs: ports that blocks outside of the part write.
+        outputs: ports of the services of the part.
+        image: memory before the first tick.
+        actions: effects of Python blocks, recorded in a run of the scene.
+    """
+
+    name: str
+    setup: RunConfig
+    blocks: list[ScheduledBlock]
+    inputs: list[BoundaryPort]
+    outputs: list[BoundaryPort]
+    image: MemoryImage
+    actions: list[Action]
+
+
+def export_part(setup: RunConfig, name: str) -> ExportedPart:
+    """Bind the blocks of a part, and record what its Python blocks do in a run of the scene.
+
+    Args:
+        setup: the scene, resolved.
+        name: one of `PARTS`.
+
+    Raises:
+        ValueError: the scene has no such part, or the part has Python code of the user.
+    """
+    names = setup.order if name == VEHICLE else [name]
+    if missing := [each for each in names if each not in setup.services]:
+        raise ValueError(f"--part {name}: scene {setup.scene} has no {missing[0]}; use one of {_choices(setup)}")
+    services = create_all(setup)
+    own = [service for service in services if service.name in names]
+    for part in (part for service in own for part in service.parts):
+        _check(part)
+    diagram = BlockDiagram(setup, own, 1)
+    parts: Sequence[Any] = diagram._parts
+    vehicles = list(dict.fromkeys(getattr(part, "vehicle", "") for part in parts))
+    blocks = [
+        ScheduledBlock(part, bound, getattr(part, "every", 1), vehicles.index(getattr(part, "vehicle", "")))
+        for part, bound in zip(parts, diagram._codes, strict=True)
+    ]
+    given = {port.name for part in parts for port in part.outputs}
+    lags: dict[str, int] = {}
+    for part in parts:
+        for needed in getattr(part, "inputs", ()):
+            if needed.port not in given:
+                lags[needed.port] = min(lags.get(needed.port, 1), needed.delay)
+    published = [port for each in names for port in setup.services[each].ports]
+    roots = [(block.part.name, block.bound.cell) for block in blocks if block.bound]
+    image = image_of(roots, diagram._rows)
+    actions = record_actions(setup, services, image, diagram) if any(b.bound is None for b in blocks) else []
+    return ExportedPart(
+        name,
+        setup,
+        blocks,
+        [BoundaryPort(diagram.ports[port], lag, len(diagram._rows[port])) for port, lag in lags.items()],
+        [BoundaryPort(port, 0, len(diagram._rows[port.name])) for port in published if port.name in diagram._rows],
+        image,
+        actions,
+    )
+
+
+def _check(part: Any) -> None:
+    if isinstance(part, Block):
+        return
+    inner = getattr(part, "_part", part)
+    module = type(inner).__module__
+    if any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
+        raise ValueError(f"{part.name}: runs Python code of the scene; only compiled blocks can be exported")
+    if type(inner).__name__ == "PropellerFailures":
+        raise ValueError(f"{part.name}: [multibody.event] replaces code in flight; remove the event from the scene")
+
+
+def _choices(setup: RunConfig) -> str:
+    return ", ".join(each for each in PARTS if each in setup.services or each == VEHICLE)

@@ -1,0 +1,1 @@
+"""FMUs as services: each runs in a separate process and steps in lock step."""

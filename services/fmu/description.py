@@ -1,0 +1,182 @@
+"""Description of an FMU, and the variables that can be connected."""
+
+import base64
+import importlib.util
+import math
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.common.field_units import Unit, parse_unit
+from lapwing.services.fmu.service_config import CO_SIMULATION, MODEL_EXCHANGE, Element
+
+INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
+TYPES = ("Real", "Float64", "Float32", "Integer", *INTEGERS, "Boolean", "Enumeration")
+_BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # base units of FMI
+BINARIES = {2: "binaries/linux64/", 3: "binaries/x86_64-linux/"}
+
+
+class NamedUnit(NamedTuple):
+    """A unit and its name."""
+
+    name: str
+    unit: Unit
+
+
+class Description:
+    """An FMU that runs on this machine.
+
+    Attributes:
+        version: of FMI, 2 or 3.
+        interface: CO_SIMULATION or MODEL_EXCHANGE.
+    """
+
+    def __init__(self, key: str, path: Path, content: bytes, interface: str | None):
+        """Read the description.
+
+        Args:
+            key: of the FMU in the scene.
+            path: of the FMU, for messages.
+            content: of the file.
+            interface: the desired one; None: co-simulation if the FMU has it.
+
+        Raises:
+            ConfigError: no FMU, of another platform, or without this interface.
+        """
+        model, names = _read(key, path, content)
+        if model.fmiVersion[:1] not in ("2", "3"):
+            raise ConfigError(key, f"{path}: FMI {model.fmiVersion}", "an FMU of version 2.0 or 3.0")
+        self.version = int(model.fmiVersion[0])
+        self.interface = _interface(key, path, model, interface)
+        if not any(name.startswith(BINARIES[self.version]) and name.endswith(".so") for name in names):
+            folders = {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
+            listed = ", ".join(sorted(folders)) or "no platform"
+            raise ConfigError(key, f"{path}: has binaries for {listed}", "an FMU for Linux on x86-64")
+        self._units = {u.name: u.baseUnit for u in model.unitDefinitions or () if u.baseUnit is not None}
+        self._variables = {v.name: v for v in model.modelVariables}
+        self._references = {v.valueReference: v for v in model.modelVariables}
+
+    def elements(self, key: str, name: str, causality: str) -> list[Element]:
+        """Return the scalar of this name, the elements of the array, or the element NAME[i, j] of an array.
+
+        Raises:
+            ConfigError: no such variable, or one of another causality or type.
+        """
+        v, index = self._variables.get(name), ""
+        if v is None and name.endswith("]"):
+            head, _, index = name[:-1].rpartition("[")
+            v = self._variables.get(head)
+        if v is None:
+            raise ConfigError.unknown(key, "variable", name, self._variables)
+        if causality and v.causality != causality:
+            raise ConfigError(key, f"{name} has causality {v.causality}", f"an {causality} of the FMU")
+        if v.type not in TYPES:
+            raise ConfigError(key, f"{name} has the type {v.type}", f"a variable of type {', '.join(TYPES)}")
+        if v.causality == "structuralParameter":
+            raise ConfigError(key, f"{name} is a structural parameter, which keeps its value", "another variable")
+        shape = self._shape(v)
+        size = math.prod(shape)
+        if not index:
+            if not shape:
+                return [Element(name, v.valueReference, v.type, 0, 1)]
+            return [Element(f"{name}[{i}]", v.valueReference, v.type, i, size) for i in range(size)]
+        return [Element(name, v.valueReference, v.type, _position(key, name, index, shape), size)]
+
+    def _shape(self, v: Any) -> tuple[int, ...]:
+        """Return the lengths of an array at the start values of the structural parameters; () of a scalar."""
+        lengths = []
+        for each in getattr(v, "dimensions", None) or ():
+            fixed = getattr(each, "start", None)
+            source = self._references.get(getattr(each, "valueReference", None))
+            lengths.append(int(fixed if fixed is not None else source.start if source is not None else 0))
+        return tuple(lengths)
+
+    def unit(self, key: str, element: Element) -> NamedUnit | None:
+        """Return the unit of a variable as the FMU defines it, None if it has none.
+
+        Raises:
+            ConfigError: the unit has no definition, or an offset.
+        """
+        v = self._references[element.reference]
+        name = v.unit or getattr(v.declaredType, "unit", None)
+        if not name:
+            return None
+        base = self._units.get(name)
+        if base is not None and base.offset:
+            raise ConfigError(
+                key, f"{v.name} is in {name}, a unit with an offset", "a unit without an offset, such as K"
+            )
+        if base is not None:
+            powers = tuple((each, int(getattr(base, each))) for each in sorted(_BASE) if getattr(base, each))
+            return NamedUnit(name, Unit(float(base.factor), powers))
+        if (known := parse_unit(name)) is None:
+            raise ConfigError(key, f"{v.name} is in {name}, which the FMU does not define", "a unit with a definition")
+        return NamedUnit(name, known)
+
+
+def _position(key: str, name: str, index: str, shape: tuple[int, ...]) -> int:
+    try:
+        indices = [int(part) for part in index.split(",")]
+    except ValueError:
+        indices = []
+    if len(indices) != len(shape) or not all(0 <= i < n for i, n in zip(indices, shape, strict=False)):
+        lengths = " x ".join(map(str, shape))
+        raise ConfigError(key, f"{name}: no such element", f"indices from 0 of an array of {lengths or 'no'} elements")
+    position = 0
+    for i, n in zip(indices, shape, strict=True):
+        position = position * n + i
+    return position
+
+
+def _read(key: str, path: Path, content: bytes) -> tuple[Any, list[str]]:
+    """Return FMPy's model description and the names of the files."""
+    if importlib.util.find_spec("fmpy") is None:
+        raise ConfigError(key, "FMUs need FMPy", "it installed: pip install lapwing[fmi]")
+    import fmpy
+
+    with tempfile.NamedTemporaryFile(suffix=".fmu") as file:
+        file.write(content)
+        file.flush()
+        try:
+            with zipfile.ZipFile(file.name) as archive:
+                names = archive.namelist()
+            return fmpy.read_model_description(file.name, validate=False), names
+        except Exception as error:  # zipfile and lxml raise many
+            text = " ".join(str(error).split()).replace(file.name, path.name)[:120]
+            raise ConfigError(key, f"{path}: not an FMU: {text}", "an FMU") from None
+
+
+def _interface(key: str, path: Path, model: Any, desired: str | None) -> str:
+    interfaces = {CO_SIMULATION: model.coSimulation, MODEL_EXCHANGE: model.modelExchange}
+    available = [name for name, given in interfaces.items() if given is not None]
+    if desired is not None and desired not in available:
+        has = ", ".join(available) or "scheduled execution"
+        raise ConfigError(key, f"{path}: has no {desired}, but {has}", "an interface that the FMU has")
+    if not available:
+        raise ConfigError(key, f"{path}: for scheduled execution only", "an FMU for co-simulation or model exchange")
+    return desired or available[0]
+
+
+def content_of(key: str, path: Path, embedded: str | None) -> bytes:
+    """Return the bytes of an FMU, from its file unless they are embedded in base64.
+
+    Raises:
+        ConfigError: neither can be read.
+    """
+    try:
+        return base64.b64decode(embedded, validate=True) if embedded else path.read_bytes()
+    except ValueError:
+        raise ConfigError(key, "the embedded FMU is damaged", "a whole log, or the scene") from None
+    except OSError as error:
+        raise ConfigError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}", "an FMU") from None
+
+
+def start_elements(elements: list[Element], key: str, value: Any) -> Mapping[Element, float]:
+    """Return the start value of each element. Raise ConfigError if the number of values differs."""
+    values = list(value) if isinstance(value, (list, tuple)) else [value]
+    if len(values) != len(elements):
+        raise ConfigError(key, f"{len(values)} values for {len(elements)} elements", "a value for each element")
+    return dict(zip(elements, map(float, values), strict=True))

@@ -1,0 +1,117 @@
+"""Model exchange: Lapwing integrates the equations of the FMU, locates state events, and meets time events exactly."""
+
+import ctypes
+import math
+from typing import Any
+
+from lapwing.dynamics import integrators
+from lapwing.services.fmu.derivatives import FmuFunctions, advance_states
+from lapwing.services.fmu.instance import UPDATES, FmuInstance
+
+WIDTH = 1e-12  # [s] of the interval in which a state event is known to be
+
+SLACK = 1e-9  # of a step: a time event this close to its end belongs to it
+
+
+class ModelExchange(FmuInstance):
+    """An FMU whose states Lapwing integrates."""
+
+    def __init__(self, spec: dict[str, Any], model: Any, fmu: Any):
+        """See `FmuInstance`."""
+        super().__init__(spec, model, fmu)
+        self._needs_completed = bool(model.modelExchange.needsCompletedIntegratorStep)
+        self._method = integrators.get(spec["integrator"]).Method()
+        self._status = ctypes.c_int64()
+        derivatives = "GetContinuousStateDerivatives" if self.is_3 else "GetDerivatives"
+        set_time, set_states, get = map(self._address, ("SetTime", "SetContinuousStates", derivatives))
+        self._functions = FmuFunctions(set_time, set_states, get, self.address, ctypes.addressof(self._status))
+
+    def _address(self, name: str) -> int:
+        return int(ctypes.cast(self.function(name), ctypes.c_void_p).value or 0)
+
+    def after_initialisation(self) -> None:
+        """Settle the discrete states, and enter continuous-time mode."""
+        self._next_event = self.update_discrete_states(0.0)
+        self.fmu.enterContinuousTimeMode()
+        states, indicators = self.model.numberOfContinuousStates, self.model.numberOfEventIndicators
+        if self.is_3:
+            states, indicators = self.fmu.getNumberOfContinuousStates(), self.fmu.getNumberOfEventIndicators()
+        self._states, self._indicators = (ctypes.c_double * states)(), (ctypes.c_double * indicators)()
+
+    def advance(self, time: float, step: float, inputs: tuple[float, ...]) -> None:
+        """Set inputs at `time`, which is an event if they differ, and integrate over `step` [s]."""
+        end, slack = time + step, SLACK * step
+        if inputs != self.last_inputs:
+            self._event(time, inputs)
+        for _ in range(UPDATES):
+            if self.ended is not None:
+                return
+            if self._next_event <= time:
+                self._event(time, None)
+            elif time >= end - slack and self._next_event > end + slack:
+                return
+            else:
+                time = self._to_event_or(time, self._next_event if self._next_event <= end + slack else end)
+        raise ValueError(f"more than {UPDATES} events between t = {end - step:g} s and {end:g} s")
+
+    def _to_event_or(self, begin: float, end: float) -> float:
+        """Integrate to a state event, or to `end`, and handle the event. Return the time reached [s]."""
+        x = self._read(self._states, "GetContinuousStates")
+        positive = self._positive()
+        after = self._integrate(begin, x, end)
+        event = self._positive() != positive
+        if event:
+            low, high = begin, end
+            while high - low > max(WIDTH, 4.0 * math.ulp(high)):
+                middle = 0.5 * (low + high)
+                states = self._integrate(begin, x, middle)
+                if self._positive() != positive:
+                    high, after = middle, states
+                else:
+                    low = middle
+            end = high
+            self._place(end, after)
+        if self._needs_completed:
+            entered, terminate = self.fmu.completedIntegratorStep()
+            event = event or entered
+            if terminate:
+                self.ended = end
+        if event:
+            self._event(end, None)
+        return end
+
+    def _integrate(self, begin: float, x: tuple[float, ...], end: float) -> tuple[float, ...]:
+        """Return the states at `end`, which the FMU has, too.
+
+        Raises:
+            ValueError: the FMU reports an error, or a state is not finite.
+        """
+        self._status.value = 0
+        if x:
+            x = advance_states(self._method, self.spec["accuracy"], self._functions, begin, x, end)
+            if not all(map(math.isfinite, x)):
+                self.check("getDerivatives", self._status.value)
+                raise ValueError("a continuous state is not finite")
+        self._place(end, x)
+        return x
+
+    def _place(self, time: float, x: tuple[float, ...]) -> None:
+        self.fmu.setTime(time)
+        if x:
+            self._states[:] = x
+            self.fmu.setContinuousStates(self._states, len(x))
+
+    def _read(self, values: Any, name: str) -> tuple[float, ...]:
+        if len(values):
+            getattr(self.fmu, name[0].lower() + name[1:])(values, len(values))
+        return tuple(values)
+
+    def _positive(self) -> tuple[bool, ...]:
+        return tuple(value > 0.0 for value in self._read(self._indicators, "GetEventIndicators"))
+
+    def _event(self, time: float, inputs: tuple[float, ...] | None) -> None:
+        self.fmu.enterEventMode()
+        if inputs is not None:
+            self.set(inputs)
+        self._next_event = self.update_discrete_states(time)
+        self.fmu.enterContinuousTimeMode()

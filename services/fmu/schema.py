@@ -1,0 +1,70 @@
+"""The `[services.NAME]` tables of a scene: FMUs that compute columns of ports."""
+
+import base64
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from lapwing.cosim.scene import Files, Scene, SceneTable
+from lapwing.dynamics.config_error import ConfigError
+
+
+class FmuTable(BaseModel):
+    """One `[services.NAME]`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    fmu: str  # path of the FMU, relative to the scene
+    embed: bool = False  # store the whole FMU in the run configuration, and so in the log
+    content: str | None = None  # the embedded FMU in base64; written by `embed`
+    interface: Literal["co_simulation", "model_exchange"] | None = None  # of an FMU that has both
+    integrator: str | None = None  # method for model exchange, default rk4
+    accuracy: float | None = Field(default=None, ge=1e-12, le=1e-2)  # of a state, relative to 1 + size; default 1e-8
+    inputs: dict[str, str] = Field(default_factory=dict)  # FMU variable = "PORT.COLUMN", or "NAME.VARIABLE" of an FMU
+    outputs: dict[str, str] = Field(default_factory=dict)  # "PORT.COLUMN" = FMU variable
+    start: dict[str, float | list[float]] = Field(default_factory=dict)  # start values of FMU variables
+    delay: int = Field(default=0, ge=0, le=1)  # [ticks] of the inputs; 1 where the FMU closes an algebraic loop
+    timeout: float = Field(default=10.0, gt=0.0)  # [s] of wall time in which a step must end
+
+
+class Services(SceneTable):
+    """FMUs by name."""
+
+    TABLE: ClassVar[str] = "services"
+    OPTIONAL: ClassVar[bool] = True
+    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
+
+    @property
+    def tables(self) -> Mapping[str, Any]:
+        """Tables of the scene by name."""
+        return self.__pydantic_extra__ or {}
+
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """Make the paths of FMUs absolute, so that a log can be simulated again from another folder, or embed them."""
+        entries = tree.get(cls.TABLE, {})
+        for entry in entries.values() if isinstance(entries, dict) else ():
+            if isinstance(entry, dict) and isinstance(path := entry.get("fmu"), str):
+                absolute = (files.folder / path).resolve()
+                entry["fmu"] = str(absolute)
+                if entry.get("embed") is True and absolute.is_file():  # a missing one is named when it is resolved
+                    entry["content"] = base64.b64encode(absolute.read_bytes()).decode()
+
+    def check(self, scene: Scene) -> None:
+        """Raise ConfigError unless every entry is a table of an FMU."""
+        for name in self.tables:
+            self.fmu(name)
+
+    def fmu(self, name: str) -> FmuTable:
+        """Return the table of one FMU. Raise ConfigError if it is invalid."""
+        key = f"{self.TABLE}.{name}"
+        if not isinstance(table := self.tables[name], dict):
+            raise ConfigError(key, f"got {table!r}", f"a table [{key}]")
+        if not name.isidentifier():
+            raise ConfigError(key, f"got the name {name!r}", "letters, digits and underscores")
+        try:
+            return FmuTable.model_validate(table)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, (key, *first["loc"])))
+            raise ConfigError(where, first["msg"].lower(), f"keys {', '.join(FmuTable.model_fields)}") from None

@@ -1,0 +1,75 @@
+"""Configuration of the FMUs of a run."""
+
+from typing import NamedTuple
+
+CO_SIMULATION, MODEL_EXCHANGE = "co_simulation", "model_exchange"
+
+
+class Element(NamedTuple):
+    """A scalar variable of an FMU, or an element of an array variable."""
+
+    variable: str  # name, with the index of an element: "u[0]"
+    reference: int
+    type: str  # as FMI names it: Real, Float64, Int32, ...
+    position: int  # in the array, row-major; 0 of a scalar
+    size: int  # elements of the variable; 1 of a scalar
+
+
+class Connection(NamedTuple):
+    """A column of a port and an element of a variable."""
+
+    port: str
+    column: int
+    element: Element
+    factor: float  # from the source's unit to the target's
+
+
+class StartValue(NamedTuple):
+    """A start value."""
+
+    element: Element
+    value: float
+
+
+class FmuConfig(NamedTuple):
+    """One FMU."""
+
+    name: str  # of the service
+    path: str
+    sha256: str
+    content: str  # the FMU in base64, "" if it stays in its file
+    version: int  # of FMI, 2 or 3
+    interface: str  # CO_SIMULATION or MODEL_EXCHANGE
+    integrator: str  # method of model exchange
+    accuracy: float  # of model exchange, relative to 1 + size of a state
+    inputs: tuple[Connection, ...]
+    outputs: tuple[Connection, ...]
+    start: tuple[StartValue, ...]
+    delay: int  # [ticks] of the inputs
+    timeout: float  # [s]
+
+
+class FmuSetup(NamedTuple):
+    """All FMUs of a run, each after those whose outputs it reads without delay."""
+
+    fmus: tuple[FmuConfig, ...]
+
+    @property
+    def replaced(self) -> dict[str, str]:
+        """The port that other services read in place of each port with columns of an FMU."""
+        return {
+            each.port: replaced_port(fmu.name, each.port)
+            for fmu in self.fmus
+            for each in fmu.outputs
+            if each.port != own_port(fmu.name)
+        }
+
+
+def own_port(name: str) -> str:
+    """Return the name of the port with the outputs of an FMU that other FMUs read."""
+    return f"fmu.{name}"
+
+
+def replaced_port(name: str, port: str) -> str:
+    """Return the name of a port whose columns an FMU computes in part."""
+    return f"{port}.{name}"

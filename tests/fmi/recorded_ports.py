@@ -1,0 +1,42 @@
+"""Samples of all ports of a scene, from the diagram that `lapwing run --mode single-process` executes."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.services import scene_resolver
+from lapwing.services.process_table import create_all
+
+
+def scene_config(name: str, **overrides: Any) -> RunConfig:
+    return scene_resolver.resolve(scene_resolver.load(name, [f"{key}={value}" for key, value in overrides.items()]))
+
+
+class RecordedPorts:
+    """A run with every sample of every port kept."""
+
+    def __init__(self, setup: RunConfig):
+        self.setup = setup
+        ports = {port.name for service in setup.services.values() for port in service.ports}
+        self.diagram = BlockDiagram(setup, create_all(setup), 1, whole=ports)
+        self.diagram.advance(setup.last_tick + 1)
+        self.ticks = self.diagram.tick
+
+    def sample(self, port: str, tick: int) -> np.ndarray | None:
+        """Return the row of a port at a tick, None if none is due."""
+        period = self.setup.port(port).period
+        if tick < 0 or tick % period:
+            return None
+        return np.ascontiguousarray(self.diagram.row(port, tick))
+
+    def latest(self, port: str, tick: int) -> np.ndarray:
+        """Return the newest row of a port that is not after a tick; zeros before the first."""
+        period = self.setup.port(port).period
+        row = self.diagram.row(port, max(tick, 0) - max(tick, 0) % period)
+        return np.ascontiguousarray(row) if tick >= 0 else np.zeros_like(row)
+
+    def all_ticks(self) -> Iterator[int]:
+        return iter(range(self.ticks))

@@ -1,0 +1,326 @@
+import json
+import math
+import random
+import shutil
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_ports import RecordedPorts, scene_config
+
+fmpy = pytest.importorskip("fmpy")
+from fmpy import read_model_description, simulate_fmu  # noqa: E402
+from fmpy.fmi2 import FMU2Slave  # noqa: E402
+from fmpy.fmi3 import FMU3Slave  # noqa: E402
+from fmpy.validation import validate_fmu  # noqa: E402
+
+from lapwing.cosim.diagram.topic_encoder import encode  # noqa: E402
+from lapwing.fmi.exported_part import export_part  # noqa: E402
+from lapwing.fmi.fmu import export_fmu  # noqa: E402
+from lapwing.fmi.variables import Variable, variables_of  # noqa: E402
+from lapwing.messages.digest import Digest  # noqa: E402
+from lapwing.messages.topics import TRUTH  # noqa: E402
+
+
+def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
+
+
+def input_signals(recorded: RecordedPorts, part: str) -> np.ndarray:
+    """Return the recorded inputs for FMPy: at time k the samples that tick k + 1 reads."""
+    exported = export_part(recorded.setup, part)
+    variables = [v for v in variables_of(exported) if v.causality == "input"]
+    kinds = {"real": np.float64, "integer": np.int32, "boolean": np.bool_}
+    signals = np.zeros(recorded.ticks, [("time", np.float64), *((v.name, kinds[v.type]) for v in variables)])
+    signals["time"] = np.arange(recorded.ticks) * recorded.setup.interval
+    for k in range(recorded.ticks):
+        row = [recorded.latest(p.port.name, k + 1 - p.lag if k + 1 < recorded.ticks else k) for p in exported.inputs]
+        values = np.concatenate(row) if row else np.zeros(0)
+        for v in variables:
+            signals[v.name][k] = values[v.offset]
+    return signals
+
+
+def assert_outputs_equal(recorded: RecordedPorts, part: str, result: np.ndarray) -> None:
+    exported = export_part(recorded.setup, part)
+    for v in variables_of(exported):
+        if v.causality == "output" and v.name in (result.dtype.names or ()):
+            port = exported.outputs[v.port].port.name
+            expected = np.array([recorded.latest(port, k)[v.offset] for k in range(len(result))])
+            assert np.array_equal(result[v.name].astype(float), expected, equal_nan=True), v.name
+
+
+@pytest.fixture(scope="module", params=[2, 3])
+def plant(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("fmu") / "hover_plant.fmu"
+    options = ["--fmi", str(request.param), "--cpu", "x86-64-v3", "--set", "run.duration=2.0"]
+    done = run_command("export-fmu", "hover", "--part", "plant", "--out", str(path), *options)
+    assert done.returncode == 0, done.stderr
+    assert f"FMI {request.param}.0" in done.stdout
+    return path
+
+
+def test_plant_has_recorded_outputs_bit_for_bit(plant: Path) -> None:
+    assert validate_fmu(str(plant)) == []
+    recorded = RecordedPorts(scene_config("hover", **{"run.duration": 2.0}))
+    names = [v.name for v in read_model_description(str(plant)).modelVariables if v.causality == "output"]
+    result = simulate_fmu(
+        str(plant), input=input_signals(recorded, "plant"), output=names, stop_time=2.0, output_interval=0.004
+    )
+    assert len(result) == recorded.ticks == 501
+    assert_outputs_equal(recorded, "plant", result)
+
+
+def test_archive_has_description_binary_and_documentation(plant: Path) -> None:
+    with zipfile.ZipFile(plant) as archive:
+        assert {"modelDescription.xml", "documentation/index.html", "resources/run_config.json"} <= set(
+            archive.namelist()
+        )
+        assert "motor_voltage" in archive.read("documentation/index.html").decode()
+        json.loads(archive.read("resources/run_config.json"))
+    model = read_model_description(str(plant))
+    units = {v.name: v.unit for v in model.modelVariables}
+    assert units["truth.velocity_world[0]"] == "m/s"
+    assert units["actuators.motor_voltage[3]"] == "V"
+    assert model.defaultExperiment.stepSize == "0.004"
+
+
+class Slave:
+    """One instance of an FMU of either version, with the functions that the tests use."""
+
+    def __init__(self, path: Path, name: str = "a"):
+        self.model = read_model_description(str(path))
+        self.folder = fmpy.extract(str(path))
+        self.is_3 = self.model.fmiVersion.startswith("3")
+        self.fmu = (FMU3Slave if self.is_3 else FMU2Slave)(
+            guid=self.model.guid, unzipDirectory=self.folder, instanceName=name,
+            modelIdentifier=self.model.coSimulation.modelIdentifier,
+        )  # fmt: skip
+        self.references = {v.name: v.valueReference for v in self.model.modelVariables}
+        self.fmu.instantiate()
+        self.time = 0.0
+
+    def begin(self, **start: float) -> None:
+        for name, value in start.items():
+            self.set(name, value)
+        if not self.is_3:
+            self.fmu.setupExperiment(startTime=0.0)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def get(self, name: str) -> float:
+        read = self.fmu.getFloat64 if self.is_3 else self.fmu.getReal
+        return read([self.references[name]])[0]
+
+    def set(self, name: str, value: float) -> None:
+        write = self.fmu.setFloat64 if self.is_3 else self.fmu.setReal
+        write([self.references[name]], [value])
+
+    def step(self, size: float = 0.004) -> None:
+        self.fmu.doStep(currentCommunicationPoint=self.time, communicationStepSize=size)
+        self.time += size
+
+    def saved(self) -> bytes:
+        get, serialise, free = (
+            (self.fmu.getFMUState, self.fmu.serializeFMUState, self.fmu.freeFMUState)
+            if self.is_3
+            else (self.fmu.getFMUstate, self.fmu.serializeFMUstate, self.fmu.freeFMUstate)
+        )
+        state = get()
+        data = serialise(state)
+        free(state)
+        return data
+
+    def load(self, data: bytes) -> None:
+        restore, put, free = (
+            (self.fmu.deserializeFMUState, self.fmu.setFMUState, self.fmu.freeFMUState)
+            if self.is_3
+            else (self.fmu.deSerializeFMUstate, self.fmu.setFMUstate, self.fmu.freeFMUstate)
+        )
+        state = restore(data)
+        put(state)
+        free(state)
+
+    def close(self) -> None:
+        self.fmu.freeInstance()
+        shutil.rmtree(self.folder)
+
+
+HEIGHT, MOTOR = "truth.position_world[2]", "actuators.motor_voltage[0]"
+START = "state.plant.vehicle.motion.position_world[2]"
+
+
+def test_instances_are_independent_and_states_move_between_them(plant: Path) -> None:
+    a, b = Slave(plant, "a"), Slave(plant, "b")
+    a.begin(**{START: 100.0})
+    b.begin()
+    for _ in range(50):
+        a.step()
+        b.step()
+    assert a.get(HEIGHT) < 100.0
+    assert b.get(HEIGHT) == pytest.approx(0.35, abs=1e-3)
+    state, height = a.saved(), a.get(HEIGHT)
+    assert a.saved() == state
+    b.load(state)
+    assert b.get(HEIGHT) == height
+    a.step(0.1)
+    b.time = a.time - 0.1
+    for _ in range(25):
+        b.step()
+    assert a.get(HEIGHT) == b.get(HEIGHT)
+    with pytest.raises(Exception, match=r"."):
+        a.load(state[:-1] if a.is_3 else b"x" * len(state))
+    a.close()
+    b.close()
+
+
+def test_free_fall_has_its_closed_form(plant: Path) -> None:
+    a = Slave(plant)
+    a.set("parameters.plant.vehicle.effects.gravity.acceleration", 2.0)
+    a.begin(**{START: 50.0})
+    a.step(1.0)
+    assert a.get(HEIGHT) == pytest.approx(49.0, abs=1e-6)
+    with pytest.raises(Exception, match=r"."):
+        a.set(START, 10.0)  # a start value after initialisation
+    a.close()
+
+
+def test_steps_shorter_than_internal_one_hold_outputs(plant: Path) -> None:
+    a, b = Slave(plant, "a"), Slave(plant, "b")
+    a.begin(**{START: 50.0})
+    b.begin(**{START: 50.0})
+    for _ in range(10):
+        a.step(0.001)
+    b.step(0.008)
+    assert a.get(HEIGHT) == b.get(HEIGHT)
+    a.close()
+    b.close()
+
+
+def test_random_and_non_finite_inputs_do_not_crash(plant: Path) -> None:
+    rng, a = random.Random(3), Slave(plant)
+    names = [n for n in a.references if n.startswith(("actuators.motor", "actuators.thrust"))]
+    a.begin()
+    fresh, failures = a.saved(), 0
+    for _ in range(300):
+        for name in names:
+            a.set(name, rng.choice([math.nan, math.inf, -math.inf, 1e308, rng.uniform(-100, 100)]))
+        try:
+            a.step()
+        except Exception:
+            failures += 1
+            a.load(fresh)
+            a.time = 0.0
+    assert failures > 0
+    a.close()
+
+
+def test_wrong_step_is_error_not_crash(plant: Path) -> None:
+    a = Slave(plant)
+    a.begin()
+    for time, size in ((1.0, 0.004), (0.0, -1.0), (0.0, math.nan), (math.inf, 0.004), (0.0, 1e300)):
+        with pytest.raises(Exception, match=r"."):
+            a.fmu.doStep(currentCommunicationPoint=time, communicationStepSize=size)
+    a.step()
+    a.close()
+
+
+def truth_digest(recorded: RecordedPorts, rows: np.ndarray) -> str:
+    """Return the digest of the topic truth from its rows, as the recorder computes it."""
+    service = next(s for s in recorded.diagram.services if s.name == "plant")
+    wire = next(w for w in service.wires if w.topic.name == TRUTH.name)
+    ticks = np.arange(len(rows))
+    digest = Digest()
+    for page in encode(wire, recorded.diagram.ports[wire.port], recorded.setup, ticks, rows):
+        payloads = np.ascontiguousarray(page.payloads).view(np.uint8).reshape(len(ticks), -1)
+        digest.update_page(page.topic.name, page.ticks * recorded.setup.interval_ns, payloads)
+    return digest.hexdigest()
+
+
+def truth_rows(result: np.ndarray, variables: list[Variable]) -> np.ndarray:
+    names = [v.name for v in variables if v.name.startswith("truth.")]
+    return np.ascontiguousarray(np.column_stack([result[name].astype(float) for name in names]))
+
+
+@pytest.mark.parametrize("scene", ["hover", pytest.param("delivery_mission", marks=pytest.mark.long)])
+@pytest.mark.parametrize("version", [2, 3])
+def test_vehicle_has_truth_digest_of_run(scene: str, version: int, tmp_path: Path) -> None:
+    recorded = RecordedPorts(scene_config(scene))
+    path = tmp_path / "vehicle.fmu"
+    variables = variables_of(export_fmu(recorded.setup, "vehicle", path, version))
+    assert validate_fmu(str(path)) == []
+    assert path.stat().st_size < 2e6
+    names = [v.name for v in variables if v.name.startswith("truth.")]
+    stop = (recorded.ticks - 1) * recorded.setup.interval
+    result = simulate_fmu(str(path), output=names, stop_time=stop, output_interval=recorded.setup.interval)
+    assert len(result) == recorded.ticks
+    expected = np.array([recorded.sample("truth", k) for k in range(recorded.ticks)])
+    assert truth_digest(recorded, truth_rows(result, variables)) == truth_digest(recorded, expected)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("part", ["plant", "sensors", "autopilot"])
+def test_part_of_mission_has_recorded_outputs(part: str, tmp_path: Path) -> None:
+    recorded = RecordedPorts(scene_config("delivery_mission"))
+    path = tmp_path / "part.fmu"
+    exported = export_fmu(recorded.setup, part, path)
+    assert validate_fmu(str(path)) == []
+    inputs = [v for v in variables_of(exported) if v.causality == "input"]
+    outputs = [v for v in variables_of(exported) if v.causality == "output"]
+    a = Slave(path)
+    kinds = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}
+
+    def set_inputs(tick: int) -> None:
+        """Set the samples that a tick reads; simulate_fmu would initialise with those of tick 1."""
+        rows = np.concatenate([recorded.latest(p.port.name, tick - p.lag) for p in exported.inputs])
+        for kind, name in kinds.items():
+            own = [v for v in inputs if v.type == kind]
+            if own and tick >= max(p.lag for p in exported.inputs):
+                values = [float(rows[v.offset]) if kind == "real" else int(rows[v.offset]) for v in own]
+                getattr(a.fmu, f"set{name}")([a.references[v.name] for v in own], values)
+
+    a.fmu.enterInitializationMode()
+    set_inputs(0)
+    a.fmu.exitInitializationMode()
+    for tick in range(recorded.ticks):
+        if tick:
+            set_inputs(tick)
+            a.time = (tick - 1) * recorded.setup.interval
+            a.step(recorded.setup.interval)
+        for kind, name in kinds.items():
+            own = [v for v in outputs if v.type == kind]
+            if own:
+                values = getattr(a.fmu, f"get{name}")([a.references[v.name] for v in own])
+                expected = [recorded.latest(exported.outputs[v.port].port.name, tick)[v.offset] for v in own]
+                assert np.array_equal(np.array(values, float), expected, equal_nan=True), f"{kind} at tick {tick}"
+    a.close()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--fmi", "1"], "--fmi 1: unknown version; use 2 or 3"),
+        (["--part", "wing"], "--part wing: unknown; use one of plant, sensors, autopilot, trajectory, vehicle"),
+        (["--set", "vehicle.nam=1"], "unknown key"),
+    ],
+)
+def test_invalid_export_is_rejected_in_one_line(arguments: list[str], message: str, tmp_path: Path) -> None:
+    out = tmp_path / "x.fmu"
+    done = run_command("export-fmu", "hover", "--out", str(out), *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert not out.exists()
+
+
+def test_export_without_compiler_is_rejected(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    done = run_command("export-fmu", "hover", "--out", str(tmp_path / "x.fmu"))
+    assert done.returncode == 2
+    assert done.stderr == "lapwing: CC=no-such-compiler: no such program; name a C compiler, or unset CC\n"
+    done = run_command("export-fmu", "hover", "--out", str(tmp_path / "x.zip"))
+    assert done.returncode == 2
+    assert "use a name that ends in .fmu" in done.stderr

@@ -1,0 +1,34 @@
+"""An FMU in its process, without a run."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from lapwing.services.fmu.host_process import HostProcess
+from lapwing.services.fmu.model import ImportedFmu
+from lapwing.services.fmu.schema import FmuTable
+from lapwing.services.fmu.service_config import Connection
+
+
+class OpenedFmu:
+    """An FMU that is stepped by hand."""
+
+    def __init__(self, path: Path, outputs: Sequence[str], inputs: Sequence[str] = (), **table: Any):
+        """Start the process; `table` are further keys of the scene's table."""
+        fmu = ImportedFmu("a", FmuTable(fmu=str(path), timeout=300.0, **table))
+        for name in outputs:
+            fmu.export("outputs", name)
+        config = fmu.with_exports(fmu.config({}, {"a": fmu}))
+        elements = [element for name in inputs for element in fmu.description.elements("inputs", name, "input")]
+        config = config._replace(inputs=tuple(Connection("u", k, each, 1.0) for k, each in enumerate(elements)))
+        self.interface, self._host, self.time = config.interface, HostProcess(config), 0.0
+
+    def initialise(self, *inputs: float) -> tuple[float, ...]:
+        """Return the outputs at time 0."""
+        return self._host.step(0.0, -1.0, inputs)
+
+    def advance(self, end: float, *inputs: float) -> tuple[float, ...]:
+        """Step to a time and return the outputs."""
+        result = self._host.step(self.time, end - self.time, inputs)
+        self.time = end
+        return result
