@@ -1,8 +1,7 @@
-"""What crosses the wire: ROS 2 message types, their CDR encoding, the topic table.
+"""ROS 2 message types, their CDR encoding, and the topic table.
 
-`from lapwing.messages import Imu, header`: the classes are generated from `msg/<package>/<Name>.msg`; adding a
-message is
-adding such a file.
+`from lapwing.messages import Imu, header`: the classes are generated from `msg/<package>/<Name>.msg`; a new message is
+a new file.
 """
 
 from typing import Any
@@ -16,5 +15,5 @@ __all__ += [cls.__name__ for cls in TYPES.values()]
 
 
 def __getattr__(name: str) -> Any:
-    """Message classes by their short names."""
+    """Return a message class by its short name."""
     return getattr(types, name)

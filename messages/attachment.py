@@ -14,18 +14,18 @@ _GID_PLACE = SIZE - _GID_SIZE
 
 
 class Attachment(NamedTuple):
-    """What an attachment says."""
+    """Contents of an attachment."""
 
     sequence: int  # of this publisher, from 0 or 1 upwards
     time_ns: int  # simulation time
-    gid: bytes  # 16 bytes that tell publishers apart
+    gid: bytes  # 16 bytes that identify the publisher
 
 
 def pack(sequence: int, time_ns: int, gid: bytes) -> bytes:
-    """The 33 bytes of an attachment.
+    """Return the 33 bytes of an attachment.
 
     Raises:
-        ValueError: the identifier has not 16 bytes.
+        ValueError: the GID does not have 16 bytes.
     """
     if len(gid) != _GID_SIZE:
         raise ValueError(f"attachment: the publisher's identifier has {len(gid)} bytes, expected {_GID_SIZE}")
@@ -50,10 +50,10 @@ _TIME = struct.Struct("<q")
 
 
 def time_and_gid(data: bytes) -> tuple[int, bytes]:
-    """Source time [ns] and identifier of an attachment, for the hot path.
+    """Return source time [ns] and GID of an attachment, for the hot path.
 
     Raises:
-        ValueError: no attachment.
+        ValueError: the bytes are no attachment.
     """
     if len(data) != SIZE or data[_GID_PLACE - 1] != _GID_SIZE:
         raise ValueError(f"no attachment: {len(data)} bytes")

@@ -22,12 +22,12 @@ _SECOND = 1_000_000_000
 
 @lru_cache(maxsize=1024)
 def record_dtype(layout: Layout) -> np.dtype:
-    """The structured dtype of a payload: its numbers by dotted name, little-endian, at their offsets.
+    """Return the structured dtype of a payload: its numbers by dotted name, little-endian, at their offsets.
 
-    Arrays and sequences of numbers are subarrays. A message within the message that holds nothing but float64 is one
-    subarray as well ("pose.orientation" (4,) in the order of its fields: x, y, z, w), and a sequence of k of them
-    ("moment" (k, 3) beside "moment.0" (3,) and "moment.0.x"). Strings and lengths have no field of their own; the last
-    field, `WHOLE`, is the payload.
+    Arrays and sequences of numbers are subarrays. A nested message of float64 only is also one subarray
+    ("pose.orientation" (4,) in the order of its fields: x, y, z, w), as is a sequence of k of them ("moment" (k, 3)
+    beside "moment.0" (3,) and "moment.0.x"). Strings and lengths have no field; the last field, `WHOLE`, is the
+    payload.
     """
     fields: dict[str, tuple[Any, int]] = {}
     floats: dict[str, list[int]] = {}  # by name of a nested message or of a sequence of them: offsets of its values
@@ -59,12 +59,12 @@ def record_dtype(layout: Layout) -> np.dtype:
 
 
 def number_fields(dtype: np.dtype) -> tuple[str, ...]:
-    """The fields of a `record_dtype` that hold numbers."""
+    """Return the fields of a `record_dtype` that hold numbers."""
     return (dtype.names or ())[:-1]
 
 
 def _parents(name: str) -> list[str]:
-    """The names of all that contains a field: "pose.0", "pose" of "pose.0.x"."""
+    """Return the names of all fields that contain a field: "pose.0", "pose" of "pose.0.x"."""
     parts = name.split(".")
     return [".".join(parts[:k]) for k in range(len(parts) - 1, 0, -1)]
 
@@ -86,24 +86,23 @@ class Record:
 
     @classmethod
     def of(cls, sample: Any) -> Self:
-        """The record of a sample message; the dtype is made once for each shape."""
+        """Return the record of a sample message; the dtype is made once for each shape."""
         return cls(type(sample), sample)
 
     def encode(self, n: int, columns: Mapping[str, Any]) -> np.ndarray:
-        """The payloads of n messages.
+        """Encode n messages.
 
         Args:
-            n: how many.
-            columns: by dotted field name the values of the n messages, shape (n,) or (n, k) as the field has k values,
-                or one value for all, shape () or (k,); or a function that gives them. Later columns overwrite
-                earlier ones.
+            n: number of messages.
+            columns: values of the n messages by dotted field name, shape (n,) or (n, k) for a field of k values; or one
+                value for all, shape () or (k,); or a function that returns them. Later columns overwrite earlier ones.
 
         Returns:
             Records, shape (n,); fields without a column are as in the sample. They may be selected and copied, but
-            not concatenated: numpy then lays the fields out anew. Concatenate their bytes (`view(np.uint8)`).
+            not concatenated: numpy then changes the layout. Concatenate their bytes (`view(np.uint8)`).
 
         Raises:
-            ValueError: no such field, a column of another shape, or numbers that an integer field cannot hold.
+            ValueError: the field does not exist, a column has another shape, or an integer field cannot hold a number.
         """
         payloads = np.empty((n, len(self.template)), np.uint8)
         payloads[:] = np.frombuffer(self.template, np.uint8)
@@ -113,7 +112,7 @@ class Record:
         return records
 
     def _fitted(self, n: int, name: str, column: np.ndarray) -> np.ndarray:
-        """A column in the field's type, of a shape that broadcasts to the field's."""
+        """Return a column in the field's type, with a shape that broadcasts to the field's."""
         if name not in number_fields(self.dtype):
             raise ValueError(f"{self.message.type_name}: {unknown_field(name, number_fields(self.dtype))}")
         field = self.dtype[name]
@@ -134,10 +133,10 @@ class Record:
 
 
 def stamp_columns(times_ns: np.ndarray, field: str = "header.stamp") -> dict[str, Callable[[], np.ndarray]]:
-    """The columns of a field of type `Time`, made where they are asked for: who looks at numbers alone leaves them out.
+    """Return lazy columns of a field of type `Time`, computed only if they are read.
 
     Args:
-        times_ns: instants [ns], int64, shape (n,).
+        times_ns: times [ns], int64, shape (n,).
         field: name of the field: "clock", "transforms.0.header.stamp".
     """
     times_ns = np.asarray(times_ns, np.int64)
@@ -145,14 +144,14 @@ def stamp_columns(times_ns: np.ndarray, field: str = "header.stamp") -> dict[str
 
 
 def quaternion_columns(wxyz: Any) -> np.ndarray:
-    """Quaternions w, x, y, z, shape (n, 4), in the order of a message: x, y, z, w; each column lies by itself."""
-    found = np.empty((4, len(wxyz)))  # numpy copies whole columns in two thirds of the time
-    for column, part in zip(found, (1, 2, 3, 0), strict=True):
+    """Convert quaternions w, x, y, z, shape (n, 4), to a message's order x, y, z, w; columns are contiguous."""
+    result = np.empty((4, len(wxyz)))  # numpy copies whole columns in two thirds of the time
+    for column, part in zip(result, (1, 2, 3, 0), strict=True):
         column[...] = wxyz[:, part]
-    return found.T
+    return result.T
 
 
 def unknown_field(name: str, known: tuple[str, ...]) -> str:
-    """Words for a field that does not exist, with the names nearest to it."""
+    """Return the error text for an unknown field, with the nearest names."""
     near = get_close_matches(name, known, n=4, cutoff=0.4) or sorted(known)[:8]
     return f"no field {name}; near it: {', '.join(near)}"

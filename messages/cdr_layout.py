@@ -22,7 +22,7 @@ _UINT32 = struct.Struct("<I")
 
 
 class Entry(NamedTuple):
-    """What stands at one place of a payload."""
+    """Entry at an offset of a payload."""
 
     name: str  # dotted: "header.frame_id", "rotor_speed", "pose.0.position.x"
     kind: str  # "value", "array" (also a sequence's elements), "string", "length" (of a string or sequence)
@@ -59,10 +59,10 @@ class Layout:
         self._expected = (ENCAPSULATION, *self.shape) if places else ENCAPSULATION
 
     def fits(self, values: tuple) -> bool:
-        """Whether values unpacked with this layout belong to it.
+        """Return True if values unpacked with this layout belong to it.
 
-        The first length stands where it stands in every shape; if it agrees, so does the place of the second, and so
-        on: when all agree, the layout is the message's own.
+        The first length has the same offset in every shape; if it agrees, so does the offset of the second, and so
+        on: if all agree, the layout is the message's own.
         """
         return self._lengths(values) == self._expected
 
@@ -85,12 +85,12 @@ class Layouts:
         self.by_shape: dict[tuple[int, ...], Layout] = {}
 
     def build(self, shape: tuple[int, ...]) -> Layout:
-        """The layout of a shape: the lengths in order of appearance, strings counted with their NUL."""
+        """Return the layout of a shape: the lengths in order of appearance, strings counted with their NUL."""
         lengths = iter(shape)
         return self._keep(walk(self._definition, self._definitions, lambda offset: next(lengths)))
 
     def unpack(self, payload: bytes) -> tuple:
-        """Flat values of a payload.
+        """Return flat values of a payload.
 
         Raises:
             ValueError: the payload is not little-endian CDR, or shorter or longer than its own lengths say.
@@ -104,10 +104,10 @@ class Layouts:
         return self._walk(payload).codec.unpack(payload)
 
     def measure(self, payload: bytes) -> Layout:
-        """The layout of a payload.
+        """Return the layout of a payload.
 
         Raises:
-            ValueError: as `unpack`.
+            ValueError: see `unpack`.
         """
         layout = self._by_size.get(len(payload))
         if layout is not None and layout.fits(layout.codec.unpack(payload)):
@@ -148,12 +148,12 @@ class Layouts:
 
 
 def walk(definition: Definition, definitions: dict[str, Definition], length_at: Callable[[int], int]) -> list[Entry]:
-    """Everything that stands in a payload of a type, in order.
+    """Return all entries of a type's payload, in order.
 
     Args:
         definition: the type.
         definitions: all types, by full name.
-        length_at: gives the length of the string or sequence whose length stands at this offset [bytes].
+        length_at: returns the length of the string or sequence whose length field has this offset [bytes].
     """
     entries: list[Entry] = []
     end = _HEADER

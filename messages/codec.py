@@ -33,17 +33,17 @@ def decode(payload):
 
 
 def make_class(definition: Definition, definitions: dict[str, Definition], classes: dict[str, type]) -> type:
-    """The message class of a definition.
+    """Return the message class of a definition.
 
     Args:
         definition: the type.
         definitions: all types, by full name.
-        classes: classes made so far; must hold every type that this one contains.
+        classes: existing classes; must contain every type that this one contains.
 
-    The class is a named tuple with the definition's fields, defaults (zero where none is given) and constants, and
+    The class is a named tuple with the definition's fields, defaults (zero if none is specified) and constants, and
 
     - `type_name`: "sensor_msgs/msg/Imu"; `schema_text`: the `ros2msg` text with all contained types;
-    - `layouts`: where its fields stand in a payload, by the lengths of its strings and sequences;
+    - `layouts`: field offsets in a payload, by the lengths of its strings and sequences;
     - `encode() -> bytes` and `decode(bytes)` (static): ROS 2 CDR, little-endian. Sequences and arrays decode to
       tuples. Both raise ValueError, with the type's name, for values or payloads that do not fit.
     """

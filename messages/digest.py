@@ -55,7 +55,7 @@ class Digest:
         self._hashes[topic].update(entries.reshape(-1).data)
 
     def hexdigest(self) -> str:
-        """The digest so far: 32 hexadecimal digits."""
+        """Return the digest so far: 32 hexadecimal digits."""
         total = hashlib.blake2b(digest_size=16)
         for topic in sorted(self._hashes):
             self._fold(topic)

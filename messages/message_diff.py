@@ -1,4 +1,4 @@
-"""Where two messages of one type differ."""
+"""First difference of two messages of one type."""
 
 from collections.abc import Iterator
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ class FieldDifference(NamedTuple):
 
 
 def first_difference(message: Any, one: bytes, other: bytes) -> FieldDifference | None:
-    """The first field that is not the same in two encoded messages of a class; None where they are the same bytes.
+    """Return the first different field of two encoded messages of a class. Return None if the bytes are equal.
 
     Raises:
         ValueError: one of them is no message of the class.
@@ -33,7 +33,7 @@ def first_difference(message: Any, one: bytes, other: bytes) -> FieldDifference 
 
 
 def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
-    """(dotted name, value) of everything in a message."""
+    """Yield (dotted name, value) of all leaves of a message."""
     if not isinstance(value, tuple):
         yield path, value
         return

@@ -36,7 +36,7 @@ class Field(NamedTuple):
 
     @property
     def nested(self) -> bool:
-        """Whether the elements are messages themselves."""
+        """True if the elements are messages."""
         return "/" in self.base
 
 
@@ -85,19 +85,19 @@ def read_folder(folder: Path) -> dict[str, Definition]:
     Raises:
         ValueError: a definition is faulty, or contains a type that has no file.
     """
-    found = {}
+    result = {}
     for path in sorted(folder.glob("*/*.msg")):
         type_name = f"{path.parent.name}/msg/{path.stem}"
-        found[type_name] = parse(type_name, path.read_text(encoding="utf-8"))
+        result[type_name] = parse(type_name, path.read_text(encoding="utf-8"))
     ordered: dict[str, Definition] = {}
-    for type_name in found:
-        for name in [*reversed(dependencies(type_name, found)), type_name]:
-            ordered.setdefault(name, found[name])
+    for type_name in result:
+        for name in [*reversed(dependencies(type_name, result)), type_name]:
+            ordered.setdefault(name, result[name])
     return ordered
 
 
 def dependencies(type_name: str, definitions: dict[str, Definition]) -> list[str]:
-    """Full names of all types contained in a type, each before the types that it contains itself."""
+    """Return the full names of all types contained in a type, each before the types that it contains."""
     names: list[str] = []
     for field in definitions[type_name].fields:
         if not field.nested:
@@ -112,7 +112,7 @@ def dependencies(type_name: str, definitions: dict[str, Definition]) -> list[str
 
 
 def schema_text(type_name: str, definitions: dict[str, Definition]) -> str:
-    """The text with that of all contained types appended, as MCAP's schema encoding `ros2msg` wants it."""
+    """Return the text of a type followed by those of all contained types, in MCAP's schema encoding `ros2msg`."""
     parts = [definitions[type_name].text]
     for name in dependencies(type_name, definitions):
         parts.append(f"{'=' * 80}\nMSG: {name.replace('/msg/', '/')}\n{definitions[name].text}")

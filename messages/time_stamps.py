@@ -6,20 +6,20 @@ _SECOND = 1_000_000_000
 
 
 def stamp(time_ns: int) -> Time:
-    """`Time` of an instant [ns]."""
+    """Return the `Time` of a time [ns]."""
     return Time(*divmod(time_ns, _SECOND))
 
 
 def nanoseconds(time: Time) -> int:
-    """Instant [ns] of a `Time`."""
+    """Return the time [ns] of a `Time`."""
     return time.sec * _SECOND + time.nanosec
 
 
 def header(time_ns: int, frame_id: str) -> Header:
-    """Header for an instant [ns] and the frame that the message's vectors are expressed in."""
+    """Return the header for a time [ns] and the frame of the message's vectors."""
     return Header(stamp(time_ns), frame_id)
 
 
 def stamp_ns(header: Header) -> int:
-    """Instant [ns] of a header."""
+    """Return the time [ns] of a header."""
     return nanoseconds(header.stamp)

@@ -33,7 +33,7 @@ class TopicColumns(Mapping[str, Column]):
     """
 
     def __init__(self, message: Any, groups: Sequence[_Group]) -> None:
-        """Messages of a class, sorted by shape; see `history` and `history_of_pages`."""
+        """Store messages of a class, grouped by shape; see `history` and `history_of_pages`."""
         self.message = message
         self.count = sum(len(group.places) for group in groups)
         self._groups = groups
@@ -42,7 +42,7 @@ class TopicColumns(Mapping[str, Column]):
         self._partly = {name for table in tables for name in table}.difference(self._names)
 
     def __getitem__(self, name: str) -> Column:
-        """A column.
+        """Return a column.
 
         Raises:
             KeyError: there is no such field, or not in every message.
@@ -73,12 +73,12 @@ class TopicColumns(Mapping[str, Column]):
         return history, (self.message, self.payloads())
 
     def payloads(self) -> list[bytes]:
-        """The messages in their order, as CDR."""
-        found = [b""] * self.count
+        """Return the messages in their order, as CDR."""
+        result = [b""] * self.count
         for group in self._groups:
             for place, row in zip(group.places.tolist(), _bytes(group.records), strict=True):
-                found[place] = row.tobytes()
-        return found
+                result[place] = row.tobytes()
+        return result
 
     def _numbers(self, name: str) -> np.ndarray:
         parts = [group.records[name] for group in self._groups]
@@ -97,7 +97,7 @@ class TopicColumns(Mapping[str, Column]):
 
 
 def history(message: Any, payloads: Sequence[bytes]) -> TopicColumns:
-    """Messages of one type as columns by dotted field name.
+    """Return messages of one type as columns by dotted field name.
 
     Args:
         message: the message class.
@@ -119,13 +119,13 @@ class ColumnBuilder:
         self._count = 0
 
     def add(self, time_ns: int, payload: bytes) -> None:
-        """One more, as CDR; ValueError if a message of its page is none of the class."""
+        """Add an encoded message. Raise ValueError if a message of its page is none of the class."""
         self._waiting.append((time_ns, payload))
         if len(self._waiting) == PAGE:
             self._put_together()
 
     def history(self) -> tuple[np.ndarray, TopicColumns]:
-        """Times [ns], int64, shape (n,), and columns of all that have come, as of `history`."""
+        """Return times [ns], int64, shape (n,), and columns of all messages. See `history`."""
         if self._waiting or not self._groups:
             self._put_together()
         return np.concatenate(self._times), TopicColumns(self._message, self._groups)
@@ -141,11 +141,11 @@ class ColumnBuilder:
 
 
 def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> TopicColumns:
-    """The same from pages of messages that have one shape each.
+    """Return messages as columns from record batches of one shape each.
 
     Args:
         message: the message class.
-        pages: places of the messages among all, shape (m,); their payloads, records or uint8 of shape (m, size).
+        pages: indices of the messages among all, shape (m,); their payloads, records or uint8 of shape (m, size).
     """
     groups = []
     for places, payloads in pages:
@@ -156,12 +156,12 @@ def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]
 
 
 def _bytes(records: np.ndarray) -> np.ndarray:
-    """Records (m,) as uint8, shape (m, size)."""
+    """Return records (m,) as uint8, shape (m, size)."""
     return records.view(np.uint8).reshape(len(records), records.dtype.itemsize)
 
 
 def _groups(message: Any, payloads: Sequence[bytes]) -> Iterator[_Group]:
-    """The messages by shape. All payloads of a size are compared with one layout at once."""
+    """Yield the messages by shape. All payloads of a size are compared with one layout at once."""
     if not payloads:
         layout = message.layouts.measure(message().encode())
         yield _Group(np.empty(0, np.int64), layout, np.empty(0, record_dtype(layout)))
@@ -179,24 +179,24 @@ def _groups(message: Any, payloads: Sequence[bytes]) -> Iterator[_Group]:
 
 
 def _fits(layout: Layout, rows: np.ndarray) -> np.ndarray:
-    """Whether payloads as long as the layout, shape (m, size), belong to it; see `Layout.fits`."""
+    """Return a mask of the payloads of the layout's size, shape (m, size), that belong to it; see `Layout.fits`."""
     lengths = [(0, ENCAPSULATION), *((e.offset, e.length) for e in layout.entries if e.kind == "length")]
-    found = np.ones(len(rows), bool)
+    result = np.ones(len(rows), bool)
     for offset, value in lengths:
-        found &= np.ascontiguousarray(rows[:, offset : offset + 4]).view("<u4")[:, 0] == value
-    return found
+        result &= np.ascontiguousarray(rows[:, offset : offset + 4]).view("<u4")[:, 0] == value
+    return result
 
 
 def _columns(group: _Group) -> dict[str, None]:
-    """Names of all that a group has, in order of the payload; numbers first."""
+    """Return the names of all columns of a group, in order of the payload; numbers first."""
     texts = [e.name for e in group.layout.entries if e.kind == "string" or e.base == "string[]"]
     return dict.fromkeys([*number_fields(group.records.dtype), *texts])
 
 
 def _texts(group: _Group, name: str) -> list[Any]:
-    """A field's strings, or tuples of strings, of each message of a group."""
-    found = {entry.name: entry for entry in group.layout.entries if entry.name == name}
-    entry = found[name]  # the last of its name: a string stands behind its length
+    """Return a field's strings, or tuples of strings, of each message of a group."""
+    result = {entry.name: entry for entry in group.layout.entries if entry.name == name}
+    entry = result[name]  # the last of its name: a string follows its length
     if entry.kind == "length":
         elements = [_texts(group, f"{name}.{k}") for k in range(entry.length)]
         return list(zip(*elements, strict=True)) if elements else [()] * len(group.records)

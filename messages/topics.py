@@ -12,14 +12,18 @@ from lapwing.messages.types import (
     CommandAcks,
     ContactForces,
     Estimate,
+    EstimateCovariance,
     FluidPressure,
+    Image,
     Imu,
+    LaserScan,
     Log,
     MagneticField,
     NavSatFix,
     Odometry,
     OperatorInput,
     OpticalFlow,
+    PointCloud2,
     PoseStamped,
     Range,
     Reading,
@@ -45,11 +49,11 @@ class Topic:
     vehicle: str = ""  # of a fleet, whose own topic it is: its name then has no place `{vehicle}`
 
     def key(self, vehicle: str = "") -> str:
-        """ROS name and name in the log: "/drone1/imu"."""
+        """Return ROS name and name in the log: "/drone1/imu"."""
         return "/" + self.name.format(vehicle=vehicle)
 
     def zenoh_key(self, vehicle: str, key_prefix: str) -> str:
-        """Zenoh key expression in a run's key prefix: "prefix/drone1/imu"."""
+        """Return the Zenoh key expression in a run's key prefix: "prefix/drone1/imu"."""
         return f"{key_prefix}/{self.name.format(vehicle=vehicle)}"
 
 
@@ -72,10 +76,14 @@ AIRSPEED = Topic("{vehicle}/differential_pressure", FluidPressure, rate="sensors
 AIRSPEED_RECEIVED = Topic("{vehicle}/differential_pressure/received", FluidPressure, rate="sensors.airspeed.rate")
 RANGEFINDER = Topic("{vehicle}/rangefinder", Range, rate="sensors.rangefinder.rate")
 OPTICAL_FLOW = Topic("{vehicle}/optical_flow", OpticalFlow, rate="sensors.optical_flow.rate")
+LASER_SCAN = Topic("{vehicle}/scan", LaserScan, rate="sensors.lidar.rate")
+POINT_CLOUD = Topic("{vehicle}/points", PointCloud2, rate="sensors.lidar.rate")
+DEPTH_IMAGE = Topic("{vehicle}/depth/image_rect", Image, rate="sensors.depth_camera.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
 TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # what of it is flown is in SETPOINT
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
 ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
+ESTIMATE_COVARIANCE = Topic("{vehicle}/estimate/covariance", EstimateCovariance, rate="rates.covariance")
 LIFT = Topic("{vehicle}/rotor_wrench", RotorWrench)
 ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
@@ -92,27 +100,27 @@ _CUSTOM_SENSOR = f"{_VEHICLE}/custom_sensor/"
 
 @cache
 def custom_sensor(name: str) -> Topic:
-    """The topic of a sensor of the user's own, at its own rate; by its name in the scene."""
+    """Return the topic of a custom sensor by its name in the scene, at its own rate."""
     return Topic(f"{_CUSTOM_SENSOR}{name}", Reading)
 
 
 @cache
 def of_vehicle(topic: Topic, vehicle: str) -> Topic:
-    """The topic "left/imu" of the vehicle `left` of a fleet; one that has no vehicle's name in it as it is."""
+    """Return the topic "left/imu" of vehicle `left` of a fleet; a topic without a vehicle's name is unchanged."""
     if _VEHICLE not in topic.name:
         return topic
-    found = replace(topic, name=topic.name.replace(_VEHICLE, vehicle), vehicle=vehicle)
-    _PLACES[found] = place(topic)
-    return found
+    result = replace(topic, name=topic.name.replace(_VEHICLE, vehicle), vehicle=vehicle)
+    _PLACES[result] = place(topic)
+    return result
 
 
 def of_all(topic: Topic) -> Topic:
-    """The topic "{vehicle}/imu" of which this one, "left/imu", is that of one vehicle of a fleet."""
+    """Return the template "{vehicle}/imu" of a vehicle's topic "left/imu"."""
     return topic_named(f"{_VEHICLE}/{topic.name.removeprefix(f'{topic.vehicle}/')}") if topic.vehicle else topic
 
 
 def topic_named(name: str) -> Topic:
-    """The topic of this name, "{vehicle}/imu", "left/imu" or "clock".
+    """Return the topic of a name, "{vehicle}/imu", "left/imu" or "clock".
 
     Raises:
         ValueError: there is none.
@@ -128,5 +136,5 @@ def topic_named(name: str) -> Topic:
 
 
 def place(topic: Topic) -> int:
-    """Where it stands among the messages of a tick: in the order of the table, sensors of the user's own behind it."""
+    """Return the rank among the messages of a tick: the order of the table, then custom sensors."""
     return _PLACES.get(topic, len(TOPICS))

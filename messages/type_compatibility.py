@@ -1,4 +1,4 @@
-"""Whether a message type as a log defines it is the one that this version has."""
+"""Comparison of a message type in a log with that of this version."""
 
 from lapwing.messages.former_names import with_current_fields
 from lapwing.messages.parse import PRIMITIVES, Definition, parse
@@ -9,13 +9,13 @@ _HEAD = "MSG: "
 
 
 def otherwise(type_name: str, text: str) -> str:
-    """First difference between a recorded definition and ours, in words; "" where both read the same.
+    """Return the first difference between a recorded definition and ours as a text; "" if both decode alike.
 
     Comments, constants and defaults are not part of a message. A type that is not ours has no difference.
 
     Args:
         type_name: full name, "sensor_msgs/msg/Imu".
-        text: the recorded definition, in the schema encoding `ros2msg`.
+        text: recorded definition, in the schema encoding `ros2msg`.
     """
     if type_name not in TYPES or not text.strip() or text == TYPES[type_name].schema_text:
         return ""
@@ -26,34 +26,34 @@ def otherwise(type_name: str, text: str) -> str:
     ours = _fields(type_name, DEFINITIONS)
     for here, there in zip([*ours, ("", "")], [*theirs, ("", "")], strict=False):
         if here != there:
-            wanted, found = (" ".join(field).strip() or "no more fields" for field in (here, there))
-            return f"has {found} where this version has {wanted}"
+            wanted, result = (" ".join(field).strip() or "no more fields" for field in (here, there))
+            return f"has {result} where this version has {wanted}"
     return ""
 
 
 def _definitions(type_name: str, text: str) -> dict[str, Definition]:
-    """The types of a schema by full name."""
-    found = {}
+    """Return the types of a schema by full name."""
+    result = {}
     for k, part in enumerate(text.replace("\r", "").split(f"{_BAR}\n")):
         name, own = type_name, part
         if k:
             head, _, own = part.partition("\n")
             package, _, short = head.removeprefix(_HEAD).strip().partition("/")
             name = f"{package}/msg/{short.removeprefix('msg/')}"
-        found[name] = with_current_fields(parse(name, own))
-    return found
+        result[name] = with_current_fields(parse(name, own))
+    return result
 
 
 def _fields(type_name: str, known: dict[str, Definition], prefix: str = "") -> list[tuple[str, str]]:
-    """Type and dotted name of every field of a type down to its numbers and texts; types of one layout are one."""
-    found = []
+    """Return type and dotted name of all leaf fields of a type; types with equal layouts count as one."""
+    result = []
     for field in known[type_name].fields:
         array = "" if field.length is None else f"[{field.length or ''}]"
         if field.nested:
-            found += _fields(field.base, known, f"{prefix}{field.name}{array}.")
+            result += _fields(field.base, known, f"{prefix}{field.name}{array}.")
         else:
-            found.append((_NAMES.get(PRIMITIVES.get(field.base, ""), field.base) + array, f"{prefix}{field.name}"))
-    return found
+            result.append((_NAMES.get(PRIMITIVES.get(field.base, ""), field.base) + array, f"{prefix}{field.name}"))
+    return result
 
 
 _NAMES = {layout: name for name, layout in PRIMITIVES.items() if name not in ("byte", "char")}

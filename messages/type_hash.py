@@ -34,7 +34,7 @@ _ARRAY, _SEQUENCE = 48, 144  # what is added for `T[n]` and `T[]`
 
 
 def type_hash(type_name: str, definitions: Mapping[str, Definition]) -> str:
-    """The hash of a type, "RIHS01_" and 64 hexadecimal digits; `definitions` has all types by full name."""
+    """Return the hash of a type, "RIHS01_" and 64 hexadecimal digits; `definitions` has all types by full name."""
     within = sorted(set(dependencies(type_name, dict(definitions))))
     description = {
         "type_description": _describe(definitions[type_name]),
@@ -45,7 +45,7 @@ def type_hash(type_name: str, definitions: Mapping[str, Definition]) -> str:
 
 @cache
 def known_type_hash(type_name: str) -> str:
-    """The hash, as of `type_hash`, of a type of `messages/msg` by its full name."""
+    """Return the `type_hash` of a type of `messages/msg` by its full name."""
     return type_hash(type_name, DEFINITIONS)
 
 

@@ -12,7 +12,7 @@ TYPES: dict[str, Any] = {}
 FOLDER = Path(__file__).parent / "msg"
 
 DEFINITIONS = read_folder(FOLDER)
-"""What their files say, by full name, each after the types that it contains."""
+"""Definitions of all types by full name, each after the types that it contains."""
 
 for _name, _definition in DEFINITIONS.items():
     TYPES[_name] = make_class(_definition, DEFINITIONS, TYPES)
@@ -23,7 +23,7 @@ globals().update(_by_name)
 
 
 def message_class(type_name: str) -> Any:
-    """The class of a full type name.
+    """Return the class of a full type name.
 
     Raises:
         ValueError: there is no such type; names the choices.
@@ -34,5 +34,5 @@ def message_class(type_name: str) -> Any:
 
 
 def __getattr__(name: str) -> Any:
-    """Reached only for names that do not exist; also tells type checkers that names are made at import."""
+    """Raise AttributeError for a missing name; also marks the names as dynamic for type checkers."""
     raise AttributeError(f"module 'lapwing.messages.types' has no message {name!r}")

@@ -9,19 +9,19 @@ _LINE = re.compile(r"\s*[A-Za-z][\w/]*(?:\[\d*\])?\s+(?P<name>[A-Za-z]\w*)[^#]*#
 
 
 def unit(type_name: str, field: str) -> str:
-    """The unit of a field by its dotted name ("pose.position.x"); "" where none is stated.
+    """Return the unit of a field by its dotted name ("pose.position.x"); "" without one.
 
-    What contains the field states its unit where the field's own line does not.
+    The containing field defines the unit if the field's own line does not.
     """
-    found = ""
+    result = ""
     for name in field.split("."):
         if name.isdigit():
             continue  # an element of a sequence
-        found = _units(type_name).get(name, found)
+        result = _units(type_name).get(name, result)
         type_name = next((f.base for f in DEFINITIONS[type_name].fields if f.name == name and f.nested), "")
         if not type_name:
             break
-    return found
+    return result
 
 
 @cache

@@ -1,7 +1,7 @@
 """Airspeed sensor, a pitot tube: the dynamic pressure of the air that comes along it (theory.md, eq. (3.39))."""
 
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Lt
 
@@ -14,7 +14,7 @@ from lapwing.messages import topics as topic
 from lapwing.services.common.airspeed_encoder import airspeed_wire
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.sensors import error_models
-from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
 from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("pressure",)
@@ -24,7 +24,7 @@ class Airspeed(NamedTuple):
     """Parameters of a tube along the body's x axis."""
 
     noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
-    turn_on_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
+    turn_on_bias_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
     range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
     resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
@@ -37,7 +37,7 @@ class AirspeedState(NamedTuple):
     """State of a tube."""
 
     scale: float
-    turn_on: float  # [Pa]
+    turn_on_bias: float  # [Pa]
     line: Line  # the first of the three
 
 
@@ -45,43 +45,45 @@ READING = AirspeedReading()
 
 
 def blank() -> AirspeedState:
-    """A state without meaning, to be overwritten at the first tick."""
+    """Return a placeholder state, replaced at the first tick."""
     return AirspeedState(0.0, 0.0, BLANK)
 
 
 @always_inline
 def _true_pressure(truth: Truth) -> float:
-    """[Pa]; from behind, the openings feel as much suction."""
+    """Return the differential pressure [Pa]; flow from behind causes the same suction."""
     along = rotate_back(truth.attitude, truth.air_velocity_world)[0]
     return 0.5 * truth.air_density * along * abs(along)
 
 
 @kernel
 def initial(p: Airspeed, key: Key, truth: Truth) -> AirspeedState:
-    """State before the first sample."""
+    """Return the state before the first sample."""
     draw = normal3(key, TURN_ON, 0)
-    scale, turn_on = 1.0 + p.scale_error * draw[0], p.turn_on_pa * draw[1]
-    return AirspeedState(scale, turn_on, new_line((scale * _true_pressure(truth) + turn_on, 0.0, 0.0)))
+    scale, turn_on_bias = 1.0 + p.scale_error * draw[0], p.turn_on_bias_pa * draw[1]
+    return AirspeedState(scale, turn_on_bias, new_delay_line((scale * _true_pressure(truth) + turn_on_bias, 0.0, 0.0)))
 
 
 @kernel
 def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> tuple[AirspeedState, AirspeedReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     noise = error_models.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 0)
-    measured = s.scale * _true_pressure(truth) + s.turn_on + noise
+    measured = s.scale * _true_pressure(truth) + s.turn_on_bias + noise
     measured = error_models.quantise(error_models.limit(measured, p.range_pa), p.resolution_pa)
-    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))
+    line, arrived, valid = apply_delay_and_faults(
+        p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0)
+    )
     variance = error_models.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
-    return AirspeedState(s.scale, s.turn_on, line), AirspeedReading(arrived[0], variance, valid)
+    return AirspeedState(s.scale, s.turn_on_bias, line), AirspeedReading(arrived[0], variance, valid)
 
 
-def wires(frame: str, port: Port, p: Airspeed) -> list[TopicEncoder]:
-    """Its topic."""
+def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+    """Return the encoder of its topic."""
     return [airspeed_wire(topic.AIRSPEED, frame, port)]
 
 
 # Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Resolution: 20 counts a pascal, the scale
 # in PX4's and ArduPilot's drivers. Chosen: zero point, span and noise (the sheet's tables were not at hand).
-SDP33 = Airspeed(noise_pa_per_sqrt_hz=0.05, turn_on_pa=0.2, scale_error=0.03, range_pa=1500.0, resolution_pa=0.05)
+SDP33 = Airspeed(noise_pa_per_sqrt_hz=0.05, turn_on_bias_pa=0.2, scale_error=0.03, range_pa=1500.0, resolution_pa=0.05)
 
 PRESETS = {"sdp33": SDP33, "ideal": Airspeed()}

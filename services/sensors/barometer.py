@@ -11,7 +11,7 @@ from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import always_inline, kernel
 from lapwing.services.common.ports import BarometerReading
 from lapwing.services.sensors import error_models
-from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
 from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("pressure",)
@@ -22,8 +22,8 @@ class Barometer(NamedTuple):
 
     noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
     bias_instability_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] peak of the Allan deviation of the bias walk (weather)
-    bias_time: Annotated[float, Gt(0)] = 1000.0  # [s] correlation time of the bias walk
-    turn_on_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
+    bias_correlation_time: Annotated[float, Gt(0)] = 1000.0  # [s] correlation time of the bias walk
+    turn_on_bias_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
     range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
     resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
@@ -31,6 +31,9 @@ class Barometer(NamedTuple):
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
     airspeed_error: Annotated[float, Ge(-1), Le(1)] = 0.0  # of the dynamic pressure, added to the static one
     wash_pa_per_n: Annotated[float, Ge(-10), Le(10)] = 0.0  # [Pa/N] of the rotors' thrust, added to the pressure
+    temperature_pa_per_k: Annotated[float, Ge(0)] = 0.0  # [Pa/K] what calibration leaves, one standard deviation
+    warm_up_rise: Annotated[float, Ge(-200), Le(200)] = 0.0  # [K] still to come at the start
+    warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -38,14 +41,15 @@ class BarometerState(NamedTuple):
     """State of a barometer."""
 
     scale: float
-    turn_on: float  # [Pa]
+    turn_on_bias: float  # [Pa]
     walk: Vec3  # [Pa], the first of the three
     line: Line  # the first of the three
+    cold: float  # [Pa] of the warm-up still to come
 
 
 def blank() -> BarometerState:
-    """A state without meaning, to be overwritten at the first tick."""
-    return BarometerState(0.0, 0.0, ZERO, BLANK)
+    """Return a placeholder state, replaced at the first tick."""
+    return BarometerState(0.0, 0.0, ZERO, BLANK, 0.0)
 
 
 @always_inline
@@ -56,29 +60,34 @@ def _true_pressure(p: Barometer, truth: Truth) -> float:
 
 @kernel
 def initial(p: Barometer, key: Key, truth: Truth) -> BarometerState:
-    """State before the first sample."""
+    """Return the state before the first sample."""
     draw = normal3(key, TURN_ON, 0)
     true = _true_pressure(p, truth)
     scale = 1.0 + p.scale_error * draw[0]
-    turn_on = p.turn_on_pa * draw[1]
+    turn_on_bias = p.turn_on_bias_pa * draw[1]
     walk = error_models.walk_deviation(p.bias_instability_pa) * draw[2]
-    return BarometerState(scale, turn_on, (walk, 0.0, 0.0), new_line((scale * true + turn_on + walk, 0.0, 0.0)))
+    cold = p.warm_up_rise * p.temperature_pa_per_k * normal(key, TURN_ON, 1) if p.temperature_pa_per_k > 0.0 else 0.0
+    start = scale * true + turn_on_bias + walk - cold
+    return BarometerState(scale, turn_on_bias, (walk, 0.0, 0.0), new_delay_line((start, 0.0, 0.0)), cold)
 
 
 @kernel
 def sample(
     p: Barometer, s: BarometerState, key: Key, tick: int, truth: Truth
 ) -> tuple[BarometerState, BarometerReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     deviation = error_models.walk_deviation(p.bias_instability_pa)
-    walk = error_models.walk(s.walk, deviation, p.bias_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
+    walk = error_models.walk(s.walk, deviation, p.bias_correlation_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
     noise = error_models.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 1)
     true = _true_pressure(p, truth)
-    measured = s.scale * true + s.turn_on + walk[0] + noise
+    measured = s.scale * true + s.turn_on_bias + walk[0] + noise - s.cold
     measured = error_models.quantise(error_models.limit(measured, p.range_pa), p.resolution_pa)
-    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0))
+    line, arrived, valid = apply_delay_and_faults(
+        p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0)
+    )
     variance = error_models.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
-    return BarometerState(s.scale, s.turn_on, walk, line), BarometerReading(arrived[0], variance, valid)
+    cold = s.cold * (1.0 - 1.0 / (p.rate * p.warm_up_time))
+    return BarometerState(s.scale, s.turn_on_bias, walk, line, cold), BarometerReading(arrived[0], variance, valid)
 
 
 # TE MS5611-01BA03 data sheet: 1.2 Pa RMS and 1 Pa resolution at the maximum oversampling, +-150 Pa, 1.2 bar. Here
@@ -86,7 +95,7 @@ def sample(
 MS5611 = Barometer(
     noise_pa_per_sqrt_hz=0.3,
     bias_instability_pa=3.0,
-    turn_on_pa=75.0,
+    turn_on_bias_pa=75.0,
     scale_error=1e-4,
     range_pa=120e3,
     resolution_pa=1.0,

@@ -11,8 +11,8 @@ from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import dot, subtract
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import overload_for
-from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.services.sensors.sensor_inputs import ROTORS, Truth
 
 
 class Instrument(NamedTuple):
@@ -20,12 +20,12 @@ class Instrument(NamedTuple):
 
     sensor: Any  # parameters: Imu, Gps, ...
     key: Key  # of its random numbers
-    gravity: float  # [m/s^2] at home, 0 where no effect gives any
+    gravity: float  # [m/s^2] at home, 0 without a gravity effect
     around: Environment
 
 
 def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
-    """`sample` of the sensor whose parameters `p` are."""
+    """Call `sample` of the sensor with parameters `p`."""
     raise NotImplementedError("compiled code only")
 
 
@@ -35,7 +35,7 @@ def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, 
 
 
 def _initial(p: Any, key: Key, truth: Truth) -> Any:
-    """`initial` of the sensor whose parameters `p` are."""
+    """Call `initial` of the sensor with parameters `p`."""
     raise NotImplementedError("compiled code only")
 
 
@@ -44,9 +44,20 @@ def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Any:
     return sys.modules[p.instance_class.__module__].initial
 
 
+def first_rotors(speed: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the speeds of ROTORS rotors, 0 for those that the vehicle does not have; compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload_for(first_rotors, inline=True)
+def _first_rotors(speed: types.Type) -> Any:
+    items = ", ".join(f"speed[{i}]" if i < len(speed) else "0.0" for i in range(ROTORS))
+    return compile_source("first_rotors(speed)", {}, f"return ({items})")
+
+
 @always_inline
 def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
-    """The reading at `tick`; the instrument is switched on at tick 0."""
+    """Output the reading at `tick`; the instrument starts at tick 0."""
     x, around = inputs[0].value, p.around
     ground, _ = surface(around.terrain, x.position_world[0], x.position_world[1])
     air = subtract(x.velocity_world, x.wind_world)
@@ -76,6 +87,7 @@ def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> t
         x.air_density,
         thrust,
         speed / len(x.rotor_speed),
+        first_rotors(x.rotor_speed),
     )
     if tick == 0:
         s = _initial(p.sensor, p.key, truth)

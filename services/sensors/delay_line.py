@@ -33,8 +33,8 @@ class Fault(NamedTuple):
 
 
 @always_inline
-def new_line(value: Vec3) -> Line:
-    """A line that has carried only this value."""
+def new_delay_line(value: Vec3) -> Line:
+    """Return a delay line filled with `value`."""
     four = (value, value, value, value)
     return four + four + four + four  # DEPTH of them; compiled tuples have no `*`
 
@@ -45,7 +45,7 @@ def _pushed(line: Line, value: Vec3) -> Line:
 
 
 @kernel
-def carry(
+def apply_delay_and_faults(
     faults: tuple[Fault, ...] | None, line: Line, latency: int, channel: int, key: Key, tick: int, value: Vec3
 ) -> tuple[Line, Vec3, bool]:
     """Send one value of a channel down its line.

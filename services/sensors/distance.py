@@ -1,4 +1,4 @@
-"""What sonar and rangefinder share: the way from a true distance to their reading (theory.md, section 3.2)."""
+"""Conversion of a true distance into a reading of a sonar or rangefinder (theory.md, section 3.2)."""
 
 import math
 from typing import Any, NamedTuple
@@ -7,7 +7,7 @@ from lapwing.dynamics.noise import TURN_ON, Key, normal
 from lapwing.kernels import always_inline
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors import error_models
-from lapwing.services.sensors.delay_line import BLANK, Line, carry, new_line
+from lapwing.services.sensors.delay_line import BLANK, Line, apply_delay_and_faults, new_delay_line
 
 CHANNELS = ("range",)
 FARTHEST = 1000.0  # [m] that the ground is looked for
@@ -21,26 +21,26 @@ class DistanceState(NamedTuple):
 
 
 def blank() -> DistanceState:
-    """A state without meaning, to be overwritten at the first tick."""
+    """Return a placeholder state, replaced at the first tick."""
     return DistanceState(0.0, BLANK)
 
 
 @always_inline
 def switched_on(p: Any, key: Key, distance: float) -> DistanceState:
-    """State before the first sample, at a true distance [m]; `p`: parameters of the sensor."""
-    return DistanceState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_line((distance, 0.0, 0.0)))
+    """Return the state before the first sample, at a true distance [m]; `p`: parameters of the sensor."""
+    return DistanceState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_delay_line((distance, 0.0, 0.0)))
 
 
 @always_inline
 def measured(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> tuple[DistanceState, DistanceReading]:
-    """Next state and reading of a true distance [m]; other arguments as of `imu.sample`."""
+    """Return the next state and the reading of a true distance [m]. See `imu.sample` for other arguments."""
     noise = error_models.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     true = (s.scale * distance + noise, 0.0, 0.0)
-    line, arrived, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, true)
-    found = error_models.quantise(arrived[0], p.resolution)
-    if found > p.range_max:
-        found = math.inf
-    elif found < p.range_min:
-        found = -math.inf
+    line, arrived, valid = apply_delay_and_faults(p.faults, s.line, p.latency_samples, 0, key, tick, true)
+    result = error_models.quantise(arrived[0], p.resolution)
+    if result > p.range_max:
+        result = math.inf
+    elif result < p.range_min:
+        result = -math.inf
     variance = error_models.sample_variance(p.noise_m_per_sqrt_hz, p.resolution, p.rate)
-    return DistanceState(s.scale, line), DistanceReading(found, variance, valid)
+    return DistanceState(s.scale, line), DistanceReading(result, variance, valid)

@@ -34,7 +34,7 @@ PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)
 
 
 class SonarWiring(NamedTuple):
-    """What a sonar's messages say of the instrument."""
+    """Constants of a sonar's messages."""
 
     field_of_view: float  # [rad]
     range_min: float  # [m]
@@ -42,7 +42,7 @@ class SonarWiring(NamedTuple):
 
 
 def wires(setup: RunConfig, sonar: SonarWiring | None, fix: int) -> list[TopicEncoder]:
-    """The topics of the sensors of `PORTS` that the vehicle carries; `fix` is the NavSatStatus of what GPS finds."""
+    """Return the encoders of the vehicle's sensors in `PORTS`; `fix` is the NavSatStatus of a GPS fix."""
     frame, given = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
         (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
@@ -60,16 +60,16 @@ def wires(setup: RunConfig, sonar: SonarWiring | None, fix: int) -> list[TopicEn
 
 
 def own_wire(frame: str, port: Port) -> TopicEncoder:
-    """The topic of a sensor of the user's own."""
+    """Return the encoder of a custom sensor."""
     return TopicEncoder(topic.custom_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
 
 
 def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:
-    """Covariances in row order, (n, size^2), with the first three of the diagonal given, (n, 3)."""
-    found = np.zeros((len(values), size * size))
+    """Return row-major covariances, shape (n, size^2), with diagonals `values`, shape (n, 3)."""
+    result = np.zeros((len(values), size * size))
     for i in range(3):
-        found[:, i * (size + 1)] = values[:, i]
-    return found
+        result[:, i * (size + 1)] = values[:, i]
+    return result
 
 
 def _three(values: np.ndarray) -> np.ndarray:
@@ -81,7 +81,7 @@ def _own_sample(frame: str, port: Port) -> Any:
 
 
 def _own(reading: Any, time_ns: np.ndarray) -> Fields:
-    """The numbers of a reading of the user's own."""
+    """Return the numbers of a custom sensor's reading."""
 
     def leaves(part: Any) -> list[np.ndarray]:
         return [leaf for item in part for leaf in leaves(item)] if isinstance(part, tuple) else [part]
@@ -90,7 +90,7 @@ def _own(reading: Any, time_ns: np.ndarray) -> Fields:
 
 
 def _imu(r: ImuReading, time_ns: np.ndarray) -> Fields:
-    """Rates and specific force in the body frame; no reading: both covariances begin with -1."""
+    """Return rates and specific force in the body frame; without a reading, both covariances start with -1."""
     valid = np.asarray(r.valid) != 0.0
     omega, force = diagonal(_three(r.omega_variance)), diagonal(_three(r.specific_force_variance))  # type: ignore[arg-type]
     omega[~valid] = force[~valid] = (UNKNOWN,) + (0.0,) * 8
@@ -104,7 +104,7 @@ def _imu(r: ImuReading, time_ns: np.ndarray) -> Fields:
 
 
 def _magnetometer(r: MagnetometerReading, time_ns: np.ndarray) -> Fields:
-    """Field in the body frame; no reading: NaN."""
+    """Return the field in the body frame; NaN without a reading."""
     valid = (np.asarray(r.valid) != 0.0)[:, None]
     return {
         **stamp_columns(time_ns),
@@ -114,7 +114,7 @@ def _magnetometer(r: MagnetometerReading, time_ns: np.ndarray) -> Fields:
 
 
 def _late(r: GpsReading, time_ns: np.ndarray) -> np.ndarray:
-    """The instants [ns] that fixes are valid for."""
+    """Return the times [ns] for which the fixes are valid."""
     # what was measured before the start is as true at the start: the vehicle stood there
     return np.maximum(time_ns - np.round(np.asarray(r.age) * 1e9).astype(np.int64), 0)
 
@@ -128,7 +128,7 @@ def _gps_sample(frame: str) -> Any:
 
 
 def _gps(fix: int, r: GpsReading, time_ns: np.ndarray) -> Fields:
-    """A fix, stamped with the time that it is valid for; no reading: no fix."""
+    """Return a fix, stamped with the time for which it is valid; without a reading, no fix."""
     valid = np.asarray(r.valid) != 0.0
     return {
         **stamp_columns(_late(r, time_ns)),
@@ -141,7 +141,7 @@ def _gps(fix: int, r: GpsReading, time_ns: np.ndarray) -> Fields:
 
 
 def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
-    """Velocity in the world frame; no reading: the covariance begins with -1."""
+    """Return the velocity in the world frame; without a reading, the covariance starts with -1."""
     valid = np.asarray(r.valid) != 0.0
     return {
         **stamp_columns(_late(r, time_ns)),
@@ -151,7 +151,7 @@ def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
 
 
 def _barometer(r: BarometerReading, time_ns: np.ndarray) -> Fields:
-    """Absolute pressure; no reading: NaN."""
+    """Return the absolute pressure; NaN without a reading."""
     return {
         **stamp_columns(time_ns),
         "fluid_pressure": np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan),
@@ -165,7 +165,7 @@ def _sonar_sample(frame: str, sonar: SonarWiring | None) -> Any:
 
 
 def _sonar(r: DistanceReading, time_ns: np.ndarray) -> Fields:
-    """Distance downwards; no echo +Inf, too near -Inf, no reading NaN."""
+    """Return the downward distance; +Inf without an echo, -Inf below the minimum, NaN without a reading."""
     return {
         **stamp_columns(time_ns),
         "range": np.where(np.asarray(r.valid) != 0.0, r.range, math.nan),

@@ -36,15 +36,15 @@ class FaultTable(BaseModel):
 def compile_faults(
     tables: Sequence[Mapping[str, Any]], channels: Sequence[str], tick: float
 ) -> tuple[Fault, ...] | None:
-    """The faults of one sensor, or None where there are none.
+    """Return the faults of a sensor. Return None if there are none.
 
     Args:
-        tables: as `FaultTable`.
+        tables: fault tables. See `FaultTable`.
         channels: names of the sensor's channels.
         tick: length of a tick [s].
 
     Raises:
-        KeyedError: of the key `faults.0.kind`, for example.
+        ConfigError: a value is invalid; the key is relative, such as `faults.0.kind`.
     """
     if not isinstance(tables, Sequence) or len(tables) > SLOTS:
         raise ConfigError("faults", f"got {tables!r}", f"a list of at most {SLOTS} tables")

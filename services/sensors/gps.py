@@ -12,7 +12,7 @@ from lapwing.dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cros
 from lapwing.kernels import always_inline, kernel, math, python_function
 from lapwing.services.common.ports import GpsReading
 from lapwing.services.sensors import error_models
-from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 CHANNELS = ("position", "velocity")
@@ -34,7 +34,7 @@ class Outage(NamedTuple):
 
 
 class Satellite(NamedTuple):
-    """Where a satellite stands in the sky, as seen from home."""
+    """Direction of a satellite as seen from home."""
 
     azimuth_deg: Annotated[float, Ge(-360), Le(360)]  # [deg] from north towards east
     elevation_deg: Annotated[float, Ge(0), Le(90)]  # [deg] over the horizon
@@ -46,12 +46,12 @@ class Gps(NamedTuple):
     noise_horizontal_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
     noise_vertical_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)]
     noise_velocity_m_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/s/sqrt(Hz)]
-    wander_horizontal: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation of the error that is correlated in time
-    wander_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
-    wander_time: Annotated[float, Gt(0)] = 60.0  # [s] its correlation time
+    correlated_error_horizontal: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation, correlated in time
+    correlated_error_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
+    correlation_time: Annotated[float, Gt(0)] = 60.0  # [s] its correlation time
     sky: tuple[Satellite, ...] | None = None  # satellites in view: position errors are theirs, not those above
     range_noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] of the distance to a satellite of `sky`
-    range_wander: Annotated[float, Ge(0)] = 0.0  # [m] of the same, correlated in time
+    range_correlated_error: Annotated[float, Ge(0)] = 0.0  # [m] of the same, correlated in time
     fix_status: Annotated[int, Ge(0), Le(2)] = 0  # of NavSatStatus: 0 alone, 1 SBAS, 2 with a ground station (RTK)
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
@@ -70,19 +70,19 @@ class GpsState(NamedTuple):
 
 
 def blank() -> GpsState:
-    """A state without meaning, to be overwritten at the first tick."""
+    """Return a placeholder state, replaced at the first tick."""
     return GpsState(ZERO, IDENTITY, BLANK, BLANK)
 
 
 @always_inline
 def _deviations(p: Gps) -> Vec3:
-    """Standard deviations of the wander [m]."""
-    return (p.wander_horizontal, p.wander_horizontal, p.wander_vertical)
+    """Return the standard deviations of the correlated error [m]."""
+    return (p.correlated_error_horizontal, p.correlated_error_horizontal, p.correlated_error_vertical)
 
 
 @kernel
 def geometry(sky: tuple[Satellite, ...] | None) -> Mat3:
-    """The factor L of `GpsState`; NaN where the satellites do not give a position (theory.md, eq. (3.42))."""
+    """Return the factor L of `GpsState`; NaN if the satellites do not determine a position (theory.md, eq. (3.42))."""
     if sky is None:
         return IDENTITY
     x = y = z = xx = xy = xz = yy = yz = zz = 0.0
@@ -109,7 +109,7 @@ def geometry(sky: tuple[Satellite, ...] | None) -> Mat3:
 
 
 def check(p: Gps) -> None:
-    """KeyedError where the satellites in view do not give a position."""
+    """Raise ConfigError if the visible satellites do not determine a position."""
     if p.sky is None:
         return
     dilution = (
@@ -122,7 +122,7 @@ def check(p: Gps) -> None:
 
 @always_inline
 def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3) -> tuple[Vec3, Vec3]:
-    """(error [m], variance [m^2]) east, north, up."""
+    """Return error [m] and variance [m^2], both east, north, up."""
     if p.sky is None:
         w = _deviations(p)
         across = error_models.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
@@ -131,15 +131,15 @@ def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3) -> tuple[Vec
         error = add(multiply(w, wander), multiply((across, across, up), white))
         return error, (horizontal, horizontal, up * up + w[2] * w[2])
     noise, L = error_models.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate), s.geometry
-    square = noise * noise + p.range_wander * p.range_wander
+    square = noise * noise + p.range_correlated_error * p.range_correlated_error
     east, north = L[0] * L[0], L[3] * L[3] + L[4] * L[4]
     variance = (square * east, square * north, square * (L[6] * L[6] + L[7] * L[7] + L[8] * L[8]))
-    return apply(L, add(scale(p.range_wander, wander), scale(noise, white))), variance
+    return apply(L, add(scale(p.range_correlated_error, wander), scale(noise, white))), variance
 
 
 @kernel
 def _seen(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
-    """(position [m], velocity [m/s]) of the antenna in the world (theory.md, eq. (3.38))."""
+    """Return position [m] and velocity [m/s] of the antenna in the world (theory.md, eq. (3.38))."""
     if antenna is None:
         return truth.position_world, truth.velocity_world
     arm = rotate(truth.attitude, antenna)
@@ -149,7 +149,7 @@ def _seen(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
 
 @kernel
 def _under_sky(outages: tuple[Outage, ...] | None, position: Vec3) -> bool:
-    """Whether there is a fix at that place."""
+    """Return True if there is a fix at this position."""
     if outages is None:
         return True
     free = True
@@ -160,12 +160,12 @@ def _under_sky(outages: tuple[Outage, ...] | None, position: Vec3) -> bool:
 
 @kernel
 def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
-    """State before the first sample: the receiver has run at this place for as long as its latency."""
+    """Return the state before the first sample: the receiver has run here for its latency."""
     wander = normal3(key, TURN_ON, 0)
     position, velocity = _seen(p.antenna, truth)
     s = GpsState(wander, geometry(p.sky), BLANK, BLANK)
     error, _ = _position_error(p, s, wander, ZERO)
-    s = GpsState(wander, s.geometry, new_line(add(position, error)), new_line(velocity))
+    s = GpsState(wander, s.geometry, new_delay_line(add(position, error)), new_delay_line(velocity))
     for k in range(p.latency_samples):
         s, _ = sample(p, s, key, TURN_ON - 1 - k, truth)
     return s
@@ -173,15 +173,19 @@ def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
 
 @kernel
 def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsState, GpsReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     v = error_models.white_deviation(p.noise_velocity_m_per_s_per_sqrt_hz, p.rate)
-    wander = error_models.walk(s.wander, 1.0, p.wander_time, p.rate, normal3(key, tick, 0))
+    wander = error_models.walk(s.wander, 1.0, p.correlation_time, p.rate, normal3(key, tick, 0))
     error, variance = _position_error(p, s, wander, normal3(key, tick, 1))
     position, velocity = _seen(p.antenna, truth)
     position = add(position, error)
     velocity = add(velocity, multiply((v, v, v), normal3(key, tick, 2)))
-    position_line, position, seen = carry(p.faults, s.position_line, p.latency_samples, 0, key, tick, position)
-    velocity_line, velocity, moving = carry(p.faults, s.velocity_line, p.latency_samples, 1, key, tick, velocity)
+    position_line, position, seen = apply_delay_and_faults(
+        p.faults, s.position_line, p.latency_samples, 0, key, tick, position
+    )
+    velocity_line, velocity, moving = apply_delay_and_faults(
+        p.faults, s.velocity_line, p.latency_samples, 1, key, tick, velocity
+    )
     latitude, longitude, height = enu_to_geodetic(truth.home, position)
     reading = GpsReading(
         latitude,
@@ -202,9 +206,9 @@ RTK = Gps(
     noise_horizontal_m_per_sqrt_hz=0.003,
     noise_vertical_m_per_sqrt_hz=0.005,
     noise_velocity_m_per_s_per_sqrt_hz=0.02,
-    wander_horizontal=0.010,
-    wander_vertical=0.013,
-    wander_time=60.0,
+    correlated_error_horizontal=0.010,
+    correlated_error_vertical=0.013,
+    correlation_time=60.0,
     fix_status=2,
     latency_samples=1,
 )
@@ -215,9 +219,9 @@ STANDARD = Gps(
     noise_horizontal_m_per_sqrt_hz=0.1,
     noise_vertical_m_per_sqrt_hz=0.2,
     noise_velocity_m_per_s_per_sqrt_hz=0.03,
-    wander_horizontal=2.1,
-    wander_vertical=3.2,
-    wander_time=200.0,
+    correlated_error_horizontal=2.1,
+    correlated_error_vertical=3.2,
+    correlation_time=200.0,
     latency_samples=2,
 )
 

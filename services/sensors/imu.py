@@ -2,29 +2,36 @@
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
-from lapwing.dynamics.noise import Key
-from lapwing.dynamics.vector import ZERO, Vec3, add
+from lapwing.dynamics.noise import Key, normal
+from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
 from lapwing.kernels import kernel
 from lapwing.services.common.ports import ImuReading
 from lapwing.services.sensors import error_models, imu_motion
 from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.imu_motion import Vibration
+from lapwing.services.sensors.low_pass import LowPass, check_low_pass
+from lapwing.services.sensors.rotor_vibration import AT_REST, Phases, RotorVibration, shaken, started
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 from lapwing.services.sensors.triad import (
     BLANK_TRIAD,
     Accelerometer,
+    CrossCoupling,
     Gyro,
     Triad,
     accelerometer_units,
+    g_shift,
     gyro_units,
     measure,
     new_triad,
+    rectified,
 )
 
 CHANNELS = ("gyro", "accelerometer")
+_JITTER = 4  # lane of the draws of the sampling instants
 
 
 class Imu(NamedTuple):
@@ -34,10 +41,16 @@ class Imu(NamedTuple):
     accelerometer: Accelerometer = Accelerometer()  # its accelerometers
     rate: Annotated[float, Gt(0)] = 250.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    warm_up: float = 0.0  # [K] still to come at the start, over the calibrated temperature
+    warm_up_rise: float = 0.0  # [K] still to come at the start, over the calibrated temperature
     warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
-    integrates: bool = False  # readings are means since the one before: what it turned and sped up by, over the time
+    delta_output: bool = False  # readings are means since the one before: what it turned and sped up by, over the time
     vibration: Vibration | None = None  # of the rotors; none if left out
+    gyro_filter: LowPass | None = None  # between the gyroscopes and the output
+    accelerometer_filter: LowPass | None = None  # between the accelerometers and the output
+    cross_coupling: CrossCoupling | None = None  # skewed axes, response to g, rectified vibration
+    rotor_vibration: RotorVibration | None = None  # of each rotor, at its own speed
+    sampling_jitter: Annotated[float, Ge(0), Le(1e-2)] = 0.0  # [s] standard deviation of the instant of a sample
+    saturation_recovery: Annotated[float, Ge(0), Le(1)] = 0.0  # [s] that an axis stays at its limit after it was beyond
     position: Place | None = None  # [m] body, of the accelerometers; the centre of mass if left out
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
@@ -51,54 +64,77 @@ class ImuState(NamedTuple):
     phase: float  # [rad] of the vibration
     attitude: Quaternion  # at the sample before
     velocity_world: Vec3  # [m/s] of the accelerometers at the sample before
+    phases: Phases  # [rad] of the rotors
+    force: Vec3  # [m/s^2] true specific force at the sample before
+
+
+def check(p: Imu) -> None:
+    """Raise ConfigError if a filter's delay does not fit its bandwidth."""
+    for name in ("gyro_filter", "accelerometer_filter"):
+        try:
+            check_low_pass(getattr(p, name), p.rate)
+        except ConfigError as error:
+            raise error.with_prefix(name) from None
 
 
 def blank() -> ImuState:
-    """A state without meaning, to be overwritten at the first tick."""
-    return ImuState(BLANK_TRIAD, BLANK_TRIAD, 0.0, 0.0, NO_ROTATION, ZERO)
+    """Return a placeholder state, replaced at the first tick."""
+    return ImuState(BLANK_TRIAD, BLANK_TRIAD, 0.0, 0.0, NO_ROTATION, ZERO, AT_REST, ZERO)
 
 
 @kernel
 def initial(p: Imu, key: Key, truth: Truth) -> ImuState:
-    """State before the first sample: what differs from unit to unit and from start to start is drawn here."""
+    """Return the state before the first sample; draw the errors of this unit and of this start."""
     omega, force = imu_motion.true_values(p, truth)
     return ImuState(
-        new_triad(gyro_units(p.gyro), key, 0, p.warm_up, omega),
-        new_triad(accelerometer_units(p.accelerometer), key, 8, p.warm_up, force),
-        p.warm_up,
+        new_triad(gyro_units(p.gyro), p.cross_coupling, key, 0, p.warm_up_rise, omega),
+        new_triad(accelerometer_units(p.accelerometer), p.cross_coupling, key, 8, p.warm_up_rise, force),
+        p.warm_up_rise,
         0.0,
         truth.attitude,
         imu_motion.velocity_world(p.position, truth),
+        started(p.rotor_vibration, key),
+        force,
     )
 
 
 @kernel
 def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuState, ImuReading]:
-    """Next state and reading.
+    """Return the next state and the reading.
 
     Args:
-        p: `Imu`.
-        s: `ImuState`.
-        key: of this instrument's random stream (`lapwing.dynamics.noise.stream_key`).
+        p: parameters.
+        s: state.
+        key: key of the instrument's random stream (`lapwing.dynamics.noise.stream_key`).
         tick: integer, different for every sample.
         truth: `Truth` at this tick.
     """
     omega, force = imu_motion.true_values(p, truth)
     velocity_world = s.velocity_world
-    if p.integrates:
+    if p.delta_output:
         velocity_world = imu_motion.velocity_world(p.position, truth)
         if tick > 0:
             omega, force = imu_motion.means(p, s, truth, velocity_world)
-    phase, shake = imu_motion.shaken(p.vibration, p.integrates, p.rate, s.phase, truth)
+    true_force, late = force, 0.0
+    if p.sampling_jitter > 0.0:
+        late = p.sampling_jitter * normal(key, tick, _JITTER)
+        omega = add(omega, scale(late, truth.angular_acceleration_body))
+        force = add(force, scale(late * p.rate, subtract(force, s.force)))
+    phase, shake = imu_motion.shaken(p.vibration, p.delta_output, p.rate, s.phase, truth)
     force = add(force, shake)
     cold = s.cold * (1.0 - 1.0 / (p.rate * p.warm_up_time))
     g, a = gyro_units(p.gyro), accelerometer_units(p.accelerometer)
-    gyro, omega, gyro_valid = measure(g, s.gyro, p, cold, 0, key, tick, omega)
-    accelerometer, force, force_valid = measure(a, s.accelerometer, p, cold, 1, key, tick, force)
+    phases, shake, square = shaken(p.rotor_vibration, p.accelerometer_filter, p, s.phases, key, tick, truth, late)
+    turned = g_shift(p.cross_coupling, key, force, square)
+    gyro, omega, gyro_valid = measure(g, s.gyro, p, p.gyro_filter, cold, 0, key, tick, omega, turned, ZERO)
+    accelerometer, force, force_valid = measure(
+        a, s.accelerometer, p, p.accelerometer_filter, cold, 1, key, tick, force, rectified(p.cross_coupling, square),
+        shake,
+    )  # fmt: skip
     omega_variance = error_models.sample_variance(g.noise, g.resolution, p.rate)
     force_variance = error_models.sample_variance(a.noise, a.resolution, p.rate)
     reading = ImuReading(omega, force, omega_variance, force_variance, gyro_valid and force_valid)
-    return ImuState(gyro, accelerometer, cold, phase, truth.attitude, velocity_world), reading
+    return ImuState(gyro, accelerometer, cold, phase, truth.attitude, velocity_world, phases, true_force), reading
 
 
 # InvenSense PS-MPU-6000A: ranges and resolutions (500 deg/s and 8 g settings), temperature within 10 % of the raw drift
@@ -108,7 +144,7 @@ MPU6000 = Imu(
     Gyro(
         noise_dps_per_sqrt_hz=error_models.density_of_random_walk(0.30),
         bias_instability_deg_per_h=4.6,
-        turn_on_dps=0.1,
+        turn_on_bias_dps=0.1,
         temperature_dps_per_k=0.008,
         scale_error=1e-3,
         misalignment_deg=0.05,
@@ -118,14 +154,14 @@ MPU6000 = Imu(
     Accelerometer(
         noise_mg_per_sqrt_hz=0.24,
         bias_instability_ug=36.0,
-        turn_on_mg=3.0,
+        turn_on_bias_mg=3.0,
         temperature_mg_per_k=0.05,
         scale_error=1e-3,
         misalignment_deg=0.05,
         range_g=8.0,
         resolution_mg=8000.0 / 2**15,
     ),
-    warm_up=5.0,
+    warm_up_rise=5.0,
 )
 
 # Bosch BST-BMI088-DS001: accelerometer 0.175 mg/sqrt(Hz) (160 in x and y, 190 in z), 0.2 mg/K and 0.015 deg/s/K before
@@ -135,7 +171,7 @@ BMI088 = Imu(
     Gyro(
         noise_dps_per_sqrt_hz=0.016,
         bias_instability_deg_per_h=6.5,
-        turn_on_dps=0.05,
+        turn_on_bias_dps=0.05,
         temperature_dps_per_k=0.0015,
         scale_error=1e-3,
         misalignment_deg=0.05,
@@ -145,14 +181,14 @@ BMI088 = Imu(
     Accelerometer(
         noise_mg_per_sqrt_hz=0.175,
         bias_instability_ug=30.0,
-        turn_on_mg=2.0,
+        turn_on_bias_mg=2.0,
         temperature_mg_per_k=0.02,
         scale_error=1e-3,
         misalignment_deg=0.05,
         range_g=12.0,
         resolution_mg=12000.0 / 2**15,
     ),
-    warm_up=5.0,
+    warm_up_rise=5.0,
 )
 
 PRESETS = {"mpu6000": MPU6000, "bmi088": BMI088, "ideal": Imu()}

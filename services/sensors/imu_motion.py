@@ -1,4 +1,4 @@
-"""What an inertial measurement unit is exposed to: rates and specific force where it is mounted, means, vibration."""
+"""True inputs of an inertial measurement unit: rates and specific force at its position, means, vibration."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -14,7 +14,7 @@ Amplitude = Annotated[float, Ge(0), Le(1e5)]
 
 
 class Vibration(NamedTuple):
-    """What rotors that are out of balance shake the accelerometers by, at the mean of the rotors' speeds."""
+    """Vibration of the accelerometers by unbalanced rotors, at their mean speed."""
 
     amplitude_mg: tuple[Amplitude, Amplitude, Amplitude]  # [mg] body, goes with the square of the rotor speed
     rotor_speed: Annotated[float, Gt(0), Le(1e5)]  # [rad/s] of that amplitude
@@ -23,7 +23,7 @@ class Vibration(NamedTuple):
 
 @kernel
 def _swung(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
-    """The specific force [m/s^2] at a place of the body that turns (theory.md, eq. (3.37))."""
+    """Return the specific force [m/s^2] at a position on the rotating body (theory.md, eq. (3.37))."""
     if position is None:
         return force
     omega = truth.omega_body
@@ -33,7 +33,7 @@ def _swung(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
 
 @always_inline
 def true_values(p: Any, truth: Truth) -> tuple[Vec3, Vec3]:
-    """(rate [rad/s], specific force [m/s^2]) of the body where the accelerometers are."""
+    """Return rate [rad/s] and specific force [m/s^2], body, at the accelerometers."""
     a = truth.acceleration_world
     force = rotate_back(truth.attitude, (a[0], a[1], a[2] + truth.gravity))
     return truth.omega_body, _swung(p.position, truth, force)
@@ -41,7 +41,7 @@ def true_values(p: Any, truth: Truth) -> tuple[Vec3, Vec3]:
 
 @kernel
 def velocity_world(position: Vec3 | None, truth: Truth) -> Vec3:
-    """Velocity [m/s] of a place of the body, in the world."""
+    """Return the world velocity [m/s] of a position on the body."""
     if position is None:
         return truth.velocity_world
     return add(truth.velocity_world, rotate(truth.attitude, cross(truth.omega_body, position)))
@@ -49,10 +49,10 @@ def velocity_world(position: Vec3 | None, truth: Truth) -> Vec3:
 
 @always_inline
 def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec3]:
-    """(rate [rad/s], specific force [m/s^2]) whose effect over the interval is what happened (theory.md, eq. (3.43)).
+    """Return the mean rate [rad/s] and specific force [m/s^2] over the interval (theory.md, eq. (3.43)).
 
-    The turning is the rotation vector from the attitude before, the force is in that attitude: coning and sculling
-    are in both.
+    The rate is the rotation vector from the previous attitude; the force is in that attitude. Both include coning and
+    sculling.
     """
     turned = log(multiply(conjugate(s.attitude), truth.attitude))
     a = scale(p.rate, subtract(velocity_world, s.velocity_world))
@@ -61,15 +61,15 @@ def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec
 
 @kernel
 def shaken(
-    vibration: Vibration | None, integrates: bool, rate: float, phase: float, truth: Truth
+    vibration: Vibration | None, delta_output: bool, rate: float, phase: float, truth: Truth
 ) -> tuple[float, Vec3]:
-    """Phase [rad] of the vibration now, and what it adds to the specific force [m/s^2] (theory.md, eq. (3.44))."""
+    """Return the phase [rad] of the vibration and its specific force [m/s^2] (theory.md, eq. (3.44))."""
     if vibration is None:
         return phase, ZERO
     turn = vibration.harmonic * truth.rotor_speed / rate
     ratio, middle = truth.rotor_speed / vibration.rotor_speed, phase + turn
     size = ratio * ratio * MG
-    if integrates:
+    if delta_output:
         middle = phase + 0.5 * turn
         size *= math.sin(0.5 * turn) / (0.5 * turn) if turn > 0.0 else 1.0
     x, y, z = scale(size, vibration.amplitude_mg)

@@ -7,11 +7,11 @@ from annotated_types import Ge, Gt, Le, Lt
 
 from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
-from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, scale
+from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, matmul, scale
 from lapwing.kernels import always_inline, kernel
 from lapwing.services.common.ports import MagnetometerReading
 from lapwing.services.sensors import error_models
-from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
 from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("field",)
@@ -24,15 +24,16 @@ class Magnetometer(NamedTuple):
 
     noise_nt_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [nT/sqrt(Hz)] one-sided density
     bias_instability_nt: Annotated[float, Ge(0)] = 0.0  # [nT] peak of the Allan deviation of the bias walk
-    bias_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
+    bias_correlation_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
     hard_iron_nt: Annotated[float, Ge(0)] = 0.0  # [nT] what calibration leaves
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
     misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
+    soft_iron: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, elements of the symmetric matrix left by calibration
     range_ut: Annotated[float, Gt(0)] = math.inf  # [uT]
     resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, field of all motors' current
+    current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, by the motors' current
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -46,41 +47,51 @@ class MagnetometerState(NamedTuple):
 
 
 def blank() -> MagnetometerState:
-    """A state without meaning, to be overwritten at the first tick."""
+    """Return a placeholder state, replaced at the first tick."""
     return MagnetometerState((0.0,) * 9, ZERO, ZERO, BLANK)
 
 
 @always_inline
 def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
-    """The Earth's and that of the motors' leads [T], body."""
+    """Return the field [T] of the Earth and of the motors' leads, body."""
     earth = rotate_back(truth.attitude, truth.magnetic_field_world)
     return add(earth, scale(truth.motor_current * _NANO, p.current_nt_per_a))
 
 
+@always_inline
+def softened(deviation: float, along: Vec3, across: Vec3) -> Mat3:
+    """Return the symmetric matrix by which magnetised material distorts the field (theory.md, eq. (3.51))."""
+    x, y, z = scale(deviation, along)
+    a, b, c = scale(deviation, across)
+    return (1.0 + x, a, b, a, 1.0 + y, c, b, c, 1.0 + z)
+
+
 @kernel
 def initial(p: Magnetometer, key: Key, truth: Truth) -> MagnetometerState:
-    """State before the first sample."""
+    """Return the state before the first sample."""
     matrix = error_models.scale_and_misalignment(
         p.scale_error, math.radians(p.misalignment_deg), normal3(key, TURN_ON, 0), normal3(key, TURN_ON, 1)
     )
+    if p.soft_iron > 0.0:
+        matrix = matmul(softened(p.soft_iron, normal3(key, TURN_ON, 4), normal3(key, TURN_ON, 5)), matrix)
     hard_iron = scale(p.hard_iron_nt * _NANO, normal3(key, TURN_ON, 2))
     walk = scale(error_models.walk_deviation(p.bias_instability_nt * _NANO), normal3(key, TURN_ON, 3))
     true = _true_field(p, truth)
-    return MagnetometerState(matrix, hard_iron, walk, new_line(add(apply(matrix, true), add(hard_iron, walk))))
+    return MagnetometerState(matrix, hard_iron, walk, new_delay_line(add(apply(matrix, true), add(hard_iron, walk))))
 
 
 @kernel
 def sample(
     p: Magnetometer, s: MagnetometerState, key: Key, tick: int, truth: Truth
 ) -> tuple[MagnetometerState, MagnetometerReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     deviation = error_models.walk_deviation(p.bias_instability_nt * _NANO)
-    walk = error_models.walk(s.walk, deviation, p.bias_time, p.rate, normal3(key, tick, 0))
+    walk = error_models.walk(s.walk, deviation, p.bias_correlation_time, p.rate, normal3(key, tick, 0))
     noise = scale(error_models.white_deviation(p.noise_nt_per_sqrt_hz * _NANO, p.rate), normal3(key, tick, 1))
     true = _true_field(p, truth)
     measured = add(add(apply(s.matrix, true), add(s.hard_iron, walk)), noise)
     measured = error_models.digitise(measured, p.range_ut * 1e-6, p.resolution_nt * _NANO)
-    line, field, valid = carry(p.faults, s.line, p.latency_samples, 0, key, tick, measured)
+    line, field, valid = apply_delay_and_faults(p.faults, s.line, p.latency_samples, 0, key, tick, measured)
     variance = error_models.sample_variance(p.noise_nt_per_sqrt_hz * _NANO, p.resolution_nt * _NANO, p.rate)
     return MagnetometerState(s.matrix, s.hard_iron, walk, line), MagnetometerReading(field, variance, valid)
 

@@ -1,7 +1,7 @@
 """Optical flow: how fast the ground turns past a camera that looks down (theory.md, eq. (3.41))."""
 
 import math
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Lt
@@ -18,7 +18,7 @@ from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common.ports import OpticalFlowReading
 from lapwing.services.sensors import error_models
-from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, carry, new_line
+from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
 from lapwing.services.sensors.rangefinder import to_ground
 from lapwing.services.sensors.sensor_inputs import Truth
 
@@ -51,13 +51,13 @@ READING = OpticalFlowReading()
 
 
 def blank() -> OpticalFlowState:
-    """A state without meaning, to be overwritten at the first tick."""
+    """Return a placeholder state, replaced at the first tick."""
     return OpticalFlowState(0.0, BLANK, BLANK)
 
 
 @always_inline
 def _true_flow(truth: Truth) -> Vec3:
-    """(flow about x, about y [rad/s], distance [m])."""
+    """Return the flow about x and about y [rad/s], and the distance [m]."""
     distance = to_ground(truth.terrain, truth.position_world, rotate(truth.attitude, (0.0, 0.0, -1.0)))
     v, omega = rotate_back(truth.attitude, truth.velocity_world), truth.omega_body
     inverse = 1.0 / max(distance, 1e-6)
@@ -66,25 +66,25 @@ def _true_flow(truth: Truth) -> Vec3:
 
 @kernel
 def initial(p: OpticalFlow, key: Key, truth: Truth) -> OpticalFlowState:
-    """State before the first sample."""
+    """Return the state before the first sample."""
     scale, true = 1.0 + p.scale_error * normal3(key, TURN_ON, 0)[0], _true_flow(truth)
     flow = (scale * true[0], scale * true[1], true[2])
-    return OpticalFlowState(scale, new_line(flow), new_line(truth.omega_body))
+    return OpticalFlowState(scale, new_delay_line(flow), new_delay_line(truth.omega_body))
 
 
 @kernel
 def sample(
     p: OpticalFlow, s: OpticalFlowState, key: Key, tick: int, truth: Truth
 ) -> tuple[OpticalFlowState, OpticalFlowReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     true, first, second = _true_flow(truth), normal3(key, tick, 0), normal3(key, tick, 1)
     noise = error_models.white_deviation(p.noise_rad_per_s_per_sqrt_hz, p.rate)
     gyro_noise = error_models.white_deviation(math.radians(p.gyro_noise_dps_per_sqrt_hz), p.rate)
     flow = (s.scale * true[0] + noise * first[0], s.scale * true[1] + noise * first[1], true[2])
     omega = truth.omega_body
     rate = (omega[0] + gyro_noise * second[0], omega[1] + gyro_noise * second[1], 0.0)
-    flow_line, flow, seen = carry(p.faults, s.flow, p.latency_samples, 0, key, tick, flow)
-    rate_line, rate, turning = carry(p.faults, s.rate, p.latency_samples, 1, key, tick, rate)
+    flow_line, flow, seen = apply_delay_and_faults(p.faults, s.flow, p.latency_samples, 0, key, tick, flow)
+    rate_line, rate, turning = apply_delay_and_faults(p.faults, s.rate, p.latency_samples, 1, key, tick, rate)
     sharp = p.range_min <= flow[2] <= p.range_max and max(abs(flow[0]), abs(flow[1])) <= p.flow_max
     distance = flow[2] if sharp else math.inf
     valid = seen and turning and sharp and distance < math.inf
@@ -93,7 +93,7 @@ def sample(
 
 
 def _fields(r: OpticalFlowReading, time_ns: np.ndarray) -> Fields:
-    """Flow and rate; no texture: NaN."""
+    """Return flow and rate; NaN without texture."""
     valid = (np.asarray(r.valid) != 0.0)[:, None]
     return {
         **stamp_columns(time_ns),
@@ -104,8 +104,8 @@ def _fields(r: OpticalFlowReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def wires(frame: str, port: Port, p: OpticalFlow) -> list[TopicEncoder]:
-    """Its topic."""
+def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+    """Return the encoder of its topic."""
     return [
         TopicEncoder(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))
     ]

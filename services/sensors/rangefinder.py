@@ -46,7 +46,7 @@ READING = DistanceReading()
 
 
 def to_ground(terrain: Any, origin: Vec3, direction: Vec3) -> float:
-    """Distance [m] from a point along a unit vector to the ground or a body on it, inf where it meets none."""
+    """Return the distance [m] along a unit vector to the ground or an obstacle; inf without an intersection."""
     raise NotImplementedError("compiled code only")
 
 
@@ -78,7 +78,7 @@ def _distance(p: Rangefinder, truth: Truth) -> float:
 
 @kernel
 def initial(p: Rangefinder, key: Key, truth: Truth) -> DistanceState:
-    """State before the first sample."""
+    """Return the state before the first sample."""
     return switched_on(p, key, _distance(p, truth))
 
 
@@ -86,18 +86,19 @@ def initial(p: Rangefinder, key: Key, truth: Truth) -> DistanceState:
 def sample(
     p: Rangefinder, s: DistanceState, key: Key, tick: int, truth: Truth
 ) -> tuple[DistanceState, DistanceReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     return measured(p, s, key, tick, _distance(p, truth))
 
 
 def _fields(r: DistanceReading, time_ns: np.ndarray) -> Fields:
-    """Distance; nothing seen +Inf, too near -Inf, no reading NaN."""
+    """Return the distance; +Inf out of range, -Inf below the minimum, NaN without a reading."""
     distance = np.where(np.asarray(r.valid) != 0.0, r.range, math.nan)
     return {**stamp_columns(time_ns), "range": distance, "variance": r.variance}
 
 
-def wires(frame: str, port: Port, p: Rangefinder) -> list[TopicEncoder]:
-    """Its topic."""
+def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+    """Return the encoder of its topic."""
+    p: Rangefinder = instrument.sensor
 
     def message() -> Any:
         return Range(

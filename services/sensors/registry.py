@@ -1,4 +1,4 @@
-"""Which sensors there are, and their parameters from a scene's tables."""
+"""Registry of sensors, and their parameters from a scene's tables."""
 
 import importlib
 import math
@@ -20,17 +20,17 @@ NO_SENSORS = ("schema", "registry", "service")  # modules of the folder that imp
 
 @cache
 def sensors() -> dict[str, ModuleType]:
-    """Every sensor, by name: a module of this folder that has `PRESETS`."""
+    """Return all sensors by name: the modules of this folder with `PRESETS`."""
     names = sorted(module.name for module in pkgutil.iter_modules(lapwing.services.sensors.__path__))
     modules = {n: importlib.import_module(f"lapwing.services.sensors.{n}") for n in names if n not in NO_SENSORS}
     return {name: module for name, module in modules.items() if hasattr(module, "PRESETS")}
 
 
 def module_of(sensor: str, table: Mapping[str, Any]) -> ModuleType:
-    """The module of a sensor: one of this folder, or one of the user's own, which its table names.
+    """Return the module of a sensor: from this folder, or the user's module named in its table.
 
     Raises:
-        KeyedError: there is none, or it lacks something.
+        ConfigError: the module does not exist or is incomplete.
     """
     if "module" not in table:
         if sensor not in sensors():
@@ -38,22 +38,22 @@ def module_of(sensor: str, table: Mapping[str, Any]) -> ModuleType:
         return sensors()[sensor]
     if sensor in sensors():
         raise ConfigError(f"{sensor}.module", f"{sensor} is the name of a sensor that ships", "another name")
-    found = importlib.import_module(table["module"])
-    if missing := [name for name in ("PRESETS", "READING", "blank", "initial", "sample") if not hasattr(found, name)]:
+    result = importlib.import_module(table["module"])
+    if missing := [name for name in ("PRESETS", "READING", "blank", "initial", "sample") if not hasattr(result, name)]:
         raise ConfigError(f"{sensor}.module", f"{table['module']} has no {', '.join(missing)}")
-    return found
+    return result
 
 
 def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
-    """Parameters of a sensor.
+    """Return the parameters of a sensor.
 
     Args:
         sensor: name of the sensor.
-        table: of the scene: `preset`, any parameters that differ from it, and `faults`, a list of tables.
+        table: scene table: `preset`, parameters that differ from it, and `faults`, a list of tables.
         tick: length of a tick [s], for the fault schedule.
 
     Raises:
-        KeyedError: the key relative to the sensors' tables.
+        ConfigError: a value is invalid; the key is relative to the sensors' tables.
     """
     module = module_of(sensor, table)
     values = dict(table)
@@ -86,7 +86,7 @@ def _adapter(cls: Any) -> TypeAdapter:
 
 
 def _check_limits(p: Any) -> None:
-    """KeyedError where a range is empty, or a number infinite that is no limit: infinite limits are none."""
+    """Raise ConfigError if a range is empty, or a number other than a limit is infinite."""
     for key, value in p._asdict().items():
         if hasattr(value, "_asdict"):
             try:
@@ -101,7 +101,7 @@ def _check_limits(p: Any) -> None:
 
 
 def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:
-    """The preset's values as nested dictionaries, replaced where the table says something else."""
+    """Return the preset's values as nested dictionaries, overridden by the table."""
     merged = dict(preset._asdict())
     for key, value in table.items():
         inner = merged.get(key)

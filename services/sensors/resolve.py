@@ -19,7 +19,9 @@ from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, gravity
 from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.encoders import SonarWiring
+from lapwing.services.sensors.imu import Imu
 from lapwing.services.sensors.registry import module_of, parameters
+from lapwing.services.sensors.rotor_vibration import Damage
 from lapwing.services.sensors.schema import Sensors
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.services.sensors.service import SensorsSetup
@@ -34,7 +36,7 @@ READINGS = {
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
-    """The sensors that the scene names; None where it names none."""
+    """Return the configuration of the scene's sensors. Return None without any."""
     tables = scene[Sensors].tables
     if not tables:
         return None
@@ -42,6 +44,8 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     sonar, fix = None, NavSatStatus.STATUS_FIX
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Communication].interval)
+        if name == ports.IMU:
+            p = _with_damage(scene, p)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
         reading = READINGS[name] if name in READINGS else _reading(name, table, p)
@@ -53,8 +57,18 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     return ServiceConfig(SensorsSetup(tuple(instruments), sonar, fix), (InputPort(ports.TRUTH),), tuple(given))
 
 
+def _with_damage(scene: Scene, p: Imu) -> Imu:
+    """Return the IMU with the scene's `effects.rotor_damage` as a source of vibration."""
+    damage = scene.tables("effects").get("rotor_damage")
+    if damage is None or p.rotor_vibration is None:
+        return p
+    start = math.ceil(damage.get("time", 0.0) / scene[Communication].interval - 1e-9)
+    of_one = Damage(damage["rotor"] - 1, start, 1.0 - damage.get("remaining_thrust", 0.0))
+    return p._replace(rotor_vibration=p.rotor_vibration._replace(damage=of_one))
+
+
 def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
-    """The same instruments with another seed."""
+    """Return the instruments with another seed."""
     setup: SensorsSetup = given.parameters
     instruments = tuple(
         instrument._replace(key=stream_key(seed, vehicle, port.name))
@@ -68,15 +82,15 @@ def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
 
 
 def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:
-    """The reading of a sensor of the user's own, after one sample of it.
+    """Return the reading of a custom sensor after a trial sample.
 
     Args:
-        name: of the sensor.
-        table: of the scene.
-        p: its parameters.
+        name: name of the sensor.
+        table: scene table.
+        p: parameters.
 
     Raises:
-        KeyedError: it cannot be sampled, or its types are not those that it declares.
+        ConfigError: it cannot be sampled, or its types differ from the declared ones.
     """
     module, where = module_of(name, table), f"sensors.{name}.module"
     key = stream_key(0, "trial", name)
@@ -86,11 +100,11 @@ def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:
     except Exception as error:
         said = str(error).strip().partition("\n")[0]
         raise ConfigError(where, f"{type(error).__name__}: {said}") from error
-    for what, found, declared in (
+    for what, result, declared in (
         ("initial", state, module.blank()),
         ("sample's state", after, module.blank()),
         ("sample's reading", reading, module.READING),
     ):
-        if numba.typeof(found) != numba.typeof(declared):
+        if numba.typeof(result) != numba.typeof(declared):
             raise ConfigError(where, f"{what} is of another type than `blank` or `READING` declares")
     return module.READING

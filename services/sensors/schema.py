@@ -15,12 +15,12 @@ class Sensors(NamedTables):
     TABLE: ClassVar[str] = "sensors"
 
     def lookup(self, keys: list[str]) -> Any:
-        """A parameter of a sensor; "imu.rate" is that of its preset unless the scene says otherwise."""
+        """Return a parameter of a sensor, from the scene or else from its preset, such as "imu.rate"."""
         name, key = keys
         return getattr(parameters(name, self.tables[name], 1.0), key)
 
     def check(self, scene: Scene) -> None:
-        """Every sensor exists, its parameters are sound, and its rate divides the exchange rate."""
+        """Check that every sensor exists, its parameters are valid, and its rate divides the communication rate."""
         super().check(scene)
         for name, table in self.tables.items():
             if "module" in table and not name.isidentifier():

@@ -1,4 +1,4 @@
-"""What the sensors measure: the true motion at one instant, and the surroundings."""
+"""Inputs of the sensors: the true motion at a time, and the environment."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -11,6 +11,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
 
 Arm = Annotated[float, Ge(-10.0), Le(10.0)]
+ROTORS = 8  # whose speeds sensors know
 Place = tuple[Arm, Arm, Arm]  # [m] of an instrument, body coordinates
 
 
@@ -35,3 +36,4 @@ class Truth(NamedTuple):
     air_density: float = 1.225  # [kg/m^3]
     thrust: float = 0.0  # [N] of all rotors
     rotor_speed: float = 0.0  # [rad/s] mean of the rotors
+    rotor_speeds: tuple[float, ...] = (0.0,) * ROTORS  # [rad/s] of the first rotors

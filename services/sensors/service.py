@@ -15,7 +15,7 @@ NAME = "sensors"
 
 
 class SensorsSetup(NamedTuple):
-    """What the service is given."""
+    """Resolved configuration of the service."""
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
     sonar: SonarWiring | None  # None where no sonar is carried
@@ -23,7 +23,7 @@ class SensorsSetup(NamedTuple):
 
 
 def create(setup: RunConfig) -> Service:
-    """The sensors of a run."""
+    """Return the sensors of a run."""
     given = setup.services[NAME]
     s: SensorsSetup = given.parameters
     parts = [
@@ -34,15 +34,15 @@ def create(setup: RunConfig) -> Service:
 
 
 def _other_wires(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
-    """The topics of sensors whose modules make them, and of the user's own."""
-    found: list[TopicEncoder] = []
+    """Return the encoders of sensors whose modules provide them, and of custom sensors."""
+    result: list[TopicEncoder] = []
     for p, port in zip(s.instruments, setup.services[NAME].ports, strict=True):
         module = sys.modules[type(p.sensor).__module__]
         if port.name in PORTS:
             continue
         ships = module.__package__ == __package__
-        found += module.wires(setup.vehicle, port, p.sensor) if ships else [own_wire(setup.vehicle, port)]
-    return found
+        result += module.wires(setup.vehicle, port, p) if ships else [own_wire(setup.vehicle, port)]
+    return result
 
 
 def _blank(p: Instrument) -> tuple:

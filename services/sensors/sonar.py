@@ -28,18 +28,18 @@ class Sonar(NamedTuple):
     range_min: Annotated[float, Ge(0)] = 0.0  # [m]
     range_max: Annotated[float, Gt(0)] = math.inf  # [m]
     resolution: Annotated[float, Ge(0)] = 0.0  # [m]
-    half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] the nearest ground within the beam gives the echo
+    half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] the nearest ground within the beam returns the echo
     tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # [deg] tilted more, the echo goes elsewhere
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
-RAYS = 8  # along the edge of the beam, for bodies that stand beside its axis
+RAYS = 8  # along the edge of the beam, for bodies off its axis
 
 
 def _distance(p: Sonar, truth: Truth) -> float:
-    """Distance to the ground that is nearest within the beam; +inf without an echo (theory.md, eq. (3.16))."""
+    """Return the distance to the nearest ground in the beam; +inf without an echo (theory.md, eq. (3.16))."""
     raise NotImplementedError("compiled code only")
 
 
@@ -59,7 +59,7 @@ def _over_level(p: Sonar, truth: Truth) -> float:
 
 @kernel
 def _over_relief(p: Sonar, truth: Truth) -> float:
-    """By the plane that the axis meets, as over level ground, or what a ray along the beam's edge meets before that."""
+    """Return the distance to the plane at the axis' intersection, or to an earlier intersection of the beam's edge."""
     R, origin, beam = rotation_matrix(truth.attitude), truth.position_world, math.radians(p.half_beam_deg)
     axis = (-R[2], -R[5], -R[8])
     farthest = min(1.5 * p.range_max, FARTHEST)
@@ -72,23 +72,23 @@ def _over_relief(p: Sonar, truth: Truth) -> float:
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     if angle > math.radians(p.tilt_max_deg):
         return math.inf
-    found = along * cosine / math.cos(max(0.0, angle - beam))
+    result = along * cosine / math.cos(max(0.0, angle - beam))
     for i in range(RAYS):
         turn = 2.0 * math.pi * i / RAYS
         edge = (math.sin(beam) * math.cos(turn), math.sin(beam) * math.sin(turn), -math.cos(beam))
-        found = min(found, ray(truth.terrain, origin, apply(R, edge), farthest))
-    return found
+        result = min(result, ray(truth.terrain, origin, apply(R, edge), farthest))
+    return result
 
 
 @kernel
 def initial(p: Sonar, key: Key, truth: Truth) -> DistanceState:
-    """State before the first sample."""
+    """Return the state before the first sample."""
     return switched_on(p, key, _distance(p, truth))
 
 
 @kernel
 def sample(p: Sonar, s: DistanceState, key: Key, tick: int, truth: Truth) -> tuple[DistanceState, DistanceReading]:
-    """Next state and reading; arguments as of `imu.sample`."""
+    """Return the next state and the reading. See `imu.sample` for arguments."""
     s, r = measured(p, s, key, tick, _distance(p, truth))
     return s, DistanceReading(float(np.float32(r.range)), float(np.float32(r.variance)), r.valid)
 

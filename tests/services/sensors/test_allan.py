@@ -27,7 +27,7 @@ def at_peak(sensor, p, correlation_time, samples=1_000_000):
 @pytest.mark.parametrize("name", IMUS)
 def test_imu_white_noise(name):
     """At the preset's own rate, quantised as it is: n / sqrt(2 tau) for a one-sided density n."""
-    p = IMUS[name]._replace(warm_up=0.0)
+    p = IMUS[name]._replace(warm_up_rise=0.0)
     m = 25
     tau = m / p.rate
     deviation = allan_deviation(record("imu", p, 100_000), m)
@@ -36,9 +36,9 @@ def test_imu_white_noise(name):
     assert together(deviation[3:]) == pytest.approx(force / math.sqrt(2 * tau), rel=0.05)
 
 
-def test_stated_random_walk_of_the_mpu6000():
+def test_stated_random_walk_of_mpu6000():
     """0.30 deg/sqrt(h): the Allan deviation of the white noise, carried on to one hour, in deg/h."""
-    x = record("imu", imu.MPU6000._replace(warm_up=0.0), 100_000)
+    x = record("imu", imu.MPU6000._replace(warm_up_rise=0.0), 100_000)
     m = 25
     at_one_hour = together(allan_deviation(x, m)[:3]) * math.sqrt(m / 250.0 / 3600.0)
     assert at_one_hour / DPS * 3600.0 == pytest.approx(0.30, rel=0.05)
@@ -48,13 +48,13 @@ def test_stated_random_walk_of_the_mpu6000():
 def test_imu_bias_instability(name):
     p = IMUS[name]
     p = p._replace(
-        warm_up=0.0,
+        warm_up_rise=0.0,
         gyro=p.gyro._replace(
             resolution_dps=0.0
         ),  # at one sample a minute rounding would hide the noise that dithers it
         accelerometer=p.accelerometer._replace(resolution_mg=0.0),
     )
-    deviation = at_peak("imu", p, p.gyro.bias_time)
+    deviation = at_peak("imu", p, p.gyro.bias_correlation_time)
     assert together(deviation[:3]) == pytest.approx(p.gyro.bias_instability_deg_per_h * DPS / 3600.0, rel=0.05)
     assert together(deviation[3:]) == pytest.approx(p.accelerometer.bias_instability_ug * 1e-3 * MG, rel=0.05)
 
@@ -71,7 +71,7 @@ def test_magnetometer(name):
     fine = p._replace(resolution_nt=0.0)
     assert white("magnetometer", fine, p.noise_nt_per_sqrt_hz * 1e-9, slice(3)) == pytest.approx(1.0, rel=0.05)
     quiet = fine._replace(noise_nt_per_sqrt_hz=0.0)
-    assert together(at_peak("magnetometer", quiet, p.bias_time)) == pytest.approx(
+    assert together(at_peak("magnetometer", quiet, p.bias_correlation_time)) == pytest.approx(
         p.bias_instability_nt * 1e-9, rel=0.05
     )
 
@@ -80,7 +80,9 @@ def test_barometer():
     p = BAROMETERS["ms5611"]
     fine = p._replace(resolution_pa=0.0)
     assert white("barometer", fine, p.noise_pa_per_sqrt_hz, slice(1)) == pytest.approx(1.0, rel=0.05)
-    assert together(at_peak("barometer", fine, p.bias_time)) == pytest.approx(p.bias_instability_pa, rel=0.05)
+    assert together(at_peak("barometer", fine, p.bias_correlation_time)) == pytest.approx(
+        p.bias_instability_pa, rel=0.05
+    )
     assert 1.0 <= p.noise_pa_per_sqrt_hz * math.sqrt(p.rate / 2) <= 3.0  # [Pa] in samples at 20 to 50 Hz
 
 
@@ -92,27 +94,27 @@ def test_sonar():
 @pytest.mark.parametrize("name", GPSS)
 def test_gps(name):
     p = GPSS[name]
-    still = p._replace(wander_horizontal=0.0, wander_vertical=0.0)
+    still = p._replace(correlated_error_horizontal=0.0, correlated_error_vertical=0.0)
     assert white("gps", still, p.noise_horizontal_m_per_sqrt_hz, slice(2)) == pytest.approx(1.0, rel=0.05)
     assert white("gps", still, p.noise_vertical_m_per_sqrt_hz, slice(2, 3)) == pytest.approx(1.0, rel=0.05)
     assert white("gps", still, p.noise_velocity_m_per_s_per_sqrt_hz, slice(3, 6)) == pytest.approx(1.0, rel=0.05)
-    deviation = at_peak("gps", p, p.wander_time)
-    assert together(deviation[:2]) == pytest.approx(error_models.ALLAN_PEAK * p.wander_horizontal, rel=0.05)
-    assert together(deviation[2:3]) == pytest.approx(error_models.ALLAN_PEAK * p.wander_vertical, rel=0.05)
+    deviation = at_peak("gps", p, p.correlation_time)
+    assert together(deviation[:2]) == pytest.approx(error_models.ALLAN_PEAK * p.correlated_error_horizontal, rel=0.05)
+    assert together(deviation[2:3]) == pytest.approx(error_models.ALLAN_PEAK * p.correlated_error_vertical, rel=0.05)
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
-def test_the_same_physical_noise_at_any_rate(rate):
+def test_same_physical_noise_at_any_rate(rate):
     p = imu.BMI088
-    p = p._replace(rate=rate, warm_up=0.0, gyro=p.gyro._replace(resolution_dps=0.0))
+    p = p._replace(rate=rate, warm_up_rise=0.0, gyro=p.gyro._replace(resolution_dps=0.0))
     tau = 0.1
     deviation = together(allan_deviation(record("imu", p, round(400 * rate)), round(tau * rate))[:3])
     assert deviation == pytest.approx(p.gyro.noise_dps_per_sqrt_hz * DPS / math.sqrt(2 * tau), rel=0.05)
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.2])
-def test_the_same_bias_walk_at_any_rate(rate):
-    p = imu.Imu(gyro=imu.Gyro(bias_instability_deg_per_h=4.6, bias_time=100.0), rate=rate)
+def test_same_bias_walk_at_any_rate(rate):
+    p = imu.Imu(gyro=imu.Gyro(bias_instability_deg_per_h=4.6, bias_correlation_time=100.0), rate=rate)
     m = round(error_models.ALLAN_PEAK_TIME * 100.0 * rate)
     deviation = together(allan_deviation(record("imu", p, 300_000), m)[:3])
     # With nine or more samples a cluster their mean is the cluster's within 1 %.
@@ -134,8 +136,8 @@ def test_every_noise_has_mean_zero():
         assert np.all(np.abs(mean) < 4 * standard_error), name
 
 
-def test_biases_have_mean_zero_and_the_stated_spread_over_vehicles():
-    p = imu.Imu(gyro=imu.Gyro(turn_on_dps=0.1), accelerometer=imu.Accelerometer(turn_on_mg=3.0))
+def test_biases_have_mean_zero_and_stated_spread_over_vehicles():
+    p = imu.Imu(gyro=imu.Gyro(turn_on_bias_dps=0.1), accelerometer=imu.Accelerometer(turn_on_bias_mg=3.0))
     first = np.array([record("imu", p, 1, seed=seed)[0] for seed in range(600)])
     first[:, 5] -= REST.gravity
     spread = np.array([0.1 * DPS] * 3 + [3.0 * MG] * 3)

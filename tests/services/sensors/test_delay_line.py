@@ -40,7 +40,7 @@ TRUE = np.arange(30.0)
 ON = (TRUE >= 10) & (TRUE < 20)
 
 
-def test_dropout_is_a_message_that_says_so():
+def test_dropout_is_invalid_message():
     assert [r.valid for r in fly({"kind": "dropout"})] == [not on for on in ON]
 
 
@@ -65,7 +65,7 @@ def test_delay():
     np.testing.assert_array_equal(fields({"kind": "delay", "samples": 4}), np.where(ON, TRUE - 4, TRUE))
 
 
-def test_spikes_come_at_the_stated_rate():
+def test_spikes_come_at_stated_rate():
     error = np.array(
         [r.field_body[0] for r in fly({"kind": "spikes", "size": 50.0, "probability": 0.3, "stop": 1e9}, ticks=2000)]
     )
@@ -74,7 +74,7 @@ def test_spikes_come_at_the_stated_rate():
     assert np.std((error[10:] - np.arange(10.0, 2000.0))[hit]) == pytest.approx(50.0, rel=0.15)
 
 
-def test_a_fault_of_one_channel_leaves_the_other():
+def test_fault_affects_only_its_channel():
     readings = fly({"kind": "bias", "channel": "gyro", "size": 1.0}, sensor="imu")
     assert readings[15].omega_body == (16.0, 1.0, 1.0)
     assert readings[15].specific_force_body == (0.0, 0.0, 9.81)
@@ -93,7 +93,7 @@ def test_a_fault_of_one_channel_leaves_the_other():
         ({"kind": "bias", "sice": 1.0}, ["faults.0.sice"]),
     ],
 )
-def test_bad_schedules_are_refused_in_one_line(table, words):
+def test_invalid_schedule_error_is_one_line(table, words):
     with pytest.raises(ValueError, match=words[0]) as error:
         compile_faults([table], imu.CHANNELS, TICK)
     assert all(word in str(error.value) for word in words)

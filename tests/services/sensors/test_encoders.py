@@ -12,7 +12,7 @@ from lapwing.services.scene_resolver import load, resolve
 
 
 @pytest.mark.parametrize("which", [topic.GPS, topic.GPS_VELOCITY], ids=["fix", "velocity"])
-def test_a_fix_is_stamped_with_its_moment_and_never_before_the_start(which):
+def test_fix_is_stamped_with_its_moment_and_never_before_start(which):
     setup = resolve(load("delivery_mission"))
     wire = next(w for service in create_all(setup) for w in service.wires if w.topic is which)
     port = setup.port(wire.port)

@@ -42,12 +42,12 @@ def read(module, p, *truths):
     return reading
 
 
-def test_imu_reads_plus_g_along_z_at_rest_and_nothing_in_free_fall():
+def test_imu_reads_g_at_rest_and_zero_in_free_fall():
     assert read(imu, imu.Imu(), truth()).specific_force_body == (0.0, 0.0, G)
     assert read(imu, imu.Imu(), truth(acceleration=(0.0, 0.0, -G))).specific_force_body == (0.0, 0.0, 0.0)
 
 
-def test_imu_measures_in_the_body_frame():
+def test_imu_measures_in_body_frame():
     """Nose down by 30 degrees (positive pitch in FLU): gravity's reaction leans towards -x of the body."""
     reading = read(imu, imu.Imu(), truth(attitude=from_roll_pitch_yaw(0.0, math.pi / 6, 1.0), omega=(0.1, 0.2, 0.3)))
     np.testing.assert_allclose(reading.specific_force_body, (-0.5 * G, 0.0, G * math.cos(math.pi / 6)), atol=1e-12)
@@ -68,7 +68,7 @@ def test_imu_saturates_and_rounds():
     assert reading.omega_variance == pytest.approx(math.radians(0.5) ** 2 / 12)
 
 
-def test_imu_scale_and_misalignment_have_the_stated_size():
+def test_imu_scale_and_misalignment_have_stated_size():
     """Turning about x at 1 rad/s: x shows the scale error, y and z the misalignment; over 400 units."""
     p = imu.Imu(imu.Gyro(scale_error=0.01, misalignment_deg=0.5))
     turning = truth(omega=(1.0, 0.0, 0.0))
@@ -82,14 +82,14 @@ def test_imu_scale_and_misalignment_have_the_stated_size():
 
 def test_imu_warms_up():
     """The bias of the cold start fades with the time constant of the warm-up."""
-    p = imu.Imu(imu.Gyro(temperature_dps_per_k=1.0), warm_up=10.0, warm_up_time=1.0, rate=100.0)
+    p = imu.Imu(imu.Gyro(temperature_dps_per_k=1.0), warm_up_rise=10.0, warm_up_time=1.0, rate=100.0)
     first = np.array(read(imu, p, truth()).omega_body)
     later = np.array(read(imu, p, *[truth()] * 101).omega_body)
     np.testing.assert_allclose(later, first * 0.99**100, rtol=1e-9)
     assert np.all(np.abs(first) > 0)
 
 
-def test_magnetometer_turns_with_the_body():
+def test_magnetometer_turns_with_body():
     """Heading north (yaw 90 degrees in ENU), the body's x axis reads the north component."""
     east, north, up = FIELD
     reading = read(
@@ -98,14 +98,14 @@ def test_magnetometer_turns_with_the_body():
     np.testing.assert_allclose(reading.field_body, (north, -east, up), atol=1e-18)
 
 
-def test_barometer_reads_the_pressure_law_and_falls_with_height():
+def test_barometer_reads_pressure_law_and_falls_with_height():
     low = read(barometer, barometer.Barometer(), truth())
     high = read(barometer, barometer.Barometer(), truth(position=(0.0, 0.0, 10.0)))
     assert low.pressure == pytest.approx(pressure(STANDARD.atmosphere, STANDARD.home.height))
     assert high.pressure - low.pressure == pytest.approx(-1.19 * 9.81 * 10.0, rel=0.02)
 
 
-def test_gps_gives_the_position_of_its_latency_ago():
+def test_gps_position_is_delayed_by_latency():
     p = gps.Gps(latency_samples=2)
     path = [truth(position=(float(k), 2.0 * k, 0.5 * k), velocity=(10.0 * k, 0.0, 0.0)) for k in range(6)]
     reading = read(gps, p, *path)
@@ -122,8 +122,10 @@ def test_gps_states_its_own_variance():
     for p in (gps.RTK, gps.STANDARD):
         reading = read(gps, p, truth())
         east, _, up = reading.position_variance
-        assert east == pytest.approx(p.wander_horizontal**2 + p.noise_horizontal_m_per_sqrt_hz**2 * p.rate / 2)
-        assert up == pytest.approx(p.wander_vertical**2 + p.noise_vertical_m_per_sqrt_hz**2 * p.rate / 2)
+        assert east == pytest.approx(
+            p.correlated_error_horizontal**2 + p.noise_horizontal_m_per_sqrt_hz**2 * p.rate / 2
+        )
+        assert up == pytest.approx(p.correlated_error_vertical**2 + p.noise_vertical_m_per_sqrt_hz**2 * p.rate / 2)
     rtk = read(gps, gps.RTK, truth()).position_variance
     assert 0.01 < math.sqrt(sum(rtk)) < 0.03  # about 2 cm
     assert math.sqrt(read(gps, gps.STANDARD, truth()).position_variance[0]) > 1.0
@@ -153,7 +155,7 @@ def test_sonar_range(height, tilt_deg, expected):
 
 
 @pytest.mark.parametrize(("slope_deg", "tilt_deg"), [(20.0, 0.0), (20.0, 20.0), (20.0, -4.0), (8.0, 0.0), (20.0, -6.0)])
-def test_sonar_over_a_slope(slope_deg, tilt_deg):
+def test_sonar_over_slope(slope_deg, tilt_deg):
     """The nearest ground within the beam: across the slope 2 m cos(slope), seen at slope - tilt off the beam's axis."""
     slope, tilt = math.radians(slope_deg), math.radians(tilt_deg)
     ground = relief(slope=(0.0, math.tan(slope)))
@@ -164,7 +166,7 @@ def test_sonar_over_a_slope(slope_deg, tilt_deg):
     assert reading.range == pytest.approx(math.inf if off > math.radians(25.0) else expected, rel=1e-6)
 
 
-def test_sonar_sees_a_box_and_the_next_tread_of_a_stair():
+def test_sonar_sees_box_and_next_tread_of_stair():
     over_box = relief(boxes=[(0.5, 0.0, 0.4, 0.4, 0.0, 0.8)])
     p = sonar.Sonar(half_beam_deg=0.0)
     assert read(sonar, p, truth((0.5, 0.0, 2.0), terrain=over_box)).range == pytest.approx(1.2)
@@ -177,7 +179,7 @@ def test_sonar_sees_a_box_and_the_next_tread_of_a_stair():
     ]
 
 
-def test_accelerometers_off_the_centre_feel_the_turning():
+def test_accelerometers_off_centre_feel_turning():
     """On a wheel of 0.3 m that turns at 2 rad/s and speeds up by 5 rad/s^2: inwards w^2 r, ahead a r."""
     p = imu.Imu(position=(0.3, 0.0, 0.0))
     spinning = truth(omega=(0.0, 0.0, 2.0))._replace(angular_acceleration_body=(0.0, 0.0, 5.0))
@@ -185,7 +187,7 @@ def test_accelerometers_off_the_centre_feel_the_turning():
     assert read(imu, imu.Imu(), spinning).specific_force_body == (0.0, 0.0, G)
 
 
-def test_gps_tells_of_its_antenna():
+def test_gps_measures_at_antenna():
     """0.4 m ahead on a vehicle that heads north and turns left at 1 rad/s: 0.4 m north, going west at 0.4 m/s."""
     p = gps.Gps(antenna=(0.4, 0.0, 0.1))
     north = truth((1.0, 2.0, 3.0), from_roll_pitch_yaw(0.0, 0.0, math.pi / 2), (5.0, 0.0, 0.0), (0.0, 0.0, 1.0))
@@ -198,13 +200,13 @@ def test_gps_tells_of_its_antenna():
     np.testing.assert_allclose(reading.velocity_world, (4.6, 0.0, 0.0), atol=1e-12)
 
 
-def test_gps_has_no_fix_under_a_roof():
+def test_gps_has_no_fix_under_roof():
     p = gps.Gps(outages=(gps.Outage(10.0, 0.0, 3.0), gps.Outage(0.0, 20.0, 1.0)))
     places = [(0.0, 0.0), (7.1, 0.0), (6.9, 0.0), (10.0, 2.9), (0.0, 20.5), (0.0, 18.9)]
     assert [read(gps, p, truth((*place, 2.0))).valid for place in places] == [True, False, True, False, False, True]
 
 
-def test_magnetometer_near_the_leads_and_barometer_in_the_wind():
+def test_magnetometer_near_leads_and_barometer_in_wind():
     """10 A at 30 nT/A along y; a hole that feels 0.2 of the 60 Pa of 10 m/s."""
     near = truth()._replace(motor_current=10.0, dynamic_pressure=60.0)
     leads = magnetometer.Magnetometer(current_nt_per_a=(0.0, 30.0, 0.0))
@@ -215,7 +217,7 @@ def test_magnetometer_near_the_leads_and_barometer_in_the_wind():
     assert read(barometer, hole, near).pressure - still == pytest.approx(12.0)
 
 
-def test_airspeed_feels_the_air_along_the_body_alone():
+def test_airspeed_feels_air_along_body_alone():
     """10 m/s ahead at 1.2 kg/m^3 are 60 Pa; as much suction backwards; across nothing."""
     north = truth(attitude=from_roll_pitch_yaw(0.0, 0.0, math.pi / 2))._replace(air_density=1.2)
     for air, expected in (((0.0, 10.0, 0.0), 60.0), ((0.0, -10.0, 0.0), -60.0), ((10.0, 0.0, 3.0), 0.0)):
@@ -228,13 +230,13 @@ def test_airspeed_noise_and_spread():
     """White noise of the stated density at 50 Hz; zero point and span over 300 units."""
     still = truth()._replace(air_density=1.2, air_velocity_world=(10.0, 0.0, 0.0))
     p = airspeed.Airspeed(noise_pa_per_sqrt_hz=0.5)
-    s, found = airspeed.initial(p, KEY, still), []
+    s, result = airspeed.initial(p, KEY, still), []
     for tick in range(4000):
         s, reading = airspeed.sample(p, s, KEY, tick, still)
-        found.append(reading.pressure)
-    assert np.std(found) == pytest.approx(0.5 * math.sqrt(25.0), rel=0.05)
+        result.append(reading.pressure)
+    assert np.std(result) == pytest.approx(0.5 * math.sqrt(25.0), rel=0.05)
     assert reading.variance == pytest.approx(0.25 * 25.0)
-    p, units = airspeed.Airspeed(turn_on_pa=0.2, scale_error=0.03), []
+    p, units = airspeed.Airspeed(turn_on_bias_pa=0.2, scale_error=0.03), []
     for seed in range(300):
         key = stream_key(seed, "drone1", "airspeed")
         units.append(airspeed.sample(p, airspeed.initial(p, key, still), key, 0, still)[1].pressure)
@@ -251,7 +253,7 @@ def test_rangefinder_in_any_direction_over_level_ground(azimuth, elevation, expe
     assert read(rangefinder, p, place).range == pytest.approx(expected)
 
 
-def test_rangefinder_ahead_sees_a_wall_and_its_limits():
+def test_rangefinder_ahead_sees_wall_and_its_limits():
     """A box whose face is 4 m ahead, seen level; turned away, nothing; beyond its range +inf, too near -inf."""
     wall = relief(boxes=[(6.0, 0.0, 4.0, 4.0, 0.0, 5.0)])
     p = rangefinder.Rangefinder(elevation_deg=0.0)
@@ -260,21 +262,21 @@ def test_rangefinder_ahead_sees_a_wall_and_its_limits():
     assert read(rangefinder, p, truth((0.0, 0.0, 2.0), away, terrain=wall)).range == math.inf
     for x, expected in ((0.0, math.inf), (3.0, 1.0), (3.8, -math.inf)):
         limited = p._replace(range_min=0.3, range_max=3.0)
-        found = read(rangefinder, limited, truth((x, 0.0, 2.0), terrain=wall)).range
-        assert found == expected or found == pytest.approx(expected)
+        result = read(rangefinder, limited, truth((x, 0.0, 2.0), terrain=wall)).range
+        assert result == expected or result == pytest.approx(expected)
 
 
 def test_rangefinder_noise():
     p = rangefinder.Rangefinder(noise_m_per_sqrt_hz=0.01)
-    s, found = rangefinder.initial(p, KEY, truth((0.0, 0.0, 4.0))), []
+    s, result = rangefinder.initial(p, KEY, truth((0.0, 0.0, 4.0))), []
     for tick in range(4000):
         s, reading = rangefinder.sample(p, s, KEY, tick, truth((0.0, 0.0, 4.0)))
-        found.append(reading.range)
-    assert np.mean(found) == pytest.approx(4.0, abs=4e-3)
-    assert np.std(found) == pytest.approx(0.01 * 5.0, rel=0.05)
+        result.append(reading.range)
+    assert np.mean(result) == pytest.approx(4.0, abs=4e-3)
+    assert np.std(result) == pytest.approx(0.01 * 5.0, rel=0.05)
 
 
-def test_optical_flow_of_turning_alone_is_the_turning():
+def test_optical_flow_of_turning_alone_is_turning():
     p, turning = optical_flow.OpticalFlow(), truth((0.0, 0.0, 3.0), omega=(0.3, -0.2, 0.5))
     reading = read(optical_flow, p, turning)
     assert reading.flow == reading.rate == (0.3, -0.2)
@@ -305,11 +307,11 @@ def test_optical_flow_without_texture_and_its_noise():
     assert not read(optical_flow, p, truth((0.0, 0.0, 35.0))).valid
     assert not read(optical_flow, p, truth((0.0, 0.0, 5.0), from_roll_pitch_yaw(2.0, 0.0, 0.0))).valid
     noisy = optical_flow.OpticalFlow(noise_rad_per_s_per_sqrt_hz=0.01)
-    s, found = optical_flow.initial(noisy, KEY, truth((0.0, 0.0, 5.0))), []
+    s, result = optical_flow.initial(noisy, KEY, truth((0.0, 0.0, 5.0))), []
     for tick in range(4000):
         s, reading = optical_flow.sample(noisy, s, KEY, tick, truth((0.0, 0.0, 5.0)))
-        found.append(reading.flow)
-    assert np.std(found, axis=0) == pytest.approx([0.05, 0.05], rel=0.05)
+        result.append(reading.flow)
+    assert np.std(result, axis=0) == pytest.approx([0.05, 0.05], rel=0.05)
     assert reading.variance == pytest.approx(0.0025)
 
 
@@ -325,26 +327,26 @@ def coning(k, rate):
     )
 
 
-def test_integrated_readings_bring_a_coning_body_home():
-    """What it turned by, one reading after the other, is its attitude; rates at instants drift away from it."""
+def test_integrated_readings_bring_coning_body_home():
+    """Composed delta angles equal the attitude; instantaneous rates drift away from it."""
     rate, ends = 250.0, {}
-    for integrates in (True, False):
-        p = imu.Imu(rate=rate, integrates=integrates)
+    for delta_output in (True, False):
+        p = imu.Imu(rate=rate, delta_output=delta_output)
         path = [truth(attitude=q, omega=omega) for q, omega in (coning(k, rate) for k in range(251))]
         s, attitude = imu.initial(p, KEY, path[0]), path[0].attitude
         for tick, now in enumerate(path):
             s, reading = imu.sample(p, s, KEY, tick, now)
             if tick:
                 attitude = multiply(attitude, exp(tuple(x / rate for x in reading.omega_body)))
-        ends[integrates] = np.linalg.norm(log(multiply(conjugate(path[-1].attitude), attitude)))
+        ends[delta_output] = np.linalg.norm(log(multiply(conjugate(path[-1].attitude), attitude)))
     assert ends[True] < 1e-12
     assert ends[False] > 0.02
 
 
-def test_integrated_readings_give_back_the_velocity_of_where_the_unit_sits():
+def test_integrated_readings_restore_velocity_at_imu():
     """Turning and speeding up: the sum of R_before f / rate - g t is the change of v + R (omega x r)."""
     rate, place = 100.0, (0.2, -0.1, 0.05)
-    p, gained, before, path = imu.Imu(rate=rate, integrates=True, position=place), np.zeros(3), None, []
+    p, gained, before, path = imu.Imu(rate=rate, delta_output=True, position=place), np.zeros(3), None, []
     for k in range(60):
         t = k / rate
         attitude = multiply(from_roll_pitch_yaw(0.3, -0.2, 0.0), exp((0.0, 0.0, 4.0 * t)))
@@ -360,28 +362,28 @@ def test_integrated_readings_give_back_the_velocity_of_where_the_unit_sits():
     np.testing.assert_allclose(gained, speeds[1] - speeds[0], atol=1e-12)
 
 
-def test_rotor_vibration_is_seen_at_another_frequency_and_integration_thins_it():
+def test_rotor_vibration_is_aliased_and_integration_attenuates():
     """251 Hz sampled at 250 Hz looks like 1 Hz; of its mean over a sample is left sin(x)/x, x = pi 251/250."""
     speed = 2.0 * math.pi * 251.0
     shaking = imu.Vibration((100.0, 100.0, 50.0), 0.5 * speed)
-    now, found = truth()._replace(rotor_speed=speed), {}
-    for integrates in (False, True):
-        p = imu.Imu(rate=250.0, vibration=shaking, integrates=integrates)
+    now, result = truth()._replace(rotor_speed=speed), {}
+    for delta_output in (False, True):
+        p = imu.Imu(rate=250.0, vibration=shaking, delta_output=delta_output)
         s, forces = imu.initial(p, KEY, now), []
         for tick in range(1000):
             s, reading = imu.sample(p, s, KEY, tick, now)
             forces.append(reading.specific_force_body)
-        found[integrates] = np.array(forces) - (0.0, 0.0, G)
-    seen = np.abs(np.fft.rfft(found[False], axis=0)) / 500.0
+        result[delta_output] = np.array(forces) - (0.0, 0.0, G)
+    seen = np.abs(np.fft.rfft(result[False], axis=0)) / 500.0
     assert np.argmax(seen[:, 0]) == 4  # cycles in 4 s
     amplitude = 4.0 * 0.1 * 9.80665  # with the square of the speed
     np.testing.assert_allclose(seen[4], (amplitude, amplitude, 0.5 * amplitude), rtol=1e-6)
-    left = np.abs(np.fft.rfft(found[True], axis=0))[4, 0] / 500.0
+    left = np.abs(np.fft.rfft(result[True], axis=0))[4, 0] / 500.0
     x = math.pi * 251.0 / 250.0
     assert left == pytest.approx(amplitude * abs(math.sin(x) / x), rel=1e-6)
 
 
-def test_barometer_in_the_wash_of_the_rotors():
+def test_barometer_in_wash_of_rotors():
     flying = truth()._replace(thrust=98.0)
     still = read(barometer, barometer.Barometer(), flying).pressure
     assert read(barometer, barometer.Barometer(wash_pa_per_n=-0.2), flying).pressure - still == pytest.approx(-19.6)
@@ -401,28 +403,28 @@ def test_gps_dilution_of_precision_by_published_geometries():
 STREET = tuple(gps.Satellite(a, e) for a, e in ((10.0, 60.0), (170.0, 50.0), (20.0, 30.0), (200.0, 70.0), (95.0, 80.0)))
 
 
-def test_gps_errors_have_the_covariance_of_the_satellites_in_view():
+def test_gps_errors_have_covariance_of_satellites_in_view():
     """Against the rows (east, north, up, 1) of least squares, over 1500 receivers; the reading says it."""
-    p = gps.Gps(sky=STREET, range_wander=2.0, range_noise_m_per_sqrt_hz=0.5)
+    p = gps.Gps(sky=STREET, range_correlated_error=2.0, range_noise_m_per_sqrt_hz=0.5)
     rows = [
         (math.cos(e) * math.sin(a), math.cos(e) * math.cos(a), math.sin(e), 1.0)
         for a, e in np.radians([tuple(satellite) for satellite in STREET])
     ]
     expected = np.linalg.inv(np.array(rows).T @ rows)[:3, :3] * (4.0 + 0.25 * 5.0)
-    found = []
+    result = []
     for seed in range(1500):
         key = stream_key(seed, "drone1", "gps")
         _, reading = gps.sample(p, gps.initial(p, key, truth()), key, 0, truth())
-        found.append((reading.longitude_deg, reading.latitude_deg, reading.height))
+        result.append((reading.longitude_deg, reading.latitude_deg, reading.height))
     assert reading.position_variance == pytest.approx(np.diag(expected))
-    here = np.array(found) - (STANDARD.home.longitude_deg, STANDARD.home.latitude_deg, STANDARD.home.height)
+    here = np.array(result) - (STANDARD.home.longitude_deg, STANDARD.home.latitude_deg, STANDARD.home.height)
     one = [np.array(enu_to_geodetic(STANDARD.home, v)) for v in ((1.0, 0, 0), (0, 1.0, 0), ZERO)]
     metres = here / (one[0][1] - one[2][1], one[1][0] - one[2][0], 1.0)
     np.testing.assert_allclose(np.cov(metres.T), expected, atol=0.12 * np.trace(expected))
     assert np.sqrt(expected[0, 0]) > 2.0 * np.sqrt(expected[1, 1])  # a street from north to south
 
 
-def test_same_key_and_tick_give_the_same_bits():
+def test_noise_is_determined_by_key_and_tick():
     s = imu.initial(imu.MPU6000, KEY, truth())
     assert imu.sample(imu.MPU6000, s, KEY, 5, truth()) == imu.sample(imu.MPU6000, s, KEY, 5, truth())
     assert imu.sample(imu.MPU6000, s, KEY, 5, truth()) != imu.sample(imu.MPU6000, s, KEY, 6, truth())

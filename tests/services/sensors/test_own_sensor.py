@@ -73,14 +73,14 @@ def scene(tmp_path):
     return made
 
 
-def test_its_readings_are_logged_and_reach_an_estimator(scene):
+def test_custom_sensor_is_logged_and_reaches_estimator(scene):
     flight = fly(scene())
     readings = flight.topic("custom_sensor/anemometer")["values"]
     true = np.linalg.norm(flight.truth["velocity"][::5], axis=1)
     assert readings[:, 0] == pytest.approx(true)
     assert (readings[:, 1] == 1.0).all()
-    told = fly(scene("autopilot.estimator=own_echo:Echo")).topic("estimate")["velocity"][:, 0]
-    assert told.max() > 0.0
+    reported = fly(scene("autopilot.estimator=own_echo:Echo")).topic("estimate")["velocity"][:, 0]
+    assert reported.max() > 0.0
 
 
 def test_several_are_logged_each_on_its_topic(scene, tmp_path):
@@ -89,10 +89,10 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
             "norm(truth.velocity_world)", "truth.position_world[2]"
         )
     )
-    given = scene(
+    values = scene(
         "sensors.height.module=own_height", "sensors.height.rate=25.0", "sensors.second.module=own_anemometer"
     )
-    setup, flight = resolve(given), lapwing.fly(given)
+    setup, flight = resolve(values), lapwing.fly(values)
     speed, second, height = (flight.topic(f"custom_sensor/{name}") for name in ("anemometer", "second", "height"))
     assert (speed["values"] == second["values"]).all()
     assert height["values"][:, 0] == pytest.approx(flight.truth.position[::10, 2])
@@ -105,7 +105,7 @@ def test_several_are_logged_each_on_its_topic(scene, tmp_path):
     assert (logs[1].topic("custom_sensor/height")["values"] == height["values"]).all()
 
 
-def test_a_preset_and_its_noise(scene):
+def test_preset_and_its_noise(scene):
     noisy = fly(scene("sensors.anemometer.preset=noisy")).topic("custom_sensor/anemometer")["values"][:, 0]
     ideal = fly(scene()).topic("custom_sensor/anemometer")["values"][:, 0]
     assert np.std(noisy - ideal) == pytest.approx(0.1, rel=0.3)
@@ -126,13 +126,13 @@ def test_a_preset_and_its_noise(scene):
         (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a name that a topic can have"),
     ],
 )
-def test_what_is_wrong_is_one_line(scene, overrides, text, said):
+def test_custom_sensor_errors_are_one_line(scene, overrides, text, said):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(*overrides, text=text))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_a_sensor_that_ships_keeps_its_name():
+def test_sensor_that_ships_keeps_its_name():
     with pytest.raises(ConfigError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
         module_of("gps", {"module": "own_anemometer"})

@@ -6,12 +6,14 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.sensors import registry
 
 
-def test_the_sensors_of_the_folder_are_found():
+def test_sensors_of_folder_are_found():
     assert set(registry.sensors()) == {
         "airspeed",
         "barometer",
+        "depth_camera",
         "gps",
         "imu",
+        "lidar",
         "magnetometer",
         "optical_flow",
         "rangefinder",
@@ -25,13 +27,13 @@ def test_every_preset_passes_its_own_validation(sensor):
         assert registry.parameters(sensor, {"preset": name}, 0.004) == preset
 
 
-def test_the_first_preset_is_the_default():
+def test_first_preset_is_default():
     assert registry.parameters("gps", {}, 0.004) == registry.sensors()["gps"].PRESETS["rtk"]
 
 
-def test_a_table_changes_single_values():
-    p = registry.parameters("imu", {"preset": "bmi088", "rate": 500, "gyro": {"turn_on_dps": 1}}, 0.002)
-    assert (p.rate, p.gyro.turn_on_dps, p.gyro.noise_dps_per_sqrt_hz) == (500.0, 1.0, 0.016)
+def test_table_changes_single_values():
+    p = registry.parameters("imu", {"preset": "bmi088", "rate": 500, "gyro": {"turn_on_bias_dps": 1}}, 0.002)
+    assert (p.rate, p.gyro.turn_on_bias_dps, p.gyro.noise_dps_per_sqrt_hz) == (500.0, 1.0, 0.016)
 
 
 @pytest.mark.parametrize(
@@ -46,7 +48,7 @@ def test_a_table_changes_single_values():
         ({"faults": 3}, ["faults", "list"]),
     ],
 )
-def test_bad_tables_are_refused_in_one_line(table, words):
+def test_invalid_table_error_is_one_line(table, words):
     with pytest.raises(ValueError, match=words[0]) as error:
         registry.parameters("imu", table, 0.004)
     assert all(word in str(error.value) for word in words)
@@ -68,15 +70,13 @@ def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, said)
         registry.parameters(sensor, table, 0.004)
 
 
-def test_a_limit_may_be_infinite():
+def test_limit_may_be_infinite():
     assert registry.parameters("rangefinder", {"range_max": float("inf")}, 0.004).range_max == float("inf")
 
 
-def test_an_unknown_sensor_lists_the_choices():
-    with pytest.raises(
-        ValueError, match="airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar"
-    ):
-        registry.parameters("lidar", {}, 0.004)
+def test_unknown_sensor_lists_choices():
+    with pytest.raises(ValueError, match="airspeed, barometer, depth_camera, gps, imu, lidar, magnetometer"):
+        registry.parameters("radar", {}, 0.004)
 
 
 def test_satellites_that_give_no_position_are_refused():
