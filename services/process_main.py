@@ -1,6 +1,5 @@
-"""One process of a run: what it is given, and how it takes part. `python -m lapwing.services.process_main NAME`,
-or a fork that
-calls `main`, reads that from standard input, as the launcher writes it."""
+"""Entry point of a process of a run: `python -m lapwing.services.process_main NAME`, or a fork that calls `main`.
+The process reads its specification from standard input, where the launcher writes it."""
 
 import json
 import os
@@ -23,7 +22,7 @@ LONGEST = 15  # characters that the system keeps of a process's name
 
 
 class ProcessSpec(NamedTuple):
-    """What a process of a run is given."""
+    """Specification of a process of a run."""
 
     name: str
     setup: RunConfig
@@ -42,26 +41,26 @@ class ProcessSpec(NamedTuple):
     ros2: int | None = None  # ROS_DOMAIN_ID of a graph
     ros2_router: str = ""  # HOST:PORT of its router
     insecure: bool = False  # unsigned commands from other machines are taken
-    external: dict[str, str] | None = None  # endpoints of services that are programs of somebody else's, by name
+    external: dict[str, str] | None = None  # endpoints of external services by name
     keys: str = ""  # path of a folder of certificates
     realtime: bool = False  # services of the lock step run in the scheduler's real-time class
     with_parent: bool = False  # ends when standard input closes
 
 
-def hand_over(given: ProcessSpec, stream: IO[bytes]) -> None:
+def write_spec(given: ProcessSpec, stream: IO[bytes]) -> None:
     """Write what a process is given; the stream stays open."""
     data = to_json(given).encode()
     stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
-def take_over() -> ProcessSpec:
+def read_spec() -> ProcessSpec:
     """Read what this process is given, from standard input."""
     text = _read(_LENGTH.unpack(_read(_LENGTH.size))[0]).decode()
     modules = json.loads(text)["setup"]["resolved"].get("modules", {})  # the set-up may name their classes
     user_module.install(modules)
-    found: Any = from_json(text, modules)
-    return found
+    result: Any = from_json(text, modules)
+    return result
 
 
 def _read(size: int) -> bytes:
@@ -74,8 +73,8 @@ def _read(size: int) -> bytes:
     return data
 
 
-def take_part(given: ProcessSpec) -> ExitCode:
-    """Take part in a run to its end. Return COMPLETED, or TERMINATED after SIGTERM.
+def run_participant(given: ProcessSpec) -> ExitCode:
+    """Run a participant to the end of the run. Return COMPLETED, or TERMINATED after SIGTERM.
 
     Raises:
         ValueError: for a reason that the user can fix.
@@ -89,7 +88,7 @@ def take_part(given: ProcessSpec) -> ExitCode:
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
 
-    setup, encoded = given.setup, process_table.encoded(given.name)
+    setup, encoded = given.setup, process_table.encoded_service(given.name)
     entry = process_table.entry(encoded or given.name)
     participants = PublisherIds(given.key_prefix, given.secret, tuple(given.external or ()))
     listen, connect = mesh(given.name, given.peers)
@@ -97,21 +96,24 @@ def take_part(given: ProcessSpec) -> ExitCode:
         security = door_settings(given.name, given.key_prefix, given.keys) if given.open else {}
     else:
         security = settings(setup, given.name, given.key_prefix, given.keys)
-    endpoints, gid = [*listen, *given.open], participants.mark(given.name)
+    endpoints, gid = [*listen, *given.open], participants.gid(given.name)
     with ZenohBus(endpoints, connect, entry.mode, gid, security, awaits=False) as bus:
         watched = MONITOR in given.peers and not given.with_parent
-        others = [*process_table.needed(setup, given.external or ()), *([MONITOR] if MONITOR in given.peers else [])]
+        others = [
+            *process_table.required_processes(setup, given.external or ()),
+            *([MONITOR] if MONITOR in given.peers else []),
+        ]
         if given.with_parent:  # the run begins when each auxiliary process has opened its links
             others += [name for name in process_table.optional() if name in given.peers]
-        # all that one launcher has started have the same set-up; a program of somebody else's may have another
+        # processes of one launcher have the same run configuration; an external service may have another
         compares = others if not given.with_parent else [encoded] if encoded else []
         pace = (given.speed, given.core, compares, given.realtime)
         process = Participant(given.name, setup, bus, participants, others, *pace)
         process.create_service = partial(process_table.create, setup)
         if given.with_parent:
-            process.end_with_parent(given.peers[given.name])
+            process.stop_with_parent(given.peers[given.name])
         elif watched:
-            process.end_with(MONITOR)
+            process.stop_without(MONITOR)
         try:
             if encoded:
                 run_encoder(process, process_table.create(setup, encoded))
@@ -137,11 +139,11 @@ def import_ahead(names: Iterable[str]) -> None:
     from lapwing.services import process_table
 
     for name in names:
-        process_table.entry(process_table.encoded(name) or name).service()
+        process_table.entry(process_table.encoded_service(name) or name).service()
 
 
 def _heard(process: Any) -> dict[str, Any]:
-    """The operator commands that have come on the bus for each vehicle, from the processes that give any."""
+    """Return the received operator commands by vehicle, from the processes that send any."""
     from lapwing.services.common.operator_inbox import OPERATOR_KEY, OperatorInbox
     from lapwing.services.process_table import MAVLINK, ROS2
 
@@ -151,15 +153,17 @@ def _heard(process: Any) -> dict[str, Any]:
 
 
 def main(name: str) -> None:
-    """Take part as the launcher says, most likely under this name."""
-    from lapwing.cosim.processes.gc_tuning import leave_garbage
+    """Run the participant that standard input specifies, most likely with this name."""
+    from lapwing.cosim.processes.gc_tuning import relax_gc
+    from lapwing.services.common import foreign_code
 
-    leave_garbage()
+    relax_gc()
+    foreign_code.allow(True)  # the command that starts this process has checked it
     with suppress(OSError):  # what `ps` and `top` call it, where the system has that
         Path("/proc/self/comm").write_text(name[:LONGEST])
     import_ahead([name])
     try:
-        code = take_part(take_over())
+        code = run_participant(read_spec())
     except (ValueError, BusError, LockStepError) as error:
         code = error.EXIT_CODE if isinstance(error, LockStepError) else ExitCode.REJECTED
         print(f"lapwing: {' '.join(str(error).split())}", file=sys.stderr)

@@ -25,6 +25,7 @@ class ProcessEntry(NamedTuple):
     needs: tuple[str, ...] = ()  # fields of the process specification that it reads besides the run configuration
     optional: bool = False  # started only if its option is given; the run continues without it
     mode: str = "peer"  # of its Zenoh session
+    foreign: bool = False  # flies a foreign firmware, in the autopilot's place
 
 
 def _plant() -> ModuleType:
@@ -45,6 +46,24 @@ def _autopilot() -> ModuleType:
     return service
 
 
+def _betaflight() -> ModuleType:
+    from lapwing.services.betaflight import service
+
+    return service
+
+
+def _ardupilot() -> ModuleType:
+    from lapwing.services.ardupilot import service
+
+    return service
+
+
+def _px4() -> ModuleType:
+    from lapwing.services.px4 import service
+
+    return service
+
+
 def _trajectory() -> ModuleType:
     from lapwing.services.trajectory import service
 
@@ -53,6 +72,12 @@ def _trajectory() -> ModuleType:
 
 def _formation() -> ModuleType:
     from lapwing.services.formation import service
+
+    return service
+
+
+def _fmu() -> ModuleType:
+    from lapwing.services.fmu import service
 
     return service
 
@@ -91,14 +116,19 @@ PROCESSES = (
     ProcessEntry("plant", _plant, True),
     ProcessEntry("sensors", _sensors, True),
     ProcessEntry("autopilot", _autopilot, True),
+    ProcessEntry("px4", _px4, True, foreign=True),
+    ProcessEntry("ardupilot", _ardupilot, True, foreign=True),
+    ProcessEntry("betaflight", _betaflight, True, foreign=True),
     ProcessEntry("trajectory", _trajectory, True),
     ProcessEntry("formation", _formation, True),
+    ProcessEntry("fmu", _fmu, True),
     ProcessEntry("recorder", _recorder, False, needs=("log",)),
     ProcessEntry("router", _router, False, needs=("open",), optional=True, mode="router"),
     ProcessEntry("mavlink", _mavlink, False, resolves=True, needs=("mavlink",), optional=True),
     ProcessEntry("foxglove", _foxglove, False, needs=("foxglove",), optional=True),
     ProcessEntry("ros2", _ros2, False, needs=("ros2",), optional=True),
 )
+AUTOPILOT, FMU = "autopilot", "fmu"
 RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"
 CLOCK_OWNER = "plant"  # keeps the pace, and says which tick is the last
 
@@ -115,15 +145,15 @@ def entry(name: str) -> ProcessEntry:
     raise ValueError(f"unknown service {name}; expected one of {', '.join(p.name for p in PROCESSES)}")
 
 
-def needed(setup: RunConfig, external: Iterable[str] = ()) -> list[str]:
+def required_processes(setup: RunConfig, external: Iterable[str] = ()) -> list[str]:
     """Return the names of the processes that a run requires, with an encoder for each service in `external`."""
     own = [p.name for p in PROCESSES if (p.name in setup.services if p.lock_step else not p.optional)]
     return own + [f"{name}{ENCODER}" for name in external]
 
 
-def usual() -> list[str]:
+def always_required() -> list[str]:
     """Return the names of the processes that a run may need without any option."""
-    return [p.name for p in PROCESSES if not p.optional]
+    return [p.name for p in PROCESSES if not (p.optional or p.foreign)]
 
 
 def optional() -> list[str]:
@@ -131,21 +161,45 @@ def optional() -> list[str]:
     return [p.name for p in PROCESSES if p.optional]
 
 
-def encoded(name: str) -> str:
+def foreign_firmware(setup: RunConfig) -> str:
+    """Return the names of the foreign firmwares that fly in a run, "" for Lapwing's own autopilot."""
+    return ", ".join(p.name for p in PROCESSES if p.foreign and p.name in setup.services)
+
+
+def encoded_service(name: str) -> str:
     """Return the service whose messages an encoder process encodes, "" for any other process."""
     return name.removesuffix(ENCODER) if name.endswith(ENCODER) else ""
 
 
-Operator = Callable[[int], Iterable[Any]]  # gives the commands that have come until a tick, besides those of the plan
+Operator = Callable[[int], Iterable[Any]]  # returns the commands received until a tick, besides those of the plan
 
 
-def create(setup: RunConfig, name: str, operators: Mapping[str, Operator] = MappingProxyType({})) -> Service:
-    """Create a service of the lock step; `operators` by vehicle name return the external commands up to a tick."""
+def create(
+    setup: RunConfig,
+    name: str,
+    operators: Mapping[str, Operator] = MappingProxyType({}),
+    recorded: Mapping[str, Any] = MappingProxyType({}),
+) -> Service:
+    """Create a service of the lock step.
+
+    Args:
+        setup: configuration of the run.
+        name: name of the service.
+        operators: by vehicle name; return the external commands up to a tick.
+        recorded: by vehicle name, messages of a foreign firmware to fly again (`firmware.playback.Recorded`).
+    """
     module = entry(name).service()
 
     def of(member: RunConfig) -> Service:
-        own = {"operator": operators[member.vehicle]} if name == "autopilot" and member.vehicle in operators else {}
-        return module.create(member, **own)
+        own: dict[str, Any] = {}
+        if name == AUTOPILOT and member.vehicle in operators:
+            own = {"operator": operators[member.vehicle]}
+        elif entry(name).foreign and member.vehicle in recorded:
+            own = {"recorded": recorded[member.vehicle]}
+        service = module.create(member, **own)
+        if FMU in member.services and name != FMU:
+            service.parts = _fmu().rewire(service.parts, member.services[FMU].parameters)
+        return service
 
     if setup.vehicle:
         return of(setup)
@@ -153,14 +207,19 @@ def create(setup: RunConfig, name: str, operators: Mapping[str, Operator] = Mapp
     return joined_service(name, [(member, of(member)) for member in having])
 
 
-def create_all(setup: RunConfig, operator: Operator | Mapping[str, Operator] | None = None) -> list[Service]:
+def create_all(
+    setup: RunConfig,
+    operator: Operator | Mapping[str, Operator] | None = None,
+    recorded: Mapping[str, Any] = MappingProxyType({}),
+) -> list[Service]:
     """Create all services of the lock step, in their order of execution.
 
     Args:
         setup: configuration of the run.
         operator: returns the external commands up to a tick; a mapping by vehicle name for several vehicles.
+        recorded: see `create`.
     """
     if operator is None:
         operator = {}
     operators = operator if isinstance(operator, Mapping) else {setup.vehicle: operator}
-    return [create(setup, name, operators) for name in setup.order]
+    return [create(setup, name, operators, recorded) for name in setup.order]

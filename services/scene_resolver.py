@@ -19,33 +19,42 @@ from lapwing.services.common import communication_schema as exchange
 from lapwing.services.common import environment_schema, mesh_schema, run_schema, success_criteria, user_modules
 from lapwing.services.common import vehicle_schema as vehicle
 from lapwing.services.common.communication_schema import Communication
+from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.services.plant import models
-from lapwing.services.process_table import PROCESSES
+from lapwing.services.process_table import AUTOPILOT, FMU, PROCESSES
 
 
 def _resolvers() -> dict[str, ModuleType]:
     """Return the module `resolve` of each process that has one; imported only once a scene is resolved."""
+    from lapwing.services.ardupilot import resolve as ardupilot
     from lapwing.services.autopilot import resolve as autopilot
+    from lapwing.services.betaflight import resolve as betaflight
+    from lapwing.services.fmu import resolve as fmu
     from lapwing.services.formation import resolve as formation
     from lapwing.services.mavlink import resolve as mavlink
     from lapwing.services.plant import resolve as plant
+    from lapwing.services.px4 import resolve as px4
     from lapwing.services.sensors import resolve as sensors
     from lapwing.services.trajectory import resolve as trajectory
 
     return {
+        "ardupilot": ardupilot,
         "autopilot": autopilot,
+        "betaflight": betaflight,
+        "fmu": fmu,
         "formation": formation,
         "mavlink": mavlink,
         "plant": plant,
+        "px4": px4,
         "sensors": sensors,
         "trajectory": trajectory,
     }
 
 
 def _configurations() -> list[ModuleType]:
-    """The module `schema` of every service that has one."""
+    """Return the `schema` modules of all services."""
     folders = sorted(p.name for p in pkgutil.iter_modules(lapwing.services.__path__) if p.ispkg)
     paths = [f"lapwing.services.{name}.schema" for name in folders]
     return [importlib.import_module(path) for path in paths if importlib.util.find_spec(path)]
@@ -53,7 +62,7 @@ def _configurations() -> list[ModuleType]:
 
 @cache
 def vocabulary() -> Vocabulary:
-    """Every table that a scene may have: of several services, of one, and of the plant's models."""
+    """Return all possible scene tables: shared ones, those of services, and those of plant models."""
     shared = [run_schema, success_criteria, exchange, environment_schema, vehicle, user_modules, mesh_schema]
     tables = [*shared, *_configurations(), *map(models.get, models.names())]
     return Vocabulary.of(tables, models.check)
@@ -63,7 +72,8 @@ def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     """Read a scene and all that it names, override, and validate.
 
     Args:
-        scene: path of its TOML file, or the name of one that ships; or one that is loaded, to which more is to be done.
+        scene: path of its TOML file or SSP package, or the name of one that ships; or one that is loaded, to which more
+            is to be done.
         overrides: "dotted.key=value" with a TOML value (a bare word counts as a text), or values by dotted key; of any
             key that the scene resolves to: "airframe.mass.total=9.5".
 
@@ -71,39 +81,48 @@ def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
         SceneError: what is wrong with which key, and what would be right.
     """
     if isinstance(scene, Scene):
-        return scenes.again(scene, overrides, vocabulary()) if overrides else scene
+        return scenes.with_overrides(scene, overrides, vocabulary()) if overrides else scene
+    if Path(scene).suffix == ".ssp":
+        return _load_package(Path(scene), overrides)
     return scenes.load(scene, overrides, vocabulary(), run_schema.SHIPPED)
 
 
+def _load_package(path: Path, overrides: Overrides) -> Scene:
+    from lapwing.services.fmu.system_structure import scene_of_package
+
+    tree = scene_of_package(path, lambda name, text: dict(parse(name, text).resolved))
+    return scenes.from_resolved(scenes.with_values(tree, overrides), vocabulary(), path.stem)
+
+
 def load_one(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
-    """`load` of a scene for what works on one vehicle; SceneError where it lists several."""
+    """Load a scene with a single vehicle. Raise SceneError if it has several."""
     loaded = load(scene, overrides)
     loaded[Vehicle]  # refused there
     return loaded
 
 
 def parse(path: Path, text: str, overrides: Overrides = ()) -> Scene:
-    """`load` of a scene's text; `path` says what it is called and what lies beside it."""
+    """Load a scene from its text; `path` is its name and the base of relative files."""
     return scenes.parse(path, text, overrides, vocabulary())
 
 
 def from_resolved(tree: Mapping[str, Any], name: str = "scene") -> Scene:
-    """The scene whose `resolved` is `tree`, without opening a file; SceneError if it is no longer a sound one."""
+    """Return the scene whose `resolved` is `tree`, without opening a file. Raise SceneError if it is invalid."""
     return scenes.from_resolved(tree, vocabulary(), name)
 
 
 def reseed(setup: RunConfig, seed: int) -> RunConfig:
-    """The same run with another seed: what `resolve` gives of the scene with that seed, without resolving it again.
+    """Return the run configuration with another seed, equal to `resolve` of the scene with that seed, but faster.
 
     Raises:
-        SceneError: no such seed.
+        SceneError: the seed is invalid.
     """
     if not hasattr(seed, "__index__") or not 0 <= (number := index(seed)) < 2**63:
         raise SceneError("run.seed", f"got {seed!r}", "a whole number from 0 to 2^63 - 1")
     seed = number
     if not setup.vehicle:
         resolved = {**setup.resolved, Run.TABLE: {**setup.resolved[Run.TABLE], "seed": seed}}
-        return multi_vehicle.joined([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
+        return multi_vehicle.merge_configs([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
     services_of = dict(setup.services)
     for name, given in services_of.items():
         module = _resolvers()[name]
@@ -114,14 +133,14 @@ def reseed(setup: RunConfig, seed: int) -> RunConfig:
 
 
 def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyType({})) -> RunConfig:
-    """The set-up of a run of this scene.
+    """Return the run configuration of a scene.
 
     Args:
-        scene: what to fly.
-        plans: operator commands that the autopilot of a vehicle gets at the first tick, by the vehicle's name.
+        scene: loaded scene.
+        plans: operator commands of the first tick, by vehicle name.
 
     Raises:
-        SceneError: what is wrong with which key, and what would be right.
+        SceneError: a value is invalid; names its key and what is expected.
     """
     if scene.vehicles:
         members = []
@@ -129,26 +148,26 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
             with vehicle.located():
                 members.append(_resolve(vehicle, plans))
         with scene.located():
-            return multi_vehicle.joined(_acquainted(members, "vehicle.{}."), dict(scene.resolved))
+            return multi_vehicle.merge_configs(_acquainted(members, "vehicle.{}."), dict(scene.resolved))
     with scene.located():
         (setup,) = _acquainted([_resolve(scene, plans)], "")
         return setup
 
 
 def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
-    """The set-ups of a run's vehicles, once services whose `resolve.py` has `fleet` have seen those of all.
+    """Return the configurations of all vehicles, combined by the services whose `resolve.py` has `fleet`.
 
-    `key`: what the keys of a vehicle begin with, with its number for {}.
+    `key` is the prefix of a vehicle's keys, with {} for its number.
     """
     keys = {member.vehicle: key.format(i) for i, member in enumerate(members)}
     for name in dict.fromkeys(name for member in members for name in member.services):
         module = _resolvers()[name]
         if hasattr(module, "fleet"):
             shares = {member.vehicle: member.services[name] for member in members if name in member.services}
-            found = module.fleet(shares, keys)
+            result = module.fleet(shares, keys)
             members = [
-                member._replace(services={**member.services, name: found[member.vehicle]})
-                if member.vehicle in found
+                member._replace(services={**member.services, name: result[member.vehicle]})
+                if member.vehicle in result
                 else member
                 for member in members
             ]
@@ -157,16 +176,17 @@ def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
 
 def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
     exchange, run = scene[Communication], scene[Run]
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     beside: dict[str, Any] = {}
     for process in PROCESSES:
-        if process.lock_step or process.resolves:
+        if process.name != FMU and (process.lock_step or process.resolves):
             given = _resolvers()[process.name].resolve(scene)
             if given is not None:
-                (found if process.lock_step else beside)[process.name] = given
+                (result if process.lock_step else beside)[process.name] = given
+    result = _resolvers()[FMU].connect(scene, result)
     if plan := plans.get(scene[Vehicle].name):
-        autopilot = found["autopilot"]
-        found["autopilot"] = autopilot._replace(parameters=autopilot.parameters._replace(plan=plan))
+        name = next(name for name in (AUTOPILOT, *FIRMWARES) if name in result)
+        result[name] = result[name]._replace(parameters=result[name].parameters._replace(plan=plan))
     return RunConfig(
         scene.name,
         run.title,
@@ -176,7 +196,7 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
         exchange.interval_ns,
         exchange.coupling,
         scene[Vehicle].name,
-        found,
+        result,
         beside,
         dict(scene.resolved),
     )

@@ -1,5 +1,4 @@
-"""What each participant of a run may publish, from the process table and the topics of its services; and the settings
-of its links that follow."""
+"""Publishing permissions of each participant, from the process table and the topics of its services."""
 
 from pathlib import Path
 from typing import Any
@@ -14,29 +13,29 @@ from lapwing.services.process_table import PROCESSES, ROUTER, create
 
 
 def names() -> list[str]:
-    """Everybody who can take part in a run."""
+    """Return the names of all possible participants of a run."""
     makers = [f"{process.name}{ENCODER}" for process in PROCESSES if process.lock_step]
     return [*(process.name for process in PROCESSES), *makers, MONITOR]
 
 
 def says(setup: RunConfig, key_prefix: str) -> dict[str, list[str]]:
-    """The key expressions that each may publish on, by name."""
-    found = {name: [f"{key_prefix}/*/{name}"] for name in names()}
-    found[MONITOR] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
+    """Return the key expressions that each participant may publish on, by name."""
+    result = {name: [f"{key_prefix}/*/{name}"] for name in names()}
+    result[MONITOR] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
     for name in setup.services:
         topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
-        found[name] += topics
-        found[f"{name}{ENCODER}"] += [*topics, f"{key_prefix}/*/{name}"]
-    return found
+        result[name] += topics
+        result[f"{name}{ENCODER}"] += [*topics, f"{key_prefix}/*/{name}"]
+    return result
 
 
 def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[str, Any]:
-    """Zenoh's settings for the links of a participant of a run on several hosts.
+    """Return the Zenoh settings for the links of a participant of a run on several hosts.
 
-    Without a folder of certificates there are none, but that a router withholds the lock step from whom it lets in.
+    Without a folder of certificates, only a router has settings: it withholds the lock step from its clients.
 
     Raises:
-        ValueError: its certificate cannot be used.
+        ValueError: the certificate cannot be used.
     """
     if not keys:
         return withholding(key_prefix) if name == ROUTER else {}
@@ -44,9 +43,9 @@ def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[st
 
 
 def door_settings(name: str, key_prefix: str, keys: str) -> dict[str, Any]:
-    """Zenoh's settings for whoever lets clients into a run on one machine.
+    """Return the Zenoh settings for the process that accepts clients of a run on one machine.
 
     Raises:
-        ValueError: its certificate cannot be used.
+        ValueError: the certificate cannot be used.
     """
     return {**(tls(Path(keys), name) if keys else {}), **door(key_prefix, bool(keys))}

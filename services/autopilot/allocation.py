@@ -11,8 +11,8 @@ from lapwing.dynamics.effects._types import WakeSlopes
 from lapwing.dynamics.small_matrices import inverse, product, symmetric_eigenvalues
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math
-from lapwing.services.autopilot.interface import PerRotor
 from lapwing.services.autopilot.mixer import Share, Shares
+from lapwing.services.common.ports import PerRotor
 
 LEAST_LIFT = 0.05  # minimum share of the hover lift per rotor, which leaves room for control
 WORST_CONDITION = 1e3  # condition number of the scaled effectiveness above which a torque is uncontrollable
@@ -57,7 +57,7 @@ def in_wakes(still: np.ndarray, turning: np.ndarray, torque_per_thrust: float, w
     return product(still, thrust) + product(turning, torque_per_thrust * np.eye(len(thrust)) + torque)
 
 
-def demand_effects(B: np.ndarray) -> np.ndarray:
+def virtual_control_effectiveness(B: np.ndarray) -> np.ndarray:
     """Return lift [N] and torques [N m] of virtual controls of 1 N: rotors times mean arm, shape (4,).
 
     Args:
@@ -66,7 +66,7 @@ def demand_effects(B: np.ndarray) -> np.ndarray:
     return np.array([math.total(abs(float(v)) for v in row) for row in B])
 
 
-def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None) -> Shares | None:
+def rotor_shares(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None) -> Shares | None:
     """Return the (collective, roll, pitch, yaw) share of every rotor. Return None if a balanced hover is impossible.
 
     If the remaining rotors after a failure cannot control yaw too, the yaw shares are 0.
@@ -76,7 +76,7 @@ def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None)
         failed: number of the failed rotor, from 1; 0: none.
         weights: weights of the squared thrusts, shape (rotors,); default 1.
     """
-    effects = demand_effects(B)
+    effects = virtual_control_effectiveness(B)
     if effects.min() <= 0.0:
         return None
     root = np.sqrt(np.ones(B.shape[1]) if weights is None else weights)
@@ -96,7 +96,7 @@ def shares_of(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = None)
 
 
 def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ...]:
-    """Return the shares with all rotors, then with each one failed. See `shares_of` for arguments.
+    """Return the shares with all rotors, then with each one failed. See `rotor_shares` for arguments.
 
     Only the first table is returned if a failed rotor ends control, as with four rotors, or cannot be identified by
     the gyroscopes, as with coaxial rotors.
@@ -104,14 +104,14 @@ def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ..
     Raises:
         ValueError: a balanced hover is impossible, or no torque acts about an axis.
     """
-    whole, count = shares_of(B, 0, weights), B.shape[1]
+    whole, count = rotor_shares(B, 0, weights), B.shape[1]
     if whole is None:
         expected = "lift from each rotor in hover, and independent torques about all three axes"
         raise ValueError(f"the {count} rotors cannot be balanced; expected {expected}")
     arms = np.round(B[1:YAW] / B[0], ARM_DIGITS)
     if len(np.unique(arms, axis=1).T) < count:
         return (whole,)
-    found = [shares for k in range(1, count + 1) if (shares := shares_of(B, k, weights)) is not None]
+    found = [shares for k in range(1, count + 1) if (shares := rotor_shares(B, k, weights)) is not None]
     return (whole, *found) if len(found) == count else (whole,)
 
 

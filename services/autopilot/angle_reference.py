@@ -16,9 +16,9 @@ class Smoothing(NamedTuple):
 class Angle(NamedTuple):
     """State of the filter; the demand leads the reference by the lag."""
 
-    demand: float  # [rad]
-    demand_rate: float  # [rad/s]
-    demand_acceleration: float  # [rad/s^2] motor command
+    command: float  # [rad]
+    command_rate: float  # [rad/s]
+    command_acceleration: float  # [rad/s^2]
     angle: float  # the reference [rad]
     rate: float  # [rad/s]
     acceleration: float  # [rad/s^2]
@@ -30,15 +30,15 @@ AT_REST = Angle(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 @always_inline
 def advance(p: Smoothing, s: Angle, target: float, dt: float) -> Angle:
     """Return the state after dt [s] with input `target` [rad]; dt times bandwidth must stay well below 1."""
-    acceleration = p.bandwidth * (p.bandwidth * (target - s.demand) - 2.0 * p.damping * s.demand_rate)
-    demand = s.demand + dt * (s.demand_rate + 0.5 * dt * acceleration)
-    demand_rate = s.demand_rate + dt * acceleration
+    acceleration = p.bandwidth * (p.bandwidth * (target - s.command) - 2.0 * p.damping * s.command_rate)
+    command = s.command + dt * (s.command_rate + 0.5 * dt * acceleration)
+    command_rate = s.command_rate + dt * acceleration
     if p.lag == 0.0:
-        return Angle(demand, demand_rate, acceleration, demand, demand_rate, acceleration)
+        return Angle(command, command_rate, acceleration, command, command_rate, acceleration)
     # Exact response of a first-order lag to a constant demand.
     excess = s.acceleration - acceleration
     decay = math.exp(-dt / p.lag)
     first = p.lag * (1.0 - decay)
     angle = s.angle + dt * (s.rate + 0.5 * dt * acceleration) + excess * p.lag * (dt - first)
     rate = s.rate + dt * acceleration + excess * first
-    return Angle(demand, demand_rate, acceleration, angle, rate, acceleration + excess * decay)
+    return Angle(command, command_rate, acceleration, angle, rate, acceleration + excess * decay)

@@ -22,13 +22,13 @@ from lapwing.services.autopilot.commander_wakeup import ESTIMATE_POLL_TICKS
 from lapwing.services.autopilot.controller_parameters import build, lift
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
 from lapwing.services.autopilot.failure_injection.motor_failures import DirectMotorControl
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
+from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
-from lapwing.services.common.autopilot_parameters import with_gains
-from lapwing.services.common.operator_inbox import joined
-from lapwing.services.common.ports import Reference
+from lapwing.services.common.autopilot_parameters import PX4_CASCADE, with_gains
+from lapwing.services.common.operator_inbox import merge_commands
+from lapwing.services.common.ports import Setpoint
 
 Operator = Callable[[int], Iterable[Any]]
 
@@ -62,6 +62,7 @@ class CommanderBlock:
         service: Service,
         operator: Operator,
         injection: Injection,
+        px4: Cell | None = None,
     ):
         """Create the block.
 
@@ -72,8 +73,10 @@ class CommanderBlock:
             service: receiver of the messages.
             operator: source of operator commands.
             injection: failure injection.
+            px4: cell of the parameters of PX4's cascade, if it flies.
         """
-        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Reference(), LATCHED),)
+        self._px4 = px4
+        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
         self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *unwritten)
         a = given.airframe
         self._given, self._law, self._thresholds, self._service, self._operator = (
@@ -100,7 +103,7 @@ class CommanderBlock:
         )
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
-        self.phases, self.words = TextTable(given.phases), TextTable([_words(self._commander.initial_status())])
+        self.phases, self.status_texts = TextTable(given.phases), TextTable([_words(self._commander.initial_status())])
         self._driven: tuple[float, ...] | None = None  # direct motor voltages in use
         self._asked = -1  # [tick] of the commander's last step
         self._estimate: Any = None  # last estimate passed to the commander
@@ -115,7 +118,7 @@ class CommanderBlock:
         self._graph = graph
         self._interval, self._interval_ns = graph.setup.interval, graph.setup.interval_ns
 
-    def act(self, tick: int) -> int:
+    def on_tick(self, tick: int) -> int:
         """Step the commander at `tick`. Return the tick of the next wake-up."""
         graph = self._graph
         if self._given.operator and tick - self._asked > 1:
@@ -139,7 +142,7 @@ class CommanderBlock:
                 flight.failed_motor,
                 followed,
                 self._thrust(tick),
-                flight.stage == LANDED,
+                flight.landed_state == LANDED,
                 self._commands(tick),
             )
         )
@@ -147,6 +150,8 @@ class CommanderBlock:
         if request.parameters is not None:
             write(self._law, controller(self._given, dict(request.parameters)))
             write(self._thresholds, battery_thresholds(request.parameters))
+            if self._px4 is not None:
+                write(self._px4, px4_law.build(request.parameters, self._given.airframe))
         if request.faults is not None and self._injection.faults is not None:
             write(self._injection.faults, request.faults)
         if self._injection.direct is not None and request.motor_voltage != self._driven:
@@ -157,11 +162,11 @@ class CommanderBlock:
             graph.put(ORDER, tick, order)
             self._ordered = order
         self._answer(tick, request)
-        return self._next(tick, request.quiet)
+        return self._next(tick, request.valid_for)
 
-    def _next(self, tick: int, quiet: float) -> int:
-        """Return the tick of the next wake-up after an output at `tick` that stays valid for `quiet` [s]."""
-        ticks = int(quiet / self._interval) if quiet < math.inf else NEVER
+    def _next(self, tick: int, valid_for: float) -> int:
+        """Return the tick of the next wake-up after an output at `tick` that stays valid for `valid_for` [s]."""
+        ticks = int(valid_for / self._interval) if valid_for < math.inf else NEVER
         if self._given.operator:
             ticks = min(ticks, *[every - tick % every for every in (ESTIMATE_POLL_TICKS, self._given.answers_every)])
         return min(tick + max(1, ticks), NEVER)
@@ -174,14 +179,15 @@ class CommanderBlock:
 
     def _flies(self, tick: int) -> bool:
         """Return True if the vehicle flies along the trajectory."""
-        return self._thrust(tick) > 0.0 and self._flight(tick).stage != LANDED
+        return self._thrust(tick) > 0.0 and self._flight(tick).landed_state != LANDED
 
     def _flight(self, tick: int) -> Flight:
         found: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
         return found
 
     def _followed(self, tick: int) -> Setpoint:
-        return _setpoint(self._graph.latest(ports.TRAJECTORY, tick))
+        found: Setpoint = self._graph.latest(ports.TRAJECTORY, tick)
+        return found
 
     def _direct(self, volts: tuple[float, ...] | None) -> DirectMotorControl:
         """Return the direct motor voltages within the motors' range; None: the controller's voltages."""
@@ -200,18 +206,18 @@ class CommanderBlock:
         given = self._given
         if not given.operator or tick % given.answers_every:
             return ()
-        message = joined(tick * self._interval_ns, self._operator(tick))
+        message = merge_commands(tick * self._interval_ns, self._operator(tick))
         self._service.messages.append((topic.OPERATOR, tick, message.encode()))
         return tuple(message.commands)
 
     def _order(self, tick: int, request: CommanderOutput, flight: Flight) -> ControllerInput:
-        status, wanted = request.status, request.setpoint
-        restart = tick if request.reset_controller and flight.stage != ON_GROUND else -1
-        words = self.words.number(_words(status))
-        if wanted is None:
-            return ControllerInput(True, Reference(), words, False, False, status.released, restart)
-        reference = Reference(*wanted, self.phases.number(status.phase), False)
-        return ControllerInput(False, reference, words, status.armed, status.finished, status.released, restart)
+        status, setpoint = request.status, request.setpoint
+        restart = tick if request.reset_controller and flight.landed_state != ON_GROUND else -1
+        status_text_id = self.status_texts.number(_words(status))
+        if setpoint is None:
+            return ControllerInput(True, Setpoint(), status_text_id, False, False, status.released, restart)
+        setpoint = setpoint._replace(phase=self.phases.number(status.phase), final=False, release=False)
+        return ControllerInput(False, setpoint, status_text_id, status.armed, status.finished, status.released, restart)
 
     def _answer(self, tick: int, request: CommanderOutput) -> None:
         self._acknowledgements += request.acknowledgements
@@ -227,13 +233,15 @@ class CommanderBlock:
 
 def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
     """Return the controller's parameters with the commander's parameter `values`."""
-    return build(with_gains(given.gains, values), given.airframe, given.geometric)
+    gains = given.gains if flies_px4_cascade(given) else with_gains(given.gains, values)
+    return build(gains, given.airframe, given.geometric)
+
+
+def flies_px4_cascade(given: AutopilotSetup) -> bool:
+    """Return True if PX4's cascade is the control law."""
+    return given.controller is not None and given.controller.name == PX4_CASCADE
 
 
 def _words(status: Status) -> Status:
     """Return the part of a status that the port does not have as numbers."""
     return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)
-
-
-def _setpoint(r: Reference) -> Setpoint:
-    return Setpoint(r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate)

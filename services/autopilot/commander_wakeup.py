@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.kernels import always_inline
-from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds, needs_attention
+from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds, needs_wakeup
 
 ESTIMATE_POLL_TICKS = 5  # [ticks] between two estimates passed to the commander
 
@@ -16,11 +16,11 @@ class WakeupParameters(NamedTuple):
 
 
 @always_inline
-def attention_due(p: WakeupParameters, tick: int, health: int, battery: InputSample, flight: InputSample) -> bool:
+def wakeup_due(p: WakeupParameters, tick: int, health: int, battery: InputSample, flight: InputSample) -> bool:
     """Return True if the commander must run at `tick`."""
     charge = battery.value.charge if battery.due else 1.0
     failed = flight.value.failed_motor if flight.due else 0
-    return needs_attention(p.thresholds.value, health, charge, failed, tick % ESTIMATE_POLL_TICKS == 0)
+    return needs_wakeup(p.thresholds.value, health, charge, failed, tick % ESTIMATE_POLL_TICKS == 0)
 
 
 @always_inline

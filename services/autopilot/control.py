@@ -8,20 +8,37 @@ from lapwing.dynamics.vector import ZERO, Vec3, subtract
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.autopilot.angle_reference import AT_REST, Angle, Smoothing, advance
 from lapwing.services.autopilot.attitude import error_by_angle, error_on_so3
-from lapwing.services.autopilot.interface import Command, Estimate, Setpoint
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LANDED, LandedState, advance_stage
+from lapwing.services.autopilot.land_detector import (
+    FLYING,
+    INITIAL_LANDED_STATE,
+    LANDED,
+    LandedState,
+    update_landed_state,
+)
 from lapwing.services.autopilot.mixer import (
     Shares,
     VirtualControls,
+    active_allocation,
     at_rest,
     clamp,
+    clamp_to_range,
     mix,
-    possible,
     saturate,
-    shares_in_force,
 )
 from lapwing.services.autopilot.motor import Motor, voltages
 from lapwing.services.autopilot.pid import Pid, integrate, output
+from lapwing.services.common.ports import PerRotor, Setpoint, StateEstimate
+
+
+class Command(NamedTuple):
+    """Output of the control law."""
+
+    motor_voltage: PerRotor  # [V]
+    thrust: PerRotor  # [N]
+    roll_reference: float  # of the inner loop [rad]
+    pitch_reference: float  # [rad]
+    yaw_reference: float  # [rad]
+    finished: bool  # landed, motors off
 
 
 class Parameters(NamedTuple):
@@ -35,9 +52,9 @@ class Parameters(NamedTuple):
     pitch_outer: Pid  # [rad] over [m]
     smoothing: Smoothing  # of the tilt references
     tilt_limit: float  # [rad] about either axis
-    hover_demand: float  # [N] feed-forward of every rotor; 0 without feed-forward
+    hover_collective: float  # [N] feed-forward of every rotor; 0 without feed-forward
     gravity: float  # [m/s^2]
-    torque_demands: Vec3  # roll, pitch, yaw control per angular acceleration [N/(rad/s^2)]; 0 without feed-forward
+    controls_per_acceleration: Vec3  # [N/(rad/s^2)] roll, pitch, yaw; 0 without feed-forward
     geometric: bool  # attitude error on SO(3) instead of Euler angles
     shares: tuple[Shares, ...]  # with all rotors, then with each one failed
     thrust_max: float  # [N] of a rotor
@@ -48,7 +65,7 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """State of the controller."""
 
-    stage: LandedState
+    landed_state: LandedState
     integral_world: Vec3  # of the position error [m s]
     integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
     tilt_x: Angle  # reference of the pitch
@@ -57,7 +74,7 @@ class State(NamedTuple):
     tilt_cut: tuple[float, float]  # sign of the part of the tilts that the limit removed, world axes
 
 
-START = State(INITIAL_STAGE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+START = State(INITIAL_LANDED_STATE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
 @always_inline
@@ -82,27 +99,27 @@ def tilt_targets(
     vx, vy = to_heading(yaw, error_rate)
     ix, iy = to_heading(yaw, integral)
     tilt_x, tilt_y = output(p.pitch_outer, ix, x, vx), output(p.roll_outer, iy, y, vy)
-    if p.hover_demand > 0.0:
+    if p.hover_collective > 0.0:
         ax, ay = to_heading(yaw, acceleration_world)
         tilt_x, tilt_y = tilt_x + ax / p.gravity, tilt_y + ay / p.gravity
     return tilt_x, tilt_y
 
 
 @always_inline
-def collective_demand(
+def collective_control(
     p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
 ) -> float:
     """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13))."""
     collective = output(p.altitude, integral, error, error_rate)
-    if p.hover_demand > 0.0:
+    if p.hover_collective > 0.0:
         upright = max(math.cos(roll) * math.cos(pitch), 0.5)
-        collective = (collective + p.hover_demand * (1.0 + acceleration / p.gravity)) / upright
+        collective = (collective + p.hover_collective * (1.0 + acceleration / p.gravity)) / upright
     return collective
 
 
 @kernel
 def step(
-    p: Parameters, s: State, dt: float, estimate: Estimate, setpoint: Setpoint, failed: int
+    p: Parameters, s: State, dt: float, estimate: StateEstimate, setpoint: Setpoint, failed: int
 ) -> tuple[State, Command]:
     """Return the state and the command after a tick.
 
@@ -116,11 +133,11 @@ def step(
     """
     roll, pitch, yaw = to_roll_pitch_yaw(estimate.attitude)
     angles = (roll, pitch, yaw)
-    stage = advance_stage(s.stage, p.resting_height, estimate, setpoint, dt)
-    if stage.name != FLYING:
+    landed = update_landed_state(s.landed_state, p.resting_height, estimate, setpoint, dt)
+    if landed.name != FLYING:
         off = at_rest(p.shares[0])
-        rest = State(stage, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
-        return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, stage.name == LANDED)
+        rest = State(landed, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
+        return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
 
     error = subtract(setpoint.position_world, estimate.position_world)
     error_rate = subtract(setpoint.velocity_world, estimate.velocity_world)
@@ -151,14 +168,14 @@ def step(
         integrate(p.yaw, s.integral_angles[2], turn[2], s.cut.yaw, dt),
     )
     wanted = VirtualControls(
-        collective_demand(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
+        collective_control(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
         output(p.roll_inner, integral_angles[0], -turn[0], -turn_rate[0])
-        - p.torque_demands[0] * tilt_y.demand_acceleration,
+        - p.controls_per_acceleration[0] * tilt_y.command_acceleration,
         output(p.pitch_inner, integral_angles[1], turn[1], turn_rate[1])
-        + p.torque_demands[1] * tilt_x.demand_acceleration,
+        + p.controls_per_acceleration[1] * tilt_x.command_acceleration,
         output(p.yaw, integral_angles[2], turn[2], turn_rate[2]),
     )
-    shares = shares_in_force(p.shares, failed)
+    shares = active_allocation(p.shares, failed)
     given = saturate(shares, wanted, p.thrust_max)
     cut = VirtualControls(
         sign(wanted.collective - given.collective),
@@ -166,7 +183,7 @@ def step(
         sign(wanted.pitch - given.pitch),
         sign(wanted.yaw - given.yaw),
     )
-    thrust = possible(mix(shares, given), p.thrust_max)
+    thrust = clamp_to_range(mix(shares, given), p.thrust_max)
     volts = voltages(p.motor, thrust)
-    state = State(stage, integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
+    state = State(landed, integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
     return state, Command(volts, thrust, angles_reference[0], angles_reference[1], setpoint.yaw, False)

@@ -8,13 +8,19 @@ import numpy as np
 from lapwing.dynamics.effects._types import WakeSlopes
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math, python_function
-from lapwing.services.autopilot.allocation import demand_effects, effectiveness, in_wakes, tables, tilted_effectiveness
+from lapwing.services.autopilot.allocation import (
+    effectiveness,
+    in_wakes,
+    tables,
+    tilted_effectiveness,
+    virtual_control_effectiveness,
+)
 from lapwing.services.autopilot.angle_reference import Smoothing
 from lapwing.services.autopilot.control import Parameters
-from lapwing.services.autopilot.interface import PerRotor
 from lapwing.services.autopilot.mixer import Shares
 from lapwing.services.autopilot.motor import Motor, thrust_at
 from lapwing.services.autopilot.pid import Pid
+from lapwing.services.common.ports import PerRotor
 
 Triple = tuple[float, float, float]  # P, I, D
 
@@ -75,9 +81,9 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
         pitch_outer=Pid(*gains.pitch_outer),
         smoothing=Smoothing(gains.reference_bandwidth, gains.reference_damping, forward * airframe.motor.time_constant),
         tilt_limit=gains.tilt_limit,
-        hover_demand=forward * weight,
+        hover_collective=forward * weight,
         gravity=airframe.gravity,
-        torque_demands=(x, y, z),
+        controls_per_acceleration=(x, y, z),
         geometric=geometric,
         shares=share,
         thrust_max=thrust_max,
@@ -141,7 +147,7 @@ def _effectiveness(
 # used several times at a start, and by every run of a campaign
 @lru_cache(maxsize=16)
 def _demand_effects(*geometry: Any) -> tuple[float, ...]:
-    return tuple(map(float, demand_effects(_effectiveness(*geometry))))
+    return tuple(map(float, virtual_control_effectiveness(_effectiveness(*geometry))))
 
 
 @lru_cache(maxsize=16)

@@ -1,19 +1,21 @@
 """Topic encoders of the autopilot."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
-from lapwing.messages import Actuators, Estimate, Status, Vector3, header
+from lapwing.messages import Estimate, EstimateCovariance, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.autopilot.estimator import NAMES
 from lapwing.services.common import ports
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand, StateEstimate
-from lapwing.services.common.reference_encoder import reference_wire
+from lapwing.services.common.command_encoder import actuators_wire, status_wire
+from lapwing.services.common.ports import StateEstimate
+from lapwing.services.common.setpoint_encoder import setpoint_encoder
 
 
 def wires(
@@ -28,33 +30,28 @@ def wires(
         texts: phase names by index; may grow.
         words: status texts of the commander by index; may grow.
     """
-    actuators = setup.port(ports.ACTUATORS).like
-    command = Actuators(header(0, "body"), actuators.motor_voltage, False, actuators.thrust)
     return [
-        TopicEncoder(topic.ACTUATORS, ports.ACTUATORS, 1, _actuators, lambda: command),
+        actuators_wire(setup.port(ports.ACTUATORS)),
         TopicEncoder(
             topic.ESTIMATE, ports.ESTIMATE, estimate_every, _estimate, _estimate_sample, lambda x: [x.rejected]
         ),
-        reference_wire(topic.SETPOINT, ports.SETPOINT, texts),
-        TopicEncoder(
-            topic.STATUS,
-            ports.STATUS,
-            status_every,
-            _status,
-            _status_sample(texts, words),
-            _status_texts,
+        setpoint_encoder(topic.SETPOINT, ports.SETPOINT, texts),
+        status_wire(status_every, texts, words),
+        *(
+            [_covariance_wire(setup.port(ports.ESTIMATE_COVARIANCE))]
+            if ports.ESTIMATE_COVARIANCE in setup.ports
+            else []
         ),
     ]
 
 
-def _actuators(x: MotorCommand, time_ns: np.ndarray) -> Fields:
-    return {
-        **stamp_columns(time_ns),
-        "motor_voltage": x.motor_voltage,
-        "armed": x.armed,
-        "thrust": x.thrust,
-        "attitude_reference": x.attitude_reference,
-    }
+def _covariance_wire(port: Port) -> TopicEncoder:
+    def fields(x: ports.EstimateCovariance, time_ns: np.ndarray) -> Fields:
+        return {**stamp_columns(time_ns), "covariance": x.covariance, "nis": x.nis}
+
+    return TopicEncoder(
+        topic.ESTIMATE_COVARIANCE, port.name, port.period, fields, lambda: EstimateCovariance(header(0, "world"))
+    )
 
 
 def _estimate_sample(rejected: int) -> Any:
@@ -77,33 +74,4 @@ def _estimate(x: StateEstimate, time_ns: np.ndarray) -> Fields:
         "velocity_std": x.velocity_std,
         "attitude_std": x.attitude_std,
         "health_flags": x.health,
-    }
-
-
-def _status_sample(texts: Sequence[str], words: Sequence[Any]) -> Callable[[int, int, int], Any]:
-    def sample(phase: int, number: int, armed: int) -> Any:
-        w = words[number]
-        return Status(
-            header(0, "body"), w.mode, texts[phase], text=w.failsafe,
-            mission_current=w.mission_current, mission_count=w.mission_count, mission_reached=w.mission_reached,
-            mission_state=w.mission_state, offboard_available=w.offboard_available,
-            arming_blockers=() if armed else tuple(w.arming_blockers),
-            failsafe=bool(w.failsafe), home=Vector3(*w.home),
-        )  # fmt: skip
-
-    return sample
-
-
-def _status_texts(x: AutopilotStatus) -> list[Any]:
-    return [x.phase, x.words, x.armed]
-
-
-def _status(x: AutopilotStatus, time_ns: np.ndarray) -> Fields:
-    return {
-        **stamp_columns(time_ns),
-        "armed": x.armed,
-        "landed": x.landed,
-        "finished": x.finished,
-        "battery_warning": x.battery_warning,
-        "failed_motor": x.failed_motor,
     }

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from lapwing.kernels import always_inline
-from lapwing.services.autopilot.interface import Estimate, Setpoint
+from lapwing.services.common.ports import Setpoint, StateEstimate
 
 ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
 CUT_HEIGHT = (
@@ -21,21 +21,21 @@ class LandedState(NamedTuple):
     waiting: float  # [s] at rest with a setpoint on the ground
 
 
-INITIAL_STAGE = LandedState(ON_GROUND, 0.0)
+INITIAL_LANDED_STATE = LandedState(ON_GROUND, 0.0)
 
 
 @always_inline
-def advance_stage(
-    stage: LandedState, resting_height: float, estimate: Estimate, setpoint: Setpoint, dt: float
+def update_landed_state(
+    landed: LandedState, resting_height: float, estimate: StateEstimate, setpoint: Setpoint, dt: float
 ) -> LandedState:
     """Return the state after a tick of dt [s]; `resting_height` is world z at rest on the ground [m]."""
     height, speed = estimate.position_world[2] - resting_height, estimate.velocity_world[2]
-    asked_height, asked_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
-    if stage.name == ON_GROUND:
-        return LandedState(FLYING if asked_height > 1e-6 or asked_speed > 0.0 else ON_GROUND, 0.0)
-    if asked_height >= CUT_HEIGHT or asked_speed > 0.0:
-        return LandedState(FLYING if asked_height >= CUT_HEIGHT and asked_speed > 0.0 else stage.name, 0.0)
-    if stage.name == LANDED:
-        return stage
-    waiting = stage.waiting + dt if abs(speed) < LANDED_SPEED and height < LANDED_HEIGHT_ERROR else 0.0
+    setpoint_height, setpoint_speed = setpoint.position_world[2] - resting_height, setpoint.velocity_world[2]
+    if landed.name == ON_GROUND:
+        return LandedState(FLYING if setpoint_height > 1e-6 or setpoint_speed > 0.0 else ON_GROUND, 0.0)
+    if setpoint_height >= CUT_HEIGHT or setpoint_speed > 0.0:
+        return LandedState(FLYING if setpoint_height >= CUT_HEIGHT and setpoint_speed > 0.0 else landed.name, 0.0)
+    if landed.name == LANDED:
+        return landed
+    waiting = landed.waiting + dt if abs(speed) < LANDED_SPEED and height < LANDED_HEIGHT_ERROR else 0.0
     return LandedState(LANDED if height < CUT_HEIGHT or waiting > LANDED_TIME else FLYING, waiting)

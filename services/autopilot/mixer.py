@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
-from lapwing.services.autopilot.interface import PerRotor
+from lapwing.services.common.ports import PerRotor
 
 Share = tuple[float, float, float, float]  # of a rotor in collective, roll, pitch, yaw
 Shares = tuple[Share, ...]  # of every rotor
@@ -32,7 +32,7 @@ def at_rest(shares: Shares) -> PerRotor:
 
 
 @always_inline
-def shares_in_force(tables: tuple[Shares, ...], failed: int) -> Shares:
+def active_allocation(tables: tuple[Shares, ...], failed: int) -> Shares:
     """Return the shares for a failed rotor, by its number from 1; those of all rotors if there is no such table."""
     return tables[failed if failed < len(tables) else 0]
 
@@ -60,7 +60,7 @@ def _clamped(highest: float, value: float, _: float) -> float:
 
 
 @always_inline
-def possible(values: PerRotor, highest: float) -> PerRotor:
+def clamp_to_range(values: PerRotor, highest: float) -> PerRotor:
     """Return the nearest values within 0..highest."""
     return map_tuple(_clamped, highest, values, values)
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
-from lapwing.services.autopilot.interface import PerRotor
+from lapwing.services.common.ports import PerRotor
 
 RPM = 30.0 / math.pi  # [rpm] per rad/s
 

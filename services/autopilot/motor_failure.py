@@ -10,7 +10,7 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.controller_parameters import Airframe, lift, rotor_effectiveness
-from lapwing.services.autopilot.interface import PerRotor
+from lapwing.services.common.ports import PerRotor
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
 LOST = 0.3  # minimum fraction of lost thrust

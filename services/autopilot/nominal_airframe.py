@@ -18,7 +18,7 @@ from lapwing.services.common.vehicle_schema import (
 
 def known_airframe(scene: Scene) -> Airframe:
     """Return the nominal vehicle parameters in the air at home."""
-    return scene.once(_known_airframe)
+    return scene.cached(_known_airframe)
 
 
 def _known_airframe(scene: Scene) -> Airframe:

@@ -18,7 +18,8 @@ from lapwing.services.autopilot.service_config import AutopilotSetup, CustomCode
 from lapwing.services.common import autopilot_parameters, ports, user_modules
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference
+from lapwing.services.common.firmware.schema import flown_by_firmware
+from lapwing.services.common.ports import AutopilotStatus, EstimateCovariance, MotorCommand, Setpoint
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import gravity, start_place
 
@@ -26,8 +27,8 @@ FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR,
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
-    """Return the configuration of the autopilot. Return None if the scene has no `[autopilot]`."""
-    if not scene.has(Autopilot):
+    """Return the configuration of the autopilot. Return None if the scene has no `[autopilot]` or another firmware."""
+    if not scene.has(Autopilot) or flown_by_firmware(scene):
         return None
     config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
     follows = follows_trajectory(scene)
@@ -57,7 +58,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         ticks(scene, min(rates.estimate, exchange.rate), "rates.estimate"),
         ticks(scene, min(rates.status, exchange.rate), "rates.status"),
         ticks(scene, min(rates.commands, exchange.rate), "rates.commands"),
-        _custom(scene, "controller", controller_rate) if config.controller else None,
+        _controller(scene),
         _custom(scene, "estimator", estimator_rate) if own else None,
         vehicle_model(known_airframe(scene), exchange.interval) if config.controller or own else None,
         distance_sensor(scene),
@@ -69,14 +70,27 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         (
             Port(ports.ACTUATORS, MotorCommand(none, False, none, (0.0, 0.0, 0.0))),
             Port(ports.ESTIMATE, EXACT),
-            Port(ports.SETPOINT, Reference()),
+            Port(ports.SETPOINT, Setpoint()),
             Port(ports.STATUS, AutopilotStatus(), given.status_every),
+            *([] if truth or own else [_covariance(scene)]),
         ),
     )
 
 
+def _covariance(scene: Scene) -> Port:
+    every = ticks(scene, min(scene[Rates].covariance, scene[Communication].rate), "rates.covariance")
+    return Port(ports.ESTIMATE_COVARIANCE, EstimateCovariance(), every)
+
+
 def _phases(scene: Scene) -> tuple[str, ...]:
     return tuple(phase.name for phase in scene.lookup("trajectory.phase"))
+
+
+def _controller(scene: Scene) -> CustomCode | None:
+    name = scene[Autopilot].controller
+    if name == autopilot_parameters.PX4_CASCADE:
+        return CustomCode(name, {}, 1)
+    return _custom(scene, "controller", controller_rate) if name else None
 
 
 def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:

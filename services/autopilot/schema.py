@@ -4,8 +4,8 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.cosim.scene.files import laid_over, named
+from lapwing.cosim.scene import Files, Scene
+from lapwing.cosim.scene.files import merge_tables, named
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import math
 from lapwing.services.autopilot import motor_limits
@@ -16,6 +16,7 @@ from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.common import autopilot_parameters as parameters
 from lapwing.services.common import user_code, user_modules
 from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.firmware.schema import FIRMWARES, FirmwareKeys, is_foreign
 from lapwing.services.common.parameter_file import parse
 
 ESTIMATORS = ("kalman", "ground_truth")
@@ -25,7 +26,7 @@ WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unrel
 Option = bool | int | float | str | list[float]
 
 
-class Autopilot(SceneTable):
+class Autopilot(FirmwareKeys):
     """The autopilot."""
 
     TABLE: ClassVar[str] = "autopilot"
@@ -34,7 +35,7 @@ class Autopilot(SceneTable):
     estimator: str = "kalman"  # the Kalman filter; "ground_truth": the true state; or "module:Name" of a user's class
     estimator_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
     attitude_error: Literal["euler", "so3"] = "euler"  # by Euler angles, as in the paper, or on SO(3)
-    controller: str | None = None  # "module:Name" of a user's controller, instead of the cascaded PID
+    controller: str | None = None  # instead of the cascaded PID "px4", PX4's cascade, or "module:Name" of a user's
     controller_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
     accept_commands: bool = False  # accept commands of an operator
     follow_trajectory: bool = True  # follow the scene's [trajectory]; false: start disarmed and wait for commands
@@ -43,16 +44,21 @@ class Autopilot(SceneTable):
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Read the gain set into the table `gains`, a parameter file into its values, and store user modules."""
+        if is_foreign(tree):
+            cls.embed_parameters(tree, files)
+            return
         if isinstance(name := named(tree, cls.TABLE, "gains", cls.model_fields["gains"].default), str):
             path = files.find("autopilot.gains", "gain set", name, "gains", FOLDER)
             content = files.toml(GainSet.TABLE, "autopilot.gains", path)
-            tree[GainSet.TABLE] = laid_over(content, tree.get(GainSet.TABLE, {}))
+            tree[GainSet.TABLE] = merge_tables(content, tree.get(GainSet.TABLE, {}))
         for key in ("controller", "estimator"):
             code, where = named(tree, cls.TABLE, key), f"{cls.TABLE}.{key}"
             if key == "estimator" and isinstance(code, str) and ":" not in code:
                 if code not in ESTIMATORS:
                     raise ConfigError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
-            elif isinstance(code, str) and (module := user_code.parted(where, code)[0]) != user_code.MEMORY:
+            elif code == parameters.PX4_CASCADE and key == "controller":
+                continue
+            elif isinstance(code, str) and (module := user_code.split_reference(where, code)[0]) != user_code.MEMORY:
                 user_modules.embed(tree, files, where, module)
         if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
             path = files.folder / file
@@ -61,6 +67,9 @@ class Autopilot(SceneTable):
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError if parameters are invalid, the vehicle cannot hover, or sensors are missing."""
+        if self.firmware in FIRMWARES:
+            return
+        self.check_own()
         parameters.table(scene)
         if not self.follow_trajectory and not self.accept_commands:
             message = "false leaves no source of setpoints; set accept_commands = true too"
@@ -73,7 +82,8 @@ class Autopilot(SceneTable):
         except ValueError as error:
             raise ConfigError("airframe", str(error)) from None
         motor_limits.check(scene, told)
-        for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
+        shipped = self.controller in (None, parameters.PX4_CASCADE)
+        for key, unused in (("controller", shipped), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
                 raise ConfigError(f"autopilot.{key}_options", "is not used", f'autopilot.{key} = "module:Name" too')
         if self.estimator == "kalman":

@@ -12,11 +12,12 @@ from lapwing.messages import topics as topic
 from lapwing.services.autopilot import block, motor_failure
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
-from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller
+from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller, flies_px4_cascade
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters
 from lapwing.services.autopilot.custom.custom_blocks import controller_parts, estimator_parts
 from lapwing.services.autopilot.encoders import wires
 from lapwing.services.autopilot.estimator.blocks.correction import Correction
+from lapwing.services.autopilot.estimator.blocks.covariance import CovarianceOutput
 from lapwing.services.autopilot.estimator.blocks.estimate import FilterEstimate
 from lapwing.services.autopilot.estimator.blocks.gps_block import GpsFusion
 from lapwing.services.autopilot.estimator.blocks.ground_truth import TrueEstimate
@@ -25,11 +26,15 @@ from lapwing.services.autopilot.estimator.blocks.navigation_state import blank
 from lapwing.services.autopilot.estimator.blocks.terrain_height import GroundReference
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
 from lapwing.services.autopilot.initial_estimate import before
+from lapwing.services.autopilot.px4 import block as px4_block
+from lapwing.services.autopilot.px4 import law as px4_law
+from lapwing.services.autopilot.px4.block import Px4Controller
 from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
 from lapwing.services.common.airspeed_encoder import airspeed_wire
 from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGHT
 from lapwing.services.common.failure_types import SOUND, Faults
+from lapwing.services.common.ports import EstimateCovariance
 
 NAME = "autopilot"
 NO_HEIGHT = 1e8  # [m^2] variance of an ignored height
@@ -42,7 +47,8 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     outputs = {port.name: port for port in setup.services[NAME].ports}
     values = {p.name: p.default for p in given.parameters}
     law, thresholds = Cell(controller(given, values)), Cell(battery_thresholds(values))
-    attention = WakeupParameters(thresholds)
+    px4 = Cell(px4_law.build(values, given.airframe)) if flies_px4_cascade(given) else None
+    wakeup = WakeupParameters(thresholds)
     service = Service(NAME, [], [])
 
     def speak(tick: int) -> list[Any]:
@@ -51,7 +57,7 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     faults = Cell(Faults(motors=(SOUND,) * len(given.airframe.rotor_x))) if given.operator else None
     read = () if given.own_estimator else [i.port for i in setup.services[NAME].inputs]
     injection = Injection(faults, setup, read, given.airframe.motor)
-    commanding = CommanderBlock(given, law, thresholds, service, speak, injection)
+    commanding = CommanderBlock(given, law, thresholds, service, speak, injection, px4)
     reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
     common = Controller(
         law, motor_failure.build(given.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
@@ -59,23 +65,26 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     battery, actuators = injection.received(ports.BATTERY), outputs[ports.ACTUATORS]
     inputs = (InputPort(ports.ESTIMATE), InputPort(ORDER), InputPort(battery), InputPort(reference))
     gives = (injection.commanded(actuators), outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
-    if given.controller is None:
+    if px4 is not None:
+        cascade = Px4Controller(common, px4)
+        control = [Block(f"{NAME}.control", cascade, Cell(px4_block.start(cascade)), inputs, gives)]
+    elif given.controller is None:
         control = [Block(f"{NAME}.control", common, Cell(block.start(common)), inputs, gives)]
     else:
         control = controller_parts(f"{NAME}.control", setup.modules, given, common, inputs, gives)
-    navigation = _navigation(setup, given, attention, outputs[ports.ESTIMATE], injection)
+    navigation = _navigation(setup, given, wakeup, outputs[ports.ESTIMATE], injection)
     service.parts = [*injection.before(NAME), *navigation, commanding, *control, *injection.after(NAME, actuators)]
-    texts, words = commanding.phases.table, commanding.words.table
+    texts, words = commanding.phases.table, commanding.status_texts.table
     service.wires = wires(setup, given.estimate_every, given.status_every, texts, words)
     if ports.AIRSPEED in read:
         told = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
         service.wires.append(airspeed_wire(topic.AIRSPEED_RECEIVED, setup.vehicle, told))
-    service.spoken = (topic.OPERATOR, topic.COMMAND_ACKS) if given.operator else ()
+    service.python_topics = (topic.OPERATOR, topic.COMMAND_ACKS) if given.operator else ()
     return service
 
 
 def _navigation(
-    setup: RunConfig, given: AutopilotSetup, attention: WakeupParameters, estimate: Port, injection: Injection
+    setup: RunConfig, given: AutopilotSetup, wakeup: WakeupParameters, estimate: Port, injection: Injection
 ) -> list[Block]:
     """Return the estimator blocks in order."""
     battery, flight = InputPort(injection.received(ports.BATTERY)), InputPort(FLIGHT, 1)
@@ -83,12 +92,10 @@ def _navigation(
     if given.own_estimator is not None:
         names = [port.name for port in setup.services["sensors"].ports] if "sensors" in setup.services else []
         sensors = {name: setup.port(name).period for name in names}
-        return estimator_parts(
-            f"{NAME}.estimate", setup.modules, given, attention, sensors, (battery, flight), estimate
-        )
+        return estimator_parts(f"{NAME}.estimate", setup.modules, given, wakeup, sensors, (battery, flight), estimate)
     if p is None:
         inputs = (InputPort(ports.TRUTH), battery, flight)
-        return [Block(f"{NAME}.estimate", TrueEstimate(attention), Cell(0.0), inputs, (estimate,))]
+        return [Block(f"{NAME}.estimate", TrueEstimate(wakeup), Cell(0.0), inputs, (estimate,))]
     state = Cell(blank())
     height_reference = next(q.default for q in given.parameters if q.name == "EKF2_HGT_REF")
     over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
@@ -107,5 +114,10 @@ def _navigation(
             parts.append(
                 Block(f"{NAME}.{port}", fusion, state, (InputPort(injection.received(port)),), (), known[port].period)
             )
-    told = FilterEstimate(p, attention, before(given.start_world))
-    return [*parts, Block(f"{NAME}.estimate", told, state, (battery, flight), (estimate,))]
+    told = FilterEstimate(p, wakeup, before(given.start_world))
+    parts.append(Block(f"{NAME}.estimate", told, state, (battery, flight), (estimate,)))
+    if ports.ESTIMATE_COVARIANCE in known:  # not in logs of former versions
+        reported = known[ports.ESTIMATE_COVARIANCE]
+        output = CovarianceOutput(EstimateCovariance())
+        parts.append(Block(f"{NAME}.covariance", output, state, (), (reported,), reported.period))
+    return parts

@@ -34,7 +34,7 @@ class AutopilotSetup(NamedTuple):
     estimate_every: int  # [ticks] between two messages of the estimate
     status_every: int
     answers_every: int
-    controller: CustomCode | None = None  # None: the cascaded PID
+    controller: CustomCode | None = None  # None: the cascaded PID; name "px4": PX4's cascade
     own_estimator: CustomCode | None = None
     vehicle: VehicleModel | None = None  # vehicle parameters for user code
     distance_sensor: str | None = None  # port of the sensor of the distance to the ground

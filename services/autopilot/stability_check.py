@@ -8,13 +8,19 @@ from lapwing.services.autopilot.margins import excess, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.communication_schema import Communication
+from lapwing.services.common.firmware.schema import flown_by_firmware
 
 MODELS = ("rigid_body", "multibody", "slung_load")  # plant models to which the margins apply
 
 
 def unstable_loops(scene: Scene) -> list[str]:
     """Return a line for each loop of the scene's autopilot that is unstable in hover, with its gain margin."""
-    if not scene.has(Autopilot) or scene.lookup("vehicle.model") not in MODELS or not known_airframe(scene).gravity:
+    if (
+        not scene.has(Autopilot)
+        or flown_by_firmware(scene)
+        or scene.lookup("vehicle.model") not in MODELS
+        or not known_airframe(scene).gravity
+    ):
         return []
     if scene[Autopilot].controller is not None:
         return []  # the loops of user code are unknown

@@ -1,8 +1,9 @@
 """Autopilot parameters that can be changed in flight: meaning, default and bounds.
 
-Names and units are PX4's where the meaning is the same; MAVLink allows 16 characters. Only controller gains (PID_...)
-and failsafe actions (FS_...) have own names. Gain defaults come from the scene's gain set. `[autopilot.parameters]`
-sets other values, or `autopilot.parameters` names a file of them (parameter_file.py).
+Names and units are PX4's where the meaning is the same; MAVLink allows 16 characters. Only gains of the cascaded PID
+(PID_...) and failsafe actions (FS_...) have own names. Defaults of PID_... come from the scene's gain set; a scene
+with PX4's cascade has PX4's gains instead. `[autopilot.parameters]` sets other values, or `autopilot.parameters`
+names a file of them (parameter_file.py).
 """
 
 import math
@@ -82,7 +83,7 @@ _FLIGHT = (
 _FAILSAFES = (
     Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "time after which offboard setpoints are lost"),
     Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"action on lost offboard setpoints: {_ACTION}", True),
-    Parameter("COM_DL_LOSS_T", "s", 10.0, 1.0, 300.0, "time after which a silent ground station is lost"),
+    Parameter("COM_DL_LOSS_T", "s", 10.0, 0.1, 300.0, "time after which a silent ground station is lost"),
     Parameter(
         "NAV_DLL_ACT", "", RETURN, 0, 3, "action on a lost ground station: 0 warning, 1 hold, 2 return, 3 land", True
     ),
@@ -98,7 +99,7 @@ _FAILSAFES = (
     ),
     Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"action on a lost position: {_ACTION}", True),
     Parameter("EKF2_HGT_REF", "", GPS_HEIGHT, 0, 2, f"height reference from the start: {_HEIGHTS}", True, True),
-    Parameter("SYS_FAILURE_EN", "", 0, 0, 1, "1: failures may be injected", True),
+    Parameter("SYS_FAILURE_EN", "", 1, 0, 1, "1: failures may be injected", True),
     Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"action outside the fence: {_ACTION}", True),
 )
@@ -114,17 +115,72 @@ _TERMS = "PID"
 _UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # of P; the other loops': N/rad
 
 
+PX4_CASCADE = "px4"  # controller with PX4's gains
+_MANY = 1000.0  # bound of gains that PX4 does not bound
+
+
+def _px4_axis(axis: str, stem: str, p: tuple[float, ...], d_most: float) -> list[Parameter]:
+    """Return the rate and angle gains of an axis; `p` has defaults and bounds of P, default of I and D, least K."""
+    name, what = f"MC_{axis}RATE", axis.lower()
+    default, least, most, i, d, k_least = p
+    return [
+        Parameter(f"{name}_K", "", 1.0, k_least, 5.0, f"scale of P, I and D of the {what} rate"),
+        Parameter(f"{name}_P", "s", default, least, most, f"normalised torque over the error of the {what} rate"),
+        Parameter(f"{name}_I", "", i, 0.0, _MANY, f"normalised torque over the integral of the {what} rate's error"),
+        Parameter(f"{name}_D", "s^2", d, 0.0, d_most, f"normalised torque over the {what} acceleration"),
+        Parameter(f"{name}_FF", "s", 0.0, 0.0, _MANY, f"normalised torque over the {what} rate setpoint"),
+        Parameter(
+            f"MC_{stem}R_INT_LIM", "", 0.3, 0.0, _MANY, f"limit of the {what} rate's integral, normalised torque"
+        ),
+    ]
+
+
+_PX4_GAINS = (
+    Parameter("MPC_TILTMAX_AIR", "deg", 45.0, 20.0, 89.0, "maximum tilt"),
+    *_px4_axis("ROLL", "R", (0.15, 0.01, 0.5, 0.2, 0.003, 0.01), 0.01),
+    *_px4_axis("PITCH", "P", (0.15, 0.01, 0.6, 0.2, 0.003, 0.01), _MANY),
+    *_px4_axis("YAW", "Y", (0.2, 0.0, 0.6, 0.1, 0.0, 0.0), _MANY),
+    Parameter("MC_ROLL_P", "1/s", 6.5, 0.0, 12.0, "roll rate over the error of roll"),
+    Parameter("MC_PITCH_P", "1/s", 6.5, 0.0, 12.0, "pitch rate over the error of pitch"),
+    Parameter("MC_YAW_P", "1/s", 2.8, 0.0, 5.0, "yaw rate over the error of yaw"),
+    Parameter("MC_YAW_WEIGHT", "", 0.4, 0.0, 1.0, "weight of the yaw against roll and pitch"),
+    Parameter("MC_ROLLRATE_MAX", "deg/s", 220.0, 0.0, 1800.0, "maximum roll rate setpoint"),
+    Parameter("MC_PITCHRATE_MAX", "deg/s", 220.0, 0.0, 1800.0, "maximum pitch rate setpoint"),
+    Parameter("MC_YAWRATE_MAX", "deg/s", 200.0, 0.0, 1800.0, "maximum yaw rate setpoint"),
+    Parameter("MPC_XY_P", "1/s", 0.95, 0.0, 2.0, "velocity over the horizontal position error"),
+    Parameter("MPC_Z_P", "1/s", 1.0, 0.1, 1.5, "velocity over the height error"),
+    Parameter("MPC_XY_VEL_P_ACC", "1/s", 1.8, 1.2, 5.0, "acceleration over the horizontal velocity error"),
+    Parameter(
+        "MPC_XY_VEL_I_ACC", "1/s^2", 0.4, 0.0, 60.0, "acceleration over the horizontal velocity error's integral"
+    ),
+    Parameter("MPC_XY_VEL_D_ACC", "", 0.2, 0.1, 2.0, "acceleration over the measured horizontal acceleration"),
+    Parameter("MPC_Z_VEL_P_ACC", "1/s", 4.0, 2.0, 15.0, "acceleration over the vertical velocity error"),
+    Parameter("MPC_Z_VEL_I_ACC", "1/s^2", 2.0, 0.2, 3.0, "acceleration over the vertical velocity error's integral"),
+    Parameter("MPC_Z_VEL_D_ACC", "", 0.0, 0.0, 2.0, "acceleration over the measured vertical acceleration"),
+    Parameter("MPC_THR_MIN", "", 0.12, 0.05, 0.5, "minimum collective, fraction"),
+    Parameter("MPC_THR_MAX", "", 1.0, 0.05, 1.0, "maximum collective, fraction"),
+    Parameter("MPC_THR_XY_MARG", "", 0.3, 0.0, 0.5, "collective kept for horizontal control, fraction"),
+    Parameter("MPC_THR_HOVER", "", 0.5, 0.1, 0.8, "collective in hover while MPC_USE_HTE is 0, fraction"),
+    Parameter("MPC_USE_HTE", "", 1, 0, 1, "1: collective in hover from nominal weight and motors", True),
+    Parameter("MPC_VELD_LP", "Hz", 5.0, 0.0, 50.0, "cut-off of the acceleration for the velocity D gains; 0: none"),
+    Parameter("IMU_DGYRO_CUTOFF", "Hz", 30.0, 0.0, 1000.0, "cut-off of the acceleration for the rate D gains; 0: none"),
+    Parameter("THR_MDL_FAC", "", 0.0, 0.0, 1.0, "quadratic part of the thrust over the motor signal"),
+)
+
+
 def table(scene: "Scene") -> dict[str, Parameter]:
     """Return the parameters of a scene with an `[autopilot]` by name, with the scene's defaults.
 
     Raises:
         ConfigError: the scene sets an unknown parameter or an invalid value.
     """
-    return dict(scene.once(_table))
+    return dict(scene.cached(_table))
 
 
 def _table(scene: "Scene") -> dict[str, Parameter]:
-    known = {p.name: p for p in (*of_gains(scene.section("gains")), *_FLIGHT, *_FAILSAFES)}
+    px4 = scene.lookup("autopilot.controller") == PX4_CASCADE
+    gains = _PX4_GAINS if px4 else of_gains(scene.section("gains"))
+    known = {p.name: p for p in (*gains, *_FLIGHT, *_FAILSAFES)}
     for name, value in scene.lookup("autopilot.parameters").items():
         if name not in known:
             raise ConfigError.unknown(f"autopilot.parameters.{name}", "parameter", name, known)

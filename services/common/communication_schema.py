@@ -46,6 +46,7 @@ class Rates(SceneTable):
     SHARED: ClassVar[bool] = True
     pose: int = Field(default=50, gt=0)  # [Hz] pose, odometry, transform and clock
     estimate: int = Field(default=50, gt=0)  # [Hz] state estimate of the autopilot
+    covariance: int = Field(default=1, gt=0)  # [Hz] full covariance of the estimate, with normalised innovations
     status: int = Field(default=10, gt=0)  # [Hz] phase, armed, landed, failures
     battery: int = Field(default=10, gt=0)  # [Hz] charge, voltage, current
     body_states: int = Field(default=50, gt=0)  # [Hz] states of the bodies of a multibody vehicle

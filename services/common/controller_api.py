@@ -1,4 +1,4 @@
-"""Interface of user-defined controllers.
+"""Interface of user-defined controllers; user code imports its names from `lapwing.plugins`.
 
 In a scene:
 
@@ -10,11 +10,11 @@ In a scene:
 In `my_module.py`, next to the scene or on Python's path:
 
     class MyController:
-        rate = 250.0                                              # [Hz], divides the exchange rate
+        rate = 250.0                                              # [Hz], divides the communication rate
 
         def __init__(self, vehicle: VehicleModel, stiffness: float = 1.0): ...
 
-        def step(self, time: float, estimate: StateEstimate, setpoint: Reference) -> ThrustAndMoments: ...
+        def step(self, time: float, estimate: StateEstimate, setpoint: Setpoint) -> ThrustAndMoments: ...
 
 A new controller is constructed at every take-off. Its `step` is called at its rate while the motors run; its last
 command holds in between. A controller that uses random numbers, wall time or files cannot be resimulated.
@@ -25,7 +25,7 @@ same types:
 
     def build(vehicle: VehicleModel, **options) -> tuple[Parameters, State]: ...
 
-    @lapwing.kernels.kernel
+    @lapwing.plugins.kernel
     def step(p, s, time, estimate, setpoint):
         return s, ThrustAndMoments(thrust, moments_body)
 """
@@ -33,9 +33,9 @@ same types:
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3
-from lapwing.services.common.ports import Reference, StateEstimate
+from lapwing.services.common.ports import Setpoint, StateEstimate
 
-__all__ = ["MotorVoltages", "Reference", "StateEstimate", "ThrustAndMoments", "VehicleModel"]
+__all__ = ["MotorVoltages", "Setpoint", "StateEstimate", "ThrustAndMoments", "VehicleModel"]
 
 
 class MotorVoltages(NamedTuple):

@@ -1,4 +1,4 @@
-"""Interface of user-defined estimators.
+"""Interface of user-defined estimators; user code imports its names from `lapwing.plugins`.
 
 In a scene:
 
@@ -10,7 +10,7 @@ In a scene:
 In `my_module.py`, next to the scene or on Python's path:
 
     class MyEstimator:
-        rate = 250.0                                              # [Hz], divides the exchange rate
+        rate = 250.0                                              # [Hz], divides the communication rate
 
         def __init__(self, vehicle: VehicleModel, cutoff: float = 1.0): ...
 
@@ -18,7 +18,7 @@ In `my_module.py`, next to the scene or on Python's path:
 
 The estimator is constructed once. Its `step` is called at its rate from tick 0; its last estimate holds in between.
 `readings` maps the sensor's name ("imu", "gps") to the newest reading since the last step and omits sensors without a
-new one; the types are defined in `lapwing.services.common.ports`. The vehicle starts at the origin, at
+new one; their types are in `lapwing.plugins`. The vehicle starts at the origin, at
 `vehicle.resting_height`.
 """
 

@@ -57,13 +57,18 @@ def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -
     Raises:
         ValueError: (one line) the file is missing, has another format, or contains an unsupported item.
     """
-    datum = _Datum(home, standing_height)
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
         raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:
         raise ValueError(f"{path}: not a UTF-8 text file; expected a .plan or .waypoints file") from None
+    return parse(path, text, standing_height, home)
+
+
+def parse(path: Path, text: str, standing_height: float = 0.0, home: Home = STANDARD.home) -> list[OperatorCommand]:
+    """Return the commands that upload the plan with this content. See `read` for arguments and errors."""
+    datum = _Datum(home, standing_height)
     try:
         if text.startswith(HEADER):
             items, fence, rally = _waypoints(text, datum)

@@ -1,4 +1,4 @@
-"""Reader of triangle meshes in STL and OBJ files; only the corners are used, so no dependency is needed."""
+"""Reader of triangle meshes in STL, OBJ and glTF files; only the corners are used, so no dependency is needed."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -6,7 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-SUFFIXES = (".stl", ".obj")
+from lapwing.services.common import gltf_file
+
+SUFFIXES = (".stl", ".obj", *gltf_file.SUFFIXES)
 LARGEST = 20_000_000  # [byte] of a file
 MOST = 20_000  # triangles: 0.3 MB in the run configuration, and smooth in a browser
 _HEAD = 84  # [byte] header of a binary STL file; its last four bytes are the number of triangles
@@ -30,7 +32,10 @@ def read(path: Path) -> Mesh:
     if path.stat().st_size > LARGEST:
         raise ValueError(f"{path.stat().st_size / 1e6:.0f} MB; expected at most {LARGEST / 1e6:.0f} MB")
     data = path.read_bytes()
-    corners = _obj(data) if path.suffix.lower() == ".obj" else _stl(data)
+    suffix = path.suffix.lower()
+    corners = (
+        gltf_file.corners_of(data) if suffix in gltf_file.SUFFIXES else _obj(data) if suffix == ".obj" else _stl(data)
+    )
     if not len(corners):
         raise ValueError("contains no triangles")
     if len(corners) > MOST:

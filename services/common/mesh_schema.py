@@ -44,7 +44,7 @@ def embed(tree: dict[str, Any], folder: Path) -> None:
         return
     path = folder / name
     if path.suffix.lower() not in SUFFIXES:
-        raise ConfigError(KEY, f"got {name!r}", "the path of an .stl or .obj file")
+        raise ConfigError(KEY, f"got {name!r}", f"the path of a file that ends in {', '.join(SUFFIXES)}")
     try:
         tree[Meshes.TABLE] = {name: pack(read(path))}
     except OSError as error:

@@ -16,7 +16,7 @@ Operator = Callable[[int], Iterable[OperatorCommand]]
 """Function of a tick that returns the commands received since its last call."""
 
 
-def nobody(_: int) -> Iterable[OperatorCommand]:
+def no_operator(_: int) -> Iterable[OperatorCommand]:
     """Return no commands."""
     return ()
 
@@ -47,6 +47,6 @@ def addressed(payload: bytes) -> tuple[str, tuple[Any, ...]]:
         return "", (OperatorCommand(UNREADABLE, text=str(error)),)
 
 
-def joined(time_ns: int, commands: Iterable[OperatorCommand]) -> OperatorInput:
+def merge_commands(time_ns: int, commands: Iterable[OperatorCommand]) -> OperatorInput:
     """Return one message with the commands at `time_ns`."""
     return OperatorInput(header(time_ns, "world"), tuple(commands))

@@ -13,6 +13,7 @@ TRUTH, BATTERY, BODIES, CONTACT = "truth", "battery", "bodies", "contact"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
 OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
+ESTIMATE_COVARIANCE = "estimate_covariance"
 LIFT = "lift"
 
 PerRotor = tuple[float, ...]
@@ -130,7 +131,7 @@ class AirspeedReading(NamedTuple):
     valid: bool = False
 
 
-class Reference(NamedTuple):
+class Setpoint(NamedTuple):
     """Setpoint of the vehicle's motion."""
 
     position_world: Vec3 = ZERO  # [m]
@@ -156,7 +157,7 @@ class AutopilotStatus(NamedTuple):
     """Numeric part of the autopilot's status."""
 
     phase: int = 0  # index of the phase's name
-    words: int = 0  # index of the commander's status texts
+    status_text_id: int = 0  # index of the commander's status texts
     armed: bool = False
     landed: bool = True
     finished: bool = False
@@ -180,6 +181,13 @@ class StateEstimate(NamedTuple):
     attitude_std: Vec3 = ZERO  # [rad] rotation vector, body
     health: int = 0  # 0: good
     rejected: int = 0  # bit i: the last reading of source i was rejected
+
+
+class EstimateCovariance(NamedTuple):
+    """Covariance of the estimator's 24 error states, in the order of EstimateCovariance.msg."""
+
+    covariance: tuple[float, ...] = (0.0,) * 300  # upper triangle, row by row
+    nis: tuple[float, ...] = (0.0,) * 7  # normalised innovations squared, by source
 
 
 class RotorWrenches(NamedTuple):

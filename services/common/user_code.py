@@ -17,7 +17,7 @@ _lent: dict[str, Any] = {}  # registered objects by name
 
 
 @contextmanager
-def lent(thing: Any, folder: Path) -> Iterator[str]:
+def registered(thing: Any, folder: Path) -> Iterator[str]:
     """Register a class, function or object under a name for scenes, within the context.
 
     A definition in a module that the run configuration can store is named "module:Name". Anything else is named
@@ -57,7 +57,7 @@ def _carried(thing: Any, folder: Path) -> str:
     return f"{module.__name__}:{name}" if same else ""
 
 
-def parted(key: str, text: str) -> tuple[str, str]:
+def split_reference(key: str, text: str) -> tuple[str, str]:
     """Return module and name of "module:Name". Raise ConfigError for another form."""
     module, _, name = text.partition(":")
     if not module or not name.isidentifier():
@@ -81,7 +81,7 @@ def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, An
     Raises:
         ConfigError: the module cannot be imported or lacks the name, or the object is not registered.
     """
-    module, name = parted(key, text)
+    module, name = split_reference(key, text)
     if module == MEMORY:
         if name not in _lent:
             message = f"{name} was an object in the memory of the Python session that ran it"

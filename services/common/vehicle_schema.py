@@ -5,7 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 from pydantic import ConfigDict, Field
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.cosim.scene.files import laid_over, named
+from lapwing.cosim.scene.files import merge_tables, named
 from lapwing.dynamics import effects
 from lapwing.dynamics.atmosphere import density
 from lapwing.dynamics.config_error import ConfigError
@@ -42,7 +42,7 @@ class Vehicle(SceneTable):
     initial_position: Pair | None = None  # [m] east and north of home, also of its trajectory; default: home
 
     @classmethod
-    def numbered(cls, i: int) -> dict[str, Any]:
+    def defaults_of(cls, i: int) -> dict[str, Any]:
         """Return the default name of vehicle i: drone1, drone2, ..."""
         return {"name": f"drone{i + 1}"}
 
@@ -55,11 +55,11 @@ class Vehicle(SceneTable):
             content = files.toml(VehicleAirframe.TABLE, "vehicle.airframe", path)
             if named(tree, VehicleAirframe.TABLE, "mesh") is None:
                 folder = path.parent
-            tree[VehicleAirframe.TABLE] = laid_over(content, tree.get(VehicleAirframe.TABLE, {}))
+            tree[VehicleAirframe.TABLE] = merge_tables(content, tree.get(VehicleAirframe.TABLE, {}))
         mesh_schema.embed(tree, folder)
         mass, frame = named(tree, "vehicle", "mass"), tree.get(VehicleAirframe.TABLE)
         if mass is not None and isinstance(frame, dict):
-            tree[VehicleAirframe.TABLE] = laid_over(frame, {"mass": {"total": mass}})
+            tree[VehicleAirframe.TABLE] = merge_tables(frame, {"mass": {"total": mass}})
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless the mass agrees with the airframe's."""
@@ -126,7 +126,7 @@ def airframe(scene: Scene) -> Airframe:
 
 def active(scene: Scene) -> tuple:
     """Return the parameters of the scene's effects, sorted by name."""
-    return scene.once(_active)
+    return scene.cached(_active)
 
 
 def _active(scene: Scene) -> tuple:
@@ -183,7 +183,7 @@ def gravity(scene: Scene) -> float:
 
 def start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     """Return (position of the centre of mass [m], attitude) of the vehicle at rest at its start, world frame."""
-    return scene.once(_start_pose)
+    return scene.cached(_start_pose)
 
 
 def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:

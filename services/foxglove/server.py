@@ -4,31 +4,32 @@ from typing import Any, Self
 
 from lapwing.messages import TYPES
 from lapwing.services.common.address import host_and_port, is_loopback
+from lapwing.services.foxglove.origin_gate import OriginGate, hidden_address
 
 BACKLOG = 16384  # messages kept for a client; the oldest go where it is too slow
 
 
 def parse_address(text: str) -> tuple[str, int]:
-    """Host and port.
+    """Return host and port.
 
     Raises:
-        ValueError: not of the form HOST:PORT.
+        ValueError: the text does not have the form HOST:PORT.
     """
-    found = host_and_port(text)
-    if found is None:
+    result = host_and_port(text)
+    if result is None:
         raise ValueError(f"--foxglove {text}: expected HOST:PORT, for example 127.0.0.1:8765")
-    return found
+    return result
 
 
 def check_address(text: str, insecure: bool) -> None:
-    """Refuse an address that other machines reach, since a viewer does not prove who he is, unless that is asked for.
+    """Check that the address is local, since viewers are not authenticated, or that `insecure` is set.
 
     Raises:
-        ValueError: that, or not of the form HOST:PORT.
+        ValueError: other machines can reach the address, or it does not have the form HOST:PORT.
     """
     if not is_loopback(parse_address(text)[0]) and not insecure:
         expected = "expected an address of this machine alone, 127.0.0.1:8765, or --insecure"
-        raise ValueError(f"--foxglove {text}: anybody could look on there: {expected}")
+        raise ValueError(f"--foxglove {text}: any program there could read the run; {expected}")
 
 
 class Server:
@@ -60,15 +61,20 @@ class Server:
         try:
             self._server = foxglove.start_server(
                 name="lapwing",
-                host=host,
-                port=port,
+                host=(hidden := hidden_address()),
+                port=0,
                 capabilities=[Capability.Time],
                 context=self._context,
                 message_backlog_size=BACKLOG,
             )
         except Exception as fault:  # the library's own, of whatever class
             raise ValueError(f"--foxglove {address}: cannot be listened on: {fault}") from None
-        self.port: int = self._server.port
+        try:
+            self._gate = OriginGate(host, port, (hidden, self._server.port))
+        except OSError as fault:
+            self._server.stop()
+            raise ValueError(f"--foxglove {address}: cannot be listened on: {fault}") from None
+        self.port: int = self._gate.port
 
     def declare(self, topic: str, type_name: str) -> None:
         """Tell clients of a topic before its first message; types that are not ours have no channel."""
@@ -80,14 +86,14 @@ class Server:
         self._channels[topic] = channel
 
     def put(self, topic: str, time_ns: int, payload: bytes) -> None:
-        """A message of a declared topic."""
+        """Publish a message of a declared topic."""
         if time_ns != self._time_ns:
             self._time_ns = time_ns
             self._server.broadcast_time(time_ns)
         self.log(topic, time_ns, payload)
 
     def log(self, topic: str, time_ns: int, payload: bytes) -> None:
-        """A message that comes late: the simulation's time stays."""
+        """Publish a delayed message without advancing the simulation time."""
         if topic in self._channels:
             self._channels[topic].log(payload, log_time=time_ns)
 
@@ -96,3 +102,4 @@ class Server:
 
     def __exit__(self, *_: object) -> None:
         self._server.stop()
+        self._gate.close()

@@ -1,12 +1,13 @@
-"""The process that shows a run while it flies: it reads the services' batches, which slows nobody down."""
+"""Live display of a run: it reads the services' log packets, which slows no service."""
 
 from typing import Any
 
 from lapwing.cosim.executors.participant import POLL, Participant
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.transport.bus_keys import BATCH_KEY
-from lapwing.cosim.transport.packets import unpack_batch
+from lapwing.cosim.transport.packets import unpack_log_packet
 from lapwing.messages.topics import EVENTS
+from lapwing.services.common.last_events import LastEvents
 from lapwing.services.foxglove.server import Server
 
 
@@ -19,25 +20,29 @@ def run(process: Participant, given: Any) -> None:
     setup = process.setup
     with Server(given.foxglove, given.insecure) as server:
         events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
-        watcher = dict.fromkeys(events, process.participants.mark(MONITOR))
+        watcher = dict.fromkeys(events, process.participants.gid(MONITOR))
         arrived = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
         for topic in events.values():
             server.declare(topic, EVENTS.message.type_name)
+        for name in setup.services:  # so that viewers subscribe before the flight begins
+            for recorded in process.create_service(name).topics:
+                server.declare(recorded.key(setup.vehicle), recorded.message.type_name)
         process.join()
-        flying = set(process.setup.services)  # those whose last batch has not come
-        while flying and not process.stopping:
+        flying, ends = set(process.setup.services), LastEvents(events)  # services whose last batch has not come
+        while ends.await_more(bool(flying)) and not process.stopping:
             news = arrived.get_with_key(POLL)
             if news is None:
                 continue
             key, time_ns, payload = news
             if not payload:
                 flying.discard(key.rpartition("/")[2])
+                ends.take(key)
                 continue
             if key in events:
                 server.log(events[key], time_ns, payload)
                 continue
             messages = []
-            for page in unpack_batch(payload)[2]:
+            for page in unpack_log_packet(payload)[2]:
                 topic = page.topic.key(setup.vehicle)
                 server.declare(topic, page.topic.message.type_name)
                 times = page.ticks * setup.interval_ns

@@ -1,13 +1,13 @@
-"""What ground stations are told of the motors: which output drives which, where it sits, and which way it turns.
+"""Actuator metadata for ground stations: output, position and spin direction of each motor.
 
-As PX4 describes them (MAVLink's component_metadata/actuators.schema.json): QGroundControl draws its page of actuators
-from it. Nothing there can be changed, and the motors cannot be run one by one.
+The format is MAVLink's component_metadata/actuators.schema.json, filled in as by PX4: QGroundControl draws its actuator
+page from it. All entries are read-only, and motors cannot be run one by one.
 """
 
 from collections.abc import Sequence
 from typing import Any
 
-from lapwing.services.mavlink.frames import swap_body
+from lapwing.services.common.mavlink.frames import swap_body
 from lapwing.services.mavlink.px4_facts import FIRST_MOTOR, MULTIROTOR, output_function
 from lapwing.services.mavlink.vehicle_description import Rotor
 
@@ -16,7 +16,7 @@ _STOPPED, _FULL = 0.0, 1.0
 
 
 def actuators(rotors: Sequence[Rotor]) -> dict[str, Any]:
-    """The description of the motors, as JSON."""
+    """Return the description of the motors as a JSON tree."""
     numbers = range(1, len(rotors) + 1)
     channel = {"name": output_function("${i}"), "label": "Function", "function": "function"}
     channels = [{"label": f"Channel {n}", "param-index": n} for n in numbers]
@@ -45,7 +45,7 @@ def actuators(rotors: Sequence[Rotor]) -> dict[str, Any]:
 
 
 def _geometry(rotors: Sequence[Rotor]) -> dict[str, Any]:
-    """Positions forward, right and down, as PX4 has them."""
+    """Return the rotor geometry in FRD axes, as in PX4."""
     x, y, z = zip(*(swap_body(rotor.position_body) for rotor in rotors), strict=True)
     turns = [float(rotor.counterclockwise) for rotor in rotors]
     values = {

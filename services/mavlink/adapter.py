@@ -7,16 +7,17 @@ from typing import Any
 
 from lapwing.messages import CommandAcks, OperatorInput, header
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, Topic
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.announcements import Announcements
 from lapwing.services.mavlink.channel import Channel
 from lapwing.services.mavlink.clock import Clock, Instant
 from lapwing.services.mavlink.command_queue import CommandQueue
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.endpoint import Endpoint
 from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.session import Session
+from lapwing.services.mavlink.setpoint_keeper import SetpointKeeper
 from lapwing.services.mavlink.signing import Signature, TimeStampStore
 from lapwing.services.mavlink.telemetry.system_status import heartbeat
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -26,7 +27,7 @@ SECOND = 1_000_000_000
 LINK_TIMEOUT = 3.5  # [s] after its last heartbeat a ground station counts as gone
 HEARTBEAT_INTERVAL = 1.0  # [s]
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
-ALL = 0  # target system or component of a message for everybody
+ALL = 0  # target system or component of a message for all receivers
 _NO_ACKS = len(CommandAcks(header(0, "world")).encode())  # bytes of acknowledgements without one
 _EMPTY = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
 
@@ -43,36 +44,37 @@ class Adapter:
         log: Path | None = None,
         time_stamps: Path | None = None,
     ):
-        """An adapter that nobody has connected to.
+        """Create an adapter without endpoints.
 
         Args:
-            description: the vehicle that it speaks for.
-            operate: hands an OperatorCommand to the autopilot; None for a recorded flight.
-            key: signs what is sent, and refuses what is not signed with it.
-            insecure: commands are taken from other machines without a key.
-            log: of the run, which endpoints may download.
-            time_stamps: file that keeps the time stamps of signed frames, None to keep them in memory only.
+            description: vehicle that the adapter represents.
+            operate: passes an OperatorCommand to the autopilot; None for a recorded flight.
+            key: signing key; unsigned frames are then rejected. None: no signing.
+            insecure: accept commands from other machines without a key.
+            log: log of the run, which endpoints may download.
+            time_stamps: file of the time stamps of signed frames; None keeps them in memory.
 
         Raises:
-            ValueError: that file cannot be written.
+            ValueError: the file of time stamps cannot be written.
         """
         self.vehicle = VehicleCache(description)
         self.clock = Clock()
         self.counts: Counter[str] = Counter()
         self.commands = CommandQueue(self.clock, operate)
-        flavour = self.vehicle.flavour
+        firmware = self.vehicle.firmware
         self.missions = MissionStore(
-            self.clock, self.commands, lambda: self.vehicle.datum, flavour.HOME_FIRST, self.counts
+            self.clock, self.commands, lambda: self.vehicle.datum, firmware.HOME_FIRST, self.counts
         )
         self.vehicle.mission = lambda: self.missions.held[mavlink.MAV_MISSION_TYPE_MISSION]
-        self.parameters = ParameterStore(description, flavour, self.commands, self.broadcast, self.counts)
+        self.parameters = ParameterStore(description, firmware, self.commands, self.broadcast, self.counts)
+        self.setpoints = SetpointKeeper(self.clock, self.commands, lambda: self.parameters.value("COM_OF_LOSS_T"))
         self.sessions: dict[Endpoint, Session] = {}
-        store = TimeStampStore(time_stamps, key, description.system) if key and time_stamps else None
+        store = TimeStampStore(time_stamps, key, description.system_id) if key and time_stamps else None
         self.signature = Signature(key, store) if key else None
         self._insecure, self._log = insecure, log
         self._announcements = Announcements(self.vehicle, self.broadcast)
         self._next_link = 0
-        self._next_heartbeat = 0.0  # [s] of wall time, before the vehicle speaks
+        self._next_heartbeat = 0.0  # [s] wall time, before the first message of the vehicle
 
     def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None], strict: bool = False) -> Endpoint:
         """Return a new endpoint.
@@ -83,7 +85,7 @@ class Adapter:
             put: sends bytes to it.
             strict: read nothing of it if its first bytes are not MAVLink.
         """
-        channel = Channel(self.vehicle.description.system, self.signature, datagrams, self.counts, strict)
+        channel = Channel(self.vehicle.description.system_id, self.signature, datagrams, self.counts, strict)
         endpoint = Endpoint(channel, local, put)
         self.sessions[endpoint] = Session(
             endpoint,
@@ -92,6 +94,7 @@ class Adapter:
             self.commands,
             self.parameters,
             self.missions,
+            self.setpoints,
             self.counts,
             self._log,
             self.trusts,
@@ -99,7 +102,7 @@ class Adapter:
         return endpoint
 
     def disconnect(self, endpoint: Endpoint) -> None:
-        """An endpoint is gone."""
+        """Remove an endpoint."""
         del self.sessions[endpoint]
         self.parameters.forget(endpoint)
         self.missions.forget(endpoint)
@@ -118,7 +121,7 @@ class Adapter:
         return False
 
     def receive(self, endpoint: Endpoint, data: bytes) -> int:
-        """Bytes have come from an endpoint; how many sound messages they held."""
+        """Handle bytes from an endpoint. Return the number of valid messages."""
         sound = 0
         for m in endpoint.decode(data):
             sound += 1
@@ -127,7 +130,7 @@ class Adapter:
         return sound
 
     def _dispatch(self, endpoint: Endpoint, m: Any) -> None:
-        system = self.vehicle.description.system
+        system = self.vehicle.description.system_id
         source = m.get_srcSystem(), m.get_srcComponent()
         target = getattr(m, "target_system", getattr(m, "target", ALL))
         component = getattr(m, "target_component", ALL)
@@ -142,12 +145,12 @@ class Adapter:
             handler(self.sessions[endpoint], m)
 
     def take(self, topic: Topic, time_ns: int, payload: bytes, wall: float) -> None:
-        """The vehicle has published a message; an estimate moves time on, and sends what is due.
+        """Store a message of the vehicle. An estimate advances the time and sends the messages that are due.
 
         Args:
-            topic: what it is about.
-            time_ns: simulation time.
-            payload: the message, encoded.
+            topic: topic of the message.
+            time_ns: simulation time [ns].
+            payload: encoded message.
             wall: monotonic wall time [s].
         """
         if topic is OPERATOR:
@@ -174,7 +177,7 @@ class Adapter:
             self._announcements.step()
 
     def tick(self, wall: float) -> None:
-        """Wall time goes on, also while the vehicle is silent; until it speaks, heartbeats say that it starts."""
+        """Advance the wall time [s]. Send heartbeats until the vehicle publishes its first message."""
         self.clock.now = Instant(self.clock.now.time_ns, wall)
         if not self.commands.started:
             self.parameters.step()
@@ -197,6 +200,7 @@ class Adapter:
         for endpoint, session in self.sessions.items():
             endpoint.send(*session.schedule.due(built), *session.log.step())
         self.commands.step()
+        self.setpoints.step()
         self.missions.step()
         self.parameters.step()
         if self.vehicle.time_ns >= self._next_link:

@@ -1,10 +1,10 @@
-"""What is sent to every endpoint at once, rather than when it is due: another mode, the next item, events, texts."""
+"""Messages sent to all endpoints on a change: mode, mission item, events, texts."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from lapwing.services.common.mavlink.dialect import id_of, mavlink
 from lapwing.services.common.status_texts import ROUTINE, TAKEN_OVER
-from lapwing.services.mavlink.dialect import id_of, mavlink
 from lapwing.services.mavlink.events import Definition, watches
 from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.telemetry import streams
@@ -17,7 +17,7 @@ class Announcements:
     """Compares each status with the one before."""
 
     def __init__(self, vehicle: VehicleCache, broadcast: Callable[[Any], None]):
-        """`broadcast` sends a message to every endpoint."""
+        """Create the comparison; `broadcast` sends a message to every endpoint."""
         self._vehicle, self._broadcast = vehicle, broadcast
         self._mode: tuple = ()
         self._home = vehicle.home_world
@@ -25,10 +25,10 @@ class Announcements:
         self._reached = NO_ITEM
         self._texts = 0
         self._told = ""  # the text of a failsafe that an event has told
-        self._watches = watches() if vehicle.flavour.EVENTS else []
+        self._watches = watches() if vehicle.firmware.EVENTS else []
 
     def step(self) -> None:
-        """There is a new status."""
+        """Send the changes since the last status."""
         s = self._vehicle.status
         if (mode := (s.mode, s.armed, s.failsafe)) != self._mode:
             self._mode = mode
@@ -54,7 +54,7 @@ class Announcements:
             self._broadcast(message)
 
     def _announce_reached(self, reached: int, count: int) -> None:
-        """Each item by itself, also where several were reached since the last status."""
+        """Announce each reached item separately, also if a status skipped some."""
         first = self._item[0] if self._reached == NO_ITEM else self._reached + 1
         self._reached = reached
         if count and reached != NO_ITEM:
@@ -62,9 +62,9 @@ class Announcements:
                 self._broadcast(mavlink.MAVLink_mission_item_reached_message(number))
 
     def say(self, text: str) -> None:
-        """A text for the operators, in pieces where it is long.
+        """Send a text to all endpoints, in pieces if it is long.
 
-        One that an event tells, too, ends with a tab, as PX4's do: ground stations that read events do not show it.
+        A text that an event also reports ends with a tab, as in PX4: ground stations that read events do not show it.
         """
         failsafe = self._vehicle.status.failsafe
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING

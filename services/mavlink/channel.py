@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.framing import frame
 from lapwing.services.mavlink.signing import Signature
 
@@ -56,7 +56,7 @@ class Channel:
         self.foreign = False  # the first bytes were no frame
 
     def encode(self, message: Any) -> bytes:
-        """The next frame; none, and counted, where a number of it is beyond a float of 32 bits."""
+        """Return the next frame. Return no bytes, and count it, if a value does not fit its field."""
         codec = self._codec
         if self._signature:
             self._signature.advance()
@@ -70,7 +70,7 @@ class Channel:
         return found
 
     def decode(self, data: bytes) -> Iterator[Any]:
-        """The sound messages of a piece of bytes; counts the others."""
+        """Yield the valid messages in a piece of bytes; count the others."""
         codec = self._codec
         if self._datagrams:
             codec.buf, codec.buf_index, codec.expected_length = bytearray(), 0, mavlink.HEADER_LEN_V1 + 2

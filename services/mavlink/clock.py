@@ -17,9 +17,9 @@ class Clock:
         self.now = Instant()
 
     def since(self, then: Instant) -> float:
-        """Seconds that an endpoint has had since `then`: by the clock on which fewer have passed.
+        """Return the time [s] since `then` by the clock that advanced less.
 
-        In a slow run the endpoint waits for the simulation, in a fast one it still needs its own wall time: nothing is
-        late before it is late by both.
+        In a slow run an endpoint waits for the simulation; in a fast run it still needs its own wall time. A message is
+        late only if it is late by both clocks.
         """
         return min((self.now.time_ns - then.time_ns) * 1e-9, self.now.wall - then.wall)

@@ -4,8 +4,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from lapwing.messages import CommandAck, OperatorCommand
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.clock import Clock, Instant
-from lapwing.services.mavlink.dialect import mavlink
 
 TIMEOUT = 2.0  # [s] the autopilot gets to acknowledge
 MAX_WAITING = 256  # commands that may wait for their acknowledgement
@@ -17,7 +17,7 @@ class CommandQueue:
     """Numbers the commands and leads the acknowledgements back."""
 
     def __init__(self, clock: Clock, put: Callable[[OperatorCommand], None] | None):
-        """`put` hands a command to the autopilot; None: there is none, this is a recorded flight."""
+        """Create an empty queue; `put` passes a command to the autopilot, None for a recorded flight."""
         self._clock, self._put = clock, put
         self.started = False  # the autopilot has spoken
         self._last = 0
@@ -25,7 +25,7 @@ class CommandQueue:
 
     @property
     def connected(self) -> bool:
-        """Whether there is an autopilot that takes commands."""
+        """True if an autopilot accepts commands."""
         return self._put is not None
 
     def put(
@@ -41,7 +41,7 @@ class CommandQueue:
 
         Args:
             kind: of OperatorCommand.
-            source: who gives it, "system/component".
+            source: sender, "system/component".
             on_acknowledgement: called with every acknowledgement; with one of our own where none comes.
             values: of OperatorCommand.
             text: of OperatorCommand.
@@ -57,16 +57,16 @@ class CommandQueue:
         self._put(OperatorCommand(kind, source, self._last, tuple(float(v) for v in values), text, tuple(items)))
 
     def _refusal(self) -> str:
-        """Why no command is taken now."""
+        """Return the reason for rejecting a command now."""
         if self._put is None:
             return "a recorded flight takes no commands"
         return "too many at once" if self.started else "the vehicle is still starting"
 
     def acknowledge(self, acknowledgements: Sequence[Any]) -> None:
-        """The autopilot has acknowledged commands."""
+        """Handle acknowledgements of the autopilot."""
         for acknowledgement in acknowledgements:
             waiting = self._waiting.get(acknowledgement.id)
-            if waiting is None or waiting[2] != acknowledgement.source:  # of nobody here: others number theirs, too
+            if waiting is None or waiting[2] != acknowledgement.source:  # of another sender with its own numbers
                 continue
             if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 self._waiting[acknowledgement.id] = waiting[0], self._clock.now, waiting[2]

@@ -1,4 +1,4 @@
-"""Files that tell ground stations what the parameters mean (MAVLink guide, "Component Metadata Protocol")."""
+"""Files that describe the parameters for ground stations (MAVLink guide, "Component Metadata Protocol")."""
 
 import json
 from collections.abc import Mapping
@@ -19,21 +19,21 @@ PARAMETER_TYPE, EVENTS_TYPE, ACTUATORS_TYPE = 1, 4, 5  # COMP_METADATA_TYPE
 
 
 def uri(path: str) -> str:
-    """Where a file is, as messages and files name it."""
+    """Return the URI of a file path."""
     return f"mftp://{path}"
 
 
 @cache
 def files(description: VehicleDescription) -> Mapping[str, bytes]:
-    """The files of a vehicle by their paths."""
+    """Return the metadata files of a vehicle by path."""
     table = {p.name: _parameter(p) for p in description.parameters}
     values = {p.name: p.default for p in description.parameters}
-    flavour = firmware.get(description.flavour)
-    for fact in flavour.facts(description):
+    emulated = firmware.get(description.firmware)
+    for fact in emulated.facts(description):
         table.setdefault(fact.name, _fact(fact, fact.value(values)))
     parameters = _json({"version": 1, "parameters": [table[name] for name in sorted(table)]})
     described = {PARAMETERS: (PARAMETER_TYPE, parameters)}
-    if flavour.EVENTS:
+    if emulated.EVENTS:
         described[EVENTS] = EVENTS_TYPE, _json(events())
     if output_function(1) in table:  # with ArduPilot's parameters there is no such page
         described[ACTUATORS] = ACTUATORS_TYPE, _json(actuators(description.rotors))

@@ -10,14 +10,14 @@ MAX_DATAGRAM = 1400  # [bytes] that any network carries in one piece
 
 
 class Endpoint:
-    """Who is at the other end, and the way there."""
+    """A MAVLink peer and the connection to it."""
 
     def __init__(self, channel: Channel, local: bool, put: Callable[[bytes], None]):
-        """An endpoint that has sent nothing yet.
+        """Create an endpoint that has sent nothing yet.
 
         Args:
-            channel: its frames.
-            local: it is on this machine.
+            channel: codec of its frames.
+            local: True if it is on this machine.
             put: sends bytes to it.
         """
         self.local = local
@@ -36,7 +36,7 @@ class Endpoint:
         return self._channel.foreign
 
     def decode(self, data: bytes) -> Iterator[Any]:
-        """The sound messages in bytes that have come from it."""
+        """Yield the valid messages in received bytes."""
         return self._channel.decode(data)
 
     def send(self, *messages: Any) -> None:

@@ -1,15 +1,15 @@
-"""The events of a run: numbered, and kept for whoever has missed one (MAVLink guide, "Events Interface")."""
+"""The events of a run: numbered, and stored for receivers that have missed one (MAVLink guide, "Events Interface")."""
 
 from collections import deque
 from collections.abc import Iterator
 from typing import Any
 
-from lapwing.services.mavlink.dialect import message_class
+from lapwing.services.common.mavlink.dialect import message_class
 
 KEPT = 100  # events that can be sent again
 ROUND = 1 << 16  # sequence numbers begin again after so many
 ARGUMENTS = 40  # [bytes] of a message
-ALL = 0  # destination of an event for everybody
+ALL = 0  # destination of an event for all receivers
 RESET = 1  # MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET: the numbers have begun anew
 UNAVAILABLE = 0  # MAV_EVENT_ERROR_REASON_UNAVAILABLE
 
@@ -22,17 +22,17 @@ class EventLog:
         self._kept: deque[tuple[int, Any]] = deque(maxlen=KEPT)  # with their numbers
 
     def current(self) -> Any:
-        """CURRENT_EVENT_SEQUENCE: a station that lacks the event of this number asks for it."""
+        """Return CURRENT_EVENT_SEQUENCE, by which a station detects missing events."""
         return message_class("CURRENT_EVENT_SEQUENCE")(self.sequence, 0 if self._kept else RESET)
 
     def add(self, number: int, level: int, arguments: bytes, time_ms: int) -> list[Any]:
-        """The messages that tell of a new event.
+        """Append an event. Return the messages that report it.
 
         Args:
-            number: its id.
-            level: of its seriousness, for people and for logs alike.
-            arguments: their bytes.
-            time_ms: since the start [ms].
+            number: event id.
+            level: severity, both external and internal.
+            arguments: encoded arguments.
+            time_ms: time since the start [ms].
         """
         begins = [] if self._kept else [self.current()]
         self.sequence = (self.sequence + 1) % ROUND
@@ -42,12 +42,12 @@ class EventLog:
         return [*begins, message]
 
     def replies(self, first: int, last: int, address: tuple[int, int]) -> Iterator[Any]:
-        """The events from one number to another, and in place of those that are not there the number of the next.
+        """Yield the events of a range of sequence numbers; for a missing one, the number of the next.
 
         Args:
             first: sequence number.
-            last: sequence number, which may be lower: they begin again after the highest.
-            address: system and component of whoever asks.
+            last: sequence number; may be lower than `first`, since numbers wrap around.
+            address: system and component of the requesting endpoint.
         """
         wanted = (last - first) % ROUND + 1
         found = dict(self._kept)

@@ -1,9 +1,9 @@
-"""What the numbers of events mean, for ground stations: libevents' JSON format, version 2."""
+"""Event metadata for ground stations, in libevents' JSON format, version 2."""
 
 from typing import Any
 
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink import firmware
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.events import Definition, definitions
 from lapwing.services.mavlink.events.arming_checks import MODES
 from lapwing.services.mavlink.events.definition import Enumeration
@@ -13,7 +13,7 @@ NAMESPACE = "lapwing"
 
 
 def events() -> dict[str, Any]:
-    """The description of every event, as JSON."""
+    """Return the description of all events as a JSON tree."""
     found = definitions().values()
     enumerations = {a.type.name: a.type for d in found for a in d.arguments if isinstance(a.type, Enumeration)}
     groups: dict[str, Any] = {}

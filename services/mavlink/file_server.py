@@ -17,11 +17,11 @@ INVALID_SIZE, INVALID_SESSION, NO_SESSION, END_OF_FILE, UNKNOWN_COMMAND, PROTECT
 
 
 class _RefusedError(Exception):
-    """A request that is refused; its argument is the error code."""
+    """Error for a rejected request; its argument is the error code."""
 
 
 def crc32(data: bytes) -> int:
-    """The checksum of the protocol: CRC-32 that begins with 0 and is not inverted at the end."""
+    """Return the protocol's checksum: CRC-32 with initial value 0 and no final inversion."""
     return zlib.crc32(data, 0xFFFFFFFF) ^ 0xFFFFFFFF
 
 
@@ -29,13 +29,13 @@ class FileServer:
     """The files as one endpoint sees them, and those that it has open."""
 
     def __init__(self, files: Mapping[str, bytes]):
-        """`files`: contents by path, without a slash at the beginning."""
+        """Create a server of `files`: contents by path, without a leading slash."""
         self._files = files
         self._open: dict[int, bytes] = {}
         self._last: tuple[bytes, list[bytes]] = (b"", [])
 
     def replies(self, payload: bytes) -> list[bytes]:
-        """The payloads that answer a request; the same again to one that is repeated."""
+        """Return the reply payloads of a request; a repeated request gets the previous replies."""
         if payload != self._last[0]:
             self._last = payload, list(self._replies(payload))
         return self._last[1]
@@ -63,7 +63,7 @@ class FileServer:
             yield reply(NAK, bytes([refused.args[0]]))
 
     def _other(self, opcode: int, session: int, data: bytes, offset: int) -> bytes:
-        """Data of the acknowledgement of a request that needs no more than one."""
+        """Return the data of the acknowledgement of a request with a single reply."""
         if opcode == CRC32:
             return struct.pack("<I", crc32(self._file(data)))
         if opcode == LIST:
@@ -92,7 +92,7 @@ class FileServer:
         return free
 
     def _pieces(self, session: int, offset: int, size: int, count: int) -> list[tuple[int, bytes]]:
-        """Up to `count` pieces of an open file from an offset: (offset, bytes)."""
+        """Return up to `count` pieces of an open file from an offset, as (offset, bytes)."""
         if session not in self._open:
             raise _RefusedError(INVALID_SESSION)
         if not 0 < size <= DATA:
@@ -104,7 +104,7 @@ class FileServer:
         return [(start, content[start : start + size]) for start in starts]
 
     def _listing(self, folder: str, offset: int) -> bytes:
-        """Entries of a folder from an index, as many as fit."""
+        """Return the entries of a folder from an index, as many as fit into a payload."""
         prefix = f"{folder}/" if folder else ""
         inside = [(path.removeprefix(prefix), data) for path, data in self._files.items() if path.startswith(prefix)]
         if not inside:

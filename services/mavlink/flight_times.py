@@ -1,10 +1,10 @@
-"""When the vehicle was armed, took off and landed."""
+"""Times of arming, take-off and landing."""
 
 from lapwing.messages import Status
 
 
 class FlightTimes:
-    """When the last flight was armed, took off and landed: simulation time [ns], 0 for what has not happened."""
+    """Simulation times [ns] of arming, take-off and landing of the last flight; 0: not yet."""
 
     def __init__(self) -> None:
         self.armed_ns = self.takeoff_ns = self.landing_ns = 0

@@ -6,14 +6,14 @@ from functools import cache
 from operator import attrgetter
 from typing import Any, NamedTuple
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 _HEADER = struct.Struct("<BBBBBBBHB")  # MAVLink guide, "Packet Serialization": magic to message id (24 bits)
 _CHECKSUM = struct.Struct("<H")
 
 
 class _Kind(NamedTuple):
-    """What is the same in all messages of a class."""
+    """Constants of a message class."""
 
     fields: Callable[[Any], tuple]  # of a message, in the order of the wire
     arrays: tuple[int, ...]  # places of those that are arrays, the last first
@@ -24,7 +24,7 @@ class _Kind(NamedTuple):
 
 @cache
 def _kind(found: Any) -> _Kind | None:
-    """A class of messages; None where it has texts or a single field."""
+    """Return the constants of a message class. Return None for one with texts or a single field."""
     names = found.ordered_fieldnames
     if len(names) < 2 or {"c", "s"} & set(found.native_format.decode()):
         return None
@@ -33,7 +33,7 @@ def _kind(found: Any) -> _Kind | None:
 
 
 def frame(message: Any, sequence: int, system: int, component: int) -> bytes | None:
-    """The unsigned MAVLink 2 frame of a message; None where it has texts or a single field."""
+    """Return the unsigned MAVLink 2 frame of a message. Return None for one with texts or a single field."""
     found: Any = type(message)
     kind = _kind(found)
     if kind is None:

@@ -5,9 +5,9 @@ from collections.abc import Callable
 from typing import Any
 
 from lapwing.messages import MissionItem, Vector3
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import swap_yaw
-from lapwing.services.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SEA, Datum, degrees, to_world
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import swap_yaw
+from lapwing.services.common.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SEA, Datum, degrees, to_world
 
 _ON_GLOBE = ABOVE_SEA | ABOVE_HOME
 
@@ -37,12 +37,12 @@ def makes(*commands: int) -> Callable[[Maker], Maker]:
 
 
 def idle() -> Any:
-    """An item that does nothing and takes no time."""
+    """Return an item without effect or duration."""
     return MissionItem("delay", Vector3(), math.nan, math.nan, 0.0, ())
 
 
 def place(m: Any, datum: Datum, needed: bool = True) -> Any:
-    """Position of an item; where it need not say and does not, NaN."""
+    """Return the position of an item; NaN if it is optional and not specified."""
     if m.frame not in _ON_GLOBE:
         raise RefusedItemError(mavlink.MAV_MISSION_UNSUPPORTED_FRAME, m.seq)
     latitude, longitude = degrees(m.x), degrees(m.y)
@@ -59,17 +59,17 @@ def place(m: Any, datum: Datum, needed: bool = True) -> Any:
 
 
 def length(value: float, result: int, m: Any) -> float:
-    """A time or a number that must not be negative; one that is not given is 0."""
+    """Return a time or number that must not be negative; 0 if it is not specified."""
     if value < 0.0:
         raise RefusedItemError(result, m.seq)
     return 0.0 if math.isnan(value) else value
 
 
 def radius(value: float) -> float:
-    """Acceptance radius [m]; NaN, for the autopilot's own, where none is given."""
+    """Return the acceptance radius [m]; NaN, for the autopilot's default, if it is not specified."""
     return value if value > 0.0 else math.nan
 
 
 def yaw(value: float) -> float:
-    """World yaw [rad] of a heading [deg]."""
+    """Return the world yaw [rad] of a heading [deg]."""
     return swap_yaw(math.radians(value))

@@ -1,11 +1,11 @@
-"""What is made of each command of a mission, a fence or of rally points."""
+"""Conversion of mission, fence and rally-point commands into the autopilot's items."""
 
 import math
 from typing import Any
 
 from lapwing.messages import MissionItem, Vector3
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.geo_coordinates import Datum
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink.item_fields import RefusedItemError, idle, length, makes, place, radius, yaw
 
 MAX_ITEMS = 1000

@@ -1,4 +1,4 @@
-"""How a run is linked to the outside."""
+"""Options of the links of a run."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -8,7 +8,7 @@ class Options(NamedTuple):
     """The links of a vehicle, and who may command it over them."""
 
     urls: tuple[str, ...]
-    key: bytes | None = None  # signs what is sent, and refuses what is not signed with it
+    key: bytes | None = None  # signs outgoing messages; messages without its signature are rejected
     insecure: bool = False  # commands are taken from other machines without a key
     log: Path | None = None  # that endpoints may download
     time_stamps: Path | None = None  # file that keeps the time stamps of signed frames

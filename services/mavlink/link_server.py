@@ -81,7 +81,7 @@ class LinkServer:
             key.data()
 
     def replay(self, key: str, time_ns: int, payload: bytes) -> None:
-        """A recorded message of a topic, by its name in the log; serves the endpoints now and then."""
+        """Handle a recorded message, with its topic name in the log; serve the endpoints at each estimate."""
         topic = self._topics.get(key)
         if topic:
             self.take(topic, time_ns, payload)
@@ -89,14 +89,14 @@ class LinkServer:
             self.wait(0.0)
 
     def take(self, topic: Topic, time_ns: int, payload: bytes) -> None:
-        """The vehicle has published a message."""
+        """Handle a published message of the vehicle."""
         wall = time.monotonic()
         self.adapter.take(topic, time_ns, payload, wall)
         if topic is ESTIMATE:
             self._pacing.note(time_ns * 1e-9, wall)
 
     def report(self) -> Sequence[str]:
-        """What there is to tell at the end."""
+        """Return the lines of the final report."""
         lines = [self._pacing.report()]
         counts = self.adapter.counts
         if refused := ", ".join(f"{count} {what}" for what, count in sorted(counts.items()) if what != "received"):

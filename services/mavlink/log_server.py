@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 NUMBER = 1  # of the only log there is
 PIECE = 90  # [bytes] of one LOG_DATA
@@ -15,7 +15,7 @@ class LogServer:
     """Lists the log, and sends what is asked for of it, a few messages at a time."""
 
     def __init__(self, path: Path | None):
-        """`path`: of the log; None: there is none."""
+        """Create a server of the log at `path`; None: no log."""
         self._path = path
         self._next = self._end = 0  # bytes that are still to be sent
         self._due = False  # whether a request is not answered yet, if only by the word that there is no more
@@ -28,7 +28,7 @@ class LogServer:
             return 0
 
     def entries(self, first: int, last: int) -> Any:
-        """LOG_ENTRY of the logs of these numbers: what has been written of the one there is by now."""
+        """Return LOG_ENTRY messages of a range of logs, with the size written so far."""
         if self._path is None or not self._size or not first <= NUMBER <= last:
             return mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0)
         return mavlink.MAVLink_log_entry_message(NUMBER, 1, NUMBER, int(self._path.stat().st_mtime), self._size)
@@ -46,7 +46,7 @@ class LogServer:
         self._due = False
 
     def step(self) -> Iterator[Any]:
-        """The next LOG_DATA messages."""
+        """Yield the next LOG_DATA messages."""
         if not self._due:
             return
         data = self._read(self._next, min(PER_STEP * PIECE, self._end - self._next))

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from lapwing.messages import MissionItem
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.geo_coordinates import Datum
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink.item_fields import MAKERS, RefusedItemError, idle
 from lapwing.services.mavlink.item_makers import MAX_ITEMS
 
@@ -48,7 +48,7 @@ _IDLE = {  # commands of a mission for parts that this vehicle does not have
 
 
 def skipped(items: Sequence[Any]) -> list[str]:
-    """What is kept and does nothing, in words."""
+    """Return texts about items that are stored but have no effect."""
     names = mavlink.enums["MAV_CMD"]
     return [
         f"item {m.seq}: {names[m.command].name.removeprefix('MAV_CMD_')} skipped" for m in items if m.command in _IDLE
@@ -56,15 +56,15 @@ def skipped(items: Sequence[Any]) -> list[str]:
 
 
 def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[Any]:
-    """The autopilot's items of MISSION_ITEM_INT messages.
+    """Return the autopilot's items of MISSION_ITEM_INT messages.
 
     Args:
-        items: in order.
-        home_first: the first of a mission is where home is, and not to be flown to.
-        datum: what places count from.
+        items: messages in order.
+        home_first: the first item of a mission is home and is not flown to.
+        datum: reference of coordinates.
 
     Raises:
-        RefusedItemError: one cannot be flown.
+        RefusedItemError: an item cannot be flown.
     """
     found = [
         idle() if home_first and number == 0 and m.mission_type == mavlink.MAV_MISSION_TYPE_MISSION else _item(m, datum)

@@ -4,12 +4,12 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import Any
 
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.geo_coordinates import Datum
+from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.mavlink.clock import Clock
 from lapwing.services.mavlink.command_queue import CommandQueue
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.geo_coordinates import Datum
-from lapwing.services.mavlink.mission_export import to_mavlink
 from lapwing.services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, skipped
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
 from lapwing.services.mavlink.statustext import statustext
@@ -31,7 +31,7 @@ _RESULTS = {
 
 
 class MissionStore:
-    """What is held of each kind, and who is uploading."""
+    """Stored items of each kind, and active uploads."""
 
     def __init__(
         self,
@@ -41,14 +41,14 @@ class MissionStore:
         home_first: bool,
         counts: Counter[str],
     ):
-        """Nothing is held yet.
+        """Create an empty store.
 
         Args:
-            clock: of the link.
-            commands: to the autopilot.
-            datum: gives what places count from.
-            home_first: the first item of a mission is home, as ArduPilot has it.
-            counts: what was refused, by reason.
+            clock: clock of the link.
+            commands: queue of commands to the autopilot.
+            datum: returns the reference of coordinates.
+            home_first: the first item of a mission is home, as in ArduPilot.
+            counts: rejected messages by reason.
         """
         self._clock, self._commands, self._datum = clock, commands, datum
         self._home_first, self._counts = home_first, counts
@@ -60,7 +60,7 @@ class MissionStore:
         self._accepted: deque[tuple[str, int]] = deque(maxlen=_RECENT)  # source and number of commands
 
     def begin(self, endpoint: Endpoint, kind: int, count: int) -> None:
-        """An endpoint has that many items to hand over."""
+        """Start an upload of `count` items."""
         self._repeats.pop(kind, None)
         upload = self._uploads.get(kind)
         if upload and upload.endpoint is not endpoint:
@@ -78,10 +78,10 @@ class MissionStore:
             self._go_on(upload)
 
     def take(self, endpoint: Endpoint, m: Any) -> None:
-        """The next item has come, or another one, or one again."""
+        """Handle an item of an upload: the next one, one out of order, or a repeated one."""
         upload = self._uploads.get(m.mission_type)
         if upload is None or upload.endpoint is not endpoint:
-            self._counts["item that nobody asked for"] += 1
+            self._counts["item without a request"] += 1
             whose, result = self._finished.get(m.mission_type, (None, 0))
             if whose is endpoint:  # it has missed the acknowledgement
                 self._acknowledge(endpoint, m.mission_type, result)
@@ -95,13 +95,13 @@ class MissionStore:
             self._go_on(upload)
 
     def forget(self, endpoint: Endpoint, kind: int | None = None) -> None:
-        """An endpoint goes on with something else, or is gone: it needs no last acknowledgement any more."""
+        """Stop repeating the last acknowledgement to an endpoint that has left or continues with something else."""
         for other, repeat in list(self._repeats.items()):
             if repeat.endpoint is endpoint and kind in (None, other):
                 del self._repeats[other]
 
     def cancel(self, endpoint: Endpoint, kind: int) -> None:
-        """An endpoint gives up its upload."""
+        """Cancel the upload of an endpoint."""
         upload = self._uploads.get(kind)
         if upload and upload.endpoint is endpoint and not upload.complete:
             del self._uploads[kind]
@@ -116,7 +116,7 @@ class MissionStore:
             self.begin(endpoint, kind, 0)
 
     def observe(self, commands: Iterable[Any], acknowledgements: Iterable[Any]) -> None:
-        """Commands of others to the autopilot, and its acknowledgements: uploads that it accepts are held too."""
+        """Store uploads of other senders that the autopilot accepts."""
         self._observed += (c for c in commands if c.kind in _KIND_OF)
         self._accepted += ((a.source, a.id) for a in acknowledgements if a.result == mavlink.MAV_RESULT_ACCEPTED)
         for command in [c for c in self._observed if (c.source, c.id) in self._accepted]:
@@ -124,13 +124,13 @@ class MissionStore:
             self.hold(command)
 
     def hold(self, command: Any) -> None:
-        """The autopilot has what this command brought, if it is an upload."""
+        """Store the items of an upload command that the autopilot has accepted."""
         if command.kind in _KIND_OF:
             kind = _KIND_OF[command.kind]
             self.held[kind] = to_mavlink(command.items, kind, self._datum())
 
     def step(self) -> None:
-        """Ask again for what does not come, and give up at last; repeat last acknowledgements."""
+        """Repeat requests for missing items until the limit; repeat the last acknowledgements."""
         for kind, repeat in list(self._repeats.items()):
             if repeat.due():
                 self._acknowledge(repeat.endpoint, kind, repeat.result)
@@ -155,7 +155,7 @@ class MissionStore:
         upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, upload.ask(), upload.kind))
 
     def _hand_over(self, upload: Upload, told: int | None = None) -> None:
-        """All items are there: the autopilot takes them, or they are refused."""
+        """Send the complete items to the autopilot, or reject them."""
         try:
             items = from_mavlink(upload.items, self._home_first, self._datum())
         except RefusedItemError as refused:

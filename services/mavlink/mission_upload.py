@@ -28,25 +28,25 @@ class Upload:
 
     @property
     def overdue(self) -> bool:
-        """Whether the next item is to be asked for again."""
+        """True if the next item must be requested again."""
         return not self.complete and self._clock.since(self._asked) >= self._retry
 
     @property
     def given_up(self) -> bool:
-        """Whether the next item has been waited for too long."""
+        """True if the next item did not arrive in time."""
         return self._clock.since(self._begun) >= UPLOAD_TIMEOUT
 
     def ask(self) -> int:
-        """The next item is asked for; its number."""
+        """Record the request of the next item. Return its number."""
         self._asked = self._clock.now
         return len(self.items)
 
     def ask_again(self) -> None:
-        """It did not come."""
+        """Record that the requested item was lost."""
         self._again = self.lossy = True
 
     def take(self, item: Any) -> None:
-        """The next item has come."""
+        """Append the next item."""
         if not self._again:  # else it is not known which request it answers
             round_trip = self._clock.since(self._asked)
             self._retry = min(RETRY, max(SOONEST + 2.0 * round_trip, 0.8 * self._retry))
@@ -63,7 +63,7 @@ class Repeat:
         self._clock, self._sent = clock, clock.now
 
     def due(self) -> bool:
-        """Whether it is to be sent now."""
+        """Return True if it must be sent now."""
         if self._clock.since(self._sent) < REPEAT:
             return False
         self._left, self._sent = self._left - 1, self._clock.now
@@ -71,5 +71,5 @@ class Repeat:
 
     @property
     def over(self) -> bool:
-        """Whether it was sent often enough."""
+        """True if all repetitions were sent."""
         return self._left <= 0

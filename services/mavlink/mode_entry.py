@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 
 class FlightMode(NamedTuple):

@@ -1,17 +1,20 @@
 """The autopilot's tunable parameters as endpoints see them: numbered, typed, and always acknowledged."""
 
 import math
+import struct
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.command_queue import CommandQueue
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.firmware import Flavour
+from lapwing.services.mavlink.firmware import Firmware
+from lapwing.services.mavlink.px4_facts import Fact
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
-BY_NAME = -1  # the index of a request that gives a name
+BY_NAME = -1  # index of a request by name
 MAX_PER_STEP = 20  # values of a list sent to one endpoint at each step of the telemetry
 
 
@@ -21,39 +24,56 @@ class ParameterStore:
     def __init__(
         self,
         description: VehicleDescription,
-        flavour: Flavour,
+        firmware: Firmware,
         commands: CommandQueue,
         broadcast: Callable[[Any], None],
         counts: Counter[str],
     ):
-        """The values that the autopilot starts with.
+        """Create a store with the autopilot's initial values.
 
         Args:
-            description: of the vehicle.
-            flavour: says how whole numbers travel, and which facts its ground stations ask for.
-            commands: to the autopilot.
+            description: vehicle.
+            firmware: firmware, which defines the encoding of integers and further facts.
+            commands: queue of commands to the autopilot.
             broadcast: sends a message to every endpoint.
-            counts: what was refused, by reason.
+            counts: rejected messages by reason.
         """
         self._table = {p.name: p for p in description.parameters}
-        self._facts = {f.name: f for f in flavour.facts(description) if f.name not in self._table}
+        self._facts = {f.name: f for f in firmware.facts(description) if f.name not in self._table}
         self.names = sorted([*self._table, *self._facts])  # in the order of their indices
         self._number = {name: k for k, name in enumerate(self.names)}
         self._values = {name: p.default for name, p in self._table.items()}
-        self._flavour, self._commands, self._broadcast, self._counts = flavour, commands, broadcast, counts
+        self._firmware, self._commands, self._broadcast, self._counts = firmware, commands, broadcast, counts
+        self._set_facts: dict[str, float] = {}  # as they were set, while their counterparts have these values
+        self._again: dict[str, int] = {}  # changed parameters to send again, in so many steps
         self._lists: dict[Endpoint, int] = {}  # lists on their way: the next index of each
 
     def value(self, name: str) -> float:
-        """A parameter's value, NaN where there is no such parameter."""
+        """Return a parameter's value; NaN if there is no such parameter."""
         fact = self._facts.get(name)
-        return fact.value(self._values) if fact else self._values.get(name, math.nan)
+        if fact is None:
+            return self._values.get(name, math.nan)
+        chosen = self._set_facts.get(name)
+        if chosen is not None and fact.assign is not None:
+            counterparts = fact.assign(chosen)
+            if counterparts is not None and all(self._values.get(k) == v for k, v in counterparts.items()):
+                return chosen
+        return fact.value(self._values)
 
     def start_list(self, endpoint: Endpoint) -> None:
         """Send all, a few at a time."""
         self._lists[endpoint] = 0
 
     def step(self) -> None:
-        """Go on with the lists."""
+        """Continue the lists, and send changed parameters again.
+
+        PX4 sends a changed parameter twice, some milliseconds apart; MAVSDK's subscriptions need the second one.
+        """
+        for name, steps in list(self._again.items()):
+            self._again[name] = steps - 1
+            if steps <= 1:
+                del self._again[name]
+                self._broadcast(self._message(name))
         for endpoint, begin in list(self._lists.items()):
             for name in self.names[begin : begin + MAX_PER_STEP]:
                 self._send(endpoint, name)
@@ -62,7 +82,7 @@ class ParameterStore:
                 del self._lists[endpoint]
 
     def forget(self, endpoint: Endpoint) -> None:
-        """An endpoint is gone."""
+        """Remove an endpoint."""
         self._lists.pop(endpoint, None)
 
     def read(self, endpoint: Endpoint, name: str, index: int) -> None:
@@ -75,16 +95,15 @@ class ParameterStore:
             self._refuse(endpoint, name, index, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def set(self, endpoint: Endpoint, name: str, value: float, trusted: bool) -> None:
-        """Ask the autopilot for a new value; every endpoint is told what it is then."""
+        """Request a new value from the autopilot, then send the resulting value to every endpoint."""
         if name in self._facts:
-            self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_READ_ONLY)
-            self._send(endpoint, name)
+            self._set_fact(endpoint, self._facts[name], value, trusted)
             return
         parameter = self._table.get(name)
         if parameter is None:
             self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
-        wanted = self._flavour.param_value(value, parameter.whole)
+        wanted = _unrounded(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
 
         def acknowledged(acknowledgement: Any) -> None:
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
@@ -102,12 +121,51 @@ class ParameterStore:
         else:
             self._commands.put("parameter", endpoint.name, acknowledged, (wanted,), name)
 
+    def _set_fact(self, endpoint: Endpoint, fact: Fact, value: float, trusted: bool) -> None:
+        """Set the counterparts of a fact, one after the other."""
+        chosen = self._firmware.param_value(value, fact.whole)
+        counterparts = fact.assign(chosen) if fact.assign and math.isfinite(chosen) else None
+        error = None
+        if fact.assign is None:
+            error = mavlink.MAV_PARAM_ERROR_READ_ONLY
+        elif not trusted:
+            error = mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED
+        elif counterparts is None or not all(
+            name in self._table and self._table[name].allows(v) for name, v in counterparts.items()
+        ):
+            error = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+        if error is not None or counterparts is None:
+            self._refuse(endpoint, fact.name, BY_NAME, error or mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            self._send(endpoint, fact.name)
+            return
+        before = self.value(fact.name)
+        self._set_facts[fact.name] = chosen
+        waiting = {name: v for name, v in counterparts.items() if self._values[name] != v}
+        if not waiting:
+            self._tell(fact.name)
+            return
+
+        def acknowledged(name: str, acknowledgement: Any) -> None:
+            del waiting[name]
+            if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
+                self._change(name, acknowledgement.value)
+            if not waiting and self.value(fact.name) == before:  # else told as what follows from the change
+                self._tell(fact.name)
+
+        for name, v in list(waiting.items()):
+            self._commands.put("parameter", endpoint.name, partial(acknowledged, name), (v,), name)
+
+    def _tell(self, name: str) -> None:
+        """Send a changed parameter to every endpoint, and again at the next step."""
+        self._broadcast(self._message(name))
+        self._again[name] = 1
+
     def _change(self, name: str, value: float) -> None:
         """Tell every endpoint the new value, and the facts that follow from it."""
         before = {fact: self.value(fact) for fact in self._facts}
         self._values[name] = value
         for changed in (name, *[fact for fact in self._facts if self.value(fact) != before[fact]]):
-            self._broadcast(self._message(changed))
+            self._tell(changed)
 
     def _send(self, endpoint: Endpoint, name: str) -> None:
         endpoint.send(self._message(name))
@@ -115,11 +173,16 @@ class ParameterStore:
     def _message(self, name: str) -> Any:
         integer = (self._table.get(name) or self._facts[name]).whole
         kind = mavlink.MAV_PARAM_TYPE_INT32 if integer else mavlink.MAV_PARAM_TYPE_REAL32
-        value = self._flavour.param_float(self.value(name), integer)
+        value = self._firmware.param_float(self.value(name), integer)
         return mavlink.MAVLink_param_value_message(name.encode(), value, kind, len(self.names), self._number[name])
 
     def _refuse(self, endpoint: Endpoint, name: str, index: int, error: int) -> None:
-        self._counts["parameter refused"] += 1
+        self._counts["parameter rejected"] += 1
         endpoint.send(
             mavlink.MAVLink_param_error_message(endpoint.system, endpoint.component, name.encode(), index, error)
         )
+
+
+def _unrounded(value: float, *bounds: float) -> float:
+    """Return the bound that the field of 32 bits holds as `value`; else the value."""
+    return next((bound for bound in bounds if struct.unpack("<f", struct.pack("<f", bound))[0] == value), value)

@@ -1,13 +1,14 @@
-"""Parameters that QGroundControl's PX4 pages ask for and that nobody can change here: facts of the vehicle.
+"""PX4's parameters that the autopilot has under other names or not at all: facts of the vehicle and translations.
 
 Names and values are those of PX4's parameter reference; a part that is not fitted says so. Some follow from others:
-what PX4 has in one number, the autopilot has in several.
+what PX4 has in one number, the autopilot has in several. Those that PX4 lets a user set and that have a counterpart can
+be set, and set the counterparts.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.vehicle_description import Battery, VehicleDescription
 from lapwing.services.mavlink.vehicle_type import vehicle_type
 
@@ -15,12 +16,24 @@ Values = Mapping[str, float]
 
 
 class Fact(NamedTuple):
-    """A parameter that can be read only."""
+    """A parameter that follows from the vehicle or from the autopilot's parameters."""
 
     name: str
     value: Callable[[Values], float]  # of the autopilot's parameters
     whole: bool = True
     unit: str = ""
+    # The autopilot's parameters for a value, None for one that it has no counterpart for; None: read only
+    assign: Callable[[float], Values | None] | None = None
+
+
+def _translated(name: str, counterpart: str, actions: dict[int, int], default: int = 0) -> Fact:
+    """Return a failsafe action of PX4 that is one of the autopilot's; `actions` has the latter by the former."""
+    shown = {ours: theirs for theirs, ours in reversed(actions.items())}
+
+    def assign(value: float) -> Values | None:
+        return {counterpart: float(actions[int(value)])} if value in actions else None
+
+    return Fact(name, lambda v: shown.get(int(v.get(counterpart, NOTHING)), default), assign=assign)
 
 
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
@@ -33,26 +46,36 @@ NO_THRESHOLDS = ("ARMSWITCH", "GEAR", "KILLSWITCH", "LOITER", "OFFB", "RETURN")
 THRESHOLD = 0.75  # that PX4 begins with
 NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # what a failsafe of the autopilot does
 _WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
-_GEOFENCE = {NOTHING: 1, HOLD: 2, RETURN: 3, LAND: 5, DESCEND: 5}  # GF_ACTION
-_LINK_LOSS = {NOTHING: 0, HOLD: 1, RETURN: 2, LAND: 3, DESCEND: 3}  # NAV_RCL_ACT
+# PX4's actions that the autopilot has; it has no termination
+_GEOFENCE = {1: NOTHING, 0: NOTHING, 2: HOLD, 3: RETURN, 5: LAND}  # GF_ACTION
+_LINK_LOSS = {0: NOTHING, 1: HOLD, 2: RETURN, 3: LAND}  # NAV_RCL_ACT
+_MOTOR_LOSS = {0: NOTHING, 1: HOLD, 2: LAND, 3: RETURN}  # COM_ACT_FAIL_ACT
+_DESCENT = {"GF_ACTION": 5, "COM_ACT_FAIL_ACT": 2}  # to show DESCEND as landing
+_BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency charge
+    _WARN: (NOTHING, NOTHING),
+    _LAND: (LAND, LAND),
+    _RETURN_THEN_LAND: (RETURN, LAND),
+}
+EXCEPTIONS = 31  # COM_RCL_EXCEPT: all bits
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
 MULTIROTOR = 0  # CA_AIRFRAME
+SATELLITES = 16  # of a fix, as telemetry has them
 FIRST_MOTOR = 101  # function of an output that drives motor 1
 
 
 def output_function(number: int | str) -> str:
-    """The parameter that says what an output, counted from 1, drives."""
+    """Return the name of the parameter with the function of an output, counted from 1."""
     return f"PWM_MAIN_FUNC{number}"
 
 
 def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
-    """The facts of a vehicle."""
+    """Return the facts of a vehicle."""
 
     def fitted(sensor: str) -> int:
-        return int(not d.sensors or sensor in d.sensors)  # where none is, the true state stands for all of them
+        return int(not d.sensors or sensor in d.sensors)  # without sensors the ground truth replaces all of them
 
     whole = {
-        "MAV_SYS_ID": d.system,
+        "MAV_SYS_ID": d.system_id,
         "MAV_COMP_ID": mavlink.MAV_COMP_ID_AUTOPILOT1,
         "MAV_TYPE": vehicle_type(len(d.rotors)),
         "SYS_AUTOSTART": GENERIC_FRAMES.get(len(d.rotors), GENERIC_FRAMES[4]),
@@ -74,6 +97,11 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "GF_MAX_HOR_DIST": 0,
         "GF_MAX_VER_DIST": 0,
         "COM_OBS_AVOID": 0,
+        "RTL_APPR_FORCE": 0,  # a rally point needs no approach
+        "SIM_GPS_USED": SATELLITES * fitted("gps"),
+        "FD_ACT_EN": 1,  # a failed motor is detected
+        "CA_FAILURE_MODE": 1,  # and left out of the allocation
+        "MC_AIRMODE": 0,  # thrust is not raised for roll, pitch or yaw at low throttle
         "SDLOG_MODE": LOGGED_FROM_BOOT_TO_SHUTDOWN,
         "PD_GRIPPER_EN": int(d.gripper),
         "CA_AIRFRAME": MULTIROTOR,
@@ -91,12 +119,15 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
         *(_battery(d.battery) if d.battery else ()),
         *[Fact(f"RC_{switch}_TH", lambda _: THRESHOLD, False) for switch in NO_THRESHOLDS],
-        Fact("COM_LOW_BAT_ACT", _low_battery),
-        Fact("GF_ACTION", lambda v: _GEOFENCE[int(v.get("FS_FENCE_ACT", NOTHING))]),
-        Fact("NAV_RCL_ACT", lambda v: _LINK_LOSS[int(v.get("NAV_DLL_ACT", NOTHING))]),  # sticks come over the data link
+        Fact("COM_LOW_BAT_ACT", _low_battery, assign=_assign_battery),
+        _translated("GF_ACTION", "FS_FENCE_ACT", _GEOFENCE, _DESCENT["GF_ACTION"]),
+        _translated("NAV_RCL_ACT", "NAV_DLL_ACT", _LINK_LOSS),  # sticks come over the data link
+        _translated("COM_ACT_FAIL_ACT", "FS_MOTOR_ACT", _MOTOR_LOSS, _DESCENT["COM_ACT_FAIL_ACT"]),
+        # Modes that go on without sticks: all that need none do so, whatever is set
+        Fact("COM_RCL_EXCEPT", lambda _: 0.0, assign=lambda x: {} if x in range(EXCEPTIONS + 1) else None),
         Fact("CP_DIST", lambda _: NO_COLLISION_PREVENTION, False, "m"),
         Fact("SENS_DPRES_OFF", lambda _: 0.0, False, "Pa"),
-        Fact("COM_RC_LOSS_T", lambda v: v.get("COM_DL_LOSS_T", 0.0), False, "s"),
+        Fact("COM_RC_LOSS_T", lambda v: v.get("COM_DL_LOSS_T", 0.0), False, "s", lambda x: {"COM_DL_LOSS_T": x}),
     ]
 
 
@@ -110,8 +141,15 @@ def _battery(b: Battery) -> Sequence[Fact]:
     ]
 
 
+def _assign_battery(value: float) -> Values | None:
+    if value not in _BATTERY:
+        return None
+    critical, emergency = _BATTERY[int(value)]
+    return {"FS_BAT_CRIT_ACT": critical, "FS_BAT_EMER_ACT": emergency}
+
+
 def _low_battery(values: Values) -> float:
-    """What PX4's number is nearest to what the autopilot does at the critical and at the emergency charge."""
+    """Return the PX4 action nearest to the autopilot's actions at critical and emergency charge."""
     critical = values.get("FS_BAT_CRIT_ACT", NOTHING)
     if critical in (LAND, DESCEND):
         return _LAND

@@ -9,24 +9,25 @@ from lapwing.kernels import python_function
 from lapwing.services.common.autopilot_parameters import table
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.vehicle_schema import Vehicle, active, airframe, start_height
 from lapwing.services.mavlink.schema import Mavlink
 from lapwing.services.mavlink.vehicle_description import Battery, Rotor, VehicleDescription
 
 
 def resolve(scene: Scene) -> VehicleDescription | None:
-    """The vehicle of a scene; None where no autopilot flies it."""
-    return describe(scene) if scene.has("autopilot") else None
+    """Return the description of the vehicle. Return None without an autopilot, or with a foreign firmware."""
+    return describe(scene) if scene.has("autopilot") and not flown_by_firmware(scene) else None
 
 
 def describe(scene: Scene) -> VehicleDescription:
-    """The vehicle of a scene that is flown."""
+    """Return the description of the vehicle of a scene with an autopilot."""
     frame, identity, sensors = airframe(scene), scene[Mavlink], tuple(sorted(scene.tables("sensors")))
     around = environment(scene)
     return VehicleDescription(
         name=scene[Vehicle].name,
-        system=identity.system,
-        flavour=identity.flavour,
+        system_id=identity.system_id,
+        firmware=identity.firmware,
         home=around.home,
         air_temperature=python_function(temperature)(around.atmosphere, around.home.height) - FREEZING,
         standing_height=start_height(scene),

@@ -1,19 +1,20 @@
-"""What a protocol handler gets: one endpoint, and as much of the vehicle as it may see and ask for."""
+"""Conversation with one endpoint, the argument of every protocol handler."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.clock import Clock, Instant
 from lapwing.services.mavlink.command_queue import CommandQueue, OnAcknowledgement
 from lapwing.services.mavlink.component_metadata import files
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.endpoint import Endpoint
 from lapwing.services.mavlink.file_server import FileServer
 from lapwing.services.mavlink.log_server import LogServer
 from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
+from lapwing.services.mavlink.setpoint_keeper import SetpointKeeper
 from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.stream_rates import Schedule
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -32,25 +33,27 @@ class Session:
         commands: CommandQueue,
         parameters: ParameterStore,
         missions: MissionStore,
+        setpoints: SetpointKeeper,
         counts: Counter[str],
         log: Path | None,
         trusts: Callable[[Endpoint], bool],
     ):
-        """A conversation that begins.
+        """Start a conversation.
 
         Args:
-            endpoint: with whom.
-            vehicle: its newest state.
-            clock: of the link.
-            commands: to the autopilot.
-            parameters: of the autopilot.
-            missions: that the vehicle holds.
-            counts: what was refused, by reason.
-            log: of the run, None where there is none.
-            trusts: whether commands of an endpoint are taken.
+            endpoint: peer.
+            vehicle: newest state of the vehicle.
+            clock: clock of the link.
+            commands: queue of commands to the autopilot.
+            parameters: parameters of the autopilot.
+            missions: items that the vehicle holds.
+            setpoints: keeper of offboard setpoints.
+            counts: rejected messages by reason.
+            log: log of the run, or None.
+            trusts: returns True if commands of an endpoint are accepted.
         """
         self.endpoint, self.vehicle, self.clock = endpoint, vehicle, clock
-        self.parameters, self.missions = parameters, missions
+        self.parameters, self.missions, self._setpoints = parameters, missions, setpoints
         self.schedule = Schedule(vehicle)
         self.log = LogServer(log)
         self.files = FileServer(files(vehicle.description))
@@ -64,7 +67,7 @@ class Session:
 
     @property
     def trusted(self) -> bool:
-        """Whether the endpoint's commands are taken; counts it where not."""
+        """True if the endpoint's commands are accepted; counts a rejection."""
         return self._trusts(self.endpoint)
 
     def send(self, message: Any) -> None:
@@ -77,8 +80,13 @@ class Session:
         """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` gets every acknowledgement."""
         self._commands.put(kind, self.endpoint.name, on_acknowledgement, values)
 
+    def offboard(self, kind: str, values: Sequence[float]) -> None:
+        """Queue an offboard setpoint; it must be trusted."""
+        self.command(kind, values)
+        self._setpoints.hold(kind, self.endpoint.name, values)
+
     def say(self, text: str) -> None:
-        """Tell the endpoint alone why something is refused; the same text at most every few seconds."""
+        """Send the reason of a rejection to this endpoint only, equal texts at most every few seconds."""
         before = self._said.get(text)
         if before is None or self.clock.since(before) > SAY_EVERY:
             if len(self._said) >= MAX_SAID:
@@ -88,5 +96,5 @@ class Session:
                 self.endpoint.send(message)
 
     def count(self, reason: str) -> None:
-        """Count a message that was refused."""
+        """Count a rejected message."""
         self._counts[reason] += 1

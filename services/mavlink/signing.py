@@ -10,7 +10,7 @@ import sqlite3
 import time
 from pathlib import Path
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 TIME_STAMPS = "mavlink_time_stamps.sqlite"
 MIN_PASSPHRASE = 8  # [characters]

@@ -3,13 +3,13 @@
 from collections.abc import Iterator
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 TEXT_LENGTH = 50  # [bytes] of one STATUSTEXT
 
 
 def statustext(severity: int, text: str, number: int = 1) -> Iterator[Any]:
-    """The messages of a text; `number` (not 0) joins the pieces of a long one."""
+    """Yield the messages of a text; `number` (not 0) identifies the pieces of a long one."""
     data = text.encode()
     joined = number if len(data) > TEXT_LENGTH else 0
     for piece, start in enumerate(range(0, len(data), TEXT_LENGTH)):

@@ -1,4 +1,4 @@
-"""Which messages of the telemetry one endpoint gets, and when the next of each is due."""
+"""Telemetry streams to one endpoint and their due times."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ class Schedule:
     """Intervals of the streams to one endpoint: of the telemetry's table, unless it has asked for others."""
 
     def __init__(self, vehicle: VehicleCache):
-        """The intervals of a ground station, all due now."""
+        """Create the intervals of a ground station, all due now."""
         self._vehicle = vehicle
         self._asked: dict[int, int] = {}  # interval [ns] by message that the endpoint has asked for; 0: never
         self._onboard = False
@@ -22,7 +22,7 @@ class Schedule:
         self._plan()
 
     def set_onboard(self, onboard: bool) -> None:
-        """Whether the endpoint is a companion computer, which gets other rates than a ground station."""
+        """Select the rates of a companion computer or of a ground station."""
         if onboard != self._onboard:
             self._onboard = onboard
             self._plan()
@@ -40,11 +40,11 @@ class Schedule:
         self._plan()
 
     def interval_us(self, number: int) -> int:
-        """Interval of a message [us], -1 for never."""
+        """Return the interval of a message [us]; -1: never."""
         return self._intervals.get(number, 0) // 1000 or -1
 
     def due(self, built: dict[int, list[Any]]) -> list[Any]:
-        """The messages that are due; `built` holds those of this moment, which all endpoints share."""
+        """Return the messages that are due; `built` caches messages of this time for all endpoints."""
         now, found = self._vehicle.time_ns, []
         for number, interval in self._intervals.items():
             due = self._due[number]
@@ -59,7 +59,7 @@ class Schedule:
         """Set all intervals anew."""
         for number, stream in streams().items():
             rate = stream.onboard if self._onboard else stream.ground
-            rate = self._vehicle.flavour.RATES.get(stream.name, rate)
+            rate = self._vehicle.firmware.RATES.get(stream.name, rate)
             interval = self._asked.get(number, round(SECOND / rate) if rate else 0)
             if self._intervals.get(number) != interval:
                 self._intervals[number] = interval

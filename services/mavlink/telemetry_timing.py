@@ -1,4 +1,4 @@
-"""How evenly the telemetry leaves, and how far the run falls behind its pace: measured, and told at the end."""
+"""Jitter of the telemetry and lag behind the real-time factor, for the final report."""
 
 from itertools import pairwise
 
@@ -6,32 +6,32 @@ MAX_STEPS = 200_000  # that are remembered
 
 
 class Pacing:
-    """When each step of the telemetry has left."""
+    """Wall time of each step of the telemetry."""
 
     def __init__(self, speed: float | None):
-        """`speed`: simulated seconds per second that are kept, None for as fast as it goes."""
+        """Create an empty record; `speed`: simulated seconds per second, None for as fast as possible."""
         self._speed = speed
         self._steps: list[tuple[float, float]] = []  # simulation time, wall time [s]
 
     def note(self, simulated: float, wall: float) -> None:
-        """A step of simulation time has left at this wall time [s]."""
+        """Record the simulation time and wall time [s] of a step."""
         if len(self._steps) < MAX_STEPS:
             self._steps.append((simulated, wall))
 
     def jitter(self) -> list[float]:
-        """How much later or earlier than due after the one before each step left [s], in order of size."""
+        """Return the deviations of the intervals between steps from the nominal ones [s], sorted."""
         speed = self._speed or 1.0
         return sorted(abs((b[1] - a[1]) - (b[0] - a[0]) / speed) for a, b in pairwise(self._steps))
 
     def behind(self) -> float:
-        """By how much the slowest moment lay behind the fastest [s of wall time]."""
+        """Return the lag of the slowest step behind the fastest [s] of wall time."""
         if self._speed is None or not self._steps:
             return 0.0
         lags = [wall - simulated / self._speed for simulated, wall in self._steps]
         return max(lags) - min(lags)
 
     def report(self) -> str:
-        """A line for people."""
+        """Return the line of the final report."""
         jitter = self.jitter()
         if self._speed is None or not jitter:
             return "telemetry: no pace to be kept"

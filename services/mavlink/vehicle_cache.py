@@ -1,4 +1,4 @@
-"""The newest state of the vehicle: every message that it publishes, decoded when somebody asks."""
+"""The newest state of the vehicle: every message that it publishes, decoded on demand."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -8,21 +8,22 @@ from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
 from lapwing.messages import Status, nanoseconds
 from lapwing.messages.topics import ESTIMATE, STATUS, TRUTH, Topic
+from lapwing.services.common.mavlink.frames import Quaternion, saturated, swap_attitude, swap_body, swap_world
+from lapwing.services.common.mavlink.geo_coordinates import Datum, to_local
 from lapwing.services.mavlink import firmware
 from lapwing.services.mavlink.event_log import EventLog
+from lapwing.services.mavlink.fast_conversions import angles, geodetic
 from lapwing.services.mavlink.flight_times import FlightTimes
-from lapwing.services.mavlink.frames import Quaternion, euler, saturated, swap_attitude, swap_body, swap_world
-from lapwing.services.mavlink.geo_coordinates import Datum, enu_to_geodetic, to_local
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 ON_GROUND = Status(landed=True)  # before the vehicle has published a status
 
 
 class NedMotion:
-    """Where the vehicle is and how it moves, in MAVLink's frames: NED, FRD, degrees."""
+    """Position and motion of the vehicle in MAVLink's frames: NED, FRD, degrees."""
 
     def __init__(self, message: Any, home: Home, standing_height: float):
-        """From a message with pose, velocity and angular velocity: the estimate or the truth."""
+        """Convert a message with pose, velocity and angular velocity: the estimate or the truth."""
         self._stamp, self._home = message.header.stamp, home
         p, q, v, w = message.pose.position, message.pose.orientation, message.velocity, message.angular_velocity
         self.position_world: Vec3 = (p.x, p.y, p.z)
@@ -39,21 +40,21 @@ class NedMotion:
     @cached_property
     def angles(self) -> Vec3:
         """Roll, pitch, yaw [rad] from NED to FRD."""
-        return euler(self.attitude)
+        return angles(self.attitude)
 
     @cached_property
     def geodetic(self) -> Vec3:
         """Latitude [deg], longitude [deg], altitude [m]."""
-        return enu_to_geodetic(self._home, self.position_world)
+        return geodetic(self._home, self.position_world)
 
 
 class VehicleCache:
     """A vehicle as its links see it: its description, simulation time, and the newest message of each topic."""
 
     def __init__(self, description: VehicleDescription):
-        """A vehicle that has published nothing yet."""
+        """Create the cache of a vehicle that has published nothing yet."""
         self.description = description
-        self.flavour = firmware.get(description.flavour)
+        self.firmware = firmware.get(description.firmware)
         self.time_ns = 0
         self.flight = FlightTimes()
         self.events = EventLog()
@@ -69,7 +70,7 @@ class VehicleCache:
         self._motions: dict[Topic, NedMotion] = {}
 
     def put(self, topic: Topic, payload: bytes) -> None:
-        """A newer message of a topic, encoded."""
+        """Store a newer encoded message of a topic."""
         self._payloads[topic] = payload
         self._decoded.pop(topic, None)
         self._motions.pop(topic, None)
@@ -79,7 +80,7 @@ class VehicleCache:
             self._home_heading = estimate.angles[2]
 
     def get(self, topic: Topic) -> Any:
-        """The newest message of a topic, None before the first."""
+        """Return the newest message of a topic. Return None before the first."""
         if topic not in self._decoded:
             if topic not in self._payloads:
                 return None
@@ -96,17 +97,17 @@ class VehicleCache:
 
     @property
     def estimate(self) -> NedMotion | None:
-        """Where the autopilot estimates the vehicle to be."""
+        """Estimated motion."""
         return self._motion(ESTIMATE)
 
     @property
     def truth(self) -> NedMotion | None:
-        """Where it is."""
+        """True motion."""
         return self._motion(TRUTH)
 
     @property
     def status(self) -> Status:
-        """What the autopilot is doing."""
+        """Newest status of the autopilot."""
         return self.get(STATUS) or ON_GROUND
 
     @property
@@ -122,7 +123,7 @@ class VehicleCache:
 
     @property
     def datum(self) -> Datum:
-        """What latitudes, longitudes and altitudes of messages count from."""
+        """Reference of latitudes, longitudes and altitudes in messages."""
         return Datum(self.description.home, self.home_world[2], self.description.standing_height)
 
     @property

@@ -25,14 +25,14 @@ class Rotor(NamedTuple):
 
 
 class VehicleDescription(NamedTuple):
-    """A vehicle as its ground stations are told of it."""
+    """Description of a vehicle for its ground stations."""
 
     name: str = "drone1"  # first part of its topics' names
-    system: int = 1  # MAVLink system id
-    flavour: str = "px4"  # the autopilot that it emulates: a module of services/mavlink/flavours
+    system_id: int = 1  # of MAVLink
+    firmware: str = "px4"  # the autopilot that it emulates: a module of services/mavlink/firmware
     home: Home = Home()  # origin of the world frame on the Earth
     air_temperature: float = 15.0  # [deg C] at home
-    standing_height: float = 0.0  # [m] of the body frame's origin above the ground when it stands
+    standing_height: float = 0.0  # [m] of the body frame's origin above the ground at rest
     rotors: tuple[Rotor, ...] = ()
     max_voltage: float | None = None  # [V] of its motors, None where they are not modelled
     battery: Battery | None = None  # None where none is modelled: the motors get what they ask for

@@ -1,6 +1,6 @@
-"""What ground stations are told that a vehicle is, by its rotors: they draw and name it by that."""
+"""MAV_TYPE of a vehicle by its rotors, by which ground stations name and draw it."""
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 _TYPES = {
     3: mavlink.MAV_TYPE_TRICOPTER,
@@ -13,8 +13,8 @@ _TYPES = {
 
 
 def vehicle_type(rotors: int) -> int:
-    """The MAV_TYPE of a multirotor.
+    """Return the MAV_TYPE of a multirotor.
 
-    Rotors over one another count one by one, as in PX4 and ArduPilot: MAV_TYPE_COAXIAL is a helicopter's.
+    Coaxial rotors count individually, as in PX4 and ArduPilot: MAV_TYPE_COAXIAL is a helicopter.
     """
     return _TYPES.get(rotors, mavlink.MAV_TYPE_GENERIC_MULTIROTOR)

@@ -35,7 +35,7 @@ AMPERE_HOUR = 3600.0  # [A s]
 
 
 class PlantWiring(NamedTuple):
-    """What the plant's messages say besides its state."""
+    """Contents of the plant's messages besides its state."""
 
     pose_every: int  # ticks between poses, transforms and clocks
     odometry: bool  # whether there is odometry
@@ -45,9 +45,9 @@ class PlantWiring(NamedTuple):
 
 
 def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
-    """The plant's topics."""
+    """Return the encoders of the plant's topics."""
     truth, given, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
-    found = [
+    result = [
         TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
         TopicEncoder(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
         TopicEncoder(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
@@ -55,24 +55,24 @@ def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
     ]
     if wiring.odometry:
         sample = Odometry(header(0, WORLD), setup.vehicle)
-        found.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
+        result.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
     if ports.BATTERY in given:
         battery = _battery_sample(setup.vehicle, wiring)
-        found.append(
+        result.append(
             TopicEncoder(topic.BATTERY, ports.BATTERY, given[ports.BATTERY].period, _battery(wiring), lambda: battery)
         )
     if ports.BODIES in given:
         sample_bodies = _bodies_sample(wiring.bodies)
-        found.append(
+        result.append(
             TopicEncoder(topic.BODIES, ports.BODIES, given[ports.BODIES].period, _bodies, lambda: sample_bodies)
         )
     if ports.CONTACT in given:
         n = len(given[ports.CONTACT].like.force_world)
         sample_contact = lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
-        found.append(
+        result.append(
             TopicEncoder(topic.CONTACT, ports.CONTACT, given[ports.CONTACT].period, _contact, lambda: sample_contact)
         )
-    return found
+    return result
 
 
 def _truth_sample(like: TrueState) -> Any:
@@ -88,7 +88,7 @@ def _truth_sample(like: TrueState) -> Any:
 
 
 def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """The whole true state."""
+    """Return the fields of the true state."""
     return {
         **stamp_columns(time_ns),
         "pose.position": x.position_world,
@@ -107,7 +107,7 @@ _PER_ROTOR = ("rotor_speed", "motor_voltage", "motor_current", "motor_power", "r
 
 
 def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """Pose of the body in the world."""
+    """Return the fields of the body's pose in the world."""
     return {
         **stamp_columns(time_ns),
         "pose.position": x.position_world,
@@ -116,7 +116,7 @@ def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
 
 
 def _odometry(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """Pose in the world, velocities in the body frame, as nav_msgs defines them; both exact."""
+    """Return pose in the world and velocities in the body frame, as in nav_msgs; both exact."""
     q = python_function(conjugate)(np.asarray(x.attitude).T)
     velocity_body = python_function(rotate)(q, np.asarray(x.velocity_world).T)
     return {
@@ -133,7 +133,7 @@ def _transform_sample(vehicle: str) -> Any:
 
 
 def _transform(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """The frame tree: world to body."""
+    """Return the transform from world to body."""
     return {
         **stamp_columns(time_ns, "transforms.0.header.stamp"),
         "transforms.0.transform.translation": x.position_world,
@@ -158,9 +158,9 @@ def _battery(wiring: PlantWiring) -> Any:
     capacity, cells = wiring.capacity / AMPERE_HOUR, wiring.cells
 
     def fields(x: BatteryReading, time_ns: np.ndarray) -> Fields:
-        """State of the battery; what no effect models is unknown (NaN), as sensor_msgs defines it."""
+        """Return the fields of the battery; unmodelled ones are NaN, as in sensor_msgs."""
         voltage = np.asarray(x.voltage)
-        found: dict[str, Any] = {
+        result: dict[str, Any] = {
             **stamp_columns(time_ns),
             "voltage": voltage,
             "current": -np.asarray(x.current),
@@ -169,8 +169,8 @@ def _battery(wiring: PlantWiring) -> Any:
             "temperature": np.asarray(x.temperature) - FREEZING,
         }
         if cells:
-            found["cell_voltage"] = np.repeat((voltage / cells)[:, None], cells, axis=1)
-        return found
+            result["cell_voltage"] = np.repeat((voltage / cells)[:, None], cells, axis=1)
+        return result
 
     return fields
 
@@ -183,21 +183,21 @@ def _bodies_sample(names: tuple[str, ...]) -> Any:
 
 
 def _bodies(x: BodyMotions, time_ns: np.ndarray) -> Fields:
-    """Every body of a vehicle, with the contacts' or joints' force and torque."""
-    found: dict[str, Any] = dict(stamp_columns(time_ns))
+    """Return the fields of all bodies, with force and torque of contacts or joints."""
+    result: dict[str, Any] = dict(stamp_columns(time_ns))
     for i in range(len(x.position_world)):
-        found[f"pose.{i}.position"] = x.position_world[i]
-        found[f"pose.{i}.orientation"] = quaternion_columns(x.attitude[i])
-        found[f"velocity.{i}"] = x.velocity_world[i]
-        found[f"angular_velocity.{i}"] = x.omega_body[i]
-        found[f"force.{i}"] = x.force_world[i]
-        found[f"torque.{i}"] = x.torque_body[i]
-    return found
+        result[f"pose.{i}.position"] = x.position_world[i]
+        result[f"pose.{i}.orientation"] = quaternion_columns(x.attitude[i])
+        result[f"velocity.{i}"] = x.velocity_world[i]
+        result[f"angular_velocity.{i}"] = x.omega_body[i]
+        result[f"force.{i}"] = x.force_world[i]
+        result[f"torque.{i}"] = x.torque_body[i]
+    return result
 
 
 def _contact(x: ContactForces, time_ns: np.ndarray) -> Fields:
-    """Every point that may touch the ground, with the force on it."""
-    found: dict[str, Any] = dict(stamp_columns(time_ns))
+    """Return the fields of all contact points, with their forces."""
+    result: dict[str, Any] = dict(stamp_columns(time_ns))
     for i, (place, force) in enumerate(zip(x.position_world, x.force_world, strict=True)):
-        found[f"position.{i}"], found[f"force.{i}"] = place, force
-    return found
+        result[f"position.{i}"], result[f"force.{i}"] = place, force
+    return result

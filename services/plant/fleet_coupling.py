@@ -1,11 +1,11 @@
-"""Who of a fleet knows of whom: what the plants of its vehicles are told, and who moves the load that they share."""
+"""Coupling of the plants of a fleet: neighbours of each vehicle, and integration of a shared load."""
 
 from collections.abc import Mapping
 from itertools import combinations
 from typing import Any
 
 from lapwing.cosim.config.run_config import ServiceConfig
-from lapwing.cosim.diagram.multi_vehicle import of_other
+from lapwing.cosim.diagram.multi_vehicle import neighbour_port
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import _hooks as hooks
@@ -26,36 +26,39 @@ PRESENCE, LOAD = "presence", "load"  # ports that plants of a fleet read of one 
 FASTEST = 0.5  # frequency of a cable times the exchange interval: up to here a load looks ahead to within 2 %
 
 
-def told(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
-    """The plants of a run's vehicles, by their names: whose effects know of others are told who else has such.
+def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
+    """Return the configurations of all plants, each with the neighbours of its interacting effects.
+
+    Args:
+        shares: configuration by vehicle name.
+        keys: prefix of each vehicle's scene keys.
 
     Raises:
-        KeyedError: vehicles touch at the start, do not agree on their load, or cannot reach it; `keys` has what each
-            one's keys begin with.
+        ConfigError: vehicles touch at the start, disagree on their load, or cannot reach it.
     """
     _check_apart(shares, keys)
     having = [name for name, given in shares.items() if interacts(effects_of(given))]
     carriers = {name: sling for name in having if (sling := _sling(shares[name]))}
     owner = next(iter(carriers), "")
-    found = dict(shares)
+    result = dict(shares)
     for name in having:
-        read = [of_other(other, PRESENCE) for other in having if other != name]
+        read = [neighbour_port(other, PRESENCE) for other in having if other != name]
         load: dict[str, Any] = {}
         if name in carriers:
-            read.append(LOAD if name == owner else of_other(owner, LOAD))
+            read.append(LOAD if name == owner else neighbour_port(owner, LOAD))
         if name == owner:
             load = _load(shares, carriers, keys)
         if read:
             plant: PlantSetup = shares[name].parameters
             others = FleetCoupling(tuple(read), presence(effects_of(shares[name])), **load)
-            found[name] = shares[name]._replace(parameters=plant._replace(others=others))
+            result[name] = shares[name]._replace(parameters=plant._replace(others=others))
         if name in carriers and name != owner:
-            found[name] = _without_bodies(found[name])
-    return found
+            result[name] = _without_bodies(result[name])
+    return result
 
 
 def effects_of(given: ServiceConfig) -> tuple:
-    """The effects of a multirotor's plant; () of any other."""
+    """Return the effects of a multirotor's plant; () for other plants."""
     core = given.parameters.core
     return core.vehicle.effects if isinstance(core, MultirotorPlant) else ()
 
@@ -80,7 +83,7 @@ def _sling(given: ServiceConfig) -> Sling | None:
 
 
 def _without_bodies(given: ServiceConfig) -> ServiceConfig:
-    """The plant of one that does not tell of the load: another one does."""
+    """Return the plant without the load's output, which another vehicle has."""
     plant: PlantSetup = given.parameters
     parameters = plant._replace(wiring=plant.wiring._replace(bodies=()))
     return ServiceConfig(parameters, given.inputs, tuple(port for port in given.ports if port.name != ports.BODIES))
@@ -89,7 +92,7 @@ def _without_bodies(given: ServiceConfig) -> ServiceConfig:
 def _load(
     shares: Mapping[str, ServiceConfig], carriers: Mapping[str, Sling], keys: Mapping[str, str]
 ) -> dict[str, Any]:
-    """What the plant of the first carrier is told of the load: it stands in the middle below all hooks."""
+    """Return the load's configuration for the first carrier; the load starts in the middle below all hooks."""
     owner, *others = carriers
     first, core = carriers[owner], shares[owner].parameters.core
     for name in others:
@@ -104,8 +107,8 @@ def _load(
     for name, sling in carriers.items():
         key, away = f"{keys[name]}effects.shared_slung_load", norm(subtract(hooks_world[name], start.load_position))
         if away > sling.length:
-            message = f"got {sling.length:g} m, and the load stands {away:.2f} m away, in the middle of its carriers"
-            raise ConfigError(f"{key}.length", message, f"at least {away:.3g} m, or vehicles that stand nearer")
+            message = f"got {sling.length:g} m, and the load is {away:.2f} m away, in the middle of its carriers"
+            raise ConfigError(f"{key}.length", message, f"at least {away:.3g} m, or vehicles closer together")
         turn = frequency(sling, shares[name].parameters.core.vehicle.body.mass) * core.interval
         if turn > FASTEST:
             message = f"the load swings along the cable by {turn:.2g} rad in an exchange interval"
@@ -113,11 +116,11 @@ def _load(
     field = hooks.all_fields(core.vehicle.effects, shares[owner].parameters.start.vehicle.memory, ZERO)
     method = integrators.get("rk4").Method()
     plant = LoadPlant(tuple(carriers.values()), field, method, core.step, core.steps, core.interval)
-    inputs = tuple(PRESENCE if name == owner else of_other(name, PRESENCE) for name in carriers)
+    inputs = tuple(PRESENCE if name == owner else neighbour_port(name, PRESENCE) for name in carriers)
     return {"load": plant, "load_start": start, "load_inputs": inputs}
 
 
 def _hook(given: ServiceConfig, sling: Sling) -> Vec3:
-    """Where the cable is fastened at the start [m], world."""
+    """Return the initial position of the cable's attachment [m], world."""
     motion = given.parameters.start.vehicle.motion
     return add(motion.position_world, rotate(motion.attitude, sling.hook_body))

@@ -21,29 +21,29 @@ from lapwing.services.plant.models._common import bodies_port, noise_key, rate_t
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of the scene: every scene has one."""
+    """Return the configuration of the plant; every scene has one."""
     model = scene[Vehicle].model
-    found = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
+    result = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
     if scene[Rates].contact_forces is not None:
-        found = _with_contact(scene, found)
-    if any(isinstance(e, SharedSlungLoad) for e in fleet_coupling.effects_of(found)):
-        if any(port.name == ports.BODIES for port in found.ports):
+        result = _with_contact(scene, result)
+    if any(isinstance(e, SharedSlungLoad) for e in fleet_coupling.effects_of(result)):
+        if any(port.name == ports.BODIES for port in result.ports):
             raise ConfigError(
-                "effects.shared_slung_load", f"the model {model} tells of bodies of its own", "another model"
+                "effects.shared_slung_load", f"the model {model} publishes its own bodies", "another model"
             )
-        plant = found.parameters
+        plant = result.parameters
         parameters = plant._replace(wiring=plant.wiring._replace(bodies=("load",)))
-        return ServiceConfig(parameters, found.inputs, (*found.ports, bodies_port(scene, 1)))
-    return found
+        return ServiceConfig(parameters, result.inputs, (*result.ports, bodies_port(scene, 1)))
+    return result
 
 
 def _with_contact(scene: Scene, found: ServiceConfig) -> ServiceConfig:
-    """The same plant, which also tells of the forces on its feet."""
+    """Return the plant with the output of its contact forces."""
     effect = next(
         (e for e in fleet_coupling.effects_of(found) if isinstance(e, GroundContact | GroundContactSmooth)), None
     )
     if effect is None:
-        message = "no effect of the scene tells of forces on feet"
+        message = "no effect of the scene computes contact forces"
         raise ConfigError(
             "rates.contact_forces", message, "a multirotor with [effects.ground_contact], or to leave it out"
         )
@@ -53,12 +53,12 @@ def _with_contact(scene: Scene, found: ServiceConfig) -> ServiceConfig:
 
 
 def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
-    """The plants of a run's vehicles, by their names, once they know of one another; as of `interactions.told`."""
-    return fleet_coupling.told(shares, keys)
+    """Return the plants by vehicle name, coupled to each other. See `fleet_coupling.couple`."""
+    return fleet_coupling.couple(shares, keys)
 
 
 def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
-    """The same plant with another seed; only a multirotor has random effects."""
+    """Return the plant with another seed; only a multirotor has random effects."""
     plant = given.parameters
     if not isinstance(plant.core, MultirotorPlant):
         return given

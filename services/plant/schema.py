@@ -10,16 +10,18 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.services.common.communication_schema import Communication
 
-CONTACT_SHARE = 0.1  # of solver.accuracy, for one part of a step in contact: errors of many parts add up
+CONTACT_SHARE = 3e-5  # of solver.accuracy, for one part of a step in contact: bounces amplify its errors
+
+PART_SHARE, PART_TOLERANCE = 0.1, 1e-5  # the same of systems with contacts of their own, and where nobody asks
 
 
 class Solver(SceneTable):
-    """How the plant is integrated between two exchanges."""
+    """Integration of the plant within a communication step."""
 
     TABLE: ClassVar[str] = "solver"
     integrator: str = "rk4_renormalised"  # a module of lapwing/dynamics/integrators
     step: float = Field(default=0.001, ge=1e-9)  # [s], divides the exchange interval
-    accuracy: float | None = Field(default=None, gt=0.0)  # error that step, and integrator unless given, are chosen for
+    accuracy: float | None = Field(default=None, ge=1e-12)  # error that step, and integrator unless set, are chosen for
 
     @field_validator("integrator")
     @classmethod
@@ -29,12 +31,12 @@ class Solver(SceneTable):
         return name
 
     def resolved(self) -> dict[str, Any]:
-        """As of any table; what is still to be chosen is left out."""
+        """Return the table without undecided values."""
         return self.model_dump(include=self.model_fields_set if self.undecided else None, exclude_none=True)
 
     @property
     def undecided(self) -> bool:
-        """Whether the step, and the integrator unless it is given, are still to be chosen for the accuracy."""
+        """True if step or integrator are still to be selected for the accuracy."""
         return self.accuracy is not None and "step" not in self.model_fields_set
 
     @property
@@ -42,12 +44,17 @@ class Solver(SceneTable):
         """Error of a part of a step in contact that leaves the accuracy to a whole flight; the usual one without."""
         return CONTACT_TOLERANCE if self.accuracy is None else CONTACT_SHARE * self.accuracy
 
+    @property
+    def part_tolerance(self) -> float:
+        """Return the error of a part of a step of systems that are no multirotors (`integrate_step_doubling`)."""
+        return PART_TOLERANCE if self.accuracy is None else PART_SHARE * self.accuracy
+
     def steps(self, exchange: Communication) -> int:
-        """Steps in one exchange interval."""
+        """Return the integrator steps per communication step."""
         return round(exchange.interval / self.step)
 
     def check(self, scene: Scene) -> None:
-        """The step divides the exchange interval."""
+        """Check that the step divides the communication step."""
         if self.undecided:
             return
         interval = scene[Communication].interval
@@ -58,10 +65,10 @@ class Solver(SceneTable):
 
 
 def method(scene: Scene) -> tuple[tuple, int, float]:
-    """The scene's integrator for compiled code, its steps in an exchange interval, and the length of one [s].
+    """Return the compiled integrator, its steps per communication step, and the step [s].
 
     Raises:
-        SceneError: the scene says an accuracy, and nobody has chosen for it.
+        SceneError: the scene has an accuracy without a selected solver.
     """
     solver, exchange = scene[Solver], scene[Communication]
     if solver.undecided:

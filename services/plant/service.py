@@ -22,7 +22,7 @@ from lapwing.kernels.cell import Cell, read, write
 from lapwing.kernels.codegen import overload_for
 from lapwing.services.common import ports
 from lapwing.services.common.ports import PerRotor
-from lapwing.services.plant.blocks import gyrostat, os4, unloading  # noqa: F401 (they say what is told of their systems)
+from lapwing.services.plant.blocks import gyrostat, os4, unloading  # noqa: F401 (their output functions)
 from lapwing.services.plant.blocks.interaction import Interaction
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 from lapwing.services.plant.blocks.neighbour_state import PresenceView
@@ -34,7 +34,7 @@ NAME = "plant"
 
 
 def create(setup: RunConfig) -> Service:
-    """The plant of a run."""
+    """Return the plant of a run."""
     given = setup.services[NAME]
     plant: PlantSetup = given.parameters
     state = Cell(plant.start)
@@ -61,11 +61,11 @@ def create(setup: RunConfig) -> Service:
 def _among_others(
     plant: PlantSetup, others: FleetCoupling, parts: list[Any], state: Cell, bodies: list[Port]
 ) -> list[Any]:
-    """The plant's parts, what the others do to the vehicle before them, and after them what they may know of it."""
+    """Return the plant's blocks between the effects of its neighbours and its own neighbour state."""
     vehicle, interval = plant.core.vehicle, plant.core.interval
     interaction = Interaction(vehicle.effects, interval)
     view = PresenceView(vehicle, others.presence, interval)
-    found = [
+    result = [
         Block(f"{NAME}.interaction", interaction, state, _a_tick_ago(PRESENCE, *others.ports)),
         *parts,
         Block(f"{NAME}.{PRESENCE}", view, state, (InputPort(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
@@ -73,8 +73,8 @@ def _among_others(
     if others.load:
         told = (Port(LOAD, NeighbourState()), *bodies)
         carriers = _a_tick_ago(*others.load_inputs)
-        found.append(Block(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, told))
-    return found
+        result.append(Block(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, told))
+    return result
 
 
 def _a_tick_ago(*names: str) -> tuple[InputPort, ...]:
@@ -110,7 +110,7 @@ class PropellerFailures:
         self._broken: list[tuple[Any, list[tuple[Block, BoundBlock]]]] = []  # of each event: the vehicle, its parts
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Before the first tick everything is compiled that may come in flight."""
+        """Compile the plants of all failures before the first tick."""
         self._graph = graph
         p, s = self._core.vehicle, read(self._part.state)
         for event in self._events:
@@ -123,8 +123,8 @@ class PropellerFailures:
             ]
             self._broken.append((p, [(part, graph.prepare(part)) for part in parts]))
 
-    def act(self, tick: int) -> int:
-        """What happens at a tick happens after that tick's state was told."""
+    def on_tick(self, tick: int) -> int:
+        """Apply the failures of `tick` after its state has been output."""
         while self._events and self._events[0].tick < tick:
             self._break(tick, self._events.pop(0), *self._broken.pop(0))
         return self._events[0].tick + 1 if self._events else NEVER
@@ -141,14 +141,14 @@ class PropellerFailures:
 
 @kernel
 def lock(p: MultirotorParameters, s: MultirotorState, command: PerRotor) -> MultirotorState:
-    """The state s with the constraints of parameters p met at once, under a command [V]."""
+    """Return the state s after an impulse that satisfies the constraints of p, under a command [V]."""
     memory = s.memory
     drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, command)
     return MultirotorState(_struck(drive, s.motion), memory)
 
 
 def _struck(drive: MultirotorDrive, x: Any) -> Any:
-    """The bodies after impulses in their hinges, in whichever coordinates they are."""
+    """Return the bodies after impulses in their hinges, in any coordinates."""
     raise NotImplementedError("compiled code only")
 
 

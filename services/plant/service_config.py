@@ -1,4 +1,4 @@
-"""What the plant is given: its core, its start, and what its messages say."""
+"""Resolved configuration of the plant: block, initial state, message contents."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ from lapwing.services.plant.encoders import PlantWiring
 
 
 class PlantEvent(NamedTuple):
-    """What becomes of a propeller in flight, after the state of `tick` was told."""
+    """Failure of a propeller in flight, after the output of `tick`."""
 
     tick: int
     propeller: int  # from 0, in the order of the airframe
@@ -15,7 +15,7 @@ class PlantEvent(NamedTuple):
 
 
 class FleetCoupling(NamedTuple):
-    """What a plant's effects know of the fleet."""
+    """Fleet data of a plant's effects."""
 
     ports: tuple[str, ...]  # of the others' presence, as this vehicle calls them; that of a load among them
     presence: NeighbourState  # what these may know of its vehicle, with the numbers that do not change
@@ -31,8 +31,8 @@ class PlantSetup(NamedTuple):
     core: Any  # parameters of a part of services/plant/cores
     start: Any  # the state at tick 0
     wiring: PlantWiring
-    bodies: Any = None  # parameters of the part that tells of single bodies, None without it
+    bodies: Any = None  # parameters of the block that publishes body states, or None
     events: tuple[PlantEvent, ...] = ()
     euler: bool = False  # five bodies in Euler angles, which end where a pitch reaches 90 degrees
     others: FleetCoupling | None = None
-    contact: Any = None  # parameters of the part that tells of forces on feet, None without it
+    contact: Any = None  # parameters of the block that publishes contact forces, or None

@@ -1,5 +1,6 @@
 """The recorder process: every recorded topic into one MCAP log, complete to the last tick."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,9 @@ from lapwing.cosim.transport.bus_keys import (
     DIVERGED_KEY,
     ENDED_KEY,
     LOGGED_KEY,
+    REPORTS_KEY,
 )
-from lapwing.cosim.transport.packets import unpack_batch
+from lapwing.cosim.transport.packets import unpack_log_packet
 
 TOLD = 1.0  # [s] of waiting for the disk from which on the log says so
 
@@ -31,7 +33,7 @@ def run(process: Participant, given: Any) -> None:
     setup = process.setup
     senders: dict[str, bytes | None] = {}
     late: dict[str, Lateness] = {}
-    for key in (BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY):
+    for key in (BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY):
         senders |= process.participants.senders(key, setup.services)
     pending = Pending(setup.services)
     news = process.bus.receive(senders)
@@ -42,10 +44,13 @@ def run(process: Participant, given: Any) -> None:
         try:
             process.join()
             while not pending.ended:
-                key, time_ns, payload = process.patient(news.get_with_key, pending.waits_for)
+                key, time_ns, payload = process.wait_with_status(news.get_with_key, pending.waits_for)
                 head, name = key.split("/")[-2:]
                 if head == DEADLINES_KEY:
                     late[name] = lateness(payload.decode(errors="replace"))
+                    continue
+                if head == REPORTS_KEY:
+                    writer.metadata |= _entries(payload)
                     continue
                 if head != BATCH_KEY:
                     if payload:  # an end without a reason is that of the run
@@ -56,7 +61,7 @@ def run(process: Participant, given: Any) -> None:
                 pages = pending.complete()
                 if pages:
                     recording.write(pages, pending.written - 1)
-                    process.tell_of_refused()
+                    process.report_rejected()
                 progress.recorded(pending.written)  # also where a batch completes nothing: it still takes in
             process.confirm()
         except Stopped:
@@ -74,32 +79,41 @@ def run(process: Participant, given: Any) -> None:
     process.leave(progress.end, LOGGED_KEY, [MONITOR])
 
 
+def _entries(payload: bytes) -> dict[str, str]:
+    """Return the metadata entries of a service, {} if they cannot be read."""
+    try:
+        result = json.loads(payload)
+        return {str(key): str(text) for key, text in result.items()}
+    except (ValueError, AttributeError):
+        return {}
+
+
 class Pending:
-    """Pages that have come, held back until every service has handed over their ticks."""
+    """Received record batches, held until every service has published their ticks."""
 
     def __init__(self, services: Any):
-        """Of a run of these services."""
-        self._stop = dict.fromkeys(services, 0)  # tick before which each has handed over all
+        """Wait for these services."""
+        self._stop = dict.fromkeys(services, 0)  # tick before which each has published all
         self._left = set(services)  # those that have not ended
         self._pages: list[RecordBatch] = []
         self.written = 0  # tick before which all is complete
 
     @property
     def ended(self) -> bool:
-        """Whether nobody will hand over more."""
+        """True if no service will publish more."""
         return not self._left
 
     def add(self, name: str, payload: bytes, end: int) -> None:
-        """A batch of a service; an empty one says that it has handed over all before the tick `end`.
+        """Add a log packet of a service; an empty one declares that the service has ended before the tick `end`.
 
         Raises:
-            LockStepError: a batch before this one has not come.
+            LockStepError: a previous packet is missing.
         """
         if not payload:
             self._check(name, end)
             self._left.discard(name)
             return
-        start, stop, pages = unpack_batch(payload)
+        start, stop, pages = unpack_log_packet(payload)
         self._check(name, start)
         self._pages += pages
         self._stop[name] = stop
@@ -110,7 +124,7 @@ class Pending:
             raise LockStepError(f"recorder: the messages of {name} of the ticks {first} to {tick - 1} are lost")
 
     def complete(self) -> list[RecordBatch]:
-        """The pages of the ticks that are complete now."""
+        """Return the record batches of the complete ticks."""
         stop = min(self._stop.values())
         if stop <= self.written:
             return []
@@ -126,6 +140,6 @@ class Pending:
         return done
 
     def waits_for(self) -> str:
-        """Who has handed over least."""
+        """Return a text that names the service that is furthest behind."""
         name = min(self._stop, key=lambda n: self._stop[n])
         return f"the messages of {name} from tick {self._stop[name]} on"

@@ -1,4 +1,4 @@
-"""When the next message of a replay goes out: by the clock, or instant by instant by hand."""
+"""Replay clock: releases messages in real time, or step by step on key presses."""
 
 import time
 from collections.abc import Callable
@@ -17,11 +17,11 @@ class Pace:
         wait: Callable[[float], None] = time.sleep,
         clock: Callable[[], float] = time.perf_counter,
     ):
-        """Of a replay that begins when the first message is waited for.
+        """Prepare a replay that begins with the first call of `wait`.
 
         Args:
             keys: what has been typed since the call before.
-            say: is told of a pause, a step and their end.
+            say: shows a pause, a step and their end.
             wait: waits so many seconds, or less.
             clock: [s].
         """
@@ -32,7 +32,7 @@ class Pace:
         self.begin()
 
     def begin(self) -> None:
-        """The log begins anew."""
+        """Restart at the beginning of the log."""
         self._started = self._clock()
         self._stepped_ns = -1
 
@@ -60,15 +60,15 @@ class Pace:
             self._wait(min(left, POLL))
 
     def _look(self, due: float, time_ns: int) -> None:
-        """Do what has been typed."""
+        """Execute typed commands."""
         if self._clock() < self._next_look:
             return
         self._next_look = self._clock() + POLL
         for key in self._keys():
             if key == PAUSE:
                 self._paused, self._step, self._stepped_ns = not self._paused, False, -1
-                self._started = self._clock() - due  # goes on from here
-                self._say(f"{'paused before' if self._paused else 'goes on at'} t = {time_ns * 1e-9:.9g} s")
+                self._started = self._clock() - due  # continues from here
+                self._say(f"{'paused before' if self._paused else 'resumed at'} t = {time_ns * 1e-9:.9g} s")
             elif key == STEP:
                 self._step = self._paused
             elif key == QUIT:

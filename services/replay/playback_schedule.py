@@ -1,4 +1,4 @@
-"""Which part of a log is replayed, and when each message is due: pure, no clock and no bus."""
+"""Replay schedule: the messages of a part of a log and their times, without clock and bus."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -14,10 +14,10 @@ class Cut(NamedTuple):
 
     @classmethod
     def of(cls, start: float, end: float | None) -> "Cut":
-        """From seconds of simulation time.
+        """Return the part between two simulation times [s].
 
         Raises:
-            ValueError: a negative time, or the end before the start.
+            ValueError: a time is negative, or the end is before the start.
         """
         if start < 0.0:
             raise ValueError(f"--from {start:g}: expected a time of 0 s or later")
@@ -36,10 +36,10 @@ class Due(NamedTuple):
 
 
 def schedule(messages: Iterable[tuple[str, str, int, bytes]], speed: float | None) -> Iterator[Due]:
-    """When each message is due; speed None: all at once.
+    """Yield each message with its time; speed None: all at once.
 
     Args:
-        messages: (topic, type name, time [ns], payload) in the log's order.
+        messages: (topic, type name, time [ns], payload) in the order of the log.
         speed: simulated seconds per second.
     """
     first: int | None = None

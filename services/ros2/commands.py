@@ -1,6 +1,6 @@
-"""What other nodes may ask of the vehicle: topics, and what each message is for the autopilot.
+"""Commands of other ROS 2 nodes: topics, and conversion of their messages for the autopilot.
 
-Frames and units are those of ROS and ours: ENU, FLU, SI.
+Frames and units are the same on both sides: ENU, FLU, SI.
 """
 
 import itertools
@@ -31,7 +31,7 @@ class Accepted(NamedTuple):
 
     name: str  # behind the vehicle's
     message: Any
-    wish: Callable[[Any], Wish]
+    to_command: Callable[[Any], Wish]
 
 
 def _pose(m: Any) -> Wish:
@@ -75,7 +75,7 @@ class Commands:
     """Turns messages into commands of the autopilot, and counts."""
 
     def __init__(self, vehicle: str):
-        """Of a vehicle, by its name."""
+        """Create the conversion for a vehicle name."""
         self.vehicle = vehicle
         self._accepted = {f"/{vehicle}/{a.name}": a for a in ACCEPTED}
         self._operator = f"/{vehicle}/{OPERATOR}"
@@ -85,25 +85,25 @@ class Commands:
         self._numbers = itertools.count(1)
 
     def read(self, topic: str, payload: bytes) -> tuple[Any, ...]:
-        """The commands of a message; none where it is refused."""
+        """Return the commands of a message; () if it is rejected."""
         try:
-            found = tuple(self._read(topic, payload))
+            result = tuple(self._read(topic, payload))
         except ValueError as error:
             self.refused, self.why = self.refused + 1, f"{topic}: {error}"
             return ()
-        self.taken += len(found)
-        return found
+        self.taken += len(result)
+        return result
 
     def _read(self, topic: str, payload: bytes) -> Iterable[Any]:
         if topic == self._operator:
             given = OperatorInput.decode(payload).commands
             return [command._replace(source=f"{SOURCE}/{command.source}") for command in given]
         accepted = self._accepted[topic]
-        kind, values = accepted.wish(accepted.message.decode(payload))
+        kind, values = accepted.to_command(accepted.message.decode(payload))
         return [OperatorCommand(kind, SOURCE, next(self._numbers), tuple(values))]
 
     def report(self) -> str:
-        """What there is to tell at the end; "" where nothing came."""
+        """Return the line of the final report; "" if no command arrived."""
         if not self.taken and not self.refused:
             return ""
         refused = f", {self.refused} messages refused, the last: {self.why}" if self.refused else ""

@@ -1,4 +1,4 @@
-"""A node of a ROS 2 graph: a Zenoh session of its own, with what rmw_zenoh expects of one."""
+"""A node of a ROS 2 graph: a separate Zenoh session with the declarations that rmw_zenoh expects."""
 
 from collections.abc import Callable
 from typing import Any, Self
@@ -11,38 +11,40 @@ from lapwing.services.common.address import host_and_port, is_loopback
 from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
 
 ROUTER = "127.0.0.1:7447"  # where nodes of rmw_zenoh look for their router
-# Nodes are told of one another, as by rmw_zenoh's own router, and then talk to one another directly.
+# Nodes discover each other as with rmw_zenoh's own router, and then communicate directly.
 _SETTINGS = {"scouting/gossip/enabled": True, "transport/unicast/open_timeout": 3000}
 
 
 def parse_router(text: str, insecure: bool) -> tuple[str, bool]:
-    """The Zenoh endpoint HOST:PORT of a router, and whether it is on this machine.
+    """Return the Zenoh endpoint of a router HOST:PORT, and True if it is on this machine.
 
     Raises:
-        ValueError: not of this form, or another machine, where nobody proves who he is, without `insecure`.
+        ValueError: the form is wrong, or it is another machine, which is not authenticated, without `insecure`.
     """
-    found = host_and_port(text)
-    if found is None:
+    result = host_and_port(text)
+    if result is None:
         raise ValueError(f"--ros2-router {text}: expected HOST:PORT, for example {ROUTER}")
-    host, port = found
+    host, port = result
     local = is_loopback(host)
     if not local and not insecure:
-        raise ValueError(f"--ros2-router {text}: is not this machine, and anybody there could command: add --insecure")
+        raise ValueError(
+            f"--ros2-router {text}: programs of that host could send commands; use --insecure to allow them"
+        )
     written = f"[{host}]" if ":" in host else host
     return f"tcp/{written}:{port}", local
 
 
 class CommandSubscription:
-    """What other nodes have published and was not taken yet."""
+    """Messages of other nodes that were not read yet."""
 
     def __init__(self, arrived: Subscription, topics: dict[str, str]):
-        """Of a subscription; the topic of each key."""
+        """Wrap a subscription with the topic of each key."""
         self._arrived, self._topics = arrived, topics
 
     def get(self) -> tuple[str, bytes] | None:
-        """Topic and payload of the next message; None where there is none."""
-        found = self._arrived.get_with_key(timeout=0.0)
-        return found and (self._topics[found[0]], found[2])
+        """Return topic and payload of the next message. Return None if there is none."""
+        result = self._arrived.get_with_key(timeout=0.0)
+        return result and (self._topics[result[0]], result[2])
 
 
 class Node:
@@ -76,7 +78,7 @@ class Node:
         self._bus.declare_alive(token)
 
     def put(self, topic: str, time_ns: int, payload: bytes) -> None:
-        """A message of a declared topic, stamped with the simulation time [ns]."""
+        """Publish a message of a declared topic, stamped with the simulation time [ns]."""
         if topic in self._puts:
             self._puts[topic](payload, time_ns)
 
@@ -104,7 +106,7 @@ def _open(endpoint: str, local: bool) -> ZenohBus:
     if local:
         try:
             return ZenohBus([endpoint], mode="router", security=_SETTINGS)
-        except BusError:  # somebody listens there already: a router, if all is well
+        except BusError:  # the port is in use, normally by a router
             pass
     try:
         return ZenohBus(connect=[endpoint], mode="client", security=_SETTINGS)

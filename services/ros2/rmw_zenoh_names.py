@@ -1,7 +1,7 @@
-"""How rmw_zenoh (Jazzy and later) names topics, and how it says who is there (its docs/design.md).
+"""Keys and liveliness tokens of rmw_zenoh (Jazzy and later; its docs/design.md).
 
 A topic's key is `<domain>/<topic>/<type>/<type hash>`. A node and each of its publishers and subscriptions declare a
-liveliness token of which `ros2 node list` and `ros2 topic list` are made; in it, `%` stands for `/`.
+liveliness token, from which `ros2 node list` and `ros2 topic list` are made; in it, `%` replaces `/`.
 """
 
 import hashlib
@@ -12,7 +12,7 @@ from lapwing.messages.type_hash import known_type_hash
 NODE, PUBLISHER, SUBSCRIPTION = "NN", "MP", "MS"
 QOS = "::,10:,:,:,,"  # all as ROS 2's default: reliable, volatile, the last 10
 NAME = "lapwing"  # of the node
-_ROOT = "%"  # stands for an empty enclave and for the namespace "/"
+_ROOT = "%"  # an empty enclave, and the namespace "/"
 
 
 class Endpoint(NamedTuple):
@@ -22,7 +22,7 @@ class Endpoint(NamedTuple):
     type_name: str
 
     def key(self, domain: int) -> str:
-        """The Zenoh key of its messages."""
+        """Return the Zenoh key of its messages."""
         return f"{domain}/{self.topic.lstrip('/')}/{self._type}"
 
     @property
@@ -31,17 +31,17 @@ class Endpoint(NamedTuple):
         return f"{package}::{kind}::dds_::{name}_/{known_type_hash(self.type_name)}"
 
     def token(self, domain: int, session: str, number: int, kind: str) -> str:
-        """The liveliness token of our publisher or subscription, the `number`-th of the node."""
+        """Return the liveliness token of the node's `number`-th publisher or subscription."""
         return f"{_entity(domain, session, number, kind)}/{self.topic.replace('/', '%')}/{self._type}/{QOS}"
 
 
 def node_token(domain: int, session: str) -> str:
-    """The liveliness token of the node, which is the first and only one of its session."""
+    """Return the liveliness token of the node, the only one of its session."""
     return _entity(domain, session, 0, NODE)
 
 
 def identifier(token: str) -> bytes:
-    """16 bytes that tell a publisher from all others, for the attachment of its messages."""
+    """Return the 16-byte publisher GID of a token, for the attachment of its messages."""
     return hashlib.blake2b(token.encode(), digest_size=16).digest()
 
 

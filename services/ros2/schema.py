@@ -1,4 +1,4 @@
-"""The `[bus]` of a scene: who else may hear it."""
+"""The `[ros2]` table of a scene."""
 
 from typing import ClassVar
 
@@ -7,11 +7,11 @@ from pydantic import Field
 from lapwing.cosim.scene import SceneTable
 
 
-class Bus(SceneTable):
-    """Whether a run in processes is a node of a ROS 2 graph, too."""
+class Ros2(SceneTable):
+    """Publication of a multi-process run to nodes of a ROS 2 graph that use rmw_zenoh."""
 
-    TABLE: ClassVar[str] = "bus"
+    TABLE: ClassVar[str] = "ros2"
     SHARED: ClassVar[bool] = True
     OPTIONAL: ClassVar[bool] = True
-    ros2: bool = False  # publish for nodes that use rmw_zenoh, as --ros2 does
-    ros2_domain: int = Field(default=0, ge=0, le=232)  # their ROS_DOMAIN_ID
+    enabled: bool = False  # publish for ROS 2 nodes, as the option --ros2 does
+    domain_id: int = Field(default=0, ge=0, le=232)  # ROS_DOMAIN_ID of the nodes

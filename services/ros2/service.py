@@ -1,6 +1,6 @@
 """The process that is a node of a ROS 2 graph: what the services publish goes out, commands come in.
 
-It takes no part in the lock step: nobody waits for it, and when it ends the flight goes on.
+It is not part of the lock step: no service waits for it, and the flight continues when it ends.
 """
 
 from typing import Any
@@ -11,6 +11,7 @@ from lapwing.cosim.executors.participant import POLL, Participant
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import EVENTS, of_vehicle
+from lapwing.services.common.last_events import LastEvents
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
@@ -27,7 +28,7 @@ def run(process: Participant, given: Any) -> None:
     for name in setup.services:
         for topic in process.create_service(name).topics:
             topics[process.key(topic)] = topic
-            authors[process.key(topic)] = process.participants.author(name)
+            authors[process.key(topic)] = process.participants.encoder_gid(name)
     given_to = {topic: commands for commands in _commands(setup) for topic in commands.messages}
     operate = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with Node(given.ros2, given.ros2_router, given.insecure) as node:
@@ -37,12 +38,13 @@ def run(process: Participant, given: Any) -> None:
         for topic in events.values():
             node.declare(topic.key(), topic.message.type_name)
         asked = node.subscribe({topic: commands.messages[topic] for topic, commands in given_to.items()})
-        watcher = dict.fromkeys(events, process.participants.mark(MONITOR))  # who watches the run tells of events
+        watcher = dict.fromkeys(events, process.participants.gid(MONITOR))  # the run monitor publishes events
         published = process.bus.receive(authors | watcher)
         process.join()
         flying = set(topics)  # topics that have not come to their end
         topics |= events
-        while flying and not process.stopping:
+        ends = LastEvents(events)
+        while ends.await_more(bool(flying)) and not process.stopping:
             while arrived := asked.get():
                 commands = given_to[arrived[0]]
                 for command in commands.read(*arrived):
@@ -55,6 +57,7 @@ def run(process: Participant, given: Any) -> None:
                 node.put(topics[key].key(setup.vehicle), time_ns, payload)
             else:
                 flying.discard(key)
+                ends.take(key)
         process.confirm()
     for commands in dict.fromkeys(given_to.values()):
         if report := commands.report():
@@ -62,6 +65,6 @@ def run(process: Participant, given: Any) -> None:
 
 
 def _commands(setup: RunConfig) -> list[Commands]:
-    """Of each vehicle that the scene lets others command: `autopilot.accept_commands`."""
+    """Return the conversions of all vehicles with `autopilot.accept_commands`."""
     steered = [member for member in members(setup) if "autopilot" in member.services]
     return [Commands(member.vehicle) for member in steered if member.services["autopilot"].parameters.operator]

@@ -10,10 +10,10 @@ from lapwing.cosim.executors.participant import POLL, Participant, Stopped
 
 
 def run(process: Participant, given: Any) -> None:
-    """Listen until the recorder has the whole run, or until asked to stop."""
+    """Route until the recorder has the entire run, or until asked to stop."""
     process.join()
     process.confirm()  # it takes no messages, but passes them on
-    process.end_with("recorder")
+    process.stop_without("recorder")
     while not process.stopping:
         time.sleep(POLL)
     if not process.abandoned:

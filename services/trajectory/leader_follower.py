@@ -1,11 +1,11 @@
-"""Compiled trajectory block of a vehicle relative to a leader's trajectory."""
+"""Compiled trajectory block of a vehicle offset to a leader's trajectory."""
 
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3, add
 from lapwing.kernels import always_inline, math
-from lapwing.services.common.ports import Reference
+from lapwing.services.common.ports import Setpoint
 from lapwing.services.trajectory import polynomial_piece
 from lapwing.services.trajectory.block import TrajectoryPath
 
@@ -19,14 +19,15 @@ class FollowedPath(NamedTuple):
 
 
 @always_inline
-def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, Vec3]:
-    """Return world position, velocity and acceleration of a reference in a frame rotated about z.
+def turned(heading: Vec3, offset: Setpoint) -> tuple[Vec3, Vec3, Vec3]:
+    """Return world position, velocity and acceleration of a setpoint in a frame rotated about z.
 
     `heading` has angle, rate and acceleration of the frame [rad], [rad/s], [rad/s^2].
     """
     angle, rate, acceleration = heading
     s, c = math.sincos(angle)
-    (x, y, z), (vx, vy, vz), (ax, ay, az) = way.position_world, way.velocity_world, way.acceleration_world
+    (x, y, z), (vx, vy, vz) = offset.position_world, offset.velocity_world
+    ax, ay, az = offset.acceleration_world
     vx, vy, ax, ay = (  # by Coriolis' theorem
         vx - rate * y,
         vy + rate * x,
@@ -41,24 +42,25 @@ def turned(heading: Vec3, way: polynomial_piece.Reference) -> tuple[Vec3, Vec3, 
 
 
 @always_inline
-def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Reference], int]:
-    """Evaluate the reference at `tick`, with the vehicle's own phases (theory.md, eq. (4.1a)); the state is unused."""
+def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Setpoint], int]:
+    """Evaluate the setpoint at `tick`, with the vehicle's own phases (theory.md, eq. (4.1a)); the state is unused."""
     t = tick * p.relative.interval
-    leader, way = polynomial_piece.evaluate(p.leader.path, t), polynomial_piece.evaluate(p.relative.path, t)
+    leader = polynomial_piece.evaluate(p.leader.path, t, p.leader.final)
+    offset = polynomial_piece.evaluate(p.relative.path, t, p.relative.final)
     heading = polynomial_piece.channel_at(p.leader.path.yaw, t) if p.heading else (0.0, 0.0, 0.0)
-    position, velocity, acceleration = turned(heading, way)
+    position, velocity, acceleration = turned(heading, offset)
     return (
         s,
         (
-            Reference(
+            Setpoint(
                 add(leader.position_world, position),
                 add(leader.velocity_world, velocity),
                 add(leader.acceleration_world, acceleration),
-                leader.yaw + way.yaw,
-                leader.yaw_rate + way.yaw_rate,
-                way.phase,
-                way.phase >= p.relative.final and leader.phase >= p.leader.final,
-                p.relative.path.phase_release[way.phase] > 0.0,
+                leader.yaw + offset.yaw,
+                leader.yaw_rate + offset.yaw_rate,
+                offset.phase,
+                offset.final and leader.final,
+                offset.release,
             ),
         ),
         CONTINUE,

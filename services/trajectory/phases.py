@@ -2,20 +2,31 @@
 
 from typing import Annotated
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, ValidationError, model_validator
 
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import fault
 from lapwing.services.trajectory.segments import choose
 from lapwing.services.trajectory.segments.segment import Positive, Segment
+from lapwing.services.trajectory.user_segment import UserSegment
+
+
+def _segment(table: object) -> Segment:
+    if not isinstance(table, dict) or "module" not in table:
+        return choose(table)
+    try:
+        return UserSegment.model_validate(table)
+    except ValidationError as error:
+        raise fault(error, UserSegment) from None
 
 
 def _segments(value: object) -> tuple[Segment, ...]:
     if not isinstance(value, list | tuple):
-        return (choose(value),)
+        return (_segment(value),)
     segments = []
     for number, table in enumerate(value):
         try:
-            segments.append(choose(table))
+            segments.append(_segment(table))
         except ConfigError as error:
             raise error.with_prefix(str(number)) from None
     return tuple(segments)

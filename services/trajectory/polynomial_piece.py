@@ -6,6 +6,7 @@ import numpy as np
 
 from lapwing.dynamics.vector import Vec3, add
 from lapwing.kernels import always_inline, kernel, math
+from lapwing.services.common.ports import Setpoint
 
 WIDTH = 9  # columns of a coefficient row: six of the quintic, then amplitude, frequency, sweep
 
@@ -45,17 +46,6 @@ class Parameters(NamedTuple):
     origin_yaw: float  # [rad]
 
 
-class Reference(NamedTuple):
-    """Reference at one instant; derivatives are right-sided at joints."""
-
-    position_world: Vec3  # [m]
-    velocity_world: Vec3  # [m/s]
-    acceleration_world: Vec3  # [m/s^2]
-    yaw: float  # [rad]
-    yaw_rate: float  # [rad/s]
-    phase: int  # index of the phase that t lies in
-
-
 @always_inline
 def last_not_after(times: np.ndarray, t: float) -> int:
     """Return the index of the last entry of ascending `times` that is <= t, or 0."""
@@ -89,18 +79,24 @@ def channel_at(channel: Channel, t: float) -> Vec3:
 
 
 @kernel
-def evaluate(p: Parameters, t: float) -> Reference:
-    """Return the reference at time t [s]; constant before 0 and after the end."""
+def evaluate(p: Parameters, t: float, final: int) -> Setpoint:
+    """Return the setpoint at time t [s]; constant before 0 and after the end.
+
+    Derivatives are right-sided at joints. `final` is the index of the first phase after which none ends in the air.
+    """
     t = max(t, 0.0)
     x, vx, ax = channel_at(p.x, t)
     y, vy, ay = channel_at(p.y, t)
     z, vz, az = channel_at(p.z, t)
     yaw, yaw_rate, _ = channel_at(p.yaw, t)
-    return Reference(
+    phase = last_not_after(p.phase_start, t)
+    return Setpoint(
         add(p.origin_world, (x, y, z)),
         (vx, vy, vz),
         (ax, ay, az),
         p.origin_yaw + yaw,
         yaw_rate,
-        last_not_after(p.phase_start, t),
+        phase,
+        phase >= final,
+        p.phase_release[phase] > 0.0,
     )

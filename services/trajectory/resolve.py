@@ -11,7 +11,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import subtract
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.ports import Reference
+from lapwing.services.common.ports import Setpoint
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import start_place
 from lapwing.services.trajectory.block import TrajectoryPath
@@ -35,7 +35,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     return ServiceConfig(
         TrajectorySetup(core, result.phases, *_leader(trajectory)),
         (InputPort(ports.TRUTH, ahead),),
-        (Port(ports.TRAJECTORY, Reference()),),
+        (Port(ports.TRAJECTORY, Setpoint()),),
     )
 
 

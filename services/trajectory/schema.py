@@ -12,15 +12,20 @@ duration = 5.0
 
 Values are displacements from the vehicle's initial pose in world axes; z = 0 is the ground. With `leader` they are
 displacements relative to the leader's trajectory. Channels without a segment hold. A channel may have a list of
-consecutive segments. A phase lasts `duration`, by default as long as its longest channel; shorter channels hold.
+consecutive segments. A segment with the key `module` is of a class in that user module. A phase lasts `duration`, by
+default as long as its longest channel; shorter channels hold.
 """
 
+from collections.abc import Iterator
 from typing import Any, ClassVar, Literal
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import named
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.common import user_modules
+from lapwing.services.trajectory import user_segment
 from lapwing.services.trajectory.phases import Phases
+from lapwing.services.trajectory.segments.segment import Segment
 from lapwing.services.trajectory.table_file import parse
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS, CompiledTrajectory, compile
 
@@ -35,15 +40,19 @@ class Trajectory(Phases, SceneTable):
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """Read the CSV file of a segment of kind "table" into its points."""
+        """Store the modules of user segments, and read the CSV file of a segment of kind "table" into its points."""
         phases = named(tree, cls.TABLE, "phase")
         for i, phase in enumerate(phases if isinstance(phases, list) else ()):
             for channel in CHANNELS if isinstance(phase, dict) else ():
                 segments = phase.get(channel, ())
                 several = isinstance(segments, list)
                 for k, segment in enumerate(segments if several else [segments]):
-                    if isinstance(segment, dict) and isinstance(file := segment.get("file"), str):
-                        key = f"trajectory.phase.{i}.{channel}" + (f".{k}" if several else "")
+                    if not isinstance(segment, dict):
+                        continue
+                    key = f"trajectory.phase.{i}.{channel}" + (f".{k}" if several else "")
+                    if isinstance(module := segment.get("module"), str):
+                        user_modules.embed(tree, files, f"{key}.module", module)
+                    elif isinstance(file := segment.get("file"), str):
                         path = files.folder / file
                         segment["points"] = parse(files.text(f"{key}.points", f"{key}.file", path), path)
 
@@ -56,8 +65,16 @@ class Trajectory(Phases, SceneTable):
 
 def compiled(scene: Scene) -> CompiledTrajectory:
     """Return the scene's trajectory about the origin. See `compile` for errors."""
-    return scene.once(_compiled)
+    return scene.cached(_compiled)
 
 
 def _compiled(scene: Scene) -> CompiledTrajectory:
-    return compile(scene[Trajectory])
+    trajectory = scene[Trajectory]
+    user_segment.load(scene, _keyed_segments(trajectory))
+    return compile(trajectory)
+
+
+def _keyed_segments(trajectory: Trajectory) -> Iterator[tuple[str, Segment]]:
+    for i, phase in enumerate(trajectory.phase):
+        for channel in CHANNELS:
+            yield from ((f"trajectory.phase.{i}.{channel}", segment) for segment in getattr(phase, channel))

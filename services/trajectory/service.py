@@ -8,7 +8,7 @@ from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.kernels.cell import Cell
 from lapwing.messages.topics import TRAJECTORY
 from lapwing.services.common import ports
-from lapwing.services.common.reference_encoder import reference_wire
+from lapwing.services.common.setpoint_encoder import setpoint_encoder
 from lapwing.services.trajectory.block import TrajectoryPath
 from lapwing.services.trajectory.leader_follower import FollowedPath
 
@@ -25,7 +25,7 @@ class TrajectorySetup(NamedTuple):
 
 
 def create(setup: RunConfig) -> Service:
-    """The signal builder of a run."""
+    """Return the trajectory service of a run."""
     given: Any = setup.services[NAME]
     part = Block(NAME, given.parameters.core, Cell(0.0), given.inputs, given.ports)
-    return Service(NAME, [part], [reference_wire(TRAJECTORY, ports.TRAJECTORY, given.parameters.phases)])
+    return Service(NAME, [part], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, given.parameters.phases)])

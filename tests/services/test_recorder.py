@@ -5,7 +5,7 @@ import pytest
 
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.cosim.transport.packets import pack_batch
+from lapwing.cosim.transport.packets import pack_log_packet
 from lapwing.messages.topics import ACTUATORS, POSE, TRUTH
 from lapwing.services.recorder.service import Pending
 
@@ -13,7 +13,7 @@ from lapwing.services.recorder.service import Pending
 def batch(topic, ticks, stop, start=0):
     ticks = np.array(ticks)
     pages = [RecordBatch(topic, ticks, ticks.astype("<i8").view(np.uint8).reshape(-1, 8))] if len(ticks) else []
-    return pack_batch(pages, start, stop)
+    return pack_log_packet(pages, start, stop)
 
 
 def written(pending):
@@ -22,7 +22,7 @@ def written(pending):
     }
 
 
-def test_messages_wait_for_the_slowest_service():
+def test_messages_wait_for_slowest_service():
     pending = Pending(["plant", "autopilot"])
     pending.add("plant", batch(TRUTH, range(10), 10), 0)
     assert written(pending) == {}
@@ -34,7 +34,7 @@ def test_messages_wait_for_the_slowest_service():
     assert pending.written == 10
 
 
-def test_a_service_without_a_message_hands_over_its_ticks_too():
+def test_service_without_message_hands_over_its_ticks_too():
     pending = Pending(["plant", "trajectory"])
     pending.add("plant", batch(POSE, [0, 5], 7), 0)
     assert pending.waits_for() == "the messages of trajectory from tick 0 on"
@@ -42,7 +42,7 @@ def test_a_service_without_a_message_hands_over_its_ticks_too():
     assert written(pending) == {POSE.name: [0, 5]}
 
 
-def test_it_ends_once_every_service_has_said_so():
+def test_recorder_ends_after_every_service():
     pending = Pending(["plant", "autopilot"])
     for name, topic in (("plant", TRUTH), ("autopilot", ACTUATORS)):
         pending.add(name, batch(topic, [0, 1], 2), 0)
@@ -53,7 +53,7 @@ def test_it_ends_once_every_service_has_said_so():
     assert written(pending) == {TRUTH.name: [0, 1], ACTUATORS.name: [0, 1]}
 
 
-def test_a_lost_batch_is_an_error_that_names_its_service():
+def test_lost_batch_is_error_that_names_its_service():
     pending = Pending(["plant", "autopilot"])
     pending.add("plant", batch(TRUTH, range(4), 4), 0)
     with pytest.raises(LockStepError, match="the messages of plant of the ticks 4 to 7 are lost"):
@@ -62,7 +62,7 @@ def test_a_lost_batch_is_an_error_that_names_its_service():
         pending.add("autopilot", b"", 3)
 
 
-def test_a_batch_and_an_end_that_come_again_change_nothing():
+def test_repeated_packet_and_end_are_ignored():
     pending = Pending(["plant"])
     for _ in range(2):
         pending.add("plant", batch(TRUTH, range(4), 4), 0)

@@ -26,7 +26,7 @@ PREFIX = "test-router"
 
 
 def visit(command, door, **security):
-    """What a client reads while a run flies, and what the run says at its end; the client publishes, too."""
+    """Return the client's messages during a run and the run's output; the client also publishes."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
         heard = None
         while heard is None and run.poll() is None:
@@ -41,9 +41,9 @@ def visit(command, door, **security):
                     heard = pose.get(timeout=2.0)
             except BusError:  # nobody listens yet
                 time.sleep(0.1)
-        said = run.communicate(timeout=200)[0]
-        assert run.returncode == 0, said
-    return heard, said
+        output = run.communicate(timeout=200)[0]
+        assert run.returncode == 0, output
+    return heard, output
 
 
 def command(tmp_path, door, *more):
@@ -51,15 +51,15 @@ def command(tmp_path, door, *more):
     return [sys.executable, "-m", "lapwing", "run", "hover", "--speed", "2", "--listen", door, *sets, *more]
 
 
-def test_a_viewer_reads_and_is_not_heard_and_nobody_else_reads(tmp_path):
+def test_viewer_is_read_only_and_authenticated(tmp_path):
     (tcp,) = loopback_endpoints(["door"]).values()
     door, keys, foreign = tcp.replace("tcp/", "tls/"), tmp_path / "keys", tmp_path / "foreign"
     make(keys, [ROUTER, VIEWER], 1)
     make(foreign, [VIEWER], 1)
     security = tls(keys, VIEWER)
-    heard, said = visit(command(tmp_path, door, "--keys", str(keys)), door, security=security)
+    heard, output = visit(command(tmp_path, door, "--keys", str(keys)), door, security=security)
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
-    assert "refused" not in said  # the door itself lets nothing in
+    assert "rejected" not in output  # the door itself lets nothing in
 
     with ZenohBus([door], security=tls(keys, ROUTER)):
         authority = {"root_ca_certificate": security["transport/link/tls"]["root_ca_certificate"]}
@@ -70,14 +70,14 @@ def test_a_viewer_reads_and_is_not_heard_and_nobody_else_reads(tmp_path):
         ZenohBus(connect=[door], mode="client", security=security).close()
 
 
-def test_a_door_without_certificates_is_for_reading_too(tmp_path):
+def test_door_without_certificates_is_for_reading_too(tmp_path):
     (door,) = loopback_endpoints(["door"]).values()
-    heard, said = visit(command(tmp_path, door, "--insecure"), door)
+    heard, output = visit(command(tmp_path, door, "--insecure"), door)
     assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
-    assert "refused" not in said
+    assert "rejected" not in output
 
 
-def test_who_comes_in_where_nobody_has_a_certificate_is_not_told_the_lock_step():
+def test_client_without_certificate_gets_no_lock_step():
     ends = loopback_endpoints(["plant", ROUTER, "door"])
     peers = {name: ends[name] for name in ("plant", ROUTER)}
     security = settings(resolve(load("hover")), ROUTER, PREFIX, "")
@@ -97,7 +97,7 @@ def test_who_comes_in_where_nobody_has_a_certificate_is_not_told_the_lock_step()
         assert set(keys) == {f"{PREFIX}/drone1/pose"}
 
 
-def test_a_viewer_who_stops_reading_holds_nobody_up(tmp_path):
+def test_stalled_viewer_does_not_block_run(tmp_path):
     (door,) = loopback_endpoints(["door"]).values()
     words = command(tmp_path, door, "--insecure", "--set", "run.duration=12")
     released, keys = threading.Event(), set()
@@ -114,9 +114,9 @@ def test_a_viewer_who_stops_reading_holds_nobody_up(tmp_path):
         # one that holds Zenoh's only thread: nothing is read any more
         frozen = zenoh.handlers.Callback(lambda sample: released.wait(), indirect=False)
         viewer._held.append(viewer._session.declare_subscriber(f"{PREFIX}/**", frozen))
-        said = run.communicate(timeout=200)[0]
+        output = run.communicate(timeout=200)[0]
         released.set()
         viewer.close()
-    assert run.returncode == 0, said
+    assert run.returncode == 0, output
     assert f"{PREFIX}/drone1/pose" in keys
     assert not [key for key in keys if key.startswith(f"{PREFIX}/_")]  # whose senders wait for all who read them

@@ -8,7 +8,7 @@ from lapwing.services.scene_resolver import load, reseed, resolve
 
 
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))
-def test_another_seed_is_what_resolving_gives(scene):
+def test_reseed_equals_resolving_with_seed(scene):
     setup = resolve(load(scene))
     assert first_difference(reseed(setup, 4711), resolve(load(scene, ["run.seed=4711"]))) is None
     assert first_difference(reseed(setup, setup.seed), setup) is None

@@ -4,7 +4,7 @@ from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 
 class AltitudeFlight:

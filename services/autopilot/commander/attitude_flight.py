@@ -5,8 +5,8 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.autopilot.land_detector import CUT_HEIGHT
+from lapwing.services.common.ports import Setpoint
 
 _RISING = 0.01  # [m/s]
 LEAST_THRUST = 0.08  # over the maximum at the lower end of the stick, PX4's MPC_MANTHR_MIN

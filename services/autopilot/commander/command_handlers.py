@@ -45,7 +45,7 @@ def handle(context: Context, command: Any) -> None:
         result = CommandAck.DENIED if isinstance(error, Denied) else CommandAck.TEMPORARILY_REJECTED
         if command.kind not in STREAMS:
             outbox.acknowledge(command, result, str(error), _present_value(context, command))
-            outbox.say(str(error))
+            outbox.send_text(str(error))
         return
     pending = context.state.pending_arm
     waits = pending is not None and pending.command is command
@@ -62,14 +62,14 @@ def arm(context: Context, command: Any) -> None:
     """Arm. Values: 1 to skip the pre-arm checks; time [s] to wait for them."""
     if context.state.guidance.armed:
         return
-    if reasons := prearm_checks.reasons(context.view, context.state):
+    if blockers := prearm_checks.arming_blockers(context.view, context.state):
         time_left = value(command.values, 1)
         if time_left > 0.0:
             context.state.pending_arm = PendingArm(command, time_left)
-            context.outbox.acknowledge(command, CommandAck.IN_PROGRESS, reasons[0])
+            context.outbox.acknowledge(command, CommandAck.IN_PROGRESS, blockers[0])
             return
         if value(command.values, 0) != 1.0:
-            raise ValueError(f"arming refused: {'; '.join(reasons)}")
+            raise ValueError(f"arming refused: {'; '.join(blockers)}")
     transitions.arm(context)
 
 
@@ -101,9 +101,9 @@ def mission_start(context: Context, command: Any) -> None:
     """Arm and fly the mission from an item, as PX4 does at MAV_CMD_MISSION_START."""
     before = context.state.mode, context.state.mode_name
     transitions.enter(context.constants, context.state, "mission", *command.values[:1])
-    if not context.state.guidance.armed and (reasons := prearm_checks.reasons(context.view, context.state)):
+    if not context.state.guidance.armed and (blockers := prearm_checks.arming_blockers(context.view, context.state)):
         context.state.mode, context.state.mode_name = before
-        raise ValueError(f"arming refused: {'; '.join(reasons)}")
+        raise ValueError(f"arming refused: {'; '.join(blockers)}")
     if not context.state.guidance.armed:
         transitions.arm(context)
     context.state.failsafe = ""

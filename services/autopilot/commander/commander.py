@@ -14,10 +14,10 @@ from lapwing.services.autopilot.commander.commander_output import CommanderOutpu
 from lapwing.services.autopilot.commander.commander_state import State, initial
 from lapwing.services.autopilot.commander.commander_status import status
 from lapwing.services.autopilot.commander.transitions import Context, arm, disarm, enter
-from lapwing.services.autopilot.commander.wakeup_conditions import quiet_time
+from lapwing.services.autopilot.commander.wakeup_conditions import time_without_changes
 from lapwing.services.autopilot.initial_estimate import EXACT
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.common import status_texts
+from lapwing.services.common.ports import Setpoint
 
 BLOCKED_TIME = 1.0  # [s] without descent at a descending setpoint, after which the vehicle is on the ground
 LOW_THRUST = 0.5  # fraction of the hover thrust below which the vehicle cannot fly
@@ -56,8 +56,8 @@ class Commander:
     def step(self, view: CommanderInput) -> CommanderOutput:
         """Return the output of a tick.
 
-        While an output is valid, calls are only needed at wake-ups (`quiet_time`). With an operator, whose commands
-        read `guidance`, call `skip` first.
+        While an output is valid, calls are only needed at wake-ups (`time_without_changes`). With an operator, whose
+        commands read `guidance`, call `skip` first.
         """
         constants, state = self.constants, self.state
         context = Context(constants, view, state, OperatorMessages())
@@ -79,7 +79,7 @@ class Commander:
             estimate_every_tick=from_estimate,
             motor_voltage=volts,
             status=status(constants, view, state),
-            quiet=quiet_time(context),
+            valid_for=time_without_changes(context),
         )
 
 
@@ -122,7 +122,7 @@ def _detect_landing(context: Context) -> None:
     state.blocked_time = state.blocked_time + view.dt if blocked else 0.0
     if view.motors_cut or state.blocked_time > BLOCKED_TIME:
         guidance.flying, state.on_ground_time, state.blocked_time = False, 0.0, 0.0
-        context.outbox.say(status_texts.LANDED)
+        context.outbox.send_text(status_texts.LANDED)
 
 
 def _disarm_when_idle(context: Context) -> None:
@@ -142,13 +142,13 @@ def _retry_arming(context: Context) -> None:
     if state.pending_arm is None:
         return
     command, time_left = state.pending_arm
-    reasons = prearm_checks.reasons(view, state)
-    if not reasons:
+    blockers = prearm_checks.arming_blockers(view, state)
+    if not blockers:
         state.pending_arm = None
         arm(context)
         outbox.acknowledge(command, CommandAck.ACCEPTED)
     elif time_left < view.dt:
         state.pending_arm = None
-        outbox.acknowledge(command, CommandAck.TEMPORARILY_REJECTED, reasons[0])
+        outbox.acknowledge(command, CommandAck.TEMPORARILY_REJECTED, blockers[0])
     else:
         state.pending_arm = state.pending_arm._replace(time_left=time_left - view.dt)

@@ -4,9 +4,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from lapwing.services.autopilot.estimator.filter_state import GPS
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.common.autopilot_parameters import Parameter
-from lapwing.services.common.ports import StateEstimate
+from lapwing.services.common.ports import Setpoint, StateEstimate
 
 POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
 

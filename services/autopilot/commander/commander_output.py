@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from lapwing.messages import CommandAck
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.common.failure_types import Faults
+from lapwing.services.common.ports import Setpoint
 
 
 class Status(NamedTuple):
@@ -40,7 +40,7 @@ class CommanderOutput(NamedTuple):
     estimate_every_tick: bool  # the setpoint depends on the estimate: pass a new one at the next tick
     motor_voltage: tuple[float, ...] | None  # direct voltages [V]; None: the controller's
     status: Status
-    quiet: float  # [s] for which the output stays valid (`wakeup_conditions.quiet_time`)
+    valid_for: float  # [s] for which the output stays valid (`wakeup_conditions.time_without_changes`)
 
 
 @dataclass
@@ -52,7 +52,7 @@ class OperatorMessages:
     parameters: dict[str, float] | None = None
     faults: Faults | None = None
 
-    def say(self, text: str) -> None:
+    def send_text(self, text: str) -> None:
         """Send a status text."""
         self.texts.append(text)
 

@@ -12,6 +12,7 @@ def status(constants: Constants, view: CommanderInput, state: State) -> Status:
     """Return the status after a tick."""
     guidance, route = state.guidance, state.guidance.route
     armed = guidance.armed and not state.on_trajectory
+    blockers = prearm_checks.arming_blockers(view, state) if constants.has_operator and not armed else ()
     last_flight = not constants.has_operator or state.finish_requested
     return Status(
         mode=state.mode_name,
@@ -24,7 +25,7 @@ def status(constants: Constants, view: CommanderInput, state: State) -> Status:
         mission_reached=route.reached,
         mission_state=mission_state(state),
         offboard_available=guidance.offboard_available,
-        arming_blockers=tuple(prearm_checks.reasons(view, state)) if constants.has_operator and not armed else (),
+        arming_blockers=tuple(blockers),
         home=guidance.home,
         released=guidance.released,
         battery_warning=sum(view.battery_charge < limit for limit in battery_thresholds(guidance.parameters)),

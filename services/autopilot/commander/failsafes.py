@@ -73,7 +73,7 @@ def update(context: Context) -> None:
             if elapsed > delay:
                 acted = _act(context, failsafe.reason, mode)
             elif before <= _WARNING_TIME < elapsed and mode:
-                context.outbox.say(f"{failsafe.reason}: {mode} in {delay - _WARNING_TIME:.0f} s")
+                context.outbox.send_text(f"{failsafe.reason}: {mode} in {delay - _WARNING_TIME:.0f} s")
         state.failsafe_timers[failsafe.reason] = FailsafeTimer(elapsed, acted)
 
 
@@ -87,7 +87,7 @@ def _act(context: Context, reason: str, mode: str | None) -> bool:
     """Take the action. Return True if the present mode allows it."""
     state = context.state
     if mode is None:
-        context.outbox.say(reason)
+        context.outbox.send_text(reason)
         return True
     if mode == "descend" and state.guidance.inputs.sticks_fresh:
         mode = "altitude_control"  # a pilot holds the sticks
@@ -95,7 +95,7 @@ def _act(context: Context, reason: str, mode: str | None) -> bool:
         return False
     state.failsafe = reason
     enter(context.constants, state, mode)
-    context.outbox.say(status_texts.TAKEN_OVER.format(reason, mode))
+    context.outbox.send_text(status_texts.TAKEN_OVER.format(reason, mode))
     return True
 
 

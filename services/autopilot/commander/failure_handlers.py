@@ -36,7 +36,7 @@ def inject_failure(context: Context, command: Any) -> None:
         changes: dict[str, Any] = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
         state.faults = state.faults._replace(**changes)
     outbox.faults = state.faults
-    outbox.say(f"injected: {unit}{named} {KINDS[kind]}")
+    outbox.send_text(f"injected: {unit}{named} {KINDS[kind]}")
 
 
 def _instances(unit: str, count: int, number: float, bits: float) -> list[int]:

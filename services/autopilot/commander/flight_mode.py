@@ -5,7 +5,7 @@ import math
 from lapwing.dynamics.vector import Vec3
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 
 class FlightMode:

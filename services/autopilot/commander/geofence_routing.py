@@ -13,7 +13,7 @@ MOST_CORNERS = 200  # a fence with more is not routed around
 Point = tuple[float, float]
 
 
-def way_round(fence: Fence, start: Point, goal: Point) -> list[Point]:
+def route_around(fence: Fence, start: Point, goal: Point) -> list[Point]:
     """Return the corners [m] of the path to the goal, including it; the straight path if there is no other."""
     if _free(fence, start, goal) or not fence.allows(*start) or not fence.allows(*goal):
         return [goal]

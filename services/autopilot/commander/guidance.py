@@ -9,7 +9,7 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput,
 from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.services.autopilot.commander.route import Route
 from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 STICK_TIMEOUT = 1.0  # [s] after which sticks count as centred
 STICK_DEADZONE = 0.05

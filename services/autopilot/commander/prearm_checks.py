@@ -18,7 +18,7 @@ def count_outages(view: CommanderInput, state: State) -> None:
     state.source_outage = [t + interval if health >> bit & 1 else 0.0 for bit, t in enumerate(state.source_outage)]
 
 
-def reasons(view: CommanderInput, state: State) -> list[str]:
+def arming_blockers(view: CommanderInput, state: State) -> list[str]:
     """Return the texts of all arming blockers, empty if the vehicle can be armed."""
     estimate, guidance = view.estimate, state.guidance
     if estimate.health == NOT_STARTED:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.vector import ZERO, Vec3, add, dot, norm, scale, subtract
 from lapwing.kernels import math
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 _POSITION_GAIN = 1.0  # [1/s] speed over distance in the last metre
 _VELOCITY_GAIN = 3.0  # [1/s] acceleration over error of the velocity

@@ -40,7 +40,7 @@ def arm(context: Context) -> None:
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
     x, y, z = context.view.estimate.position_world
     guidance.home = (x, y, z - context.constants.resting_height)
-    context.outbox.say(status_texts.ARMED)
+    context.outbox.send_text(status_texts.ARMED)
 
 
 def disarm(context: Context, reason: str) -> None:
@@ -51,4 +51,4 @@ def disarm(context: Context, reason: str) -> None:
     state.failsafe_timers.clear()
     if state.mode_name != "hold":
         enter(context.constants, state, "hold")
-    context.outbox.say(status_texts.DISARMED.format(reason))
+    context.outbox.send_text(status_texts.DISARMED.format(reason))

@@ -23,10 +23,10 @@ def battery_thresholds(parameters: Mapping[str, float]) -> BatteryThresholds:
     return BatteryThresholds(parameters["BAT_LOW_THR"], parameters["BAT_CRIT_THR"], parameters["BAT_EMERGEN_THR"])
 
 
-def quiet_time(context: Context) -> float:
+def time_without_changes(context: Context) -> float:
     """Return the time [s] after a tick for which the commander's output stays valid.
 
-    It ends early if `needs_attention` is True, a command arrives or, with an operator, an estimate is due. It is 0 if
+    It ends early if `needs_wakeup` is True, a command arrives or, with an operator, an estimate is due. It is 0 if
     the output may change at every tick.
     """
     state = context.state
@@ -41,7 +41,7 @@ def quiet_time(context: Context) -> float:
 
 
 @always_inline
-def needs_attention(
+def needs_wakeup(
     thresholds: BatteryThresholds,
     health: int,
     battery_charge: float,

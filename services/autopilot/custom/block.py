@@ -11,12 +11,17 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.codegen import overload_for
 from lapwing.services.autopilot import motor_failure
-from lapwing.services.autopilot.block import Controller, estimate_of, outcome, setpoint_of
-from lapwing.services.autopilot.custom.controller_output import NO_WRENCH, ControllerOutput, command, demand, off
-from lapwing.services.autopilot.interface import PerRotor
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LandedState, advance_stage
+from lapwing.services.autopilot.block import Controller, block_outputs
+from lapwing.services.autopilot.custom.controller_output import (
+    NO_WRENCH,
+    ControllerOutput,
+    command,
+    motors_off,
+    parse_controller_output,
+)
+from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
 from lapwing.services.autopilot.mixer import at_rest
-from lapwing.services.common.ports import Reference, StateEstimate
+from lapwing.services.common.ports import PerRotor, Setpoint, StateEstimate
 
 
 class PythonControllerProxy(NamedTuple):
@@ -40,27 +45,27 @@ class CustomController(NamedTuple):
 class CustomState(NamedTuple):
     """State of the block."""
 
-    stage: LandedState
+    landed_state: LandedState
     own: Any
     held: ControllerOutput  # last output of the user's controller
-    watch: motor_failure.State
+    failure_detector: motor_failure.State
     still_from: int  # [tick]
     charge: float  # of the battery, fraction; NaN: unknown
 
 
 def start(p: CustomController) -> CustomState:
     """Return the initial state."""
-    watch = p.common.watch
-    held = off(len(watch.roll_arm))
-    return CustomState(INITIAL_STAGE, p.own_start, held, python_function(motor_failure.start)(watch), 0, float("nan"))
+    detector = p.common.failure_detector
+    held, watched = motors_off(len(detector.roll_arm)), python_function(motor_failure.start)(detector)
+    return CustomState(INITIAL_LANDED_STATE, p.own_start, held, watched, 0, float("nan"))
 
 
-def _ask(
+def _call_user_step(
     p: Any,
     s: Any,
     time: float,
     estimate: StateEstimate,
-    setpoint: Reference,
+    setpoint: Setpoint,
     by_port: tuple[InputSample, ...],
     none: PerRotor,
 ) -> tuple[Any, ControllerOutput]:
@@ -69,13 +74,13 @@ def _ask(
 
 
 @always_inline
-def _demanded(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
+def _parsed(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
     """Return state and parsed output of the user's step."""
-    return given[0], demand(given[1], none)
+    return given[0], parse_controller_output(given[1], none)
 
 
-@overload_for(_ask, inline=True)
-def _ask_of(
+@overload_for(_call_user_step, inline=True)
+def _call_user_step_of(
     p: types.Type,
     s: types.Type,
     time: types.Type,
@@ -87,7 +92,7 @@ def _ask_of(
     if p.instance_class is PythonControllerProxy:
         return lambda p, s, time, estimate, setpoint, by_port, none: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step
-    return lambda p, s, time, estimate, setpoint, by_port, none: _demanded(found(p, s, time, estimate, setpoint), none)
+    return lambda p, s, time, estimate, setpoint, by_port, none: _parsed(found(p, s, time, estimate, setpoint), none)
 
 
 @always_inline
@@ -97,17 +102,18 @@ def step(
     """Compute the motor command at `tick`."""
     c = p.common
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
-    wanted = inputs[3].value if order.follow else order.reference
-    stage, watched, still_from = s.stage, s.watch, s.still_from
+    setpoint = inputs[3].value if order.follow else order.setpoint
+    landed, watched, still_from = s.landed_state, s.failure_detector, s.still_from
     if order.restart_at == tick:
-        stage, watched, still_from = INITIAL_STAGE, motor_failure.start(c.watch), tick + c.bounce
+        landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
+        watched = motor_failure.start(c.failure_detector)
     charge = battery.value.charge if battery.due else s.charge
-    stage = advance_stage(stage, c.law.value.resting_height, estimate_of(e), setpoint_of(wanted), c.interval)
+    landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     own, held, none = s.own, s.held, at_rest(c.law.value.shares[0])
-    if stage.name != FLYING:
+    if landed.name != FLYING:
         own, held = p.own_start, ControllerOutput(True, none, NO_WRENCH, (0.0, 0.0))
     elif tick % p.every == 0:
-        own, held = _ask(p.own, own, tick * c.interval, e, wanted, inputs[4:], none)
-    given = command(c.law.value, p.lift, p.moments, p.voltage_max, held, wanted.yaw, stage.name, watched.failed)
-    watched, outputs = outcome(c, watched, still_from, charge, order, e, wanted, stage.name, given)
-    return CustomState(stage, own, held, watched, still_from, charge), outputs, CONTINUE
+        own, held = _call_user_step(p.own, own, tick * c.interval, e, setpoint, inputs[4:], none)
+    given = command(c.law.value, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, landed.name, watched.failed)
+    watched, outputs = block_outputs(c, watched, still_from, charge, order, e, setpoint, landed.name, given)
+    return CustomState(landed, own, held, watched, still_from, charge), outputs, CONTINUE

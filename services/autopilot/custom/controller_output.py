@@ -10,13 +10,14 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import compile_source, map_tuple, overload_for
 from lapwing.services.autopilot import control
-from lapwing.services.autopilot.interface import Command, PerRotor
+from lapwing.services.autopilot.control import Command
 from lapwing.services.autopilot.land_detector import FLYING, LANDED
-from lapwing.services.autopilot.mixer import VirtualControls, at_rest, mix, possible, saturate, shares_in_force
+from lapwing.services.autopilot.mixer import VirtualControls, active_allocation, at_rest, clamp_to_range, mix, saturate
 from lapwing.services.autopilot.motor import Motor, thrust_at, voltages
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments
+from lapwing.services.common.ports import PerRotor
 
-DEMAND = "demand"  # port within the autopilot
+CONTROLLER_OUTPUT = "controller_output"  # port within the autopilot
 
 Wrench = tuple[float, float, float, float]
 NO_WRENCH = (0.0, 0.0, 0.0, 0.0)
@@ -31,12 +32,12 @@ class ControllerOutput(NamedTuple):
     roll_pitch: tuple[float, float]  # [rad] references, for the log
 
 
-def off(rotors: int) -> ControllerOutput:
+def motors_off(rotors: int) -> ControllerOutput:
     """Return the output that stops the motors."""
     return ControllerOutput(True, (0.0,) * rotors, NO_WRENCH, (0.0, 0.0))
 
 
-def demand(output: Any, none: PerRotor) -> ControllerOutput:
+def parse_controller_output(output: Any, none: PerRotor) -> ControllerOutput:
     """Return the numbers of a `MotorVoltages` or `ThrustAndMoments`.
 
     Args:
@@ -69,8 +70,8 @@ def _numbers(what: str, given: Iterable[float], n: int) -> Any:
     return found
 
 
-@overload_for(demand, inline=True)
-def _demand(output: types.Type, none: types.Type) -> Callable:
+@overload_for(parse_controller_output, inline=True)
+def _parse_controller_output(output: types.Type, none: types.Type) -> Callable:
     told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
     roll_pitch = "output[-1]" if told else "(0.0, 0.0)"
     if output.instance_class is MotorVoltages:
@@ -97,7 +98,7 @@ def command(
     voltage_max: float,
     asked: ControllerOutput,
     yaw: float,
-    stage: int,
+    landed: int,
     failed: int,
 ) -> Command:
     """Return the motor command.
@@ -109,19 +110,19 @@ def command(
         voltage_max: [V].
         asked: output of the user's controller.
         yaw: setpoint [rad].
-        stage: ON_GROUND, FLYING or LANDED.
+        landed: ON_GROUND, FLYING or LANDED.
         failed: number of the failed rotor, from 1; 0: none.
     """
-    if stage != FLYING:
+    if landed != FLYING:
         none = at_rest(law.shares[0])
-        return Command(none, none, 0.0, 0.0, yaw, stage == LANDED)
+        return Command(none, none, 0.0, 0.0, yaw, landed == LANDED)
     if asked.to_motors:
-        volts = possible(asked.volts, voltage_max)
+        volts = clamp_to_range(asked.volts, voltage_max)
         thrust = map_tuple(_thrust_at, law.motor, volts, volts)
     else:
-        shares, w = shares_in_force(law.shares, failed), asked.wrench
+        shares, w = active_allocation(law.shares, failed), asked.wrench
         part = 1.0 / lift
         demands = VirtualControls(part * w[0], w[1] / moments[0], w[2] / moments[1], w[3] / moments[2])
-        thrust = possible(mix(shares, saturate(shares, demands, law.thrust_max)), law.thrust_max)
+        thrust = clamp_to_range(mix(shares, saturate(shares, demands, law.thrust_max)), law.thrust_max)
         volts = voltages(law.motor, thrust)
     return Command(volts, thrust, asked.roll_pitch[0], asked.roll_pitch[1], yaw, False)

@@ -11,7 +11,7 @@ from lapwing.services.autopilot.commander_wakeup import WakeupParameters
 from lapwing.services.autopilot.controller_parameters import lift, moments
 from lapwing.services.autopilot.custom import block
 from lapwing.services.autopilot.custom.block import CustomController, PythonControllerProxy
-from lapwing.services.autopilot.custom.controller_output import DEMAND
+from lapwing.services.autopilot.custom.controller_output import CONTROLLER_OUTPUT
 from lapwing.services.autopilot.custom.python_controller import PythonControllerBlock
 from lapwing.services.autopilot.custom.python_estimator import HELD, HeldEstimate, PythonEstimatorBlock
 from lapwing.services.autopilot.custom.user_code_loader import CONTROLLER, ESTIMATOR, compiled, constructor, is_compiled
@@ -49,14 +49,14 @@ def controller_parts(
     construct = constructor(CONTROLLER, module, found, vehicle, code.options)
     asked = PythonControllerBlock(code, module, construct, inputs[3].port, vehicle)
     p = CustomController(common, PythonControllerProxy(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)
-    return [asked, Block(name, p, Cell(block.start(p)), (*inputs, InputPort(DEMAND)), outputs)]
+    return [asked, Block(name, p, Cell(block.start(p)), (*inputs, InputPort(CONTROLLER_OUTPUT)), outputs)]
 
 
 def estimator_parts(
     name: str,
     texts: Mapping[str, str],
     given: AutopilotSetup,
-    attention: WakeupParameters,
+    wakeup: WakeupParameters,
     sensors: dict[str, int],
     inputs: tuple[InputPort, ...],
     estimate: Port,
@@ -77,4 +77,4 @@ def estimator_parts(
     assert vehicle is not None
     module, found = named(ESTIMATOR, code.name, texts)
     asked = PythonEstimatorBlock(code, module, constructor(ESTIMATOR, module, found, vehicle, code.options), sensors)
-    return [asked, Block(name, HeldEstimate(attention), Cell(0.0), (InputPort(HELD), *inputs), (estimate,))]
+    return [asked, Block(name, HeldEstimate(wakeup), Cell(0.0), (InputPort(HELD), *inputs), (estimate,))]

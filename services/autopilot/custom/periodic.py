@@ -15,7 +15,7 @@ class PeriodicPart(ABC):
         """Store the diagram."""
         self._graph = graph
 
-    def act(self, tick: int) -> int:
+    def on_tick(self, tick: int) -> int:
         """Call the user code if it is due at `tick`. Return the tick of the next wake-up."""
         every = self._code.every
         if tick % every == 0:

@@ -8,20 +8,19 @@ from lapwing.cosim.config.user_module import FAULTS, blame
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import python_function
-from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, estimate_of, setpoint_of
-from lapwing.services.autopilot.custom.controller_output import DEMAND, demand, off
+from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER
+from lapwing.services.autopilot.custom.controller_output import CONTROLLER_OUTPUT, motors_off, parse_controller_output
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_STAGE, LandedState, advance_stage
+from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
 from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common import ports
 from lapwing.services.common.controller_api import VehicleModel
 
-_advance_stage, _estimate_of = python_function(advance_stage), python_function(estimate_of)
-_setpoint_of = python_function(setpoint_of)
+_update_landed_state = python_function(update_landed_state)
 
 
 class PythonControllerBlock(PeriodicPart):
-    """Calls the controller and writes its output to the port `demand`."""
+    """Calls the controller and writes its output to the port `controller_output`."""
 
     name = "autopilot.controller"
 
@@ -42,7 +41,7 @@ class PythonControllerBlock(PeriodicPart):
             reference: port of the trajectory, or `NO_TRAJECTORY`.
             vehicle: vehicle parameters.
         """
-        self.outputs = (Port(DEMAND, off(len(vehicle.rotor_positions_body)), LATCHED),)
+        self.outputs = (Port(CONTROLLER_OUTPUT, motors_off(len(vehicle.rotor_positions_body)), LATCHED),)
         self._none = self.outputs[0].like.volts
         self._code, self._module, self._construct = code, module, construct
         self._reference, self._resting_height = reference, vehicle.resting_height
@@ -52,22 +51,23 @@ class PythonControllerBlock(PeriodicPart):
         graph = self._graph
         estimate, order = graph.latest(ports.ESTIMATE, tick), graph.latest(ORDER, tick)
         follows = order.follow and self._reference != NO_TRAJECTORY
-        setpoint = graph.latest(self._reference, tick) if follows else order.reference
-        stage = LandedState(graph.latest(FLIGHT, tick - 1).stage, 0.0) if tick > 0 else INITIAL_STAGE
-        if stage.name != FLYING or order.restart_at == tick:
+        setpoint = graph.latest(self._reference, tick) if follows else order.setpoint
+        landed = INITIAL_LANDED_STATE
+        if tick > 0:
+            landed = LandedState(graph.latest(FLIGHT, tick - 1).landed_state, 0.0)
+        if landed.name != FLYING or order.restart_at == tick:
             self._controller = None
-            before = INITIAL_STAGE if order.restart_at == tick else stage
-            asked = _estimate_of(estimate), _setpoint_of(setpoint)
-            stage = _advance_stage(before, self._resting_height, *asked, graph.setup.interval)
-        if stage.name != FLYING:
+            previous = INITIAL_LANDED_STATE if order.restart_at == tick else landed
+            landed = _update_landed_state(previous, self._resting_height, estimate, setpoint, graph.setup.interval)
+        if landed.name != FLYING:
             return
         time = tick * graph.setup.interval
         try:
             self._controller = self._controller or self._construct()
-            found = demand(self._controller.step(time, estimate, setpoint), self._none)
+            output = parse_controller_output(self._controller.step(time, estimate, setpoint), self._none)
         except FAULTS as error:
-            raise LockStepError(f"{self._said(error)} at t = {time:.3f} s") from error
-        graph.put(DEMAND, tick, found)
+            raise LockStepError(f"{self._blame(error)} at t = {time:.3f} s") from error
+        graph.put(CONTROLLER_OUTPUT, tick, output)
 
-    def _said(self, error: BaseException) -> str:
+    def _blame(self, error: BaseException) -> str:
         return f"controller {self._code.name}: {blame(error, self._module)}"

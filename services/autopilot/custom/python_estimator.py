@@ -9,7 +9,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSam
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import always_inline
-from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters, wakeup_due
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
 from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common.estimator_api import checked_estimate
@@ -48,12 +48,12 @@ class PythonEstimatorBlock(PeriodicPart):
 class HeldEstimate(NamedTuple):
     """Parameters of the block."""
 
-    attention: WakeupParameters
+    wakeup: WakeupParameters
 
 
 @always_inline
 def step(p: HeldEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[StateEstimate], int]:
     """Output the latest estimate; the state is unused."""
     held, battery, flight = inputs
-    due = attention_due(p.attention, tick, held.value.health, battery, flight)
+    due = wakeup_due(p.wakeup, tick, held.value.health, battery, flight)
     return s, (held.value,), WAKE_PYTHON if due else CONTINUE

@@ -14,11 +14,11 @@ from lapwing.cosim.config.user_module import FAULTS, blame
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels.cell import Cell
 from lapwing.services.autopilot.controller_parameters import Airframe
-from lapwing.services.autopilot.custom.controller_output import demand
+from lapwing.services.autopilot.custom.controller_output import parse_controller_output
 from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments, VehicleModel
 from lapwing.services.common.estimator_api import checked_estimate
-from lapwing.services.common.ports import Reference, StateEstimate
+from lapwing.services.common.ports import Setpoint, StateEstimate
 from lapwing.services.common.user_code import named
 
 CONTROLLER, ESTIMATOR = "autopilot.controller", "autopilot.estimator"
@@ -57,10 +57,11 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
     """
     module, found = named(CONTROLLER, name, texts)
     start = (0.0, 0.0, vehicle.resting_height)
-    given = (0.0, StateEstimate(position_world=start), Reference(position_world=start))
+    given = (0.0, StateEstimate(position_world=start), Setpoint(position_world=start))
     if not is_compiled(found):
         p = constructor(CONTROLLER, module, found, vehicle, options)()
-        _try(CONTROLLER, name, module, p, lambda: demand(p.step(*given), (0.0,) * len(vehicle.spin_directions)))
+        none = (0.0,) * len(vehicle.spin_directions)
+        _try(CONTROLLER, name, module, p, lambda: parse_controller_output(p.step(*given), none))
         return _rate(CONTROLLER, name, p)
     p, s = compiled(module, found, vehicle, options)
 

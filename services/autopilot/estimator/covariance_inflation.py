@@ -35,7 +35,7 @@ def _widen(c: np.ndarray, start: int, deviation: float) -> None:
 
 
 @kernel
-def doubt(p: Estimator, m: Memory, source: int) -> None:
+def inflate_covariance(p: Estimator, m: Memory, source: int) -> None:
     """Inflate the covariance after the gate rejected a reading of `source`."""
     c = m.covariance
     for_long = m.since[source] * p.interval > _LONG

@@ -23,21 +23,21 @@ class Estimator(NamedTuple):
     start_std: Annotated[float, Gt(0)] = 0.1  # [m] of the start position, each axis
     position_std: Annotated[float, Gt(0)] = 10.0  # [m] above which the position counts as unknown
     attitude_std: Annotated[float, Gt(0)] = 0.1  # [rad] of the initial attitude
-    gyro_bias_std: Annotated[float, Gt(0)] = 2e-3  # [rad/s] at the start
+    gyro_bias_std: Annotated[float, Gt(0)] = 1.9e-3  # [rad/s] at the start
     gyro_bias_walk: Annotated[float, Ge(0)] = 1e-5  # [rad/s/sqrt(s)], instability and warm-up
     gyro_scale_std: Annotated[float, Ge(0)] = 1.2e-3  # scale and misalignment, ratio
-    accelerometer_bias_std: Annotated[float, Gt(0)] = 0.035  # [m/s^2] at the start, with scale and misalignment
+    accelerometer_bias_std: Annotated[float, Gt(0)] = 0.031  # [m/s^2] at the start, with scale and misalignment
     accelerometer_bias_walk: Annotated[float, Ge(0)] = 1e-4  # [m/s^2/sqrt(s)]
     barometer_walk: Annotated[float, Ge(0)] = 0.02  # [m/sqrt(s)], with the weather
-    magnetometer_bias_std: Annotated[float, Ge(0)] = 7.5e-8  # [T] hard iron and misalignment after calibration
+    magnetometer_bias_std: Annotated[float, Ge(0)] = 6.5e-8  # [T] hard iron and misalignment after calibration
     magnetometer_bias_walk: Annotated[float, Ge(0)] = 6e-10  # [T/sqrt(s)]
-    heading_std: Annotated[float, Ge(0)] = 1e-3  # [rad] between the magnetometer's axes and the body's
+    heading_std: Annotated[float, Ge(0)] = 9e-4  # [rad] between the magnetometer's axes and the body's
     sonar_scale_std: Annotated[float, Ge(0)] = 2e-3  # ratio, speed of sound
     sonar_half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 10.0
     sonar_height_max: Annotated[float, Ge(0)] = 5.0  # [m] above which the sonar is not used
-    gps_wander_horizontal: Annotated[float, Ge(0)] = 0.010  # [m] time-correlated error per axis
-    gps_wander_vertical: Annotated[float, Ge(0)] = 0.013  # [m]
-    gps_wander_time: Annotated[float, Gt(0)] = 60.0  # [s]
+    gps_correlated_error_horizontal: Annotated[float, Ge(0)] = 0.010  # [m] time-correlated error per axis
+    gps_correlated_error_vertical: Annotated[float, Ge(0)] = 0.013  # [m]
+    gps_correlation_time: Annotated[float, Gt(0)] = 60.0  # [s]
 
     flow_scale_std: Annotated[float, Ge(0)] = 0.02  # ratio, focal length of the flow camera
 
@@ -50,6 +50,8 @@ class Estimator(NamedTuple):
 
 PRESETS = {
     "rtk": Estimator(),
-    "standard": Estimator(gps_wander_horizontal=2.1, gps_wander_vertical=3.2, gps_wander_time=200.0),
+    "standard": Estimator(
+        gps_correlated_error_horizontal=2.1, gps_correlated_error_vertical=3.2, gps_correlation_time=200.0
+    ),
 }
 """Filter parameters by receiver."""

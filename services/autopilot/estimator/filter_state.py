@@ -22,6 +22,7 @@ IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
 FLOW = len(SOURCES)  # also monitored; it only replaces GPS, so its absence is no fault
 NAMES = (*SOURCES, "optical_flow")  # all monitored sources
 WATCHED = len(NAMES)
+PACKED = SIZE * (SIZE + 1) // 2 + WATCHED
 
 HISTORY = 128  # IMU readings stored for delayed measurements
 NEVER = -1
@@ -35,7 +36,7 @@ class Nominal(NamedTuple):
     position_world: Vec3  # [m]
     gyro_bias: Vec3  # [rad/s]
     accelerometer_bias: Vec3  # [m/s^2]
-    gps_wander: Vec3  # [m]
+    gps_correlated_error: Vec3  # [m]
     magnetometer_bias: Vec3  # [T] body
     heading_bias: float  # [rad]
     barometer_bias: float  # [m]
@@ -52,6 +53,7 @@ class Inertial(NamedTuple):
     velocity_gain: Vec3  # [m/s] acceleration integrated since the start, never corrected
     distance_gain: Vec3  # [m] velocity_gain integrated
     held: bool  # the last reading was rejected and its predecessor reused
+    cut: int  # [readings] since the motors stopped over the ground; 0: they have not
 
 
 class Memory(NamedTuple):
@@ -67,6 +69,7 @@ class Memory(NamedTuple):
     repeats: np.ndarray  # (WATCHED,) number of consecutive equal readings
     last: np.ndarray  # (WATCHED, 6) last reading of each source
     nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
+    packed: np.ndarray  # (1, PACKED) upper triangle of the covariance and `nis`, as they are sent
 
 
 class State(NamedTuple):
@@ -78,7 +81,7 @@ class State(NamedTuple):
 
 
 @always_inline
-def level(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
+def attitude_from_gravity(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
     """Return the attitude at rest from gravity and magnetic field (theory.md, eq. (3.20))."""
     up = scale(1.0 / norm(specific_force_body), specific_force_body)
     across = subtract(field_body, scale(dot(field_body, up), up))
@@ -104,6 +107,7 @@ def new_memory() -> Memory:
         np.zeros(WATCHED, np.int64),
         np.zeros((WATCHED, 6)),
         np.zeros(WATCHED),
+        np.zeros((1, PACKED)),
     )
 
 
@@ -126,9 +130,9 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
         covariance[POSITION + i, POSITION + i] = p.start_std * p.start_std
         covariance[GYRO + i, GYRO + i] = p.gyro_bias_std * p.gyro_bias_std
         covariance[ACCELEROMETER + i, ACCELEROMETER + i] = p.accelerometer_bias_std * p.accelerometer_bias_std
-        covariance[WANDER + i, WANDER + i] = p.gps_wander_horizontal * p.gps_wander_horizontal
+        covariance[WANDER + i, WANDER + i] = p.gps_correlated_error_horizontal * p.gps_correlated_error_horizontal
         covariance[IRON + i, IRON + i] = p.magnetometer_bias_std * p.magnetometer_bias_std
-    covariance[WANDER + 2, WANDER + 2] = p.gps_wander_vertical * p.gps_wander_vertical
+    covariance[WANDER + 2, WANDER + 2] = p.gps_correlated_error_vertical * p.gps_correlated_error_vertical
     covariance[HEADING, HEADING] = p.heading_std * p.heading_std
     covariance[BAROMETER, BAROMETER] = 50.0 * 50.0
     covariance[SCALE, SCALE] = p.sonar_scale_std * p.sonar_scale_std
@@ -138,9 +142,9 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     m.refused[:] = m.repeats[:] = 0
     m.last[:] = math.nan
     m.nis[:] = 0.0
-    attitude = level(p, specific_force_body, field_body)
+    attitude = attitude_from_gravity(p, specific_force_body, field_body)
     nominal = Nominal(attitude, ZERO, position_world, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
-    return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False), m)
+    return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False, 0), m)
 
 
 @always_inline
@@ -159,7 +163,7 @@ def corrected(s: State) -> State:
         add(n.position_world, three(d, POSITION)),
         add(n.gyro_bias, three(d, GYRO)),
         add(n.accelerometer_bias, three(d, ACCELEROMETER)),
-        add(n.gps_wander, three(d, WANDER)),
+        add(n.gps_correlated_error, three(d, WANDER)),
         add(n.magnetometer_bias, three(d, IRON)),
         n.heading_bias + d[HEADING],
         n.barometer_bias + d[BAROMETER],

@@ -15,7 +15,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     corrected,
 )
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
-from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
 _ALIKE = 100.0  # readings, 2 s, over which the scale error is correlated
 
@@ -56,8 +56,8 @@ def update_flow(
     """
     m = s.memory
     seen, turned = (flow[0], flow[1], distance), (rate[0], rate[1], 0.0)
-    if not valid or not distance > 0.0 or repeated(m, FLOW, seen, turned, variance > 0.0, p.frozen):
-        judge(m, FLOW, False, 0.0)
+    if not valid or not distance > 0.0 or is_stuck(m, FLOW, seen, turned, variance > 0.0, p.frozen):
+        record_gate_result(m, FLOW, False, 0.0)
         return s
     received = m.refused[GPS_VELOCITY] == 0 and m.since[GPS_VELOCITY] != NEVER
     if received and m.since[GPS_VELOCITY] * p.interval <= p.patience:
@@ -78,5 +78,5 @@ def update_flow(
     if accepted:
         for axis in range(2):
             fuse(m, passing[axis] - flow_row(m, r, velocity, axis, distance), noise)
-    judge(m, FLOW, accepted, nis)
+    record_gate_result(m, FLOW, accepted, nis)
     return corrected(s)

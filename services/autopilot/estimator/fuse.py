@@ -38,11 +38,11 @@ def innovation_variance(m: Memory, variance: float) -> float:
 @kernel
 def fuse(m: Memory, innovation: float, variance: float) -> float:
     """Fuse the measurement of the row. Return its normalised innovation squared."""
-    return absorb(m, innovation, innovation_variance(m, variance))
+    return apply_update(m, innovation, innovation_variance(m, variance))
 
 
 @noinline
-def absorb(m: Memory, innovation: float, s: float) -> float:
+def apply_update(m: Memory, innovation: float, s: float) -> float:
     """Fuse an innovation with variance s and its covariance with the error in `m.product`. See `fuse`."""
     y = innovation
     for i in range(SIZE):

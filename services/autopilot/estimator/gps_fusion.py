@@ -2,9 +2,9 @@
 
 from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
+from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, scale, subtract
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.services.autopilot.estimator.covariance_inflation import doubt
+from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
 from lapwing.services.autopilot.estimator.delayed_measurements import (
     Noise,
     late_innovation_variances,
@@ -12,9 +12,9 @@ from lapwing.services.autopilot.estimator.delayed_measurements import (
     late_velocity_row,
 )
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
-from lapwing.services.autopilot.estimator.filter_state import GPS, GPS_VELOCITY, HISTORY, State, corrected
-from lapwing.services.autopilot.estimator.fuse import absorb
-from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+from lapwing.services.autopilot.estimator.filter_state import GPS, GPS_VELOCITY, HISTORY, Memory, State, corrected
+from lapwing.services.autopilot.estimator.fuse import apply_update
+from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
 
 @always_inline
@@ -59,8 +59,55 @@ def _noise_since(p: Estimator, s: State, age: int) -> Noise:
 
 
 @always_inline
-def _wander_variance(p: Estimator, axis: int) -> float:
-    return math.square(p.gps_wander_vertical if axis == 2 else p.gps_wander_horizontal)
+def _white_variance(p: Estimator, variance: Vec3, axis: int) -> float:
+    """Return the variance of the white noise, without that of the correlated error [m^2]."""
+    correlated = math.square(p.gps_correlated_error_vertical if axis == 2 else p.gps_correlated_error_horizontal)
+    return max(variance[axis] - correlated, 0.01 * variance[axis])
+
+
+@always_inline
+def _row(m: Memory, source: int, force: Vec3, r: Mat3, axis: int, delay: float) -> None:
+    """Write the measurement row of a delayed position or velocity."""
+    if source == GPS:
+        late_position_row(m, force, r, axis, delay)
+    else:
+        late_velocity_row(m, force, r, axis, delay)
+
+
+@always_inline
+def _fuse(
+    p: Estimator, s: State, source: int, innovation: Vec3, variance: Vec3, force: Vec3, delay: float, age: int
+) -> State:
+    """Gate the three axes together, fuse them one after the other, and record the result.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+        source: GPS or GPS_VELOCITY.
+        innovation: [m] or [m/s], world.
+        variance: of the white noise per axis.
+        force: weighted specific force since the fix [m/s^2].
+        delay: [s].
+        age: delay [ticks].
+    """
+    m, since, r = s.memory, _noise_since(p, s, age), rotation_matrix(s.nominal.attitude)
+    accepted, nis = True, 0.0
+    for axis in range(3):
+        _row(m, source, force, r, axis, delay)
+        _, largest = late_innovation_variances(m, axis, since, variance[axis], force)
+        ratio = innovation[axis] * innovation[axis] / largest
+        nis += ratio
+        accepted = accepted and ratio < p.gate * p.gate
+    if accepted:
+        nis = 0.0
+        for axis in range(3):
+            _row(m, source, force, r, axis, delay)
+            s_gain, _ = late_innovation_variances(m, axis, since, variance[axis], force)
+            nis += apply_update(m, innovation[axis], s_gain)
+    record_gate_result(m, source, accepted, nis)
+    if not accepted:
+        inflate_covariance(p, m, source)
+    return corrected(s)
 
 
 @kernel
@@ -87,34 +134,14 @@ def update_gps(
         valid: False without a fix.
     """
     m = s.memory
-    if not valid or repeated(m, GPS, (latitude_deg, longitude_deg, height), ZERO, variance[0] > 0.0, 1):
-        judge(m, GPS, False, 0.0)
+    if not valid or is_stuck(m, GPS, (latitude_deg, longitude_deg, height), ZERO, variance[0] > 0.0, 1):
+        record_gate_result(m, GPS, False, 0.0)
         return s
     measured = geodetic_to_enu(p.home, latitude_deg, longitude_deg, height)
     position, _, delay, force, _ = _past(p, s, age)
-    since = _noise_since(p, s, age)
-    innovation = subtract(measured, add(position, s.nominal.gps_wander))
-    r = rotation_matrix(s.nominal.attitude)
-    accepted = True
-    nis = 0.0
-    for axis in range(3):
-        late_position_row(m, force, r, axis, delay)
-        white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
-        _, largest = late_innovation_variances(m, axis, since, white, force)
-        ratio = innovation[axis] * innovation[axis] / largest
-        nis += ratio
-        accepted = accepted and ratio < p.gate * p.gate
-    if accepted:
-        nis = 0.0
-        for axis in range(3):
-            late_position_row(m, force, r, axis, delay)
-            white = max(variance[axis] - _wander_variance(p, axis), 0.01 * variance[axis])
-            s_gain, _ = late_innovation_variances(m, axis, since, white, force)
-            nis += absorb(m, innovation[axis], s_gain)
-    judge(m, GPS, accepted, nis)
-    if not accepted:
-        doubt(p, m, GPS)
-    return corrected(s)
+    innovation = subtract(measured, add(position, s.nominal.gps_correlated_error))
+    white = (_white_variance(p, variance, 0), _white_variance(p, variance, 1), _white_variance(p, variance, 2))
+    return _fuse(p, s, GPS, innovation, white, force, delay, age)
 
 
 @kernel
@@ -130,28 +157,9 @@ def update_gps_velocity(p: Estimator, s: State, velocity_world: Vec3, variance: 
         valid: False without a fix.
     """
     m = s.memory
-    if not valid or repeated(m, GPS_VELOCITY, velocity_world, ZERO, variance > 0.0, 1):
-        judge(m, GPS_VELOCITY, False, 0.0)
+    if not valid or is_stuck(m, GPS_VELOCITY, velocity_world, ZERO, variance > 0.0, 1):
+        record_gate_result(m, GPS_VELOCITY, False, 0.0)
         return s
     _, velocity, delay, _, force = _past(p, s, age)
-    since = _noise_since(p, s, age)
     innovation = subtract(velocity_world, velocity)
-    r = rotation_matrix(s.nominal.attitude)
-    accepted = True
-    nis = 0.0
-    for axis in range(3):
-        late_velocity_row(m, force, r, axis, delay)
-        _, largest = late_innovation_variances(m, axis, since, variance, force)
-        ratio = innovation[axis] * innovation[axis] / largest
-        nis += ratio
-        accepted = accepted and ratio < p.gate * p.gate
-    if accepted:
-        nis = 0.0
-        for axis in range(3):
-            late_velocity_row(m, force, r, axis, delay)
-            s_gain, _ = late_innovation_variances(m, axis, since, variance, force)
-            nis += absorb(m, innovation[axis], s_gain)
-    judge(m, GPS_VELOCITY, accepted, nis)
-    if not accepted:
-        doubt(p, m, GPS_VELOCITY)
-    return corrected(s)
+    return _fuse(p, s, GPS_VELOCITY, innovation, (variance, variance, variance), force, delay, age)

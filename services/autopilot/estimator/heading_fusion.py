@@ -3,11 +3,11 @@
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, apply, subtract
 from lapwing.kernels import kernel, math
-from lapwing.services.autopilot.estimator.covariance_inflation import doubt
+from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import HEADING, IRON, MAG, THETA, State, corrected
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
-from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
 
 @kernel
@@ -22,8 +22,8 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
         valid: False without a reading.
     """
     m = s.memory
-    if not valid or repeated(m, MAG, field_body, ZERO, variance > 0.0, p.frozen):
-        judge(m, MAG, False, 0.0)
+    if not valid or is_stuck(m, MAG, field_body, ZERO, variance > 0.0, p.frozen):
+        record_gate_result(m, MAG, False, 0.0)
         return s
     bx, by, bz = p.magnetic_field_world
     horizontal = bx * bx + by * by
@@ -42,7 +42,7 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
     accepted = nis < p.gate * p.gate
     if accepted:
         fuse(m, innovation, variance / horizontal)
-    judge(m, MAG, accepted, nis)
+    record_gate_result(m, MAG, accepted, nis)
     if not accepted:
-        doubt(p, m, MAG)
+        inflate_covariance(p, m, MAG)
     return corrected(s)

@@ -4,11 +4,11 @@ from lapwing.dynamics.atmosphere import pressure_altitude
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel, math
-from lapwing.services.autopilot.estimator.covariance_inflation import doubt
+from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import BARO, BAROMETER, POSITION, SCALE, SONAR, State, corrected
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
-from lapwing.services.autopilot.estimator.measurement_checks import judge, repeated
+from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
 _GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] variation of the ground under the vehicle
 
@@ -21,9 +21,9 @@ def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: fl
     accepted = nis < p.gate * p.gate
     if accepted:
         fuse(m, innovation, variance)
-    judge(m, source, accepted, nis)
+    record_gate_result(m, source, accepted, nis)
     if not accepted:
-        doubt(p, m, source)
+        inflate_covariance(p, m, source)
     return corrected(s)
 
 
@@ -39,8 +39,8 @@ def update_barometer(p: Estimator, s: State, pressure: float, variance: float, v
         valid: False without a reading.
     """
     m = s.memory
-    if not valid or not pressure > 0.0 or repeated(m, BARO, (pressure, 0.0, 0.0), ZERO, variance > 0.0, p.frozen):
-        judge(m, BARO, False, 0.0)
+    if not valid or not pressure > 0.0 or is_stuck(m, BARO, (pressure, 0.0, 0.0), ZERO, variance > 0.0, p.frozen):
+        record_gate_result(m, BARO, False, 0.0)
         return s
     altitude = pressure_altitude(p.atmosphere, pressure) - p.home.height
     slope = pressure_altitude(p.atmosphere, pressure + 1.0) - p.home.height - altitude  # [m/Pa]
@@ -64,7 +64,7 @@ def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid
     """
     m = s.memory
     if not valid:
-        judge(m, SONAR, False, 0.0)
+        record_gate_result(m, SONAR, False, 0.0)
         return s
     height = s.nominal.position_world[2] - p.ground_height
     if math.isinf(distance) or height > p.sonar_height_max:

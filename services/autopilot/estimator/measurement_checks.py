@@ -6,7 +6,7 @@ from lapwing.services.autopilot.estimator.filter_state import Memory
 
 
 @kernel
-def repeated(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, often: int) -> bool:
+def is_stuck(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, often: int) -> bool:
     """Return True if a noisy instrument has repeated the same numbers `often` times: it is stuck.
 
     Args:
@@ -27,7 +27,7 @@ def repeated(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, oft
 
 
 @kernel
-def judge(m: Memory, source: int, accepted: bool, nis: float) -> None:
+def record_gate_result(m: Memory, source: int, accepted: bool, nis: float) -> None:
     """Record the gate result of a reading."""
     m.refused[source] = 0 if accepted else 1
     m.nis[source] = nis

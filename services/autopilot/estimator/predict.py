@@ -27,10 +27,15 @@ from lapwing.services.autopilot.estimator.filter_state import (
     State,
     three,
 )
-from lapwing.services.autopilot.estimator.measurement_checks import repeated
+from lapwing.services.autopilot.estimator.measurement_checks import is_stuck
 
 _STRAIGHT = 0.1  # fraction of a jolt up to which the change between two readings counts as linear
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
+_REBOUND = (
+    12.0  # [m^2/s^3] variance by time of the velocity after the motors have stopped: 0.7 m/s after a drop of 40 ms
+)
+_TIPPING = 2.5e-3  # [rad^2/s] the same of the attitude
+_BOUNCE = 1.0  # [s] after which the vehicle rests
 
 
 @always_inline
@@ -107,6 +112,7 @@ def predict(
     omega_variance: float,
     specific_force_variance: float,
     valid: bool,
+    cut: bool = False,
 ) -> State:
     """Return the state one interval later.
 
@@ -118,11 +124,12 @@ def predict(
         omega_variance: [(rad/s)^2] per axis.
         specific_force_variance: [(m/s^2)^2] per axis.
         valid: False without a reading; the last one is reused.
+        cut: True once the motors have stopped for the landing.
     """
     n, i, m = s.nominal, s.inertial, s.memory
     dt = p.interval
     first = i.tick == 0
-    frozen = valid and repeated(m, IMU, omega_body, specific_force_body, omega_variance > 0.0, p.frozen)
+    frozen = valid and is_stuck(m, IMU, omega_body, specific_force_body, omega_variance > 0.0, p.frozen)
     spike = valid and not first and _held(p, i, omega_body, specific_force_body)
     usable = valid and not spike and not frozen
     omega = omega_body if usable else i.omega
@@ -149,7 +156,7 @@ def predict(
 
     c = m.covariance
     _propagate_covariance(c, scale(0.5, add(f0, f1)), r, dt)
-    keep = math.exp(-dt / p.gps_wander_time)
+    keep = math.exp(-dt / p.gps_correlation_time)
     _fade(c, keep)
 
     rate = norm(omega_mean)
@@ -164,6 +171,10 @@ def predict(
         q_velocity += math.square(max(0.5 * dt * jolt, _IMPACT))
     if not first and (twist > p.jolt_rate or spike):
         q_theta += math.square(0.5 * dt * twist)
+    cut_for = i.cut + 1 if cut else 0
+    if 0 < cut_for * dt < _BOUNCE:  # the vehicle drops, and an impact may be shorter than the interval
+        q_velocity += dt * _REBOUND * math.square(math.square(1.0 - cut_for * dt / _BOUNCE))
+        q_theta += dt * _TIPPING * math.square(math.square(1.0 - cut_for * dt / _BOUNCE))
     if not valid or frozen:  # old readings are wrong by as much as a manoeuvre changes them
         q_velocity += dt * 1.0
         q_theta += dt * 0.1
@@ -174,7 +185,7 @@ def predict(
         c[VELOCITY + k, VELOCITY + k] += q_velocity
         c[GYRO + k, GYRO + k] += dt * (p.gyro_bias_walk * p.gyro_bias_walk)
         c[ACCELEROMETER + k, ACCELEROMETER + k] += dt * (p.accelerometer_bias_walk * p.accelerometer_bias_walk)
-        deviation = p.gps_wander_vertical if k == 2 else p.gps_wander_horizontal
+        deviation = p.gps_correlated_error_vertical if k == 2 else p.gps_correlated_error_horizontal
         c[WANDER + k, WANDER + k] += (1.0 - keep * keep) * (deviation * deviation)
         c[IRON + k, IRON + k] += dt * (p.magnetometer_bias_walk * p.magnetometer_bias_walk)
     c[BAROMETER, BAROMETER] += dt * (p.barometer_walk * p.barometer_walk)
@@ -191,10 +202,10 @@ def predict(
         position,
         n.gyro_bias,
         n.accelerometer_bias,
-        scale(keep, n.gps_wander),
+        scale(keep, n.gps_correlated_error),
         n.magnetometer_bias,
         n.heading_bias,
         n.barometer_bias,
         n.sonar_scale,
     )
-    return State(nominal, Inertial(tick, omega, force, f1, velocity_gain, distance_gain, spike), m)
+    return State(nominal, Inertial(tick, omega, force, f1, velocity_gain, distance_gain, spike, cut_for), m)

@@ -1,14 +1,39 @@
 """Zero-velocity update on the ground with motors off (theory.md, eq. (3.34))."""
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.kernels import kernel
+from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
-from lapwing.services.autopilot.estimator.filter_state import GYRO, VELOCITY, State, corrected
+from lapwing.services.autopilot.estimator.filter_state import GYRO, HISTORY, VELOCITY, State, corrected
 from lapwing.services.autopilot.estimator.fuse import acceleration_row, clear, fuse
 
 _VELOCITY_VARIANCE = 0.01 * 0.01  # [(m/s)^2] compliance of the feet
 _OMEGA_VARIANCE = 1e-3 * 1e-3  # [(rad/s)^2]
 _ACCELERATION_VARIANCE = 0.02 * 0.02  # [(m/s^2)^2]
+_SHAKEN = 64  # readings from which the vibration at rest is known
+
+
+@kernel
+def shaking(p: Estimator, s: State, axis: int, specific_force_variance: float) -> float:
+    """Return the variance of the acceleration [(m/s^2)^2] along a world axis while wind shakes the vehicle on its feet.
+
+    Args:
+        p: `Estimator`.
+        s: `State` after `predict`.
+        axis: 0 to 2.
+        specific_force_variance: [(m/s^2)^2] of the readings' white noise, which is not part of the result.
+    """
+    tick, h = s.inertial.tick, s.memory.history
+    count = min(tick - 1, _SHAKEN, HISTORY - 2)
+    if count < 2:
+        return 0.0
+    total, squares = 0.0, 0.0
+    for k in range(count):
+        gained = h[(tick - k) % HISTORY, axis] - h[(tick - k - 1) % HISTORY, axis]
+        total += gained
+        squares += gained * gained
+    variance = (squares - total * total / count) / ((count - 1) * math.square(p.interval))
+    # a gain is the mean of two readings, which halves the variance of what is white
+    return max(2.0 * variance - specific_force_variance, 0.0)
 
 
 @kernel
@@ -33,5 +58,6 @@ def update_standstill(p: Estimator, s: State, omega_variance: float, specific_fo
         clear(m)
         acceleration_row(m, i.force_world, r, axis, 1.0)
         acceleration = i.force_world[axis] - (p.gravity if axis == 2 else 0.0)
-        fuse(m, -acceleration, specific_force_variance + _ACCELERATION_VARIANCE)
+        shaken = max(shaking(p, s, axis, specific_force_variance), _ACCELERATION_VARIANCE)
+        fuse(m, -acceleration, specific_force_variance + shaken)
     return corrected(s)

@@ -42,12 +42,12 @@ def _wrong_by(r: types.Type) -> Any:
     return FAILURES[r.instance_class].wrong
 
 
-def nonsense(r: Any, key: Key, tick: int) -> Any:
+def garbage_reading(r: Any, key: Key, tick: int) -> Any:
     """Return a random reading at a tick."""
     raise NotImplementedError("compiled code only")
 
 
-@overload_for(nonsense, inline=True)
+@overload_for(garbage_reading, inline=True)
 def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Any:
     return FAILURES[r.instance_class].garbage
 
@@ -73,7 +73,7 @@ def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ..
     if kind == WRONG:
         x = wrong(r)
     elif kind == GARBAGE:
-        x = nonsense(r, p.key, tick)
+        x = garbage_reading(r, p.key, tick)
     elif kind == DELAYED:
         x = late.value
     if silent(kind, p.key, 0, s.readings) or (kind == DELAYED and not late.due):

@@ -1,4 +1,4 @@
-"""What ground stations are told has happened: a file for each sort, which declares the events and looks for them."""
+"""Events for ground stations; each file declares a group of events and their detectors."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -11,12 +11,12 @@ __all__ = ["Definition", "EventDetector", "definitions", "watches"]
 
 @cache
 def definitions() -> Mapping[str, Definition]:
-    """Every event by its name."""
+    """Return all events by name."""
     discovery.modules(__name__)
     return DEFINITIONS
 
 
 def watches() -> list[EventDetector]:
-    """What looks for them, anew for one vehicle."""
+    """Return new event detectors for a vehicle."""
     definitions()
     return [kind() for kind in WATCHES]

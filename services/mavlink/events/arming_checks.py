@@ -1,13 +1,13 @@
-"""Which sensors are sound, and what hinders arming: libevents' protocol "health_and_arming_check".
+"""Sensor health and arming checks: libevents' protocol "health_and_arming_check".
 
-A report is a summary of the arming checks, an event for each that fails, and a summary of the sensors' health.
+A report is a summary of the arming checks, an event for each failed check, and a summary of the sensors' health.
 """
 
 from collections.abc import Iterator
 
 from lapwing.services.common import status_texts
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink import firmware
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.events.definition import (
     PROTOCOL,
     Argument,
@@ -93,7 +93,7 @@ _READINGS = {status_texts.NO_READINGS.format(source): source for source in SOURC
 
 @watch
 class ArmingWatch:
-    """Reports when something has changed, and to whoever is new."""
+    """Reports on every change, and to new endpoints."""
 
     def __init__(self) -> None:
         self._told: tuple = ()  # what a change of is reported at once
@@ -101,7 +101,7 @@ class ArmingWatch:
         self._next = 0  # [ns]
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
-        """The next report, where one is due."""
+        """Yield the next report if one is due."""
         told = v.reports_asked, tuple(v.status.arming_blockers)
         if told == self._told and v.time_ns < self._next:
             return
@@ -126,7 +126,7 @@ def _report(reasons: tuple[str, ...], located: bool, health: tuple[tuple[str, bo
 
 
 def _failed(reason: str) -> tuple:
-    """The event of a failed check, with the values of its arguments."""
+    """Return the event of a failed check and the values of its arguments."""
     if source := _READINGS.get(reason):
         return READINGS, (_ALL, _component(source), SOURCES.index(source))
     definition, component = next((found for text, found in FAILED.items() if reason.startswith(text)), OTHER)

@@ -1,4 +1,4 @@
-"""What the simulation sees and a real autopilot does not: the feet touch the ground, motors are at their limit."""
+"""Events that only a simulation knows: ground contact, motor saturation."""
 
 from collections.abc import Iterator
 
@@ -8,7 +8,7 @@ from lapwing.services.mavlink.telemetry.power import motor_fractions
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 MOTORS = 8  # that an event can name
-LASTS = 1_000_000_000  # [ns] that a motor is at a limit before that is told, or off it before that is over
+LASTS = 1_000_000_000  # [ns] at a limit before saturation is reported, or off it before saturation ends
 _NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
 _motors = Argument(
     "motors",
@@ -33,7 +33,7 @@ class ContactWatch:
         self._contact = True
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
-        """Whether the vehicle has come down, or up."""
+        """Yield an event if the ground contact changed."""
         truth = v.get(TRUTH)
         if truth is None:
             return
@@ -52,7 +52,7 @@ class SaturationWatch:
         self._told = 0
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
-        """Which motors have been there for long; each time once."""
+        """Yield an event for motors that have been at a limit for `LASTS`, once each."""
         flying = v.status.armed and not v.status.landed
         fractions = motor_fractions(v)[:MOTORS] if flying else []
         there = sum(1 << k for k, f in enumerate(fractions) if not _NEAR < f < 1.0 - _NEAR)

@@ -1,7 +1,7 @@
-"""How an event is declared: its name, its words, its arguments, and how serious it is.
+"""Declaration of events: name, text, arguments, severity.
 
-The words and the arguments are those of libevents, which MAVLink's Events Interface comes with: "{1}" stands for the
-first argument. A ground station reads them in the vehicle's metadata, and is sent the numbers alone.
+Texts and arguments follow libevents, the format of MAVLink's Events Interface: "{1}" is the first argument. A ground
+station reads them from the vehicle's metadata; messages contain numbers only.
 """
 
 import struct
@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple, Protocol, TypeVar
 
 from lapwing.services.common.event_kinds import KINDS
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 FORMATS = {"uint8_t": "B", "uint32_t": "I"}
@@ -33,7 +33,7 @@ class Entry(NamedTuple):
 
 
 class Enumeration(NamedTuple):
-    """Values that stand for something; of a bit field each is a bit."""
+    """Enumeration of values; in a bit field each value is a bit."""
 
     name: str  # ends with _t
     type: str
@@ -76,7 +76,7 @@ class Definition(NamedTuple):
         return _COMPONENT << 24 | self.sub_id
 
     def encode(self, values: Sequence[int]) -> bytes:
-        """The values of the arguments as bytes, little-endian, in the order of `arguments`."""
+        """Return the values of the arguments as little-endian bytes, in the order of `arguments`."""
         return struct.pack("<" + "".join(FORMATS[a.base] for a in self.arguments), *values)
 
 
@@ -87,15 +87,15 @@ class EventDetector(Protocol):
     """Looks for events of some sort."""
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
-        """What has happened since the step before."""
+        """Yield the events since the previous step."""
 
 
 Kind = TypeVar("Kind", bound=Callable[[], EventDetector])
 
 DEFINITIONS: dict[str, Definition] = {}
-"""Every event that has been declared, by its name."""
+"""All declared events by name."""
 WATCHES: list[Callable[[], EventDetector]] = []
-"""What looks for them."""
+"""Event detectors."""
 
 
 def event(

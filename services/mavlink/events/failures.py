@@ -1,4 +1,4 @@
-"""What goes wrong: failsafes that take over, motors that fail, a battery that runs empty."""
+"""Failure events: failsafes, motor failures, low battery."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ FAILSAFE = event(
 FAILSAFE_OVER = event("failsafe_over", "failsafe", "Failsafe is over")
 MOTOR_FAILED = event(
     "motor_failed", "fault", "Motor {1} has failed", Argument("motor", "uint8_t"), level=CRITICAL,
-    description="It gives less thrust than it is asked for.",
+    description="Its thrust is lower than commanded.",
 )  # fmt: skip
 BATTERY = (
     event("battery_low", "battery", "Low battery", level=WARNING),
@@ -43,7 +43,7 @@ class FailureWatch:
         self._failsafe, self._motor, self._battery = "", 0, 0
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
-        """What has come up, and which failsafe has gone."""
+        """Yield events for new failures and for the end of a failsafe."""
         s = v.status
         if s.battery_warning != self._battery:
             yield from ((definition, ()) for definition in BATTERY[self._battery : s.battery_warning])

@@ -1,4 +1,4 @@
-"""Arming, take-off, landing, flight modes: what the autopilot does as it is told."""
+"""Arming, take-off, landing, flight modes: what the autopilot does on command."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,9 @@ _PLACES = (
     Entry(NO_TAKEOFF, "no_takeoff", "nobody took off"),
     Entry(IN_AIR, "in_air", "in the air"),
 )
-MODES = tuple(dict.fromkeys([*(mode.kind for mode in firmware.get("px4").MODES), "orbit", "goto", "descend", "phases"]))
+MODES = tuple(
+    dict.fromkeys([*(mode.kind for mode in firmware.get("px4").MODES), "orbit", "goto", "descend", "trajectory"])
+)
 UNKNOWN = len(MODES)
 _MODES = (
     *[Entry(number, kind, kind.replace("_", " ")) for number, kind in enumerate(MODES)],
@@ -28,7 +30,7 @@ MODE = event("flight_mode", "mode", "Flight mode: {1}", Argument("mode", mode_ty
 
 
 def mode_number(mode: str) -> int:
-    """The number by which an event names a mode."""
+    """Return the number of a mode in events."""
     return MODES.index(mode) if mode in MODES else UNKNOWN
 
 
@@ -40,7 +42,7 @@ class FlightWatch:
         self._armed, self._landed, self._mode = False, True, ""
 
     def step(self, v: VehicleCache) -> Iterator[Happened]:
-        """What is another."""
+        """Yield events for a changed mode, landed state or arming state."""
         s = v.status
         if s.mode != self._mode:
             if self._mode:

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.mode_entry import FlightMode
 from lapwing.services.mavlink.px4_facts import Fact
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
@@ -46,30 +46,30 @@ _KINDS = {mode.number: mode.kind for mode in MODES}
 
 
 def facts(description: VehicleDescription) -> Sequence[Fact]:
-    """None: ArduPilot's ground stations ask for other ones."""
+    """Return no facts: ArduPilot's ground stations request others."""
     return ()
 
 
 def custom_mode(main: float, sub: float) -> int:
-    """The number of a mode."""
+    """Return the number of a mode."""
     return int(main)
 
 
 def mode_number(mode: str) -> int:
-    """The custom mode that shows a mode of ours; what is none of ArduPilot's shows as GUIDED."""
+    """Return the custom mode that represents a flight mode; GUIDED if ArduPilot has no equivalent."""
     return _SHOWN.get(mode, _GUIDED)
 
 
 def mode_kind(number: int) -> str | None:
-    """The kind of command that enters a custom mode."""
+    """Return the kind of command that enters a custom mode. Return None if there is none."""
     return _KINDS.get(number)
 
 
 def param_float(value: float, integer: bool) -> float:
-    """A parameter as it travels."""
+    """Return a parameter's value as encoded in messages."""
     return float(round(value)) if integer else value
 
 
 def param_value(value: float, integer: bool) -> float:
-    """A parameter that has travelled."""
+    """Return a parameter's value decoded from a message."""
     return float(round(value)) if integer else value

@@ -2,7 +2,7 @@
 
 import struct
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.mode_entry import FlightMode
 from lapwing.services.mavlink.px4_facts import px4_facts
 
@@ -15,7 +15,7 @@ facts = px4_facts
 
 
 def custom_mode(main: float, sub: float) -> int:
-    """The number of a main and a sub mode."""
+    """Return the custom mode of a main and a sub mode."""
     return int(main) << 16 | int(sub) << 24
 
 
@@ -38,20 +38,20 @@ _SHOWN_AS = {"goto": "hold", "descend": "land"}  # modes that PX4 has no number 
 
 
 def mode_number(mode: str) -> int:
-    """The custom mode that shows a mode of ours; what is none of PX4's shows as hold."""
+    """Return the custom mode that represents a flight mode; hold if PX4 has no equivalent."""
     return _NUMBERS.get(_SHOWN_AS.get(mode, mode), _NUMBERS["hold"])
 
 
 def mode_kind(number: int) -> str | None:
-    """The kind of command that enters a custom mode."""
+    """Return the kind of command that enters a custom mode. Return None if there is none."""
     return _KINDS.get(number & 0xFFFF0000)
 
 
 def param_float(value: float, integer: bool) -> float:
-    """A parameter as it travels."""
+    """Return a parameter's value as encoded in messages."""
     return struct.unpack("<f", struct.pack("<i", round(value)))[0] if integer else value
 
 
 def param_value(value: float, integer: bool) -> float:
-    """A parameter that has travelled."""
+    """Return a parameter's value decoded from a message."""
     return float(struct.unpack("<i", struct.pack("<f", value))[0]) if integer else value

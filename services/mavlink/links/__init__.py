@@ -7,22 +7,22 @@ from lapwing.dynamics import discovery
 from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.mavlink.links.link import Link
 
-__all__ = ["Link", "check", "kinds", "numbered", "open_link"]
+__all__ = ["Link", "check", "for_vehicle_index", "kinds", "open_link"]
 
 
 @cache
 def kinds() -> dict[str, type[Link]]:
-    """Class by the first word of a URL."""
+    """Return the link classes by URL scheme."""
     classes = [value for module in discovery.modules(__name__).values() for value in vars(module).values()]
     links = [cls for cls in classes if isinstance(cls, type) and issubclass(cls, Link) and cls.SCHEME]
     return {cls.SCHEME: cls for cls in sorted(links, key=lambda cls: cls.SCHEME)}
 
 
 def check(url: str) -> type[Link]:
-    """The kind of link that a URL names.
+    """Return the link class of a URL.
 
     Raises:
-        ValueError: none; the text lists the forms.
+        ValueError: there is none; the message lists the forms.
     """
     scheme, _, rest = url.partition(":")
     kind = kinds().get(scheme)
@@ -32,15 +32,15 @@ def check(url: str) -> type[Link]:
     return kind
 
 
-def numbered(url: str, i: int) -> str:
-    """The URL of the link of vehicle i (from 0) of several that one URL is given for.
+def for_vehicle_index(url: str, i: int) -> str:
+    """Return the URL of vehicle i (from 0) if several vehicles share one URL.
 
     Raises:
-        ValueError: no such kind, or there is none for so many.
+        ValueError: the scheme is unknown, or has no URL for so many vehicles.
     """
     kind, (scheme, _, rest) = check(url), url.partition(":")
     try:
-        return f"{scheme}:{kind.numbered(rest, i)}"
+        return f"{scheme}:{kind.for_vehicle_index(rest, i)}"
     except ValueError as error:
         raise ValueError(f"--mavlink {url}: {error}") from None
 

@@ -1,4 +1,4 @@
-"""What all links have in common."""
+"""Base class of links."""
 
 import re
 import socket
@@ -14,13 +14,13 @@ MAX_RATE = 2000.0  # [1/s] pieces that a link takes; what comes faster is droppe
 
 
 class Budget:
-    """How many pieces of bytes a link may read: so many a second, and a second's worth at once."""
+    """Rate limit of the pieces that a link reads, with a burst of one second."""
 
     def __init__(self, rate: float = MAX_RATE):
         self._rate, self._left, self._then = rate, rate, time.monotonic()
 
     def take(self) -> bool:
-        """Whether there is one more."""
+        """Return True if another piece may be read."""
         now = time.monotonic()
         self._left = min(self._rate, self._left + (now - self._then) * self._rate)
         self._then = now
@@ -42,17 +42,17 @@ class Link:
 
     @staticmethod
     def fits(rest: str) -> bool:
-        """Whether the rest of a URL has this link's form: host and port."""
+        """Return True if the rest of a URL has this link's form: host and port."""
         match = re.fullmatch(r"[\w.-]+:(\d+)", rest, re.ASCII)
         return match is not None and int(match[1]) < 65536
 
     @classmethod
-    def numbered(cls, rest: str, i: int) -> str:
-        """The rest of the URL for vehicle i (from 0) of several: the same for all that send to one station."""
+    def for_vehicle_index(cls, rest: str, i: int) -> str:
+        """Return the rest of the URL for vehicle i (from 0); the same for all that send to one station."""
         return rest
 
     def affords(self) -> bool:
-        """Whether one more piece may be read; counts it where not."""
+        """Return True if another piece may be read; count it otherwise."""
         if self.budget.take():
             return True
         self.adapter.counts["faster than a link takes"] += 1
@@ -64,7 +64,7 @@ class Link:
 
 
 def next_port(rest: str, i: int) -> str:
-    """Host and the port i further on; ValueError where there is none."""
+    """Return host and port plus i. Raise ValueError if the port is too large."""
     host, _, port = rest.rpartition(":")
     if int(port) + i > 65535:
         raise ValueError(f"port {port}: the link of vehicle {i} would be at {int(port) + i}")
@@ -72,6 +72,6 @@ def next_port(rest: str, i: int) -> str:
 
 
 def socket_address(rest: str) -> tuple[str, int]:
-    """Host, as a number, and port; raises OSError for a host that nobody knows."""
+    """Return the numeric host and the port. Raise OSError for an unknown host."""
     host, _, port = rest.rpartition(":")
     return socket.gethostbyname(host), int(port)

@@ -19,8 +19,8 @@ class Serial(Link):
     FORM: ClassVar[str] = "serial:DEVICE:BAUD"
 
     @classmethod
-    def numbered(cls, rest: str, i: int) -> str:
-        """A line has room for one vehicle."""
+    def for_vehicle_index(cls, rest: str, i: int) -> str:
+        """Return the rest of the URL. Raise ValueError for a second vehicle."""
         if i:
             raise ValueError(f"serial:{rest}: has room for one vehicle; expected udpout, udpin or tcpin")
         return rest
@@ -43,7 +43,7 @@ class Serial(Link):
 
     @staticmethod
     def fits(rest: str) -> bool:
-        """A device and a speed that the system knows."""
+        """Return True for a device and a baud rate that the system supports."""
         match = re.fullmatch(r"/.+:(\d+)", rest, re.ASCII)
         return match is not None and hasattr(termios, f"B{match[1]}")
 

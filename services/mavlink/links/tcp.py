@@ -19,8 +19,8 @@ class TcpIn(Link):
     FORM: ClassVar[str] = "tcpin:HOST:PORT"
 
     @classmethod
-    def numbered(cls, rest: str, i: int) -> str:
-        """Each vehicle listens at the port after that of the one before."""
+    def for_vehicle_index(cls, rest: str, i: int) -> str:
+        """Return the rest of the URL with the port of vehicle i (from 0)."""
         return next_port(rest, i)
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):

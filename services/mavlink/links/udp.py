@@ -1,4 +1,4 @@
-"""UDP: to a ground station that waits on a port, or on a port of our own for whoever comes."""
+"""UDP: to a ground station that listens on a port, or listening on a port for any endpoint."""
 
 import socket
 import time
@@ -28,12 +28,12 @@ class _Udp(Link):
         selector.register(self.socket, EVENT_READ, self.read)
 
     def meet(self, address: Address) -> Endpoint:
-        """An endpoint at a new address."""
+        """Return a new endpoint at an address."""
 
         def put(data: bytes) -> None:
             try:
                 self.socket.sendto(data, address)
-            except OSError:  # nobody listens there now, or the way is full: UDP may lose what it likes
+            except OSError:  # no listener, or a full buffer: UDP may lose messages
                 self.adapter.counts["not sent"] += 1
 
         return self.adapter.connect(is_loopback(address[0]), True, put, strict=True)
@@ -45,7 +45,7 @@ class _Udp(Link):
                 data, address = self.socket.recvfrom(PIECE)
             except BlockingIOError:
                 return
-            except OSError:  # the reply to something sent where nobody listens
+            except OSError:  # the reply to a message without a listener
                 continue
             if self.affords():
                 self.hear(address, data)
@@ -81,14 +81,14 @@ class UdpOut(_Udp):
 
 
 class UdpIn(_Udp):
-    """A link that listens on a UDP port: whoever sends a sound message there is an endpoint."""
+    """A link that listens on a UDP port: every sender of a valid message is an endpoint."""
 
     SCHEME: ClassVar[str] = "udpin"
     FORM: ClassVar[str] = "udpin:HOST:PORT"
 
     @classmethod
-    def numbered(cls, rest: str, i: int) -> str:
-        """Each vehicle listens at the port after that of the one before."""
+    def for_vehicle_index(cls, rest: str, i: int) -> str:
+        """Return the rest of the URL with the port of vehicle i (from 0)."""
         return next_port(rest, i)
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
@@ -100,7 +100,7 @@ class UdpIn(_Udp):
             raise
 
     def hear(self, address: Address, data: bytes) -> None:
-        """An endpoint is known by its address, and met at its first sound message."""
+        """Handle a datagram; a new address becomes an endpoint at its first valid message."""
         endpoint = self.endpoints.get(address)
         now = time.monotonic()
         if endpoint is None:

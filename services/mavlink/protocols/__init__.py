@@ -1,4 +1,4 @@
-"""What endpoints may ask for: a file for each protocol of MAVLink, each declaring which messages it handles."""
+"""Requests of endpoints; each file implements a MAVLink protocol and declares the messages that it handles."""
 
 from functools import cache
 
@@ -10,6 +10,6 @@ __all__ = ["Handler", "handlers"]
 
 @cache
 def handlers() -> dict[int, Handler]:
-    """Every handler by the number of its message."""
+    """Return all handlers by message number."""
     discovery.modules(__name__)
     return HANDLERS

@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.geo_coordinates import degrees
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.geo_coordinates import degrees
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 
@@ -41,9 +41,9 @@ Outcome = Request | Reply | int  # int: a MAV_RESULT at once
 Rule = Callable[[Session, Command], Outcome]
 
 RULES: dict[int, Rule] = {}
-"""What becomes of each MAV_CMD: a request to the autopilot, a reply, or a MAV_RESULT."""
+"""Rule of each MAV_CMD; it returns a request to the autopilot, a reply, or a MAV_RESULT."""
 READ_ONLY: set[int] = set()
-"""Those that change nothing and that everybody may give."""
+"""Commands that change nothing, accepted from every endpoint."""
 
 
 def rule(*numbers: int, changes: bool = True) -> Callable[[Rule], Rule]:
@@ -60,7 +60,7 @@ def rule(*numbers: int, changes: bool = True) -> Callable[[Rule], Rule]:
 
 @handles("COMMAND_LONG")
 def command_long(session: Session, m: Any) -> None:
-    """Seven numbers; places in degrees above the sea."""
+    """Handle COMMAND_LONG: seven numbers; positions in degrees, altitude above sea level."""
     p = (m.param1, m.param2, m.param3, m.param4)
     command = Command(m.command, p, mavlink.MAV_FRAME_GLOBAL, m.param5, m.param6, m.param7)
     execute(session, command)
@@ -68,13 +68,13 @@ def command_long(session: Session, m: Any) -> None:
 
 @handles("COMMAND_INT")
 def command_int(session: Session, m: Any) -> None:
-    """Four numbers and an exact place in a frame of its own."""
+    """Handle COMMAND_INT: four numbers and a position in a frame."""
     p = (m.param1, m.param2, m.param3, m.param4)
     execute(session, Command(m.command, p, m.frame, degrees(m.x), degrees(m.y), m.z))
 
 
 def execute(session: Session, command: Command) -> None:
-    """Do it, and acknowledge it."""
+    """Execute a command and acknowledge it."""
     function = RULES.get(command.number)
     if function is None:
         outcome: Outcome = UNSUPPORTED

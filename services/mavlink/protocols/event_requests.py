@@ -1,8 +1,8 @@
-"""What endpoints ask for of the events: those that have got lost, and a report of what hinders arming."""
+"""Requests of lost events and of a report of the arming checks."""
 
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.commands import ACCEPTED, UNSUPPORTED, Command, Outcome, rule
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
@@ -10,7 +10,7 @@ from lapwing.services.mavlink.session import Session
 
 @handles("REQUEST_EVENT")
 def request_events(session: Session, m: Any) -> None:
-    """Send events once more; free to everybody, as all telemetry."""
+    """Send events again; allowed for every endpoint, like all telemetry."""
     for message in session.vehicle.events.replies(m.first_sequence, m.last_sequence, session.address):
         session.send(message)
 
@@ -18,7 +18,7 @@ def request_events(session: Session, m: Any) -> None:
 @rule(mavlink.MAV_CMD_RUN_PREARM_CHECKS, changes=False)
 def report(session: Session, c: Command) -> Outcome:
     """Ask for a report of the arming checks, which run all the time; it comes with the next status."""
-    if not session.vehicle.flavour.EVENTS:
+    if not session.vehicle.firmware.EVENTS:
         return UNSUPPORTED
     session.vehicle.reports_asked += 1
     return ACCEPTED

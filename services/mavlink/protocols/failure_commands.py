@@ -1,7 +1,7 @@
 """The command that injects failures."""
 
 from lapwing.services.common.failure_types import UNITS, possible, refusal
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.commands import UNSUPPORTED, Command, Outcome, Request, rule
 from lapwing.services.mavlink.session import Session
 

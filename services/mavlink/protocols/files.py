@@ -2,13 +2,13 @@
 
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 
 
 @handles("FILE_TRANSFER_PROTOCOL")
 def file_transfer(session: Session, m: Any) -> None:
-    """Reading is free to everybody: there is nothing secret in the files."""
+    """Serve a file request; all endpoints may read the files."""
     for payload in session.files.replies(bytes(m.payload)):
         session.send(mavlink.MAVLink_file_transfer_protocol_message(0, *session.address, list(payload)))

@@ -3,9 +3,9 @@
 import math
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import swap_yaw
-from lapwing.services.mavlink.geo_coordinates import to_world
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import swap_yaw
+from lapwing.services.common.mavlink.geo_coordinates import to_world
 from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Request, rule
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
@@ -13,8 +13,8 @@ from lapwing.services.mavlink.session import Session
 
 @handles("SET_MODE")
 def set_mode(session: Session, m: Any) -> None:
-    """The old way to change the mode, which is not acknowledged."""
-    kind = session.vehicle.flavour.mode_kind(m.custom_mode)
+    """Change the mode by the deprecated message, which is not acknowledged."""
+    kind = session.vehicle.firmware.mode_kind(m.custom_mode)
     if kind is None:
         session.say(f"no flight mode {m.custom_mode}")
     elif session.trusted:
@@ -23,12 +23,12 @@ def set_mode(session: Session, m: Any) -> None:
 
 @rule(mavlink.MAV_CMD_DO_SET_MODE)
 def do_set_mode(session: Session, c: Command) -> Outcome:
-    """A flight mode by its numbers."""
-    flavour = session.vehicle.flavour
+    """Enter a custom flight mode."""
+    firmware = session.vehicle.firmware
     if not int(c.params[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
         session.say("flight modes only by their custom numbers")
         return UNSUPPORTED
-    kind = flavour.mode_kind(flavour.custom_mode(c.params[1], c.params[2]))
+    kind = firmware.mode_kind(firmware.custom_mode(c.params[1], c.params[2]))
     if kind is None:
         session.say(f"no flight mode {c.params[1]:.0f}, {c.params[2]:.0f}")
         return UNSUPPORTED
@@ -37,8 +37,8 @@ def do_set_mode(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_SET_STANDARD_MODE)
 def do_set_standard_mode(session: Session, c: Command) -> Outcome:
-    """A flight mode by what it is called on every autopilot."""
-    kinds = {mode.standard: mode.kind for mode in session.vehicle.flavour.MODES}
+    """Enter a standard flight mode."""
+    kinds = {mode.standard: mode.kind for mode in session.vehicle.firmware.MODES}
     kinds.pop(mavlink.MAV_STANDARD_MODE_NON_STANDARD, None)
     kind = kinds.get(int(c.params[0]))
     return Request(kind) if kind else UNSUPPORTED
@@ -59,11 +59,11 @@ def arm_disarm(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_NAV_TAKEOFF)
 def takeoff(session: Session, c: Command) -> Outcome:
-    """Up to an altitude, above the sea or home as the flavour has it; where none is given, to MIS_TAKEOFF_ALT."""
+    """Take off to an altitude above sea level or home, as in the firmware; NaN: MIS_TAKEOFF_ALT."""
     datum, altitude, frame = session.vehicle.datum, c.altitude, c.frame
     if math.isnan(altitude):
         altitude, frame = session.parameters.value("MIS_TAKEOFF_ALT"), mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
-    elif not session.vehicle.flavour.TAKEOFF_ABOVE_SEA:
+    elif not session.vehicle.firmware.TAKEOFF_ABOVE_SEA:
         frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
     _, _, height = to_world(datum, frame, math.nan, math.nan, altitude)
     return Request("takeoff", (height, math.nan))
@@ -89,13 +89,13 @@ def loiter(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
 def pause(session: Session, c: Command) -> Outcome:
-    """Go on with the mission where the first parameter is 1; else hold the present position."""
+    """Continue the mission if the first parameter is 1; otherwise hold the present position."""
     return Request("mission", (math.nan,)) if c.params[0] == 1.0 else Request("hold")
 
 
 @rule(mavlink.MAV_CMD_DO_REPOSITION)
 def reposition(session: Session, c: Command) -> Outcome:
-    """Go there; what of the place is not given stays as it is. Yaw is a heading [rad]."""
+    """Fly to a position; unspecified coordinates keep their present values. Yaw is a heading [rad]."""
     estimate = session.vehicle.estimate
     there = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
     yaw = swap_yaw(c.params[3])
@@ -108,7 +108,7 @@ def reposition(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_ORBIT)
 def orbit(session: Session, c: Command) -> Outcome:
-    """Round a place, clockwise where the radius is above 0, as PX4 takes it."""
+    """Orbit a position, clockwise for a positive radius, as in PX4."""
     radius, speed, behaviour, turns = c.params
     x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
     clockwise = math.copysign(1.0, radius) * math.copysign(1.0, speed) > 0.0
@@ -118,7 +118,7 @@ def orbit(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI)
 def set_roi(session: Session, c: Command) -> Outcome:
-    """Point the nose at a place."""
+    """Point the nose at a position."""
     if c.number == mavlink.MAV_CMD_DO_SET_ROI and int(c.params[0]) != mavlink.MAV_ROI_LOCATION:
         return Request("roi") if int(c.params[0]) == mavlink.MAV_ROI_NONE else UNSUPPORTED
     x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
@@ -153,7 +153,7 @@ def gripper(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_CHANGE_ALTITUDE)
 def change_altitude(session: Session, c: Command) -> Outcome:
-    """To another altitude, here; its frame is the second parameter."""
+    """Change the altitude here; the second parameter is its frame."""
     _, _, height = to_world(session.vehicle.datum, int(c.params[1]), math.nan, math.nan, c.params[0])
     return Request("goto", (math.nan, math.nan, height))
 
@@ -176,7 +176,7 @@ def mission_start(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
 def set_mission_current(session: Session, c: Command) -> Outcome:
-    """Go on with another item."""
+    """Continue with another item."""
     return Request("mission_current", (c.params[0],)) if c.params[0] >= 0.0 else ACCEPTED
 
 

@@ -1,9 +1,9 @@
-"""How a protocol declares which messages it handles."""
+"""Declaration of the messages that a protocol handles."""
 
 from collections.abc import Callable
 from typing import Any
 
-from lapwing.services.mavlink.dialect import id_of
+from lapwing.services.common.mavlink.dialect import id_of
 from lapwing.services.mavlink.session import Session
 
 Handler = Callable[[Session, Any], None]

@@ -1,8 +1,8 @@
-"""Who is there, and what time it is."""
+"""Heartbeat, time synchronisation and origin."""
 
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 from lapwing.services.mavlink.telemetry import requested
@@ -10,7 +10,7 @@ from lapwing.services.mavlink.telemetry import requested
 
 @handles("HEARTBEAT")
 def heartbeat(session: Session, m: Any) -> None:
-    """An endpoint is there; a companion computer gets other rates."""
+    """Record a heartbeat; select the stream rates of a companion computer."""
     session.vehicle.reports_asked += session.endpoint.last_heartbeat is None
     session.endpoint.last_heartbeat = session.clock.now
     session.schedule.set_onboard(m.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
@@ -18,21 +18,21 @@ def heartbeat(session: Session, m: Any) -> None:
 
 @handles("TIMESYNC")
 def timesync(session: Session, m: Any) -> None:
-    """Reply with our clock beside theirs; their replies to us are of no use here."""
+    """Reply with both clocks; ignore replies."""
     if m.tc1 == 0:
         session.send(mavlink.MAVLink_timesync_message(session.vehicle.time_ns, m.ts1))
 
 
 @handles("PING")
 def ping(session: Session, m: Any) -> None:
-    """Send a ping back, addressed to whoever asked."""
+    """Send a ping back, addressed to its sender."""
     if m.target_system == 0 and m.target_component == 0:
         session.send(mavlink.MAVLink_ping_message(m.time_usec, m.seq, *session.address))
 
 
 @handles("SET_GPS_GLOBAL_ORIGIN")
 def set_origin(session: Session, m: Any) -> None:
-    """Echo the origin exactly as given: the scene's home stays where it is."""
+    """Echo the origin as received; the scene's home does not change."""
     if session.trusted:
         session.vehicle.origin = m.latitude, m.longitude, m.altitude
         for message in requested(session.vehicle, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN) or ():
@@ -41,4 +41,4 @@ def set_origin(session: Session, m: Any) -> None:
 
 @handles("SYSTEM_TIME", "COMMAND_ACK", "STATUSTEXT", "PARAM_VALUE", "REQUEST_DATA_STREAM", "RADIO_STATUS")
 def ignore(session: Session, m: Any) -> None:
-    """Nothing to be done: a vehicle keeps its own time, and PX4 too has no data streams of that kind."""
+    """Ignore the message: the vehicle keeps its own time and, like PX4, has no data streams of that kind."""

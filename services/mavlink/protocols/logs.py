@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 
@@ -15,7 +15,7 @@ def list_logs(session: Session, m: Any) -> None:
 
 @handles("LOG_REQUEST_DATA")
 def send_log_data(session: Session, m: Any) -> None:
-    """Send bytes of the log from an offset on; reading is free to everybody, as of all files."""
+    """Send bytes of the log from an offset; every endpoint may read all files."""
     session.log.request(m.id, m.ofs, m.count)
 
 
@@ -27,7 +27,7 @@ def stop(session: Session, m: Any) -> None:
 
 @handles("LOG_ERASE")
 def refuse_to_erase(session: Session, m: Any) -> None:
-    """Refuse to erase the log of a run, and say so."""
+    """Reject the erasure of the run's log with a text."""
     session.say("LOG_ERASE: the log of a run stays")
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.services.mavlink.dialect import mavlink, message_class
+from lapwing.services.common.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Reply, rule
 from lapwing.services.mavlink.session import Session
 from lapwing.services.mavlink.telemetry import requested, streams
@@ -10,7 +10,7 @@ from lapwing.services.mavlink.telemetry import requested, streams
 
 @rule(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, changes=False)
 def set_message_interval(session: Session, c: Command) -> Outcome:
-    """Another rate for one message, to this endpoint alone."""
+    """Set the rate of a message to this endpoint."""
     number = int(c.params[0])
     if number not in streams() or math.isnan(c.params[1]):
         return UNSUPPORTED
@@ -20,7 +20,7 @@ def set_message_interval(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_GET_MESSAGE_INTERVAL, changes=False)
 def get_message_interval(session: Session, c: Command) -> Outcome:
-    """How often a message is sent."""
+    """Send the interval of a message."""
     number = int(c.params[0])
     if not 0 <= number <= 0xFFFF:
         return DENIED
@@ -31,25 +31,25 @@ def get_message_interval(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_REQUEST_MESSAGE, changes=False)
 def request_message(session: Session, c: Command) -> Outcome:
-    """One message, once."""
+    """Send a message once."""
     return _reply(session, int(c.params[0]), c.params[1])
 
 
 @rule(mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES, changes=False)
 def request_capabilities(session: Session, c: Command) -> Outcome:
-    """The older way to ask for AUTOPILOT_VERSION."""
+    """Send AUTOPILOT_VERSION; the deprecated request."""
     return _reply(session, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
 
 
 @rule(mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION, changes=False)
 def request_protocol_version(session: Session, c: Command) -> Outcome:
-    """The older way to ask for PROTOCOL_VERSION."""
+    """Send PROTOCOL_VERSION; the deprecated request."""
     return _reply(session, message_class("PROTOCOL_VERSION").id)
 
 
 @rule(mavlink.MAV_CMD_GET_HOME_POSITION, changes=False)
 def get_home_position(session: Session, c: Command) -> Outcome:
-    """The older way to ask for HOME_POSITION."""
+    """Send HOME_POSITION; the deprecated request."""
     return _reply(session, mavlink.MAVLINK_MSG_ID_HOME_POSITION)
 
 

@@ -3,8 +3,8 @@
 import math
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.geo_coordinates import degrees, to_world
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.geo_coordinates import degrees, to_world
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 
@@ -23,7 +23,7 @@ def count(session: Session, m: Any) -> None:
 
 @handles("MISSION_ITEM_INT")
 def item_int(session: Session, m: Any) -> None:
-    """An item of an upload; or, as ArduPilot's ground stations write it, a place to fly to."""
+    """Handle an item of an upload or, from ArduPilot's ground stations, a position to fly to."""
     if m.current not in (GUIDED, GUIDED_ALTITUDE):
         session.missions.take(session.endpoint, m)
         return
@@ -61,7 +61,7 @@ def item(session: Session, m: Any) -> None:
 
 @handles("MISSION_REQUEST_LIST")
 def request_list(session: Session, m: Any) -> None:
-    """A download begins."""
+    """Start a download."""
     session.missions.forget(session.endpoint, m.mission_type)
     held = session.missions.held.get(m.mission_type)
     if held is None:
@@ -72,7 +72,7 @@ def request_list(session: Session, m: Any) -> None:
 
 @handles("MISSION_REQUEST_INT", "MISSION_REQUEST")
 def request_item(session: Session, m: Any) -> None:
-    """One item of a download, as often as it is asked for."""
+    """Send an item of a download."""
     held = session.missions.held.get(m.mission_type, [])
     if m.seq >= len(held):
         _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID_SEQUENCE)
@@ -91,7 +91,7 @@ def request_item(session: Session, m: Any) -> None:
 
 @handles("MISSION_ACK")
 def acknowledged(session: Session, m: Any) -> None:
-    """A download is complete, or an upload is given up."""
+    """Handle the end of a download or the cancellation of an upload."""
     session.missions.cancel(session.endpoint, m.mission_type)
 
 
@@ -106,7 +106,7 @@ def clear(session: Session, m: Any) -> None:
 
 @handles("MISSION_SET_CURRENT")
 def set_current(session: Session, m: Any) -> None:
-    """Go on with another item; MISSION_CURRENT says when that is so."""
+    """Continue with another item; MISSION_CURRENT reports the change."""
     if session.trusted:
         session.command("mission_current", (m.seq,))
 

@@ -1,12 +1,19 @@
-"""Setpoints of offboard flight, and sticks: streams of messages that nobody acknowledges; what is refused is said."""
+"""Setpoints of offboard flight, and sticks: streams of messages without acknowledgement; a rejection sends a text."""
 
 from typing import Any
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
-from lapwing.services.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SEA, degrees, from_local, from_world, to_world
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import swap_attitude, swap_body, swap_world, swap_yaw
+from lapwing.services.common.mavlink.geo_coordinates import (
+    ABOVE_HOME,
+    ABOVE_SEA,
+    degrees,
+    from_local,
+    from_world,
+    to_world,
+)
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 
@@ -19,17 +26,17 @@ IGNORE_YAW = mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 IGNORE_YAW_RATE = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 THRUST_BODY = 1 << 5  # ATTITUDE_TARGET_TYPEMASK_THRUST_BODY_SET, which pymavlink leaves out
 CENTRE = 500.0  # of the throttle stick, which is the only one from 0 to 1000
-_GUIDED = ("hold", "goto", "offboard")  # modes that ArduPilot's GUIDED stands for
+_GUIDED = ("hold", "goto", "offboard")  # modes that ArduPilot's GUIDED covers
 
 
 def masked(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
-    """Three numbers, NaN where the mask says to ignore them; from NED or FRD axes still."""
+    """Return three numbers in their NED or FRD axes, with NaN where the mask ignores them."""
     a, b, c = (math.nan if mask >> first_bit + k & 1 else value for k, value in enumerate((x, y, z)))
     return a, b, c
 
 
 def rotated(v: Vec3, heading: float) -> Vec3:
-    """A vector of forward, right, down as north, east, down; of a pair of which one is given the other is 0."""
+    """Rotate forward, right, down to north, east, down; if one of a horizontal pair is NaN it counts as 0."""
     s, c = math.sin(heading), math.cos(heading)
     if math.isnan(v[0]) and math.isnan(v[1]):
         return v
@@ -39,7 +46,7 @@ def rotated(v: Vec3, heading: float) -> Vec3:
 
 @handles("SET_POSITION_TARGET_LOCAL_NED")
 def local_target(session: Session, m: Any) -> None:
-    """Position, velocity, acceleration from the local origin, or from the vehicle along the world's or its own axes."""
+    """Handle SET_POSITION_TARGET_LOCAL_NED: setpoints relative to the local origin or the vehicle."""
     estimate = session.vehicle.estimate
     if m.coordinate_frame not in _LOCAL or estimate is None:
         _refuse(session, f"SET_POSITION_TARGET_LOCAL_NED: frame {m.coordinate_frame} unsupported")
@@ -55,14 +62,14 @@ def local_target(session: Session, m: Any) -> None:
     if m.coordinate_frame in _FROM_HERE:
         n, e, d = estimate.position_ned
         position = position[0] + n, position[1] + e, position[2] + d
-    turned = heading if session.vehicle.flavour.GUIDED and m.coordinate_frame in _BODY else 0.0
+    turned = heading if session.vehicle.firmware.GUIDED and m.coordinate_frame in _BODY else 0.0
     position_world = from_local(session.vehicle.description.standing_height, position)
     _put(session, m, position_world, velocity, acceleration, turned)
 
 
 @handles("SET_POSITION_TARGET_GLOBAL_INT")
 def global_target(session: Session, m: Any) -> None:
-    """The same with the position on the Earth."""
+    """Handle SET_POSITION_TARGET_GLOBAL_INT: setpoints with a geographic position."""
     estimate = session.vehicle.estimate
     if m.coordinate_frame not in ABOVE_SEA | ABOVE_HOME or estimate is None:
         _refuse(session, f"SET_POSITION_TARGET_GLOBAL_INT: frame {m.coordinate_frame} unsupported")
@@ -88,7 +95,7 @@ def _unless(ignored: int, value: float) -> float:
 def _put(
     session: Session, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3, turned: float = 0.0
 ) -> None:
-    """Hand a setpoint over; velocity and acceleration in NED, `turned` [rad] is what its yaw counts from."""
+    """Send a setpoint; velocity and acceleration in NED, `turned` [rad] is the reference of its yaw."""
     yaw = swap_yaw(turned + _unless(m.type_mask & IGNORE_YAW, m.yaw))
     rate = -_unless(m.type_mask & IGNORE_YAW_RATE, m.yaw_rate)
     values = (*position_world, *swap_world(velocity), *swap_world(acceleration), yaw, rate)
@@ -96,8 +103,8 @@ def _put(
         _refuse(session, f"{m.get_type()}: forces unsupported")
     elif all(map(math.isnan, values)):
         _refuse(session, f"{m.get_type()}: nothing to follow")
-    elif session.vehicle.flavour.GUIDED and all(map(math.isnan, (*values[3:9], rate))):
-        if _guided(session, m):  # ArduPilot flies to a place that it is told once
+    elif session.vehicle.firmware.GUIDED and all(map(math.isnan, (*values[3:9], rate))):
+        if _guided(session, m):  # ArduPilot flies to a place that is sent once
             _send(session, m, "goto", (*position_world, yaw))
     else:
         _send(session, m, "offboard_position", values)
@@ -105,7 +112,7 @@ def _put(
 
 @handles("SET_ATTITUDE_TARGET")
 def attitude_target(session: Session, m: Any) -> None:
-    """Attitude or body rates, and collective thrust as a fraction of its maximum; ArduPilot's is a climb rate."""
+    """Handle SET_ATTITUDE_TARGET: attitude or body rates, and thrust as a fraction; for ArduPilot a climb rate."""
     ignored = m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
     norm = math.sqrt(sum(e * e for e in m.q))
     if not ignored and not 0.5 < norm < 2.0:  # NaN fails too
@@ -120,7 +127,7 @@ def attitude_target(session: Session, m: Any) -> None:
     if m.type_mask & THRUST_BODY:
         _refuse(session, "SET_ATTITUDE_TARGET: thrust_body unsupported")
         return
-    if session.vehicle.flavour.GUIDED and not math.isnan(thrust):
+    if session.vehicle.firmware.GUIDED and not math.isnan(thrust):
         climb_rate = (2.0 * thrust - 1.0) * session.parameters.value("MPC_Z_VEL_MAX_UP")
         thrust = math.nan
     _send(session, m, "offboard_attitude", (*unit, *swap_body(rates), thrust, climb_rate))
@@ -128,14 +135,14 @@ def attitude_target(session: Session, m: Any) -> None:
 
 @handles("MANUAL_CONTROL")
 def manual_control(session: Session, m: Any) -> None:
-    """Sticks of a joystick, -1000 to 1000: forward, right, throttle from 0, turn to the right."""
+    """Handle MANUAL_CONTROL: joystick axes -1000 to 1000 forward, right and yaw right, throttle 0 to 1000."""
     values = (_stick(m.x), -_stick(m.y), _stick(2.0 * (m.z - CENTRE)), -_stick(m.r))
     if session.trusted:
         session.command("manual", values)
 
 
 def _stick(value: float) -> float:
-    """A stick's way, -1 to 1; one that is not there is in the middle."""
+    """Return the position of a stick, -1 to 1; 0 for an absent one."""
     return value * 1e-3 if abs(value) <= 1000.0 else 0.0
 
 
@@ -143,16 +150,19 @@ def _send(session: Session, m: Any, kind: str, values: tuple[float, ...]) -> Non
     if any(map(math.isinf, values)):
         _refuse(session, f"{m.get_type()}: not finite")
         return
-    guided = session.vehicle.flavour.GUIDED
+    guided = session.vehicle.firmware.GUIDED
     if not session.trusted or (guided and not _guided(session, m)):
         return
-    session.command(kind, values)
+    if kind == "goto":
+        session.command(kind, values)
+    else:
+        session.offboard(kind, values)
     if guided and kind != "goto" and session.vehicle.status.mode != "offboard":
         session.command("offboard")  # ArduPilot's GUIDED follows setpoints at once
 
 
 def _guided(session: Session, m: Any) -> bool:
-    """Whether ArduPilot's GUIDED would follow a setpoint now."""
+    """Return True if ArduPilot's GUIDED mode would follow a setpoint now."""
     status = session.vehicle.status
     if status.mode in _GUIDED and not status.landed:
         return True

@@ -1,4 +1,4 @@
-"""What the vehicle sends without being asked: one table of messages, gathered from the files of this folder."""
+"""Telemetry messages: one table, collected from the files of this folder."""
 
 from functools import cache
 from typing import Any
@@ -12,21 +12,21 @@ __all__ = ["Stream", "requested", "streams"]
 
 @cache
 def streams() -> dict[int, Stream]:
-    """Every stream by the number of its message; what the dialect lacks is not there."""
+    """Return all streams by message number, without those that the dialect lacks."""
     discovery.modules(__name__)
     return STREAMS
 
 
 def requested(vehicle: VehicleCache, number: int, parameter: float = 0.0) -> list[Any] | None:
-    """The messages that answer a request for one of this number, as they would be now.
+    """Return the current messages that answer a request.
 
     Args:
-        vehicle: its newest state.
-        number: of the message.
-        parameter: the request's second, which some messages depend on.
+        vehicle: newest state of the vehicle.
+        number: message number.
+        parameter: second parameter of the request, which some messages depend on.
 
     Returns:
-        None for a message that is not of the telemetry; empty while it has no content.
+        None for a message that is not telemetry; empty while it has no content.
     """
     if number in streams():
         return streams()[number].messages(vehicle)

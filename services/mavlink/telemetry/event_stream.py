@@ -1,4 +1,4 @@
-"""How far the events have come."""
+"""Sequence number of the events."""
 
 from typing import Any
 
@@ -8,5 +8,5 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 @stream("CURRENT_EVENT_SEQUENCE", 1.0 / 3.0)
 def current_sequence(v: VehicleCache) -> Any:
-    """The number of the last event."""
-    return v.events.current() if v.flavour.EVENTS else None
+    """Return the number of the last event."""
+    return v.events.current() if v.firmware.EVENTS else None

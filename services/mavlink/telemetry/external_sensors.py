@@ -1,11 +1,11 @@
-"""What the sensors that look outside read: distances, optical flow, and the air that comes along."""
+"""Telemetry of distance sensors, optical flow and airspeed."""
 
 import math
 from typing import Any
 
 from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, OPTICAL_FLOW, RANGEFINDER, SONAR
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import Quaternion, from_euler, saturated
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import Quaternion, from_euler, saturated
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -19,38 +19,38 @@ DOWN = (mavlink.MAV_SENSOR_ROTATION_PITCH_270, NO_ROTATION)
 
 
 def good_distance(v: VehicleCache) -> bool:
-    """Whether every sensor of distances gives readings."""
+    """Return True if every distance sensor has a reading."""
     found = [v.get(topic) for topic in (SONAR, RANGEFINDER)]
     return any(found) and not any(math.isnan(m.range) for m in found if m)
 
 
 def good_flow(v: VehicleCache) -> bool:
-    """Whether the camera sees the ground pass by."""
+    """Return True if the camera measures the flow."""
     m = v.get(OPTICAL_FLOW)
     return m is not None and math.isfinite(m.flow[0])
 
 
 def _airspeed(v: VehicleCache) -> Any:
-    """What the autopilot has got of the airspeed; what the sensor reads where no operator is listened to."""
+    """Return the reading that the autopilot received; without an operator, that of the sensor."""
     return v.get(AIRSPEED_RECEIVED) or v.get(AIRSPEED)
 
 
 def good_airspeed(v: VehicleCache) -> bool:
-    """Whether the newest reading is one."""
+    """Return True if the newest reading is valid."""
     m = _airspeed(v)
     return m is not None and math.isfinite(m.fluid_pressure)
 
 
 def indicated_airspeed(v: VehicleCache) -> float | None:
-    """Speed [m/s] of the air along the tube by its pressure, at the density of the sea; None without a reading."""
+    """Return the airspeed [m/s] along the tube at sea-level density. Return None without a reading."""
     return math.sqrt(max(0.0, 2.0 * _airspeed(v).fluid_pressure / SEA_LEVEL_DENSITY)) if good_airspeed(v) else None
 
 
 def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaternion]:
-    """MAV_SENSOR_ORIENTATION of a ray, and where it has no number of its own the turn in FRD that leads there from x.
+    """Return the MAV_SENSOR_ORIENTATION of a ray, and for a custom one the rotation in FRD from x to the ray.
 
     Args:
-        azimuth_deg: from body x towards y, which is to the left.
+        azimuth_deg: from body x towards y (left).
         elevation_deg: above the body's xy plane.
     """
     if abs(elevation_deg) == 90.0:
@@ -63,7 +63,7 @@ def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaterni
 
 @stream("DISTANCE_SENSOR", 5.0, 10.0)
 def distance_sensors(v: VehicleCache) -> Any:
-    """Distance that each sees; nothing in reach reads just beyond it."""
+    """Return the distance of each sensor; out of range reads just above the maximum."""
     found = []
     if (sonar := v.get(SONAR)) is not None:
         found.append(_distance(v, sonar, SONAR_ID, mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND, DOWN))
@@ -95,7 +95,7 @@ def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[in
 
 @stream("OPTICAL_FLOW_RAD", 1.0, 10.0)
 def optical_flow(v: VehicleCache) -> Any:
-    """The flow of the newest reading over the time between two; without texture its quality is 0."""
+    """Return the flow integrated over one period; quality 0 without texture."""
     m = v.get(OPTICAL_FLOW)
     if m is None:
         return None

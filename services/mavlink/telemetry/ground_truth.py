@@ -4,8 +4,8 @@ from typing import Any
 
 from lapwing.kernels import math
 from lapwing.messages.topics import TRUTH
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import saturated, swap_world
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import saturated, swap_world
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -14,7 +14,7 @@ MILLI_G = 9.80665e-3  # [m/s^2]
 
 @stream("HIL_STATE_QUATERNION", 15.0)
 def true_state(v: VehicleCache) -> Any:
-    """The true state; the acceleration is dv/dt along the body's axes."""
+    """Return the true state; the acceleration is dv/dt in body axes."""
     m, truth = v.truth, v.get(TRUTH)
     if m is None:
         return None
@@ -37,7 +37,7 @@ def true_state(v: VehicleCache) -> Any:
 
 @stream("WIND_COV", 0.5, 1.0)
 def wind(v: VehicleCache) -> Any:
-    """The wind that blows where the vehicle is: the velocity of the air, and the altitude above the sea."""
+    """Return the velocity of the air at the vehicle, and the altitude above sea level."""
     m, truth = v.truth, v.get(TRUTH)
     if m is None:
         return None
@@ -47,7 +47,7 @@ def wind(v: VehicleCache) -> Any:
 
 
 def _to_body(q: tuple[float, float, float, float], a: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Components along the body's axes of a vector given along the world's."""
+    """Rotate a world vector into body axes."""
     w, x, y, z = q
     # v' = v - 2 u x (w v - u x v) with u the vector part: the inverse rotation
     c = (y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0])

@@ -1,16 +1,16 @@
-"""Where the vehicle started, and how well it knows where it is."""
+"""Home position, origin and accuracy of the estimate."""
 
 from typing import Any
 
 from lapwing.kernels import math
 from lapwing.messages.topics import ESTIMATE
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import saturated
-from lapwing.services.mavlink.geo_coordinates import enu_to_geodetic, to_local
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import saturated
+from lapwing.services.common.mavlink.geo_coordinates import enu_to_geodetic, to_local
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-# What the estimator gives: attitude, velocities, position relative and absolute, height; nothing over terrain.
+# Outputs of the estimator: attitude, velocities, position relative and absolute, height; nothing over terrain.
 _GIVEN = (
     mavlink.ESTIMATOR_ATTITUDE
     | mavlink.ESTIMATOR_VELOCITY_HORIZ
@@ -25,7 +25,7 @@ _GIVEN = (
 
 @stream("HOME_POSITION", 0.5)
 def home_position(v: VehicleCache) -> Any:
-    """Where it stood when it was armed, and returns to; before that, where it stood at the start."""
+    """Return the position of the last arming; before that, the initial position."""
     home = v.home_world
     latitude, longitude, height = enu_to_geodetic(v.description.home, home)
     return mavlink.MAVLink_home_position_message(
@@ -41,13 +41,13 @@ def home_position(v: VehicleCache) -> Any:
 
 @stream("GPS_GLOBAL_ORIGIN")
 def global_origin(v: VehicleCache) -> Any:
-    """The origin of local positions."""
+    """Return the origin of local positions."""
     return mavlink.MAVLink_gps_global_origin_message(*v.origin, time_usec=v.boot_us)
 
 
 @stream("ESTIMATOR_STATUS", 0.5, 1.0)
 def estimator_status(v: VehicleCache) -> Any:
-    """How far the estimate is to be trusted."""
+    """Return validity and accuracy of the estimate."""
     e = v.get(ESTIMATE)
     if e is None:
         return None

@@ -1,9 +1,9 @@
-"""What the vehicle is and what it can do."""
+"""Identity and capabilities of the vehicle."""
 
 from typing import Any
 
+from lapwing.services.common.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink import component_metadata
-from lapwing.services.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.file_server import crc32
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -26,26 +26,26 @@ CHANNELS, NO_CHANNEL, NO_SIGNAL_STRENGTH = 18, 0xFFFF, 255
 
 @stream("AUTOPILOT_VERSION")
 def autopilot_version(v: VehicleCache) -> Any:
-    """What it can do, and how whole parameters travel."""
+    """Return the capabilities, including the encoding of integer parameters."""
     nobody = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
-        _CAPABILITIES | v.flavour.PARAMETER_ENCODING,
+        _CAPABILITIES | v.firmware.PARAMETER_ENCODING,
         *(VERSION, VERSION, VERSION, 0),
         *(nobody, nobody, nobody),
-        *(0, 0, v.description.system),
+        *(0, 0, v.description.system_id),
     )
 
 
 @stream("PROTOCOL_VERSION")
 def protocol_version(v: VehicleCache) -> Any:
-    """MAVLink 2, and 1 is understood."""
+    """Return version 2, with version 1 as the minimum."""
     nobody = [0] * 8
     return message_class("PROTOCOL_VERSION")(MAVLINK_2, MAVLINK_1, MAVLINK_2, nobody, nobody)
 
 
 @stream("COMPONENT_METADATA")
 def metadata(v: VehicleCache) -> Any:
-    """Where the file is that names the other files about this vehicle."""
+    """Return the URI of the general metadata file, which names the others."""
     general = component_metadata.files(v.description)[component_metadata.GENERAL]
     place = component_metadata.uri(component_metadata.GENERAL).encode()
     return message_class("COMPONENT_METADATA")(v.boot_ms, crc32(general), place)
@@ -53,13 +53,13 @@ def metadata(v: VehicleCache) -> Any:
 
 @stream("RC_CHANNELS")
 def rc_channels(v: VehicleCache) -> Any:
-    """No radio-control receiver is fitted."""
+    """Return no channels: there is no radio-control receiver."""
     return mavlink.MAVLink_rc_channels_message(v.boot_ms, 0, *[NO_CHANNEL] * CHANNELS, NO_SIGNAL_STRENGTH)
 
 
 @stream("FLIGHT_INFORMATION")
 def flight_information(v: VehicleCache) -> Any:
-    """When it was armed, took off and landed, since the start; the number of the flight."""
+    """Return the times of arming, take-off and landing since the start, and the number of the flight."""
     f = v.flight
     return mavlink.MAVLink_flight_information_message(
         v.boot_ms, f.armed_ns // 1000, f.takeoff_ns // 1000, f.number, f.landing_ns // 1_000_000

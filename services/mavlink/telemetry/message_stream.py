@@ -1,9 +1,9 @@
-"""How a message of the telemetry is declared: its name, its rates, and the function that builds it."""
+"""Declaration of telemetry messages: name, rates, builder."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from lapwing.services.mavlink.dialect import id_of
+from lapwing.services.common.mavlink.dialect import id_of
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 Builder = Callable[[VehicleCache], Any]  # the message, None while there is nothing to say, or a list of several
@@ -18,7 +18,7 @@ class Stream(NamedTuple):
     build: Builder
 
     def messages(self, vehicle: VehicleCache) -> list[Any]:
-        """What there is to say now."""
+        """Return the current messages."""
         found = self.build(vehicle)
         if found is None:
             return []

@@ -1,18 +1,18 @@
-"""Which flight modes there are, and which is flown (MAVLink guide, "Standard Modes Protocol")."""
+"""Available and current flight modes (MAVLink guide, "Standard Modes Protocol")."""
 
 import math
 from typing import Any
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.message_stream import on_request, stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 
 @stream("CURRENT_MODE", 0.5)
 def current_mode(v: VehicleCache) -> Any:
-    """The flight mode. The one that was asked for is not told apart from it."""
-    number = v.flavour.mode_number(v.status.mode)
-    standard = {mode.number: mode.standard for mode in v.flavour.MODES}
+    """Return the flight mode; the intended mode is the same."""
+    number = v.firmware.mode_number(v.status.mode)
+    standard = {mode.number: mode.standard for mode in v.firmware.MODES}
     return mavlink.MAVLink_current_mode_message(
         standard.get(number, mavlink.MAV_STANDARD_MODE_NON_STANDARD), number, number
     )
@@ -20,8 +20,8 @@ def current_mode(v: VehicleCache) -> Any:
 
 @on_request("AVAILABLE_MODES")
 def available_modes(v: VehicleCache, index: float) -> list[Any]:
-    """The mode of an index from 1, or all of them for 0."""
-    modes = v.flavour.MODES
+    """Return the mode of an index from 1, or all modes for 0."""
+    modes = v.firmware.MODES
     wanted = 0 if math.isnan(index) else round(index)
     messages = []
     for number, mode in enumerate(modes, start=1):

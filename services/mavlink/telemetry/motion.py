@@ -1,10 +1,10 @@
-"""Where the vehicle is, how it moves, how it is turned."""
+"""Position, velocity and attitude."""
 
 from typing import Any
 
 from lapwing.kernels import math
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import compass, saturated
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import compass, saturated
 from lapwing.services.mavlink.telemetry.external_sensors import indicated_airspeed
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
@@ -13,7 +13,7 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 @stream("ATTITUDE", 50.0)
 def attitude(v: VehicleCache) -> Any:
-    """Euler angles and body rates."""
+    """Return Euler angles and body rates."""
     if (m := v.estimate) is None:
         return None
     return mavlink.MAVLink_attitude_message(v.boot_ms, *m.angles, *m.omega_frd)
@@ -21,7 +21,7 @@ def attitude(v: VehicleCache) -> Any:
 
 @stream("ATTITUDE_QUATERNION", 50.0)
 def attitude_quaternion(v: VehicleCache) -> Any:
-    """The attitude without its singularity."""
+    """Return the attitude as a quaternion, and body rates."""
     if (m := v.estimate) is None:
         return None
     return mavlink.MAVLink_attitude_quaternion_message(v.boot_ms, *m.attitude, *m.omega_frd)
@@ -29,7 +29,7 @@ def attitude_quaternion(v: VehicleCache) -> Any:
 
 @stream("LOCAL_POSITION_NED", 50.0)
 def local_position(v: VehicleCache) -> Any:
-    """From home, north east down."""
+    """Return position and velocity in NED from the local origin."""
     if (m := v.estimate) is None:
         return None
     return mavlink.MAVLink_local_position_ned_message(v.boot_ms, *m.position_ned, *m.velocity_ned)
@@ -37,7 +37,7 @@ def local_position(v: VehicleCache) -> Any:
 
 @stream("GLOBAL_POSITION_INT", 50.0)
 def global_position(v: VehicleCache) -> Any:
-    """On the Earth."""
+    """Return the geographic position."""
     if (m := v.estimate) is None:
         return None
     latitude, longitude, altitude = m.geodetic
@@ -54,7 +54,7 @@ def global_position(v: VehicleCache) -> Any:
 
 @stream("VFR_HUD", 4.0)
 def hud(v: VehicleCache) -> Any:
-    """What a pilot's display shows."""
+    """Return the values of a head-up display."""
     if (m := v.estimate) is None:
         return None
     north, east, down = m.velocity_ned
@@ -74,7 +74,7 @@ def hud(v: VehicleCache) -> Any:
 
 @stream("ALTITUDE", 1.0)
 def altitude(v: VehicleCache) -> Any:
-    """Every altitude there is."""
+    """Return the altitudes above all references."""
     if (m := v.estimate) is None:
         return None
     above_sea, local, above_home = m.geodetic[2], -m.position_ned[2], m.position_world[2] - v.home_world[2]

@@ -1,11 +1,11 @@
-"""What the speed controllers (ESC) of the first four motors report."""
+"""Reports of the speed controllers (ESC) of the first four motors."""
 
 import math
 from typing import Any
 
 from lapwing.messages.topics import TRUTH
-from lapwing.services.mavlink.dialect import message_class
-from lapwing.services.mavlink.frames import saturated
+from lapwing.services.common.mavlink.dialect import message_class
+from lapwing.services.common.mavlink.frames import saturated
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -21,7 +21,7 @@ def _padded(values: Any, nothing: Any) -> list[Any]:
 
 @stream("ESC_STATUS", 1.0, 10.0)
 def esc_status(v: VehicleCache) -> Any:
-    """Rotor speed, voltage and current of each motor."""
+    """Return rotor speed, voltage and current of each motor."""
     truth = v.get(TRUTH)
     if truth is None or not truth.rotor_speed:
         return None
@@ -33,7 +33,7 @@ def esc_status(v: VehicleCache) -> Any:
 
 @stream("ESC_INFO", 1.0, 1.0)
 def esc_info(v: VehicleCache) -> Any:
-    """Which speed controllers are there, all without a fault."""
+    """Return the present speed controllers, all without a fault."""
     truth = v.get(TRUTH)
     if truth is None or not truth.rotor_speed:
         return None

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from lapwing.messages.topics import ESTIMATE
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -13,7 +13,7 @@ _GOOD, _BAD = 100, -1  # quality [%], -1: failed
 
 
 def _triangle(*variances: float) -> list[float]:
-    """A covariance of which only the first entries of the diagonal are known."""
+    """Return the upper triangle of a covariance with known first diagonal entries."""
     found = [math.nan] * 21
     for index, variance in zip(_DIAGONAL, variances, strict=False):
         found[index] = variance
@@ -22,7 +22,7 @@ def _triangle(*variances: float) -> list[float]:
 
 @stream("ODOMETRY", 0.0, 30.0)
 def odometry(v: VehicleCache) -> Any:
-    """Pose from body FRD to NED; velocity along NED, as PX4 sends it."""
+    """Return the pose of FRD in NED and the velocity in NED, as in PX4."""
     m, e = v.estimate, v.get(ESTIMATE)
     if m is None:
         return None

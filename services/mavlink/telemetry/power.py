@@ -4,8 +4,8 @@ import math
 from typing import Any
 
 from lapwing.messages.topics import ACTUATORS, BATTERY
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import saturated
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import saturated
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -22,7 +22,7 @@ _STATES = (
 
 
 def motor_fractions(v: VehicleCache) -> list[float]:
-    """Voltage of each motor as a fraction of its maximum, 0 to 1."""
+    """Return the voltage of each motor over its maximum, 0 to 1."""
     actuators = v.get(ACTUATORS)
     if actuators is None or v.description.max_voltage is None:
         return []
@@ -31,7 +31,7 @@ def motor_fractions(v: VehicleCache) -> list[float]:
 
 @stream("SERVO_OUTPUT_RAW", 5.0, 10.0)
 def servo_output(v: VehicleCache) -> Any:
-    """Motor commands as pulse widths."""
+    """Return the motor commands as pulse widths."""
     pulses = [round(PULSE_MIN + PULSE_SPAN * fraction) for fraction in motor_fractions(v)[:OUTPUTS]]
     if not pulses:
         return None
@@ -40,7 +40,7 @@ def servo_output(v: VehicleCache) -> Any:
 
 @stream("ACTUATOR_OUTPUT_STATUS", 0.0, 10.0)
 def actuator_outputs(v: VehicleCache) -> Any:
-    """Motor commands as pulse widths, up to 32 of them."""
+    """Return the motor commands as pulse widths, up to 32."""
     pulses = [PULSE_MIN + PULSE_SPAN * fraction for fraction in motor_fractions(v)[:ACTUATORS_MAX]]
     if not pulses:
         return None
@@ -50,13 +50,13 @@ def actuator_outputs(v: VehicleCache) -> Any:
 
 
 def remaining(battery: Any) -> int:
-    """Charge that is left [%], -1 for not known."""
+    """Return the remaining charge [%]; -1: unknown."""
     return saturated(100.0 * battery.percentage, 8, unknown=-1)
 
 
 @stream("BATTERY_STATUS", 0.5, 0.5)
 def battery_status(v: VehicleCache) -> Any:
-    """The battery, cell by cell."""
+    """Return the state of the battery, cell by cell."""
     b = v.get(BATTERY)
     if b is None:
         return None
@@ -80,7 +80,7 @@ def battery_status(v: VehicleCache) -> Any:
 
 
 def power(v: VehicleCache) -> tuple[int, int, int]:
-    """Voltage [mV], current [0.01 A] and remaining charge [%] for SYS_STATUS."""
+    """Return voltage [mV], current [0.01 A] and remaining charge [%] for SYS_STATUS."""
     b = v.get(BATTERY)
     if b is None or not math.isfinite(b.voltage):
         return 0xFFFF, -1, -1

@@ -1,12 +1,13 @@
-"""What the sensors read, or would read where the vehicle flies on the truth."""
+"""Sensor readings; ideal ones if the vehicle flies on the true state."""
 
 from typing import Any
 
 from lapwing.kernels import math
 from lapwing.messages import NavSatStatus
 from lapwing.messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import compass, saturated, swap_body
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import compass, saturated, swap_body
+from lapwing.services.mavlink.px4_facts import SATELLITES
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -16,37 +17,36 @@ FIX_TYPES = {  # by what the receiver says of itself
     NavSatStatus.STATUS_SBAS_FIX: mavlink.GPS_FIX_TYPE_DGPS,
     NavSatStatus.STATUS_GBAS_FIX: mavlink.GPS_FIX_TYPE_RTK_FIXED,
 }
-SATELLITES = 16  # that a fix is said to come from
 UNKNOWN_16 = 0xFFFF
 
 
 def good_imu(v: VehicleCache) -> bool:
-    """Whether the newest reading is one."""
+    """Return True if the newest reading is valid."""
     m = v.get(IMU)
     return m is not None and m.angular_velocity_covariance[0] >= 0.0
 
 
 def good_mag(v: VehicleCache) -> bool:
-    """Whether the newest reading is one."""
+    """Return True if the newest reading is valid."""
     m = v.get(MAG)
     return m is not None and math.isfinite(m.magnetic_field.x)
 
 
 def good_baro(v: VehicleCache) -> bool:
-    """Whether the newest reading is one."""
+    """Return True if the newest reading is valid."""
     m = v.get(BARO)
     return m is not None and math.isfinite(m.fluid_pressure)
 
 
 def good_gps(v: VehicleCache) -> bool:
-    """Whether there is a fix."""
+    """Return True if the receiver has a fix."""
     m = v.get(GPS)
     return m is not None and m.status.status >= NavSatStatus.STATUS_FIX
 
 
 @stream("HIGHRES_IMU", 1.5, 50.0)
 def highres_imu(v: VehicleCache) -> Any:
-    """Every inertial, magnetic and pressure reading; what is not there is 0 and not flagged."""
+    """Return the inertial, magnetic and pressure readings; absent ones are 0 and not flagged."""
     if not good_imu(v):
         return None
     m = v.get(IMU)
@@ -64,7 +64,7 @@ def highres_imu(v: VehicleCache) -> Any:
 
 @stream("SCALED_IMU")
 def scaled_imu(v: VehicleCache) -> Any:
-    """The inertial and magnetic readings in whole numbers."""
+    """Return the inertial and magnetic readings as integers."""
     if not good_imu(v):
         return None
     m = v.get(IMU)
@@ -80,7 +80,7 @@ def scaled_imu(v: VehicleCache) -> Any:
 
 @stream("SCALED_PRESSURE", 1.0, 5.0)
 def scaled_pressure(v: VehicleCache) -> Any:
-    """Air pressure."""
+    """Return the air pressure."""
     if not good_baro(v):
         return None
     pressure = v.get(BARO).fluid_pressure / HECTOPASCAL
@@ -89,7 +89,7 @@ def scaled_pressure(v: VehicleCache) -> Any:
 
 @stream("GPS_RAW_INT", 5.0)
 def gps_raw(v: VehicleCache) -> Any:
-    """The receiver's fix; where there is no receiver, the estimated position as a fix."""
+    """Return the receiver's fix; without a receiver, the estimated position."""
     if not v.description.sensors:
         return _estimated(v)
     fix, moving = v.get(GPS), v.get(GPS_VELOCITY)
@@ -135,5 +135,5 @@ def _fix(
 
 @stream("VIBRATION", 0.5, 0.5)
 def vibration(v: VehicleCache) -> Any:
-    """The model has no vibration; displays want to be told."""
+    """Return no vibration, which the model does not have but displays expect."""
     return mavlink.MAVLink_vibration_message(v.boot_us, 0.0, 0.0, 0.0, 0, 0, 0)

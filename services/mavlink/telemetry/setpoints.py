@@ -1,13 +1,13 @@
-"""What the controllers follow."""
+"""Setpoints of the controllers."""
 
 import math
 from typing import Any
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.messages.topics import ACTUATORS, SETPOINT
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
-from lapwing.services.mavlink.geo_coordinates import from_world, to_local
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
+from lapwing.services.common.mavlink.geo_coordinates import from_world, to_local
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -21,7 +21,7 @@ _YAW_BIT = 10  # of the type mask, after three of position, three of velocity, t
 
 
 def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:
-    """Type mask, world position [m], and velocity, acceleration, yaw and yaw rate in NED."""
+    """Return type mask, world position [m], and velocity, acceleration, yaw and yaw rate in NED."""
     position = tuple(setpoint.position)
     velocity, acceleration = swap_world(tuple(setpoint.velocity)), swap_world(tuple(setpoint.acceleration))
     turn = swap_yaw(setpoint.yaw), -setpoint.yaw_rate
@@ -33,7 +33,7 @@ def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:
 
 @stream("POSITION_TARGET_LOCAL_NED", 1.5, 10.0)
 def local_target(v: VehicleCache) -> Any:
-    """Position, velocity and acceleration that are followed; nothing while the motors are off."""
+    """Return the setpoint of position, velocity and acceleration. Return None while the motors are off."""
     setpoint = v.get(SETPOINT)
     if setpoint is None or not v.status.armed:
         return None
@@ -45,7 +45,7 @@ def local_target(v: VehicleCache) -> Any:
 
 @stream("POSITION_TARGET_GLOBAL_INT", 1.0, 10.0)
 def global_target(v: VehicleCache) -> Any:
-    """The same with the position on the Earth; nothing where there is no position to follow."""
+    """Return the setpoint with a geographic position. Return None without a position setpoint."""
     setpoint = v.get(SETPOINT)
     if setpoint is None or not v.status.armed or not all(map(math.isfinite, setpoint.position)):
         return None
@@ -64,7 +64,7 @@ def global_target(v: VehicleCache) -> Any:
 
 @stream("ATTITUDE_TARGET", 2.0, 10.0)
 def attitude_target(v: VehicleCache) -> Any:
-    """Attitude that the inner loops follow, and collective thrust as a fraction; body rates are not told."""
+    """Return the attitude setpoint and collective thrust as a fraction, without body rates."""
     actuators = v.get(ACTUATORS)
     if actuators is None or not v.status.armed:
         return None

@@ -1,11 +1,11 @@
-"""What the vehicle is doing, and whether it is well."""
+"""Mode, health and clocks of the vehicle."""
 
 import time
 from collections.abc import Iterator
 from typing import Any
 
 from lapwing.messages.topics import ESTIMATE
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.external_sensors import good_airspeed, good_distance, good_flow
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import power
@@ -52,7 +52,7 @@ _BETWEEN = {  # ground and air, by the mode or the item of a mission
 
 @stream("HEARTBEAT", 1.0)
 def heartbeat(v: VehicleCache) -> Any:
-    """I am here, in this mode."""
+    """Return the heartbeat with the current mode."""
     s = v.status
     base = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | mavlink.MAV_MODE_FLAG_STABILIZE_ENABLED
     if s.armed:
@@ -67,24 +67,24 @@ def heartbeat(v: VehicleCache) -> Any:
     if s.failsafe:
         state = mavlink.MAV_STATE_CRITICAL
     return mavlink.MAVLink_heartbeat_message(
-        vehicle_type(len(v.description.rotors)), v.flavour.AUTOPILOT, base, v.flavour.mode_number(s.mode), state, 3
+        vehicle_type(len(v.description.rotors)), v.firmware.AUTOPILOT, base, v.firmware.mode_number(s.mode), state, 3
     )
 
 
 def healthy(v: VehicleCache) -> bool:
-    """Whether the estimate is to be trusted."""
+    """Return True if the estimate is valid."""
     e = v.get(ESTIMATE)
     return e is not None and e.health_flags == 0
 
 
 def _refused(v: VehicleCache, source: str) -> bool:
-    """Whether the estimator has no use for the newest reading of a sensor, or has got none."""
+    """Return True if the estimator rejected the newest reading of a sensor or has received none."""
     e = v.get(ESTIMATE)
     return e is not None and source in e.rejected_sources
 
 
 def sensor_health(v: VehicleCache) -> Iterator[tuple[str, int, bool]]:
-    """Each sensor that is there or that the true state stands for: its name, its bits of SYS_STATUS, if it is sound."""
+    """Yield name, SYS_STATUS bits and validity of each sensor, or of the true state in its place."""
     for bits, (good, source) in _SENSORS.items():
         yield source, bits, good(v) and not _refused(v, source) if v.description.sensors else healthy(v)
     for sensors, (bit, good, source) in _OPTIONAL.items():
@@ -94,7 +94,7 @@ def sensor_health(v: VehicleCache) -> Iterator[tuple[str, int, bool]]:
 
 @stream("SYS_STATUS", 1.0, 5.0)
 def sys_status(v: VehicleCache) -> Any:
-    """Which sensors are there and sound, whether it may be armed, and the battery."""
+    """Return presence and health of the sensors, arming permission, and battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
     sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
@@ -110,7 +110,7 @@ def sys_status(v: VehicleCache) -> Any:
 
 @stream("EXTENDED_SYS_STATE", 1.0, 5.0)
 def extended_state(v: VehicleCache) -> Any:
-    """On the ground, in the air, or between."""
+    """Return the landed state: on the ground, in the air, taking off or landing."""
     s = v.status
     if s.landed:
         state = mavlink.MAV_LANDED_STATE_ON_GROUND
@@ -123,7 +123,7 @@ def extended_state(v: VehicleCache) -> Any:
 
 @stream("MISSION_CURRENT", 1.0)
 def mission_current(v: VehicleCache) -> Any:
-    """How far the mission is."""
+    """Return the progress of the mission."""
     s = v.status
     item = 0 if s.mission_current == NONE else s.mission_current
     flying = 1 if s.mode == "mission" else 2
@@ -132,18 +132,18 @@ def mission_current(v: VehicleCache) -> Any:
 
 @stream("SYSTEM_TIME", 1.0)
 def system_time(v: VehicleCache) -> Any:
-    """Time of day, and since the start."""
+    """Return the time of day and the time since the start."""
     return mavlink.MAVLink_system_time_message(time.time_ns() // 1000, v.boot_ms)
 
 
 @stream("TIMESYNC", 10.0)
 def timesync(v: VehicleCache) -> Any:
-    """What is your clock?"""
+    """Return a request of the endpoint's clock."""
     return mavlink.MAVLink_timesync_message(0, v.time_ns)
 
 
 @stream("EKF_STATUS_REPORT")
 def ekf_status(v: VehicleCache) -> Any:
-    """ArduPilot's word for a sound estimate."""
+    """Return ArduPilot's status of a valid estimate."""
     # attitude, velocities, absolute and relative positions: bits 0 to 5 and 8, 9 of EKF_STATUS_FLAGS
     return mavlink.MAVLink_ekf_status_report_message(0x33F if healthy(v) else 0, *(0.0,) * 5)

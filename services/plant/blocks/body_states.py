@@ -17,7 +17,7 @@ from lapwing.services.common.ports import BodyMotions, PerRotor
 
 
 class FiveBodiesView(NamedTuple):
-    """The vehicle whose bodies are told."""
+    """The vehicle with the bodies."""
 
     vehicle: MultirotorParameters
     interval: float  # [s] a tick
@@ -25,7 +25,7 @@ class FiveBodiesView(NamedTuple):
 
 
 def on_se3(x: Any) -> FiveBodies:
-    """The bodies' poses, in whichever coordinates they are."""
+    """Return the bodies' poses on SE(3), from any coordinates."""
     raise NotImplementedError("compiled code only")
 
 
@@ -38,7 +38,7 @@ def _on_se3(x: types.Type) -> Callable:
 
 @always_inline
 def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
-    """The motions of the bodies at `tick`, the forces and torques of their hinges under the command of the tick."""
+    """Output the motions of the bodies at `tick`, and the loads of their hinges under the command of the tick."""
     actuators = inputs[0]
     command = actuators.value.motor_voltage if actuators.due else p.off
     g, memory = p.vehicle, s.vehicle.memory

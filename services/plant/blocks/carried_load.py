@@ -33,7 +33,7 @@ class LoadMotion(NamedTuple):
 
 
 class LoadDrive(NamedTuple):
-    """What holds the load over an exchange interval."""
+    """Forces on the load over a communication step."""
 
     load: LoadPlant
     carriers: tuple[NeighbourState, ...]  # at its beginning
@@ -42,7 +42,7 @@ class LoadDrive(NamedTuple):
 
 @always_inline
 def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
-    """Force [N] of a cable on its hook, which goes on as it was accelerated at the beginning of the interval."""
+    """Return the force [N] of a cable on its hook, whose acceleration is constant over the step."""
     x, ahead = c
     velocity = add(carrier.hook_velocity, scale(ahead, carrier.hook_acceleration))
     way = scale(ahead, add(carrier.hook_velocity, scale(0.5 * ahead, carrier.hook_acceleration)))
@@ -53,7 +53,7 @@ def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
 
 @always_inline
 def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
-    """Force [N] of the load on all cables together, at time t [s]."""
+    """Return the force [N] of the load on all cables at time t [s]."""
     total = (0.0, 0.0, 0.0)
     for force in map_tuple(_pull, (x, t - p.start), p.load.slings, p.carriers):
         total = add(total, force)
@@ -62,7 +62,7 @@ def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
 
 @always_inline
 def rate(p: LoadDrive, t: float, x: LoadMotion) -> LoadMotion:
-    """Tangent of the load (theory.md, eq. (1.23))."""
+    """Return the tangent of the load (theory.md, eq. (1.23))."""
     air = Air(p.carriers[0].air_density, p.carriers[0].wind_world)
     return LoadMotion(x.load_velocity, load_acceleration(p.load.slings[0], p.load.field, air, pulls(p, t, x), x))
 
@@ -79,7 +79,7 @@ def _presence(_: float, received: InputSample, same: InputSample) -> NeighbourSt
 def step(
     p: LoadPlant, s: LoadMotion, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[LoadMotion, tuple[NeighbourState, BodyMotions], int]:
-    """The load at `tick`, given where its carriers were a tick ago; and the force of the cables on it."""
+    """Advance the load to `tick` from its carriers' states of the previous tick; output it with the cables' force."""
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
         drive = LoadDrive(p, map_tuple(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)

@@ -12,7 +12,7 @@ from lapwing.services.common.ports import ContactForces
 
 
 class ContactView(NamedTuple):
-    """The vehicle whose feet are told of."""
+    """The vehicle with the feet."""
 
     vehicle: MultirotorParameters
 
@@ -29,7 +29,7 @@ def _force(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
 
 @always_inline
 def step(p: ContactView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[ContactForces], int]:
-    """Where each point of the vehicle is at `tick`, and what the ground does to it."""
+    """Output position and ground force of each contact point at `tick`."""
     vehicle, state = p.vehicle, s.vehicle
     pushes = hooks.all_contact_forces(vehicle.effects, state.memory, seen(vehicle.layout, state.motion))
     return s, (ContactForces(map_tuple(_place, 0.0, pushes, pushes), map_tuple(_force, 0.0, pushes, pushes)),), CONTINUE

@@ -17,7 +17,7 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_index
 from lapwing.kernels.state_tree import finite
 from lapwing.services.common.ports import BodyMotions, RotorWrenches, TrueState
-from lapwing.services.plant.blocks.termination import signal
+from lapwing.services.plant.blocks.termination import termination_status
 
 
 class CooperativePlant(NamedTuple):
@@ -41,7 +41,7 @@ def _zero(values: tuple, i: int) -> Vec3:
 def step(
     p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CooperativeLoadState, tuple[TrueState, BodyMotions], int]:
-    """March to `tick` under the command given; the load tells of the vehicle's own motion."""
+    """Integrate to `tick` under the received command; the load represents the vehicle's own motion."""
     g = p.formation
     lift = inputs[0].value if inputs[0].due else p.off
     g = CooperativeLoadParameters(
@@ -62,4 +62,4 @@ def step(
         (ZERO,) + nothing,  # noqa: RUF005
         (ZERO,) + nothing,  # noqa: RUF005
     )
-    return x, (truth, bodies), signal(tick, p.last, finite(x))
+    return x, (truth, bodies), termination_status(tick, p.last, finite(x))

@@ -8,14 +8,14 @@ from lapwing.dynamics.effects.payload_release import RELEASED, PayloadRelease
 from lapwing.kernels.codegen import compile_source, overload_for
 
 
-def let_go(effects: tuple, memory: tuple) -> tuple:
-    """The effects' memory after the payload was let go; the same where no effect is a payload."""
+def release_payload(effects: tuple, memory: tuple) -> tuple:
+    """Return the effects' discrete state after the release of the payload; unchanged without a payload."""
     raise NotImplementedError("compiled code only")
 
 
-@overload_for(let_go, inline=True)
+@overload_for(release_payload, inline=True)
 def _let_go(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
     carried = [getattr(kind, "instance_class", None) is PayloadRelease for kind in effects]
     parts = "".join("gone, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
     body = f"return ({parts})" if any(carried) else "return memory"
-    return compile_source("let_go(effects, memory)", {"gone": RELEASED}, body)
+    return compile_source("release_payload(effects, memory)", {"gone": RELEASED}, body)

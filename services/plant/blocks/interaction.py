@@ -1,4 +1,4 @@
-"""What the other vehicles of a fleet do to a multirotor, before it steps."""
+"""Effect of the other vehicles of a fleet on a multirotor, before it steps."""
 
 from typing import Any, NamedTuple
 
@@ -24,7 +24,7 @@ def _presence(inputs: tuple[InputSample, ...], i: int) -> NeighbourState:
 
 @always_inline
 def step(p: Interaction, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
-    """The plant's state with what its effects make of the vehicles around, itself the first, a tick ago."""
+    """Update the plant's effects with the neighbours' states of the previous tick, its own state first."""
     vehicle = s.vehicle
     if inputs[0].due:
         others = map_index(_presence, inputs[1:], inputs[1:])

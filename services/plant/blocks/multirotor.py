@@ -10,8 +10,8 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters,
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import finite
 from lapwing.services.common.ports import BatteryReading, PerRotor, TrueState
-from lapwing.services.plant.blocks.gripper import let_go
-from lapwing.services.plant.blocks.termination import signal
+from lapwing.services.plant.blocks.gripper import release_payload
+from lapwing.services.plant.blocks.termination import termination_status
 
 for _name in effects.names():
     effects.get(_name)  # registers its hooks: a set-up names an effect by the class of its parameters alone
@@ -31,7 +31,7 @@ class MultirotorPlant(NamedTuple):
 
 
 class MultirotorPlantState(NamedTuple):
-    """What the plant remembers."""
+    """State of the block."""
 
     vehicle: MultirotorState
     last: int  # tick of the run
@@ -46,7 +46,7 @@ def step(
     command = actuators.value.motor_voltage if actuators.due else p.off
     vehicle = s.vehicle
     if status.due and status.value.released:
-        vehicle = MultirotorState(vehicle.motion, let_go(p.vehicle.effects, vehicle.memory))
+        vehicle = MultirotorState(vehicle.motion, release_payload(p.vehicle.effects, vehicle.memory))
     if tick > 0:
         vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
     motion = seen(p.vehicle.layout, vehicle.motion)
@@ -59,4 +59,4 @@ def step(
     )  # fmt: skip
     gauge = BatteryReading(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
     sound = finite(vehicle.motion)
-    return MultirotorPlantState(vehicle, last), (truth, gauge), signal(tick, last, sound)
+    return MultirotorPlantState(vehicle, last), (truth, gauge), termination_status(tick, last, sound)

@@ -1,4 +1,4 @@
-"""What the other vehicles of a fleet may know of a multirotor, after it has stepped."""
+"""State of a multirotor for the other vehicles of a fleet, after it has stepped."""
 
 from typing import Any, NamedTuple
 
@@ -8,13 +8,14 @@ from lapwing.dynamics.effects._axes import in_world, thrust_wrench
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.vector import add, apply, cross
+from lapwing.dynamics.vector import ZERO, Mat3, add, apply, cross
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters
+from lapwing.dynamics.vehicles.newton_euler import angular_acceleration
 from lapwing.kernels import always_inline
 
 
 class PresenceView(NamedTuple):
-    """The vehicle that is told of."""
+    """The vehicle with this state."""
 
     vehicle: MultirotorParameters
     like: NeighbourState  # with the numbers that do not change
@@ -22,8 +23,17 @@ class PresenceView(NamedTuple):
 
 
 @always_inline
+def _inverse_inertia_world(body: Any, R: Mat3) -> Mat3:
+    """Return the inverse inertia [1/(kg m^2)] along the world's axes, row by row: it is symmetric."""
+    x = apply(R, angular_acceleration(body, ZERO, (R[0], R[1], R[2])))
+    y = apply(R, angular_acceleration(body, ZERO, (R[3], R[4], R[5])))
+    z = apply(R, angular_acceleration(body, ZERO, (R[6], R[7], R[8])))
+    return (x[0], x[1], x[2], y[0], y[1], y[2], z[0], z[1], z[2])
+
+
+@always_inline
 def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[NeighbourState], int]:
-    """The presence at `tick`, by the truth of that tick."""
+    """Output the neighbour state at `tick` from the true state."""
     truth, vehicle = inputs[0].value, p.vehicle
     body = hooks.all_mass_properties(vehicle.effects, s.vehicle.memory, vehicle.body)
     thrust, _ = thrust_wrench(vehicle.layout, Loads(truth.rotor_thrust, truth.rotor_torque))
@@ -35,5 +45,6 @@ def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) ->
         p.like.radius, p.like.restitution, p.like.disc_radius,
         hook, add(truth.position_world, apply(R, hook)), add(truth.velocity_world, apply(R, turning)),
         add(truth.acceleration_world, apply(R, swinging)), truth.wind_world, tick * p.interval, False,
+        p.like.friction, apply(R, omega), _inverse_inertia_world(body, R),
     )  # fmt: skip
     return s, (told,), CONTINUE

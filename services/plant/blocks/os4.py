@@ -1,16 +1,16 @@
-"""What is told of the OS4 quadrotor: its motion and what its rotors do."""
+"""Output of the OS4 quadrotor: motion and rotors."""
 
 from lapwing.dynamics.integrators import rate
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
 from lapwing.kernels import always_inline
 from lapwing.services.common.ports import TrueState
-from lapwing.services.plant.blocks.uncontrolled import TOLD
+from lapwing.services.plant.blocks.uncontrolled import OUTPUT_FUNCTIONS
 
 
 @always_inline
-def told(p: Os4Parameters, t: float, x: Os4State) -> tuple[TrueState]:
-    """The state, its acceleration, thrusts and torques of the rotors."""
+def outputs_of(p: Os4Parameters, t: float, x: Os4State) -> tuple[TrueState]:
+    """Return the true state with acceleration, rotor thrusts and torques."""
     a, b, c, d = x.rotor_speed
     k, m = p.lift_constant, p.drag_constant
     return (
@@ -23,4 +23,4 @@ def told(p: Os4Parameters, t: float, x: Os4State) -> tuple[TrueState]:
     )  # fmt: skip
 
 
-TOLD[Os4Parameters] = told
+OUTPUT_FUNCTIONS[Os4Parameters] = outputs_of

@@ -11,14 +11,14 @@ from lapwing.services.common.ports import BodyMotions
 
 
 class SlungLoadView(NamedTuple):
-    """The vehicle whose load is told."""
+    """The vehicle that carries the load."""
 
     layout: RotorLayout
 
 
 @always_inline
 def step(p: SlungLoadView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
-    """The motion of the load at `tick`, a point that does not turn, and the force of the cable on it."""
+    """Output the motion of the load at `tick`, a point without rotation, and the force of the cable on it."""
     x, zero = s.vehicle.motion, ((0.0, 0.0, 0.0),)
     force = (cable_force(p.layout, x),)
     return s, (BodyMotions((x.load_position,), (NO_ROTATION,), (x.load_velocity,), zero, force, zero),), CONTINUE

@@ -1,12 +1,12 @@
-"""How a run ends: at its duration, a while after the mission, or because the numbers do."""
+"""End of a run: duration, mission end plus stop delay, or a non-finite state."""
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE
 from lapwing.kernels import always_inline
 
 
 @always_inline
-def signal(tick: int, last: int, sound: bool) -> int:
-    """The plant's signal at `tick` of a run whose last tick is `last`."""
+def termination_status(tick: int, last: int, sound: bool) -> int:
+    """Return the plant's step status at `tick` of a run with last tick `last`."""
     if not sound:
         return NON_FINITE
     return FINISHED if tick >= last else CONTINUE

@@ -1,4 +1,4 @@
-"""A plant that nobody commands: a system of lapwing/dynamics/vehicles that any integrator marches from tick to tick."""
+"""A plant without commands: a system of lapwing/dynamics/vehicles that any integrator advances from tick to tick."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -10,7 +10,7 @@ from lapwing.dynamics.integrators import StepDoubling, integrate_fixed, integrat
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import overload_for
 from lapwing.kernels.state_tree import finite
-from lapwing.services.plant.blocks.termination import signal
+from lapwing.services.plant.blocks.termination import termination_status
 
 
 class AutonomousPlant(NamedTuple):
@@ -24,18 +24,18 @@ class AutonomousPlant(NamedTuple):
     last: int  # tick of the run
 
 
-def told(p: Any, t: float, x: Any) -> tuple:
-    """What is told of the state x at time t [s]: a tuple of port values, chosen by the class of the parameters p."""
+def outputs_of(p: Any, t: float, x: Any) -> tuple:
+    """Return the port values of state x at time t [s], by the class of the parameters p."""
     raise NotImplementedError("compiled code only")
 
 
-TOLD = DispatchTable()
-"""The compiled function of `told` by the class of a system's parameters."""
+OUTPUT_FUNCTIONS = DispatchTable()
+"""The compiled function of `outputs_of` by the class of a system's parameters."""
 
 
-@overload_for(told, inline=True)
-def _told(p: types.Type, t: types.Type, x: types.Type) -> Any:
-    return TOLD[p.instance_class]
+@overload_for(outputs_of, inline=True)
+def _outputs_by(p: types.Type, t: types.Type, x: types.Type) -> Any:
+    return OUTPUT_FUNCTIONS[p.instance_class]
 
 
 def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
@@ -51,8 +51,8 @@ def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type)
 
 @always_inline
 def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple, int]:
-    """March to `tick`; at tick 0 leave the system where it is."""
+    """Integrate to `tick`; tick 0 is the initial state."""
     x = s
     if tick > 0:
         x = _marched(p.method, p, (tick - 1) * p.interval, x)
-    return x, told(p.system, tick * p.interval, x), signal(tick, p.last, finite(x))
+    return x, outputs_of(p.system, tick * p.interval, x), termination_status(tick, p.last, finite(x))

@@ -1,15 +1,15 @@
-"""What is told of the crate that unloads its pack: the motion of the pack."""
+"""Output of the crate that unloads its pack: the motion of the pack."""
 
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
 from lapwing.kernels import always_inline
 from lapwing.services.common.ports import TrueState
-from lapwing.services.plant.blocks.uncontrolled import TOLD
+from lapwing.services.plant.blocks.uncontrolled import OUTPUT_FUNCTIONS
 
 
 @always_inline
-def told(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState]:
-    """The pack's motion."""
+def outputs_of(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState]:
+    """Return the pack's motion."""
     return (
         TrueState(
             x.position_world,
@@ -31,4 +31,4 @@ def told(p: UnloadingParameters, t: float, x: UnloadingState) -> tuple[TrueState
     )
 
 
-TOLD[UnloadingParameters] = told
+OUTPUT_FUNCTIONS[UnloadingParameters] = outputs_of

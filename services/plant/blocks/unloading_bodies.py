@@ -14,7 +14,7 @@ NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(unloading_contact_poi
 
 
 class UnloadingView(NamedTuple):
-    """The crate whose bodies are told."""
+    """The crate with the bodies."""
 
     carrier: UnloadingParameters
     interval: float  # [s] a tick
@@ -22,7 +22,7 @@ class UnloadingView(NamedTuple):
 
 @always_inline
 def _roller(p: UnloadingParameters, i: int) -> Vec3:
-    """Place of the axis of a roller [m]."""
+    """Return the position of a roller's axis [m]."""
     forward = (math.cos(p.tilt), 0.0, -math.sin(p.tilt))
     upward = (math.sin(p.tilt), 0.0, math.cos(p.tilt))
     behind = scale(-(i + 0.5) * p.roller_spacing, forward)
@@ -31,7 +31,7 @@ def _roller(p: UnloadingParameters, i: int) -> Vec3:
 
 @always_inline
 def _on_roller(rollers: tuple[Vec3, ...], i: int) -> Vec3:
-    """Force of the pack on a roller [N]."""
+    """Return the force of the pack on a roller [N]."""
     return scale(-1.0, add(add(ZERO, rollers[2 * i]), rollers[2 * i + 1]))
 
 
@@ -39,7 +39,7 @@ def _on_roller(rollers: tuple[Vec3, ...], i: int) -> Vec3:
 def step(
     p: UnloadingView, s: UnloadingState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[UnloadingState, tuple[BodyMotions], int]:
-    """The motions of the bodies at `tick`; the door lies along z of its frame."""
+    """Output the motions of the bodies at `tick`; the door lies along z of its frame."""
     c, t = p.carrier, tick * p.interval
     rollers, door, ground, walls = unloading.forces_on_pack(c, t, s)
     on_pack = ZERO

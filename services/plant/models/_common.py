@@ -27,23 +27,23 @@ from lapwing.services.plant.service_config import PlantSetup
 
 
 def last_tick(scene: Scene) -> int:
-    """The tick at which the run ends at the latest."""
+    """Return the last possible tick of the run."""
     return round(scene[Run].duration * scene[Communication].rate)
 
 
 def rate_ticks(scene: Scene, key: str) -> int:
-    """Ticks between messages of a rate of the table `rates`."""
+    """Return the ticks between messages for a key of the table `rates`."""
     return ticks(scene, min(getattr(scene[Rates], key), scene[Communication].rate), f"rates.{key}")
 
 
 def wiring(scene: Scene, odometry: bool = False, battery: Any = None, bodies: tuple[str, ...] = ()) -> PlantWiring:
-    """What the plant's messages say besides its state."""
+    """Return the contents of the plant's messages besides its state."""
     cells, capacity = (battery.cells, battery.capacity) if battery else (0, math.nan)
     return PlantWiring(rate_ticks(scene, "pose"), odometry, cells, capacity, bodies)
 
 
 def bodies_port(scene: Scene, n: int) -> Port:
-    """The port of n single bodies."""
+    """Return the port of n bodies."""
     zero = (ZERO,) * n
     return Port(
         ports.BODIES, BodyMotions(zero, (NO_ROTATION,) * n, zero, zero, zero, zero), rate_ticks(scene, "body_states")
@@ -51,14 +51,14 @@ def bodies_port(scene: Scene, n: int) -> Port:
 
 
 def needs(scene: Scene, *tables: str) -> None:
-    """KeyedError if a scene lacks one of these optional tables."""
+    """Raise ConfigError if a scene lacks one of these optional tables."""
     for name in tables:
         if not scene.has(name):
             raise ConfigError(name, "missing", f"a table [{name}], which the model {scene[Vehicle].model} needs")
 
 
 def can_have(scene: Scene, *tables: str) -> None:
-    """ConfigError if a scene has a table that means nothing to its model, which knows only `tables` of these."""
+    """Raise ConfigError if a scene has a model-dependent table other than `tables`."""
     for name in sorted({"effects", "sensors", "autopilot", "trajectory"}.difference(tables)):
         if scene.has(name) and (scene.section(name).OPTIONAL or scene.tables(name)):
             raise ConfigError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
@@ -73,32 +73,32 @@ def autonomous(
     names: tuple[str, ...] = (),
     controlled: bool = False,
 ) -> ServiceConfig:
-    """A plant that nobody commands.
+    """Return the configuration of a plant without commands.
 
     Args:
-        scene: what to fly.
+        scene: resolved scene.
         p: parameters of the system.
         start: its state at tick 0.
-        told: the shape of what is told of it.
-        bodies: parameters of the part that tells of single bodies, None without it.
-        names: the bodies.
-        controlled: whether the error of every step is controlled, for systems with contacts.
+        told: prototype of its output.
+        bodies: parameters of the block of its bodies, or None.
+        names: names of the bodies.
+        controlled: control the error of each step, for systems with contacts.
     """
     how, steps, step = method(scene)
     if controlled:
-        how = integrators.StepDoubling(how, scene[Solver].contact_tolerance)
+        how = integrators.StepDoubling(how, scene[Solver].part_tolerance)
     core = AutonomousPlant(p, how, steps, step, scene[Communication].interval, last_tick(scene))
     given = (Port(ports.TRUTH, told), *([bodies_port(scene, len(names))] if bodies else []))
     return ServiceConfig(PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), given)
 
 
 def noise_key(seed: int, vehicle: str) -> Key:
-    """The key of the plant's random numbers."""
+    """Return the key of the plant's random numbers."""
     return stream_key(seed, vehicle, "plant")
 
 
 def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
-    """A multirotor with parameters p whose states the module `form` makes."""
+    """Return the configuration of a multirotor with parameters p and the state form of module `form`."""
     exchange, frame = scene[Communication], airframe(scene)
     n = (0.0,) * len(frame.rotors.position)
     how, steps, step = method(scene)
@@ -117,10 +117,10 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
 
 
 def check_system(scene: Scene, p: Any, start: Any) -> None:
-    """Refuse a start that is not sound, and an integrator that is not for such a state.
+    """Check the initial state and the integrator.
 
     Raises:
-        KeyedError: of the model's table, or of `solver.integrator`.
+        ConfigError: the initial state is invalid, or the integrator does not support such states.
     """
     model = scene[Vehicle].model
     try:
@@ -131,7 +131,7 @@ def check_system(scene: Scene, p: Any, start: Any) -> None:
 
 
 def check_integrator(scene: Scene, p: Any, start: Any) -> None:
-    """ConfigError of `solver.integrator` if it is not for a system with parameters p and such states."""
+    """Raise ConfigError if the integrator does not support parameters p and such states."""
     name, model = scene[Solver].integrator, scene[Vehicle].model
     if why := integrators.incompatibility(name, p, start):
         others = ", ".join(integrators.compatible_methods(p, start))

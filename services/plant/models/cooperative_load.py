@@ -21,7 +21,7 @@ LOAD = "load"
 
 
 def check(scene: Scene) -> None:
-    """The formation is described, somebody controls it and gets its state at every tick."""
+    """Check that the scene describes the formation and controls it at every tick."""
     needs(scene, "cooperative_load", "formation")
     can_have(scene)
     rate = scene[Communication].rate
@@ -32,7 +32,7 @@ def check(scene: Scene) -> None:
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of the formation."""
+    """Return the configuration of the formation's plant."""
     p, start = system(scene)
     n = len(p.link_length)
     off = RotorWrenches((0.0,) * n, (ZERO,) * n)
@@ -44,7 +44,7 @@ def resolve(scene: Scene) -> ServiceConfig:
 
 
 def system(scene: Scene) -> tuple[CooperativeLoadParameters, CooperativeLoadState]:
-    """(parameters with the rotors off, state at the start)."""
+    """Return the parameters with the rotors off, and the initial state."""
     c = scene[CooperativeLoad]
     n = len(c.link_length)
     off = LiftCommand((0.0,) * n, (NOTHING,) * n)

@@ -42,19 +42,19 @@ class Gyrostat(SceneTable):
 
 
 def check(scene: Scene) -> None:
-    """The satellite is described, with sound numbers, and nothing asks of it what it cannot do."""
+    """Check that the scene describes a valid satellite and has no table that it cannot use."""
     needs(scene, "gyrostat")
     can_have(scene)
     check_system(scene, *system(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of the satellite."""
+    """Return the configuration of the satellite's plant."""
     return autonomous(scene, *system(scene), TrueState())
 
 
 def system(scene: Scene) -> tuple[GyrostatParameters, RigidBody]:
-    """(parameters, state at the start)."""
+    """Return the parameters and the initial state."""
     g = scene[Gyrostat]
     for axis, moment in zip("xyz", g.inertia, strict=True):
         if not moment > 0.0:

@@ -25,7 +25,7 @@ FORM = {"se3": multirotor_multibody, "euler": multirotor_euler}
 
 
 class Event(BaseModel):
-    """What becomes of a propeller in flight, at the first tick that is not before `time`."""
+    """Failure of a propeller in flight, at the first tick not before `time`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     time: float = Field(ge=0.0)  # [s]
@@ -34,17 +34,17 @@ class Event(BaseModel):
 
 
 class Multibody(SceneTable):
-    """How the five bodies are described, held together and driven (theory.md, chapter 8), and what breaks in flight."""
+    """Formulation of the five bodies, their constraints, drives and failures (theory.md, chapter 8)."""
 
     TABLE: ClassVar[str] = "multibody"
     OPTIONAL: ClassVar[bool] = True
     coordinates: Literal["se3", "euler"] = "se3"  # a pose in SE(3) for each body, or positions and Euler angles
     stabilisation: Literal["projection", "partitioning", "baumgarte", "none"] = "projection"  # of constraints
-    drive: Literal["torque", "speed"] = "torque"  # motors give a torque, or prescribe the rotor speed
+    drive: Literal["torque", "speed"] = "torque"  # motors apply a torque, or prescribe the rotor speed
     event: Annotated[tuple[Event, ...], Field(strict=False)] = ()  # what becomes of propellers in flight
 
     def check(self, scene: Scene) -> None:
-        """The scene has bodies to describe, and time for the events, of which none follows on the loss of its part."""
+        """Check that the model has five bodies, and that no event affects a lost part or lies after the run."""
         if scene[Vehicle].model != "multibody":
             raise ConfigError(
                 "multibody", f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "multibody"'
@@ -67,7 +67,7 @@ def _settings(scene: Scene) -> Multibody:
 
 
 def check(scene: Scene) -> None:
-    """As of the reduced model; the airframe tells of single rotors, which turn little in a step."""
+    """Check the rigid-body model's needs, single rotors in the airframe, and a step short enough for them."""
     rigid_body.check(scene)
     try:
         multirotor_multibody.drone_of(airframe(scene))
@@ -79,13 +79,13 @@ def check(scene: Scene) -> None:
 
 
 def longest_step(scene: Scene) -> float:
-    """The step [s] in which no propeller turns further than LARGEST_TURN."""
+    """Return the step [s] in which no propeller turns further than LARGEST_TURN."""
     motor = airframe(scene).motor
     return LARGEST_TURN * motor.rotor_constant / motor.max_voltage
 
 
 def described(scene: Scene) -> tuple[ModuleType, Any]:
-    """As `rigid_body.described`."""
+    """Return the module of the state form, and the parameters."""
     s = _settings(scene)
     form = FORM[s.coordinates]
     return form, form.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
@@ -96,14 +96,14 @@ def _tick(scene: Scene, time: float) -> int:
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of a multirotor of five bodies, and what breaks in flight."""
+    """Return the configuration of a multirotor of five bodies, with its failures."""
     form, p = described(scene)
-    found = multirotor_plant(scene, form, p)
+    result = multirotor_plant(scene, form, p)
     events = tuple(
         PlantEvent(_tick(scene, event.time), event.propeller - 1, event.failure)
         for event in sorted(_settings(scene).event, key=lambda event: event.time)
     )
-    plant = found.parameters
+    plant = result.parameters
     view = FiveBodiesView(p, plant.core.interval, plant.core.off)
     parameters = plant._replace(
         model="multibody",
@@ -112,4 +112,4 @@ def resolve(scene: Scene) -> ServiceConfig:
         euler=form is multirotor_euler,
         wiring=plant.wiring._replace(bodies=NAMES),
     )
-    return found._replace(parameters=parameters, ports=(*found.ports, bodies_port(scene, len(NAMES))))
+    return result._replace(parameters=parameters, ports=(*result.ports, bodies_port(scene, len(NAMES))))

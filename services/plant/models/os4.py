@@ -1,4 +1,4 @@
-"""The OS4 quadrotor with rotors at given speeds, or turned by motors at given voltages: nobody steers it."""
+"""The OS4 quadrotor with rotors at given speeds, or driven by motors at given voltages; it has no autopilot."""
 
 import math
 from typing import ClassVar
@@ -45,20 +45,20 @@ class Os4(SceneTable):
 
 
 def check(scene: Scene) -> None:
-    """The quadrotor is described, and nothing asks of it what it cannot do."""
+    """Check that the scene describes the quadrotor and has no table that it cannot use."""
     needs(scene, "os4")
     can_have(scene)
     check_system(scene, *system(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of the quadrotor."""
+    """Return the configuration of the quadrotor's plant."""
     four = (0.0,) * 4
     return autonomous(scene, *system(scene), TrueState(rotor_speed=four, rotor_thrust=four, rotor_torque=four))
 
 
 def system(scene: Scene) -> tuple[Os4Parameters, Os4State]:
-    """(parameters, state at the start)."""
+    """Return the parameters and the initial state."""
     q = scene[Os4]
     motors = Os4Motors(q.motors.voltage, q.motors.constant, q.motors.resistance) if q.motors else None
     p = Os4Parameters(

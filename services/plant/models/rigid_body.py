@@ -6,25 +6,26 @@ from typing import Any
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.vehicles import multirotor
+from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.vehicle_schema import active, airframe
 from lapwing.services.plant.models._common import check_integrator, multirotor_plant, needs
 
 
 def check(scene: Scene) -> None:
-    """KeyedError where the airframe's file is missing or unsound, nobody flies it, or the integrator does not fit."""
+    """Raise ConfigError for an invalid airframe, a missing autopilot or an unsuitable integrator."""
     airframe(scene)
     needs(scene, "autopilot")
-    if not scene.lookup("autopilot.accept_commands"):
+    if not scene.lookup("autopilot.accept_commands") and not flown_by_firmware(scene):
         needs(scene, "trajectory")
     p = multirotor.parameters(airframe(scene))
     check_integrator(scene, p, multirotor.initial_state(p).motion)
 
 
 def described(scene: Scene) -> tuple[ModuleType, Any]:
-    """(module that makes the states, parameters)."""
+    """Return the module of the state form, and the parameters."""
     return multirotor, multirotor.parameters(airframe(scene), active(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of a multirotor as one rigid body."""
+    """Return the configuration of a multirotor as one rigid body."""
     return multirotor_plant(scene, *described(scene))

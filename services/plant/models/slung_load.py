@@ -32,7 +32,7 @@ FASTEST = 1.0  # frequency of the cable times the step: explicit methods of orde
 
 
 class SlungLoad(SceneTable):
-    """The cable and its load; the autopilot is told of neither."""
+    """Cable and load; the autopilot does not know either."""
 
     TABLE: ClassVar[str] = NAME
     OPTIONAL: ClassVar[bool] = True
@@ -44,7 +44,7 @@ class SlungLoad(SceneTable):
     drag_area: float = Field(default=0.0, ge=0.0)  # [m^2] of the load, drag coefficient times area
 
     def check(self, scene: Scene) -> None:
-        """There is a vehicle to carry it, and the step is short enough for the cable."""
+        """Check that the vehicle can carry the load, and that the step is short enough for the cable."""
         if scene[Vehicle].model != NAME:
             raise ConfigError(
                 NAME, f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "{NAME}"'
@@ -57,7 +57,7 @@ class SlungLoad(SceneTable):
 
 
 def _check_weight(scene: Scene) -> None:
-    """The rotors lift vehicle and load."""
+    """Check that the rotors lift vehicle and load."""
     frame, load = airframe(scene), scene[SlungLoad].mass
     fastest = frame.motor.max_voltage / frame.motor.rotor_constant
     shares = wake_slopes(scene).thrust
@@ -78,21 +78,21 @@ def _sling(scene: Scene) -> Sling:
 
 
 def check(scene: Scene) -> None:
-    """As of the reduced model; and there is a load."""
+    """Check the rigid-body model's needs, and that the scene has a load."""
     needs(scene, NAME)
     rigid_body.check(scene)
 
 
 def described(scene: Scene) -> tuple[ModuleType, Any]:
-    """As `rigid_body.described`."""
+    """Return the module of the state form, and the parameters."""
     return multirotor_slung, multirotor_slung.parameters(airframe(scene), _sling(scene), active(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of a multirotor with its load, which is told of as a body."""
-    found = multirotor_plant(scene, *described(scene))
-    plant = found.parameters
+    """Return the configuration of a multirotor with its load, which is output as a body."""
+    result = multirotor_plant(scene, *described(scene))
+    plant = result.parameters
     parameters = plant._replace(
         model=NAME, bodies=SlungLoadView(plant.core.vehicle.layout), wiring=plant.wiring._replace(bodies=("load",))
     )
-    return found._replace(parameters=parameters, ports=(*found.ports, bodies_port(scene, 1)))
+    return result._replace(parameters=parameters, ports=(*result.ports, bodies_port(scene, 1)))

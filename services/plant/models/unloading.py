@@ -1,4 +1,4 @@
-"""The crate that unloads its pack over the door, as the drone stands on the ground."""
+"""Crate that unloads its pack through the door while the drone is on the ground."""
 
 import math
 from typing import ClassVar
@@ -47,14 +47,14 @@ class Unloading(SceneTable):
     door_damping: float = Field(ge=0.0)  # [N m s/rad]
     door_lock: float = Field(default=50.0, gt=0.0)  # [N m/rad] of the lock and of the stop
     edge_radius: float = Field(default=0.003, gt=0.0)  # [m]
-    pickup: float = Field(gt=0.0)  # [s] when somebody takes the pack away
+    pickup: float = Field(gt=0.0)  # [s] when the pack is taken away
     gravity: float = Field(default=9.81, ge=0.0)  # [m/s^2]
     roller_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on rollers
     door_friction: Pair = Field(strict=False)  # the same, of pack on door
     ground_friction: Pair = Field(strict=False)  # the same, of pack on ground
 
     def check(self, scene: Scene) -> None:
-        """Sizes are sizes, the pack fits into the crate, friction is lower in motion."""
+        """Check that sizes are positive, the pack fits into the crate, and friction is lower in motion."""
         if not all(side > 0.0 for side in self.pack_size):
             raise ConfigError("unloading.pack_size", f"got {list(self.pack_size)}", "three lengths above 0 m")
         length, width, _ = self.pack_size
@@ -70,14 +70,14 @@ class Unloading(SceneTable):
 
 
 def check(scene: Scene) -> None:
-    """The crate is described, and nothing asks of it what it cannot do."""
+    """Check that the scene describes the crate and has no table that it cannot use."""
     needs(scene, "unloading")
     can_have(scene)
     check_system(scene, *system(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
-    """The plant of the crate."""
+    """Return the configuration of the crate's plant."""
     p, start = system(scene)
     view = UnloadingView(p, scene[Communication].interval)
     return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES, controlled=True)
@@ -88,7 +88,7 @@ def _surface(friction: Pair) -> Surface:
 
 
 def system(scene: Scene) -> tuple[UnloadingParameters, UnloadingState]:
-    """(parameters, state at the start)."""
+    """Return the parameters and the initial state."""
     c = scene[Unloading]
     length, width, height = c.pack_size
     m = c.pack_mass / 12.0

@@ -6,14 +6,14 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract, rotate, to_roll_pitch_yaw
-from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, norm, scale, subtract
+from lapwing.dynamics.vector import ZERO, Vec3, add, cross, divide, multiply, norm, scale, subtract
 from lapwing.kernels import kernel
 from lapwing.services.autopilot.attitude import wrap
 from lapwing.services.autopilot.control import START, step
 from lapwing.services.autopilot.controller_parameters import Airframe
-from lapwing.services.autopilot.interface import Estimate, PerRotor, Setpoint
 from lapwing.services.autopilot.land_detector import LANDED
 from lapwing.services.autopilot.motor import RPM, Motor
+from lapwing.services.common.ports import PerRotor, StateEstimate
 from lapwing.services.trajectory.phases import Phases
 from lapwing.services.trajectory.polynomial_piece import evaluate
 from lapwing.services.trajectory.trajectory_compiler import compile
@@ -124,22 +124,22 @@ def fly(p, trajectory, plant, white, noise):
     for i in range(len(white)):
         e = white[i]
         gust = (a * gust[0] + n_gust * e[0], a * gust[1] + n_gust * e[1], a * gust[2] + n_gust * e[2])
-        r = evaluate(trajectory, i * TICK)
-        setpoint = Setpoint(r.position_world, r.velocity_world, r.acceleration_world, r.yaw, r.yaw_rate)
-        estimate = Estimate(
+        setpoint = evaluate(trajectory, i * TICK, 0)
+        estimate = StateEstimate(
             add(b.position_world, (noise[0] * e[3], noise[0] * e[4], noise[0] * e[5])),
             retract(b.attitude, (noise[2] * e[9], noise[2] * e[10], noise[2] * e[11])),
             add(b.velocity_world, (noise[1] * e[6], noise[1] * e[7], noise[1] * e[8])),
             add(b.omega_body, (noise[3] * e[12], noise[3] * e[13], noise[3] * e[14])),
-        )
+            ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0, 0,
+        )  # fmt: skip
         s, u = step(p, s, TICK, estimate, setpoint, 0)
         angles = to_roll_pitch_yaw(b.attitude)
         for k in range(3):
             log[i, 1 + k] = b.position_world[k]
             log[i, 4 + k] = angles[k]
-            log[i, 7 + k] = r.position_world[k]
+            log[i, 7 + k] = setpoint.position_world[k]
         log[i, 0], log[i, 10], log[i, 11], log[i, 12] = i * TICK, u.roll_reference, u.pitch_reference, u.yaw_reference
-        log[i, 13], log[i, 14] = max(max(u.thrust[0], u.thrust[1]), max(u.thrust[2], u.thrust[3])), s.stage.name
+        log[i, 13], log[i, 14] = max(max(u.thrust[0], u.thrust[1]), max(u.thrust[2], u.thrust[3])), s.landed_state.name
         volts = u.motor_voltage
         k = MOTOR.speed_constant * MOTOR.gear_ratio / RPM
         new = (k * volts[0], k * volts[1], k * volts[2], k * volts[3])

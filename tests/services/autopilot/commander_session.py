@@ -6,8 +6,8 @@ from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.services.autopilot.commander.commander import Commander
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.initial_estimate import EXACT
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.common.autopilot_parameters import table
+from lapwing.services.common.ports import Setpoint
 from lapwing.services.scene_resolver import load
 
 DT = 0.004  # [s]

@@ -161,7 +161,7 @@ DEFAULT = equipment()
 
 
 class Flight(NamedTuple):
-    """What happened, ten times a second."""
+    """Records of a flight at 10 Hz."""
 
     error: np.ndarray  # (n, 9) rotation vector [rad], velocity [m/s], position [m]: truth less estimate
     covariance: np.ndarray  # (n, 9, 9) of these, as the filter believes

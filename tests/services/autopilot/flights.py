@@ -25,15 +25,15 @@ def scripted(script):
     """An operator of {time [s]: commands}; a key (start, end) repeats them at 10 Hz."""
 
     def operator(tick):
-        found = []
+        result = []
         for when, commands in script.items():
             start, end = when if isinstance(when, tuple) else (when, None)
             first = round(start * RATE)
             if end is None:
-                found += commands if tick == first else []
+                result += commands if tick == first else []
             elif first <= tick <= round(end * RATE) and (tick - first) % 25 == 0:
-                found += commands
-        return found
+                result += commands
+        return result
 
     return operator
 

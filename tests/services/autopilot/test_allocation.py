@@ -7,7 +7,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lapwing.services.autopilot import controller_parameters
-from lapwing.services.autopilot.allocation import demand_effects, effectiveness, shares_of, tables, tilted_effectiveness
+from lapwing.services.autopilot.allocation import (
+    effectiveness,
+    rotor_shares,
+    tables,
+    tilted_effectiveness,
+    virtual_control_effectiveness,
+)
 from lapwing.services.autopilot.mixer import VirtualControls, mix, saturate
 
 TOP, YAW = 10.0, 0.02  # [N], [m]
@@ -43,34 +49,36 @@ ROTORS = {
 
 
 @pytest.mark.parametrize("name", ROTORS)
-def test_allocation_times_effectiveness_is_the_identity(name):
+def test_allocation_times_effectiveness_is_identity(name):
     B = ROTORS[name]
-    found = B @ np.array(shares_of(B))
-    assert found == pytest.approx(np.diag(demand_effects(B)), abs=1e-12)
+    result = B @ np.array(rotor_shares(B))
+    assert result == pytest.approx(np.diag(virtual_control_effectiveness(B)), abs=1e-12)
 
 
-def test_of_all_thrusts_that_give_a_wrench_they_are_the_least():
+def test_allocation_is_least_squares_solution():
     B = ROTORS["octa"]
-    wanted = np.array([20.0, 0.3, -0.2, 0.05])
-    assert np.array(shares_of(B)) @ (wanted / demand_effects(B)) == pytest.approx(np.linalg.pinv(B) @ wanted)
+    expected = np.array([20.0, 0.3, -0.2, 0.05])
+    assert np.array(rotor_shares(B)) @ (expected / virtual_control_effectiveness(B)) == pytest.approx(
+        np.linalg.pinv(B) @ expected
+    )
 
 
-def test_four_rotors_in_a_cross_have_shares_of_one_to_the_bit():
+def test_cross_of_four_rotors_has_unit_shares():
     a = AIRFRAME
     signs = [(1.0, np.sign(y), -np.sign(x), s) for x, y, s in zip(a.rotor_x, a.rotor_y, a.reaction_sign, strict=True)]
     assert controller_parameters.shares(a) == (tuple(signs),)
 
 
 @pytest.mark.parametrize("name", ["hexa X", "octa"])
-def test_a_failed_rotor_gives_nothing_and_the_others_all_of_lift_roll_and_pitch(name):
+def test_allocation_without_failed_rotor_keeps_lift_roll_pitch(name):
     B = ROTORS[name]
     for k, shares in enumerate(tables(B)[1:]):
         assert shares[k] == (0.0, 0.0, 0.0, 0.0)
-        found = B @ np.array(shares) / demand_effects(B)[:, None]
-        assert found[:3] == pytest.approx(np.eye(4)[:3], abs=1e-12)
+        result = B @ np.array(shares) / virtual_control_effectiveness(B)[:, None]
+        assert result[:3] == pytest.approx(np.eye(4)[:3], abs=1e-12)
 
 
-def test_which_failures_leave_yaw_to_a_hexacopter_is_as_published():
+def test_which_failures_leave_yaw_to_hexacopter_is_as_published():
     """Du, Quan, Yang, Cai, J. Guidance, Control, and Dynamics 38 (2015) 978: turning PNPNPN it is uncontrollable
     without any one rotor; turning PPNNPN it is controllable without one of the first four."""
     yaw = [any(share[3] for share in shares) for shares in tables(HEXA_X)[1:]]
@@ -79,7 +87,7 @@ def test_which_failures_leave_yaw_to_a_hexacopter_is_as_published():
 
 
 @pytest.mark.parametrize("name", ["quad +", "X8, coaxial", "Y6, coaxial"])
-def test_without_a_rotor_to_spare_or_to_tell_there_is_one_table(name):
+def test_no_failure_tables_without_redundant_rotor(name):
     assert len(tables(ROTORS[name])) == 1
 
 
@@ -92,7 +100,7 @@ def test_without_a_rotor_to_spare_or_to_tell_there_is_one_table(name):
         effectiveness((0.3, 0.1, 0.1, 0.3), (0.2, 0.2, -0.2, -0.2), (YAW, -YAW, YAW, -YAW)),  # all in front
     ],
 )
-def test_rotors_that_cannot_balance_the_vehicle_are_refused(B):
+def test_rotors_that_cannot_balance_vehicle_are_refused(B):
     with pytest.raises(ValueError, match="cannot be balanced; expected lift from each"):
         tables(B)
 
@@ -106,26 +114,26 @@ ANY = st.floats(-30.0, 30.0)
 @given(ANY, ANY, ANY, ANY, st.sampled_from([tables(B)[-1] for B in ROTORS.values()]))
 @settings(deadline=None, max_examples=300)
 def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, roll, pitch, yaw, shares):
-    wanted = VirtualControls(collective, roll, pitch, yaw)
-    found = saturate(shares, wanted, TOP)
-    thrust = np.array(mix(shares, found))
+    expected = VirtualControls(collective, roll, pitch, yaw)
+    result = saturate(shares, expected, TOP)
+    thrust = np.array(mix(shares, result))
     assert thrust.min() >= -1e-9
     assert thrust.max() <= TOP + 1e-9
 
     def possible(q):
-        asked = [np.dot(share, q) for share in shares]
-        return min(asked) >= -1e-9 and max(asked) <= TOP + 1e-9
+        requested = [np.dot(share, q) for share in shares]
+        return min(requested) >= -1e-9 and max(requested) <= TOP + 1e-9
 
     tilt = np.array([(s[1] * roll + s[2] * pitch, s[0]) for s in shares if s[0] > 0.0])
     lifts = (-tilt[:, 0] / tilt[:, 1]).max(), ((TOP - tilt[:, 0]) / tilt[:, 1]).min()
     if lifts[0] <= lifts[1]:  # some collective makes room for all of roll and pitch
-        assert found[1:3] == (roll, pitch)
-        assert found.collective == pytest.approx(np.clip(collective, *lifts), abs=1e-9)
+        assert result[1:3] == (roll, pitch)
+        assert result.collective == pytest.approx(np.clip(collective, *lifts), abs=1e-9)
     else:
-        more = found._replace(roll=1.001 * found.roll, pitch=1.001 * found.pitch, yaw=0.0)
+        more = result._replace(roll=1.001 * result.roll, pitch=1.001 * result.pitch, yaw=0.0)
         tried = np.linspace(0.0, 4.0 * TOP, 400)
         assert not any(possible(more._replace(collective=c)) for c in tried)
-    if possible(wanted) and possible(wanted._replace(yaw=0.0)):
-        assert found == pytest.approx(wanted, abs=1e-9)
-    elif found.yaw != yaw and any(share[3] for share in shares):
-        assert not possible(found._replace(yaw=found.yaw + 1e-3 * np.sign(yaw - found.yaw)))
+    if possible(expected) and possible(expected._replace(yaw=0.0)):
+        assert result == pytest.approx(expected, abs=1e-9)
+    elif result.yaw != yaw and any(share[3] for share in shares):
+        assert not possible(result._replace(yaw=result.yaw + 1e-3 * np.sign(yaw - result.yaw)))

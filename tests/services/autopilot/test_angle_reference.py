@@ -6,7 +6,7 @@ from lapwing.services.autopilot.angle_reference import AT_REST, Smoothing, advan
 
 
 @pytest.mark.parametrize("lag", [0.0, 0.02])
-def test_step_response_is_that_of_the_transfer_function(lag):
+def test_step_response_is_that_of_transfer_function(lag):
     w, damping, dt = 20.0, 0.7, 1e-4
     t = np.arange(1, 5001) * dt
     denominator = np.polymul([1.0, 2.0 * damping * w, w * w], [lag, 1.0] if lag else [1.0])
@@ -18,7 +18,7 @@ def test_step_response_is_that_of_the_transfer_function(lag):
     assert np.array(angles) == pytest.approx(expected[1:], abs=2e-3)
 
 
-def test_what_is_fed_forward_and_what_is_followed_differ_by_the_lag_alone():
+def test_command_leads_reference_by_lag():
     # A double integrator behind the lag, driven by the demanded acceleration, ends each tick on the reference.
     p, dt, sub = Smoothing(22.0, 0.6, 0.02), 0.004, 400
     state, angle, rate, delivered = AT_REST, 0.0, 0.0, 0.0
@@ -27,7 +27,7 @@ def test_what_is_fed_forward_and_what_is_followed_differ_by_the_lag_alone():
         for _ in range(sub):
             h = dt / sub
             before = delivered
-            delivered += (1.0 - np.exp(-h / p.lag)) * (state.demand_acceleration - delivered)
+            delivered += (1.0 - np.exp(-h / p.lag)) * (state.command_acceleration - delivered)
             angle, rate = angle + h * rate, rate + 0.5 * h * (before + delivered)
         assert state.rate == pytest.approx(rate, abs=1e-5)
         assert state.angle == pytest.approx(angle, abs=1e-4)

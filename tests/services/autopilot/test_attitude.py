@@ -16,7 +16,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 @given(TILT, TILT, RATES)
 @settings(deadline=None)
-def test_rates_of_the_angles_are_their_difference_quotients(roll, pitch, omega):
+def test_rates_of_angles_are_their_difference_quotients(roll, pitch, omega):
     q, h = from_roll_pitch_yaw(roll, pitch, 0.3), 1e-5
     after, before = (to_roll_pitch_yaw(retract(q, scale(s * h, omega))) for s in (1.0, -1.0))
     assert angle_rates(roll, pitch, omega) == pytest.approx(scale(0.5 / h, subtract(after, before)), abs=1e-5)
@@ -25,14 +25,14 @@ def test_rates_of_the_angles_are_their_difference_quotients(roll, pitch, omega):
 
 @given(TILT, TILT, st.floats(-3.0, 3.0), RATES)
 @settings(deadline=None)
-def test_on_so3_the_error_turns_the_attitude_onto_the_reference(roll, pitch, yaw, turn):
+def test_on_so3_error_turns_attitude_onto_reference(roll, pitch, yaw, turn):
     reference = (0.2, -0.3, 1.0)
     attitude = from_roll_pitch_yaw(roll, pitch, yaw)
     error, _ = error_on_so3(attitude, reference, ZERO, ZERO)
     assert to_roll_pitch_yaw(retract(attitude, error)) == pytest.approx(reference, abs=1e-9)
 
 
-def test_both_errors_agree_for_small_angles_and_their_rates_are_their_derivatives():
+def test_attitude_errors_agree_for_small_angles():
     angles, reference, rates, omega = (0.01, -0.02, 1.0), (0.02, 0.01, 1.01), (0.3, -0.2, 0.1), (0.5, 0.4, -0.3)
     a, da = error_by_angle(angles, reference, rates, omega)
     q = from_roll_pitch_yaw(*angles)
@@ -51,5 +51,5 @@ def test_both_errors_agree_for_small_angles_and_their_rates_are_their_derivative
 @pytest.mark.parametrize(
     ("angle", "wrapped"), [(3.5, 3.5 - 2 * math.pi), (-3.5, 2 * math.pi - 3.5), (1.0, 1.0), (7.0, 7.0 - 2 * math.pi)]
 )
-def test_yaw_goes_the_short_way_round(angle, wrapped):
+def test_yaw_goes_short_way_round(angle, wrapped):
     assert wrap(angle) == pytest.approx(wrapped)

@@ -11,7 +11,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
 from lapwing.kernels import python_function
 from lapwing.services.autopilot import controller_parameters
-from lapwing.services.autopilot.allocation import demand_effects
+from lapwing.services.autopilot.allocation import virtual_control_effectiveness
 from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.common.vehicle_schema import Effects, airframe
@@ -46,10 +46,10 @@ def wrench(scene, thrust):
     return np.array([force[2], *torque])
 
 
-def test_the_autopilot_knows_the_slopes_of_the_plants_force_and_torques():
+def test_autopilot_knows_slopes_of_plants_force_and_torques():
     scene = load("hover", X8)
-    found = controller_parameters.rotor_effectiveness(known_airframe(scene))
-    for k, column in enumerate(found.T):
+    result = controller_parameters.rotor_effectiveness(known_airframe(scene))
+    for k, column in enumerate(result.T):
         step = 1e-3 * np.eye(8)[k]
         assert column == pytest.approx((wrench(scene, 12.0 + step) - wrench(scene, 12.0 - step)) / 2e-3, abs=1e-7)
 
@@ -70,21 +70,21 @@ def test_hover_is_balanced_at_one_speed_of_all_rotors():
 def test_demands_act_on_their_own_axis_alone():
     known = known_airframe(load("hover", X8))
     B, shares = controller_parameters.rotor_effectiveness(known), np.array(controller_parameters.shares(known)[0])
-    assert B @ shares == pytest.approx(np.diag(demand_effects(B)), abs=1e-12)
+    assert B @ shares == pytest.approx(np.diag(virtual_control_effectiveness(B)), abs=1e-12)
 
 
-def test_which_of_two_rotors_over_one_another_has_failed_is_not_guessed():
+def test_coaxial_motor_failure_is_not_identified():
     assert len(controller_parameters.shares(known_airframe(load("hover", X8)))) == 1
 
 
-def test_a_vehicle_that_only_the_lost_thrust_would_carry_is_refused():
+def test_vehicle_that_only_lost_thrust_would_carry_is_refused():
     heavy = {**X8, "airframe.mass.total": 30.0}
     assert resolve(load("hover", {k: v for k, v in heavy.items() if k != "effects.coaxial_interference"}))
     with pytest.raises(ValueError, match=r"per rotor is below the .* N needed to hover"):
         resolve(load("hover", heavy))
 
 
-def test_the_card_of_a_scene_and_its_autopilot_agree_on_hover(tmp_path):
+def test_card_of_scene_and_its_autopilot_agree_on_hover(tmp_path):
     """But for the voltage that the motors' resistance takes, which the autopilot leaves to its loops."""
     table = "\n".join(f"{key.removeprefix('airframe.')} = {json.dumps(X8[key])}" for key in X8 if "airframe" in key)
     scene = tmp_path / "x8.toml"
@@ -97,20 +97,20 @@ def test_the_card_of_a_scene_and_its_autopilot_agree_on_hover(tmp_path):
     assert 0.85 * ideal < computed < ideal
 
 
-def test_the_tuner_sees_the_plant_that_the_autopilot_is_told_of():
+def test_tuner_uses_nominal_airframe():
     scene = load("hover", X8)
-    found, known = hover(scene), known_airframe(scene)
-    assert found.rotor_speed == pytest.approx(
+    result, known = hover(scene), known_airframe(scene)
+    assert result.rotor_speed == pytest.approx(
         math.sqrt(controller_parameters.hover_thrust(known) / known.motor.thrust_coefficient), rel=1e-3
     )
-    assert found.altitude == pytest.approx(controller_parameters.lift(known) / known.mass, rel=1e-3)
+    assert result.altitude == pytest.approx(controller_parameters.lift(known) / known.mass, rel=1e-3)
     moments = controller_parameters.moments(known)
     for axis, k in (("roll", 0), ("pitch", 1), ("yaw", 2)):
-        assert getattr(found, axis) == pytest.approx(moments[k] / known.inertia_body[k], rel=0.02), axis
-    assert found.spin_up_zero == pytest.approx(known.spin_up_zero, rel=0.15)
+        assert getattr(result, axis) == pytest.approx(moments[k] / known.inertia_body[k], rel=0.02), axis
+    assert result.spin_up_zero == pytest.approx(known.spin_up_zero, rel=0.15)
 
 
-def test_a_corner_of_the_tuner_has_more_thrust_of_every_rotor():
+def test_corner_of_tuner_has_more_thrust_of_every_rotor():
     active = effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}}, airframe(load("hover", X8)))
     wash, rotor = (corners._stronger(e, 1.2) for e in active)
     assert wash.thrust_constant == rotor.thrust_constant == pytest.approx(1.2 * active[1].thrust_constant)

@@ -8,8 +8,8 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, from_roll_pitch_yaw
 from lapwing.services.autopilot.control import START, step
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import load
-from lapwing.services.autopilot.interface import Estimate, Setpoint
 from lapwing.services.autopilot.land_detector import LANDED
+from lapwing.services.common.ports import Setpoint, StateEstimate
 
 TABLE_7 = np.array([0.2373, 0.2700, 0.0981, 0.0334, 0.0277, 0.0220])  # x, y, z [m], roll, pitch, yaw [rad]
 ZERO = (0.0, 0.0, 0.0)
@@ -21,7 +21,7 @@ LOOPS = pytest.mark.parametrize("geometric", [False, True])
 def command(name, setpoint=HIGH, attitude=NO_ROTATION, yaw=0.0, geometric=False, ticks=20, omega=ZERO):
     p, s = build(load(name), AIRFRAME, geometric), START
     for _ in range(ticks):
-        s, u = step(p, s, TICK, Estimate(HIGH, attitude, ZERO, omega), Setpoint(setpoint, ZERO, ZERO, yaw, 0.0), 0)
+        s, u = step(p, s, TICK, StateEstimate(HIGH, attitude, ZERO, omega), Setpoint(setpoint, ZERO, ZERO, yaw, 0.0), 0)
     return u
 
 
@@ -32,7 +32,7 @@ def torque(thrust):
     )
 
 
-def test_at_its_setpoint_tuned_carries_the_weight_and_paper_does_nothing_yet():
+def test_thrust_at_setpoint_is_weight_with_feed_forward():
     assert sum(command("tuned").thrust) == pytest.approx(AIRFRAME.mass * AIRFRAME.gravity, rel=1e-12)
     assert sum(command("paper").thrust) == 0.0
 
@@ -41,7 +41,7 @@ def test_at_its_setpoint_tuned_carries_the_weight_and_paper_does_nothing_yet():
 @LOOPS
 @pytest.mark.parametrize("heading", [0.0, math.pi / 2, -2.5])
 @pytest.mark.parametrize("direction", [(1.0, 0.0), (0.0, 1.0)])
-def test_an_error_tilts_the_thrust_towards_the_setpoint_whatever_the_heading(name, geometric, heading, direction):
+def test_position_error_tilts_thrust_at_any_heading(name, geometric, heading, direction):
     dx, dy = direction
     attitude = from_roll_pitch_yaw(0.0, 0.0, heading)
     u = command(name, (0.2 * dx, 0.2 * dy, 10.1), attitude, heading, geometric, ticks=60)
@@ -69,12 +69,12 @@ def test_tilts_turns_and_rates_are_opposed(name, geometric):
         assert reaction(omega=turned)[axis] < -1e-3
 
 
-def test_yaw_takes_the_short_way_across_the_seam():
+def test_yaw_takes_short_way_across_seam():
     u = command("tuned", attitude=from_roll_pitch_yaw(0.0, 0.0, 3.1), yaw=-3.1, ticks=1)
     assert torque(u.thrust)[2] > 0.0
 
 
-def test_thrusts_stay_possible_whatever_is_asked():
+def test_saturated_thrusts_stay_in_range():
     top = build(load("paper"), AIRFRAME).thrust_max
     rng = np.random.default_rng(5)
     for name in ("paper", "tuned"):
@@ -92,7 +92,7 @@ def test_thrusts_stay_possible_whatever_is_asked():
 
 
 @LOOPS
-def test_paper_flies_the_mission_as_table_7_says(geometric):
+def test_paper_gains_reproduce_table_7(geometric):
     log = mission(build(load("paper"), AIRFRAME, geometric))
     assert log[-1, 14] == LANDED
     assert rmse(log)[:3] == pytest.approx(TABLE_7[:3], rel=0.25)
@@ -100,7 +100,7 @@ def test_paper_flies_the_mission_as_table_7_says(geometric):
 
 @LOOPS
 @pytest.mark.parametrize("delay", [0, 1])
-def test_tuned_flies_the_mission_ten_times_better_on_truth(geometric, delay):
+def test_tuned_flies_mission_ten_times_better_on_truth(geometric, delay):
     p = build(load("tuned"), AIRFRAME, geometric)
     for seed in range(3):
         log = mission(p, NOMINAL._replace(delay=delay), seed)
@@ -108,7 +108,7 @@ def test_tuned_flies_the_mission_ten_times_better_on_truth(geometric, delay):
         assert (rmse(log) < 0.1 * TABLE_7).all()
 
 
-def test_tuned_stays_below_a_third_with_wrong_mass_inertia_and_thrust():
+def test_tuned_gains_tolerate_wrong_mass_inertia_and_thrust():
     p = build(load("tuned"), AIRFRAME)
     for mass in (0.8, 1.2):
         for inertia in (0.8, 1.2):
@@ -124,13 +124,13 @@ def test_tuned_stays_below_a_third_with_wrong_mass_inertia_and_thrust():
                 assert (rmse(log) < TABLE_7 / 3.0).all()
 
 
-def test_tuned_stays_below_a_third_on_a_noisy_estimate():
+def test_tuned_stays_below_third_on_noisy_estimate():
     log = mission(build(load("tuned"), AIRFRAME), noise=(0.02, 0.05, 0.005, 0.02))
     assert (rmse(log) < TABLE_7 / 3.0).all()
 
 
 @SETS
-def test_the_same_flight_gives_the_same_bits(name):
+def test_flight_is_repeatable_bit_for_bit(name):
     p = build(load(name), AIRFRAME)
     assert mission(p, seed=3).tobytes() == mission(p, seed=3).tobytes()
     assert mission(p, seed=3).tobytes() != mission(p, seed=4).tobytes()

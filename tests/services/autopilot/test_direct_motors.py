@@ -18,13 +18,13 @@ def motors(*volts):
     return command("offboard_motors", *volts)
 
 
-def test_a_flight_whose_voltages_come_from_outside_is_the_controllers_to_the_bit():
+def test_external_voltages_reproduce_controlled_flight():
     flown = fly(12, {}, operated=False)
     volts = flown.column("actuators", lambda m: tuple(m.motor_voltage))
-    given = {k: [motors(*v)] for k, v in enumerate(volts)}
-    given[0] += START
+    values = {k: [motors(*v)] for k, v in enumerate(volts)}
+    values[0] += START
     scene = load("hover", [*OPERATED, EVERY_TICK, "run.duration=12"])
-    again = memory_log.fly(scene, lambda tick: given.get(tick, ()))
+    again = memory_log.fly(scene, lambda tick: values.get(tick, ()))
     assert volts.max() > 5.0
     count = len(volts)
     for name in ("ground_truth", "actuators"):
@@ -37,7 +37,7 @@ def test_a_flight_whose_voltages_come_from_outside_is_the_controllers_to_the_bit
     assert thrust[1] == pytest.approx(thrust[0], rel=1e-9, abs=1e-9)
 
 
-def test_they_hold_between_their_stamps_within_what_the_motors_take_and_the_controller_comes_back(tmp_path):
+def test_direct_voltages_hold_are_limited_and_time_out(tmp_path):
     script = UP | {3.0: [motors(7.0, 8.0, -1.0, 1e6), command("offboard")], 3.1: [command("hold")]}
     log = tmp_path / "direct.mcap"
     setup = resolve(load("hover", [*OPERATED, "run.duration=8"]))
@@ -55,22 +55,22 @@ def test_they_hold_between_their_stamps_within_what_the_motors_take_and_the_cont
     assert resimulate(log) == (stated, stated)
 
 
-def test_where_no_more_come_a_failsafe_takes_over():
+def test_missing_voltages_trigger_failsafe():
     flown = fly(8, UP | {(3.0, 3.5): [motors(*[9.0] * 4)], 3.2: [command("offboard")]})
     assert "the offboard setpoints are lost: hold" in said(flown)
 
 
-def test_who_stands_with_its_motors_off_has_landed_and_can_be_disarmed():
+def test_vehicle_at_rest_with_motors_off_has_landed():
     script = {0.0: [motors(*[3.0] * 4), *START], 0.5: [motors(*[0.0] * 4)], (0.6, 2.4): [motors(*[0.0] * 4)]}
     flown = fly(3, script | {2.5: [command("disarm", id=9)]})
     assert results(flown)[9] == ACCEPTED
 
 
 @pytest.mark.parametrize("volts", [(5.0,), (5.0,) * 6, (5.0, 5.0, 5.0, float("nan"))])
-def test_what_is_no_voltage_for_each_motor_is_not_taken(volts):
+def test_invalid_voltages_are_rejected(volts):
     flown = fly(1, {0.1: [motors(*volts)], 0.2: [command("offboard", id=3)]})
     assert results(flown)[3] == REJECTED
-    assert any("the last was refused: expected 4 voltages, got [5.0" in text for text in said(flown))
+    assert any("the last was rejected: expected 4 voltages, got [5.0" in text for text in said(flown))
 
 
 def test_six_motors_take_six():

@@ -41,7 +41,7 @@ def test_levelled_attitude(angles):
     np.testing.assert_allclose(rotation_matrix(levelled), rotation_matrix(attitude), atol=1e-14)
 
 
-def test_prediction_follows_a_turning_climb():
+def test_prediction_follows_turning_climb():
     """Constant acceleration in the world while turning at a constant rate: exact but for the trapezoidal rule."""
     omega, acceleration = (0.0, 0.0, 0.8), (1.0, -0.5, 0.3)
     s = at_rest()
@@ -84,7 +84,7 @@ def test_covariance_propagation_against_dense_matrices():
     np.testing.assert_array_equal(ours, ours.T)
 
 
-def test_scalar_updates_one_by_one_equal_the_joint_update():
+def test_scalar_updates_one_by_one_equal_joint_update():
     """Three rows in turn against the textbook gain, and the sum of their ratios against the joint NIS."""
     rng = np.random.default_rng(1)
     m = at_rest().memory
@@ -128,7 +128,7 @@ def heading_innovation(attitude, iron):
     return s.memory
 
 
-def test_row_of_the_heading_against_differences():
+def test_row_of_heading_against_differences():
     h = 1e-6
     row = heading_innovation(NO_ROTATION, ZERO).row.copy()
     bx, by, _ = STANDARD.magnetic_field_world
@@ -182,7 +182,7 @@ def textbook():
         imu=i._replace(
             gyro=i.gyro._replace(temperature_dps_per_k=0.0, **exact),
             accelerometer=i.accelerometer._replace(temperature_mg_per_k=0.0, **exact),
-            warm_up=0.0,
+            warm_up_rise=0.0,
         ),
         magnetometer=m._replace(**exact),
     )
@@ -199,7 +199,7 @@ def textbook():
     return {"instruments": instruments, "p": p}
 
 
-def test_instruments_without_errors_give_an_estimate_without_errors():
+def test_instruments_without_errors_give_estimate_without_errors():
     """Zero variances are no trouble, and a vehicle at rest that repeats its readings is not taken for frozen."""
     flight = ef.flight(instruments=ef.equipment(**{name: ef.sensors()[name].PRESETS["ideal"] for name in ef.NAMES}))
     assert np.abs(flight.error[10:, ef.P]).max() < 5e-3
@@ -218,7 +218,7 @@ DEGREES = {
 
 
 @pytest.mark.parametrize("agility", [1.0, 2.0])
-def test_consistent_in_a_world_as_modelled(agility):
+def test_consistent_in_world_as_modelled(agility):
     """NEES of attitude, velocity and position, and NIS of every source, within their 95 % bounds over 100 seeds."""
     flights = ensemble(agility=agility, **textbook())
     share, mean_inside = inside(flights.nees[:, SETTLED], 9)
@@ -231,8 +231,8 @@ def test_consistent_in_a_world_as_modelled(agility):
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
-def test_consistent_on_the_presets():
-    """The same with every error of the real instruments, of which scale and alignment are no states of the filter."""
+def test_consistent_on_presets():
+    """Consistency with all errors of the presets; scale and alignment are not filter states."""
     flights = ensemble()
     _, mean_inside = inside(flights.nees[:, SETTLED], 9)
     assert mean_inside
@@ -242,7 +242,7 @@ def test_consistent_on_the_presets():
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
-def test_an_ordinary_receiver_leaves_the_truth_within_three_sigma():
+def test_ordinary_receiver_leaves_truth_within_three_sigma():
     instruments = ef.equipment(gps=ef.gps.STANDARD)
     flights = ensemble(instruments=instruments, p=estimator.PRESETS["standard"])
     error = flights.error[:, 20:, ef.P]
@@ -255,14 +255,14 @@ def test_position_alone_will_do():
     assert np.all(rms(ensemble(velocity=False).error[:, 50:, ef.P]) < (0.015, 0.015, 0.01))
 
 
-def test_doubt_is_only_for_what_lasts():
+def test_covariance_is_inflated_only_for_lasting_rejection():
     s = at_rest()
     before = s.memory.covariance.copy()
     s.memory.since[filter_state.MAG] = 100
-    covariance_inflation.doubt(P, s.memory, filter_state.MAG)
+    covariance_inflation.inflate_covariance(P, s.memory, filter_state.MAG)
     np.testing.assert_array_equal(s.memory.covariance, before)
     s.memory.since[filter_state.MAG] = 2600  # 10.4 s
-    covariance_inflation.doubt(P, s.memory, filter_state.MAG)
+    covariance_inflation.inflate_covariance(P, s.memory, filter_state.MAG)
     assert np.all(
         np.diag(s.memory.covariance)[filter_state.IRON : filter_state.IRON + 3] > np.diag(before)[filter_state.IRON]
     )

@@ -69,7 +69,7 @@ def test_fault(sensor, fault, refused, largest):
     assert flight.health[-1] == 0
 
 
-def test_the_health_says_what_is_lost_and_recovers():
+def test_health_reports_loss_and_recovery():
     p = registry.parameters("gps", {"faults": [{"kind": "dropout", "start": START, "stop": STOP}]}, ef.INTERVAL)
     health = ef.flight(seed=3, instruments=ef.equipment(gps=p)).health
     lost = 1 << estimator.SOURCES.index("gps") | 1 << estimator.SOURCES.index("gps_velocity")

@@ -36,7 +36,7 @@ def velocity_fix(s, velocity, tick):
     return estimator.update_gps_velocity(P, s, (noise, noise, velocity + noise), 0.02**2, AGE, True)
 
 
-def test_a_fix_of_before_an_impact_leaves_open_what_the_impact_did():
+def test_fix_before_impact_does_not_correct_impact():
     """The vehicle comes down at 1 m/s and stops; of that the accelerometer sees one reading."""
     s = velocity_fix(predicted(at_rest(), 100), 0.0, 0)
     assert np.all(velocity_std(s) < 0.05)
@@ -59,7 +59,7 @@ def random_memory(rng):
 
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0, 10.0])
-def test_the_covariance_against_dense_matrices(share):
+def test_covariance_against_dense_matrices(share):
     """The row sees the error now less what came in since, which has its part of the covariance with the row."""
     rng = np.random.default_rng(round(share * 10))
     m = random_memory(rng)
@@ -73,7 +73,7 @@ def test_the_covariance_against_dense_matrices(share):
     s, largest = delayed_measurements.late_innovation_variances(m, 0, since, variance, force)
     assert s == pytest.approx(now * (1.0 - part) + variance)
     assert largest == pytest.approx(now + noise + variance)
-    fuse.absorb(m, 0.7, s)
+    fuse.apply_update(m, 0.7, s)
     gain = before @ h * (1.0 - part) / s
     np.testing.assert_allclose(m.correction, gain * 0.7, atol=1e-10)
     rest, cross = np.eye(filter_state.SIZE) - np.outer(gain, h), np.outer(before @ h * part, gain)
@@ -92,7 +92,7 @@ def turning(s):
     return s
 
 
-def test_rows_of_the_past_do_not_move_with_an_attitude_that_was_wrong_all_along():
+def test_delayed_rows_are_invariant_to_constant_attitude_error():
     """Two filters at the same place then, one turned by a little: what both say of then is the same."""
     theta = 1e-5 * np.array([1.0, -2.0, 0.5])
     one, other = predicted(at_rest(), 100), predicted(at_rest(), 100)
@@ -113,7 +113,7 @@ def test_rows_of_the_past_do_not_move_with_an_attitude_that_was_wrong_all_along(
             assert one.memory.row @ off == pytest.approx(0.0, abs=1e-3 * np.abs(off[at : at + 3]).max())
 
 
-def test_noise_of_the_attitude_counts_by_what_it_has_left_to_do():
+def test_attitude_noise_is_weighted_by_remaining_delay():
     """A gyroscope's noise of the last ticks alone says little of a late fix, that of the first all."""
     s = at_rest()
     for k in range(AGE):
@@ -125,11 +125,11 @@ def test_noise_of_the_attitude_counts_by_what_it_has_left_to_do():
     assert since.attitude_position == pytest.approx(noise * left**4 / 4.0, rel=1e-3)
 
 
-def test_an_exact_measurement_of_the_past_leaves_just_what_came_in_since():
+def test_exact_past_measurement_leaves_noise_since():
     m = at_rest().memory
     m.covariance[:] = np.eye(filter_state.SIZE)
     m.row[:] = 0.0
     m.row[filter_state.VELOCITY + 1] = 1.0
     s, _ = delayed_measurements.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
-    fuse.absorb(m, 0.3, s)
+    fuse.apply_update(m, 0.3, s)
     assert m.covariance[filter_state.VELOCITY + 1, filter_state.VELOCITY + 1] == pytest.approx(0.25)

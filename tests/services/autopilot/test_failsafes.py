@@ -1,4 +1,4 @@
-"""What the vehicle does by itself when something is lost, in flight."""
+"""Failsafes in flight."""
 
 from itertools import groupby
 from pathlib import Path
@@ -25,7 +25,7 @@ def warnings(flown):
     return [int(w) for w in flown.column("status", lambda m: m.battery_warning)]
 
 
-def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
+def test_emptying_battery_warns_then_returns_then_lands(tmp_path):
     script = UP | {6: [command("goto", 10.0, 0.0, 3.0)]}
     small = [
         airframe(tmp_path, 12000.0),
@@ -33,8 +33,8 @@ def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
         "autopilot.parameters.RTL_RETURN_ALT=3.0",
     ]
     flown = fly(80, script, *small)
-    told = said(flown)
-    order = [told.index(t) for t in ("the battery is low", "the battery is critical: return", "landed")]
+    reported = said(flown)
+    order = [reported.index(t) for t in ("the battery is low", "the battery is critical: return", "landed")]
     assert order == sorted(order)
     charge = flown.column("battery", lambda m: m.percentage)
     assert charge[0] == pytest.approx(0.2, abs=1e-3)
@@ -44,7 +44,7 @@ def test_an_emptying_battery_warns_then_returns_then_lands(tmp_path):
     assert not at(flown, "status", 80.0, lambda m: m.armed)
 
 
-def test_a_nearly_empty_battery_lands_where_it_is(tmp_path):
+def test_nearly_empty_battery_lands_immediately(tmp_path):
     script = UP | {6: [command("goto", 30.0, 0.0, 3.0)]}
     low = [airframe(tmp_path, 4000.0), "effects.battery.initial_charge=0.18", "autopilot.parameters.FS_BAT_CRIT_ACT=0"]
     flown = fly(40, script, *low)
@@ -53,7 +53,7 @@ def test_a_nearly_empty_battery_lands_where_it_is(tmp_path):
     assert height(flown, 40.0) == pytest.approx(0.35, abs=0.05)
 
 
-def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unknown():
+def test_critical_battery_prevents_arming():
     script = {0.04: [command("arm", id=1)]}
     flown = fly(0.5, script, "effects.battery.initial_charge=0.06")
     assert results(flown)[1] == REJECTED
@@ -64,7 +64,7 @@ def test_a_critical_battery_does_not_arm_and_without_a_battery_the_charge_is_unk
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
-def test_a_damaged_rotor_is_named_and_the_vehicle_lands(rotor):
+def test_damaged_rotor_is_named_and_vehicle_lands(rotor):
     damage = [f"effects.rotor_damage.rotor={rotor}", "effects.rotor_damage.time=8.0"]
     damage += ["effects.rotor_damage.remaining_thrust=0.55", "effects.rotor_damage.remaining_torque=0.55"]
     flown = fly(20, UP, *damage)
@@ -76,7 +76,7 @@ def test_a_damaged_rotor_is_named_and_the_vehicle_lands(rotor):
     assert not at(flown, "status", 20.0, lambda m: m.armed)
 
 
-def test_a_lost_rotor_is_noticed_before_the_vehicle_has_fallen():
+def test_lost_rotor_is_noticed_before_vehicle_has_fallen():
     damage = ["effects.rotor_damage.rotor=3", "effects.rotor_damage.time=8.0"]
     flown = fly(9, {0.04: [command("takeoff", 10.0), command("arm")]}, *damage)
     failed, times = flown.column("status", lambda m: m.failed_motor), flown.times("status")
@@ -91,7 +91,7 @@ SENSORS = [
 ]  # fmt: skip
 
 
-def test_without_a_position_it_descends_and_tells_before():
+def test_lost_position_warns_then_descends():
     flown = fly(30, UP | {1.0: [command("takeoff", 3.0), command("arm")]}, *SENSORS, GPS_LOST % (10.0, 1e9))
     assert "the position is lost: descend in 2 s" in said(flown)
     assert "the position is lost: descend" in said(flown)
@@ -101,7 +101,7 @@ def test_without_a_position_it_descends_and_tells_before():
     assert np.hypot(*place(flown, 30.0)[:2]) < 2.0
 
 
-def test_who_holds_the_sticks_gets_the_vehicle_without_a_position():
+def test_position_loss_hands_over_to_manual_control():
     sticks = {(9.0, 20.0): [command("manual", 0.3, 0.0, 0.0, 0.0)], 16.0: [command("goto", 5.0, 0.0, 3.0, id=1)]}
     script = UP | {1.0: [command("takeoff", 3.0), command("arm")]} | sticks
     flown = fly(26, script, *SENSORS, GPS_LOST % (10.0, 24.0))
@@ -115,7 +115,7 @@ def test_who_holds_the_sticks_gets_the_vehicle_without_a_position():
     assert mode(flown, 26.0) == "hold"  # there is a position again, and an operator
 
 
-def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back():
+def test_trajectory_ends_when_position_returns_without_operator():
     soon = "autopilot.parameters.COM_POS_FS_DELAY=0.5"
     flown = fly(20, {}, *SENSORS, GPS_LOST % (3.0, 4.3), soon, operated=False)
     modes = [name for name, _ in groupby(flown.column("status", lambda m: m.mode))]
@@ -127,7 +127,7 @@ def test_without_an_operator_the_trajectory_ends_where_the_position_comes_back()
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("wind", [(3.0, 1.0), (8.0, 3.0)])
-def test_sound_motors_raise_no_alarm_in_the_delivery_mission(seed, wind):
+def test_delivery_mission_raises_no_motor_alarm(seed, wind):
     mean, sigma = wind
     sets = [
         f"run.seed={seed}",

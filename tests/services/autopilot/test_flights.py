@@ -41,7 +41,7 @@ def pitch(flown, t):
     return angles(flown, t)[1]
 
 
-def test_takeoff_goto_land_and_disarm_by_itself():
+def test_takeoff_goto_land_and_disarm():
     script = UP | {8: [command("goto", 4.0, 0.0, 3.0, 1.0, id=1)], 14: [command("land", id=2)]}
     flown = fly(25, script)
     assert height(flown, 7.9) == pytest.approx(3.0, abs=0.1)
@@ -54,7 +54,7 @@ def test_takeoff_goto_land_and_disarm_by_itself():
     assert results(flown) == {0: ACCEPTED, 1: ACCEPTED, 2: ACCEPTED}
 
 
-def test_a_mission_with_speed_jump_delay_and_return():
+def test_mission_with_speed_jump_delay_and_return():
     items = [
         item("takeoff", z=3.0),
         item("speed", values=(3.0,)),
@@ -76,7 +76,7 @@ def test_a_mission_with_speed_jump_delay_and_return():
     assert max(flown.column("ground_truth", lambda m: m.pose.position.z)) == pytest.approx(4.35, abs=0.2)
 
 
-def test_refusals_say_why():
+def test_rejections_name_reason():
     script = {
         0.04: [
             command("goto", 1.0, 1.0, 1.0, id=1),
@@ -94,7 +94,7 @@ def test_refusals_say_why():
     assert any("MPC_XY_CRUISE: expected a number from 0.1 to 20" in text for text in said(flown))
 
 
-def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost():
+def test_offboard_follows_setpoints_and_holds_after_loss():
     velocity = command("offboard_position", *[float("nan")] * 3, 1.0, 0.0, 0.0)
     flown = fly(14, UP | {(6, 9): [velocity], 6.2: [command("offboard", id=1)]})
     assert results(flown)[1] == ACCEPTED
@@ -105,7 +105,7 @@ def test_offboard_follows_fresh_setpoints_and_holds_when_they_are_lost():
     assert "the offboard setpoints are lost: hold" in said(flown)
 
 
-def test_a_lost_ground_station_brings_it_home_in_simulation_time():
+def test_lost_ground_station_returns_in_simulation_time():
     script = UP | {6: [command("goto", 4.0, 0.0, 3.0)], (0.5, 7): [command("link")]}
     flown = fly(14, script, "autopilot.parameters.COM_DL_LOSS_T=2.0")
     assert mode(flown, 8.5) == "goto"
@@ -113,13 +113,13 @@ def test_a_lost_ground_station_brings_it_home_in_simulation_time():
     assert at(flown, "status", 9.3, lambda m: m.failsafe)
 
 
-def test_sticks_ask_for_velocities_along_the_heading():
+def test_sticks_ask_for_velocities_along_heading():
     script = UP | {5.9: [command("position_control")], (6, 9): [command("manual", 0.2, 0.0, 0.0, 0.0)]}
     flown = fly(9, script)
     assert at(flown, "ground_truth", 9.0, lambda m: m.velocity.x) == pytest.approx(0.2 * 5.0, abs=0.05)
 
 
-def test_a_fence_turns_it_back():
+def test_fence_turns_vehicle_back():
     ring = [item("fence_circle_in", 0.0, 0.0, 0.0, radius=5.0)]
     sticks = command("manual", 0.6, 0.0, 0.0, 0.0)
     script = UP | {5: [command("fence_upload", items=ring), command("position_control")], (5.1, 12): [sticks]}
@@ -128,14 +128,14 @@ def test_a_fence_turns_it_back():
     assert 5.0 < place(flown, 12.0)[0] < 9.0
 
 
-def test_what_stands_disarmed_cannot_return_or_land_and_says_so():
+def test_disarmed_vehicle_rejects_return_and_land():
     flown = fly(1.0, {0.04: [command("return", id=1), command("land", id=2)]})
     assert results(flown) == {1: REJECTED, 2: REJECTED}
     assert said(flown) == ["return: the vehicle does not fly", "land: the vehicle does not fly"]
     assert mode(flown, 1.0) == "hold"
 
 
-def test_the_setpoint_is_what_is_followed_also_after_the_trajectory_was_left():
+def test_setpoint_is_recorded_after_leaving_trajectory():
     script = {4.0: [command("goto", 2.0, 0.0, 1.5)]}
     flown = fly(10, script, "autopilot.accept_commands=true", operated=False)
     assert mode(flown, 3.9) == "mission"
@@ -163,7 +163,7 @@ def test_polygons_are_kept_out_of_and_in():
     assert 6.0 < place(flown, 14.0)[0] < 8.0  # it stopped behind the edge of the tower
 
 
-def test_it_returns_to_the_nearest_rally_point():
+def test_return_uses_nearest_rally_point():
     points = [item("rally", 8.0, 3.0, 3.0), item("rally", -20.0, 0.0, 3.0)]
     script = UP | {5: [command("rally_upload", items=points), command("goto", 6.0, 0.0, 3.0)], 10: [command("return")]}
     flown = fly(30, script, "autopilot.parameters.RTL_RETURN_ALT=4.0")
@@ -171,7 +171,7 @@ def test_it_returns_to_the_nearest_rally_point():
     assert not at(flown, "status", 30.0, lambda m: m.armed)
 
 
-def test_offboard_attitude_tilts_by_the_angle_along_the_heading():
+def test_offboard_attitude_tilts_by_angle_along_heading():
     angle, yaw = 0.1, 0.5
     s, c = math.sin(0.5 * angle), math.cos(0.5 * angle)
     q = (c * math.cos(0.5 * yaw), -s * math.sin(0.5 * yaw), s * math.cos(0.5 * yaw), c * math.sin(0.5 * yaw))
@@ -187,7 +187,7 @@ def test_offboard_attitude_tilts_by_the_angle_along_the_heading():
     assert up == pytest.approx(0.0, abs=0.05)  # no thrust is given: the altitude is held
 
 
-def test_by_hand_from_the_ground_in_stabilized_and_acro():
+def test_by_hand_from_ground_in_stabilized_and_acro():
     sticks = {
         (0.5, 3.0): [command("manual", 0.0, 0.0, 0.15, 0.0)],
         (3.1, 4.0): [command("manual", 0.25, 0.0, 0.0, 0.0)],
@@ -205,7 +205,7 @@ def test_by_hand_from_the_ground_in_stabilized_and_acro():
     assert mode(flown, 9.4) == "hold"  # nobody holds the sticks
 
 
-def test_body_rates_tilt_it_on_and_a_yaw_rate_turns_it():
+def test_body_rate_setpoints_tilt_and_turn():
     nan = float("nan")
     rates = command("offboard_attitude", *[nan] * 4, 0.0, 0.2, 0.3, nan)
     level = command("offboard_attitude", 1.0, 0.0, 0.0, 0.0, nan, nan, 0.3, nan)
@@ -218,7 +218,7 @@ def test_body_rates_tilt_it_on_and_a_yaw_rate_turns_it():
     assert height(flown, 8.5) == pytest.approx(3.0, abs=0.3)  # no thrust is given: the altitude is held
 
 
-def test_altitude_control_takes_off_from_the_ground():
+def test_altitude_control_takes_off_from_ground():
     script = {0.04: [command("altitude_control", id=1), command("arm")], (0.5, 3.0): [command("manual", 0, 0, 0.5, 0)]}
     flown = fly(3.0, script)
     assert results(flown)[1] == ACCEPTED
@@ -236,13 +236,13 @@ def test_gains_change_in_flight_and_act():
     assert [results(changed)[k] for k in (1, 2)] == [ACCEPTED, DENIED]
     lag = []
     for flown in (changed, same):
-        asked, flew = (flown.column(topic, value) for topic, value in (
+        requested, flew = (flown.column(topic, value) for topic, value in (
             ("setpoint", lambda m: m.position.z), ("ground_truth", lambda m: m.pose.position.z)))  # fmt: skip
-        lag.append(max(abs(asked - flew)[2000:]))
+        lag.append(max(abs(requested - flew)[2000:]))
     assert lag[0] > 1.2 * lag[1]
 
 
-def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
+def test_estimate_is_valid_after_landing_and_second_flight():
     sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
     sets = ["autopilot.estimator=kalman", *[f"sensors.{each}" for each in sensors]]
     # with 3, 8, 11 and 16 the receiver was refused for 10 s; a fix of before the touch-down was fused as if after it
@@ -263,7 +263,7 @@ def test_the_estimate_is_sound_after_a_touch_down_and_it_flies_again():
         assert height(flown, 20.0) > 1.5
 
 
-def test_a_gripper_lets_the_payload_go():
+def test_gripper_lets_payload_go():
     items = [item("takeoff", z=3.0), item("waypoint", 1.0, 0.0, 3.0, hold=1.0), item("gripper", values=(0.0,)),
              item("waypoint", 2.0, 0.0, 3.0, hold=3.0)]  # fmt: skip
     script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}

@@ -22,7 +22,7 @@ P = estimator.PRESETS["rtk"]
 
 
 @pytest.mark.parametrize("axis", range(2))
-def test_row_against_differences_and_the_sensor(axis):
+def test_row_against_differences_and_sensor(axis):
     """Errors of attitude and velocity by the truth: the row tells how the flow that a camera sees differs."""
     attitude, velocity, distance = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([2.0, -1.0, 0.5]), 4.0
     memory = ef.estimator.initial(
@@ -99,7 +99,7 @@ def flights(sees):
 
 
 @pytest.mark.long
-def test_without_a_receiver_the_flow_keeps_the_drift_small_and_the_filter_knows_how_large_it_is():
+def test_flow_without_gps_bounds_drift_consistently():
     with_flow, covariance, health = flights(True)
     without, _, health_without = flights(False)
     before, out = slice(60, 145), slice(160, None)
@@ -118,7 +118,7 @@ def test_without_a_receiver_the_flow_keeps_the_drift_small_and_the_filter_knows_
 
 
 @pytest.mark.long
-def test_a_flight_goes_on_without_a_receiver_where_it_has_optical_flow():
+def test_flight_continues_on_optical_flow_without_gps():
     script = {9: [inject("gps", OFF)]}
     seeing = fly_by_sensors(24, script, ENABLED, "sensors.optical_flow.preset=pmw3901")
     assert not any("position is lost" in text for text in said(seeing))
@@ -130,7 +130,7 @@ def test_a_flight_goes_on_without_a_receiver_where_it_has_optical_flow():
 
 
 @pytest.mark.long
-def test_under_the_bridge_the_flow_carries_the_flight():
+def test_under_bridge_flow_carries_flight():
     """The scene that ships, and the same with a camera that sees nothing."""
 
     def drift(flight):

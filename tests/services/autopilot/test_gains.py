@@ -5,7 +5,7 @@ from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import FOLDER, load, names
 
 
-def test_the_paper_s_set_is_table_6():
+def test_paper_s_set_is_table_6():
     gains = load("paper")
     assert gains.altitude == (28.0, 22.0, 18.0)
     assert gains.yaw == (129.1, 181.2, 97.17)
@@ -15,7 +15,7 @@ def test_the_paper_s_set_is_table_6():
     assert not gains.feed_forward
 
 
-def test_every_set_that_ships_builds_and_a_path_serves_as_well(tmp_path):
+def test_every_set_that_ships_builds_and_path_serves_as_well(tmp_path):
     assert {"paper", "tuned"} <= set(names())
     for name in names():
         build(load(name), AIRFRAME)
@@ -24,7 +24,7 @@ def test_every_set_that_ships_builds_and_a_path_serves_as_well(tmp_path):
     assert load(str(own)) == load("tuned")
 
 
-def test_what_is_wrong_is_said_in_one_line(tmp_path):
+def test_error_is_one_line(tmp_path):
     text = (FOLDER / "paper.toml").read_text(encoding="utf-8")
     cases = {
         "missing.toml": (None, "cannot be read"),
@@ -47,6 +47,6 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path):
         load("papr")
 
 
-def test_a_vehicle_too_heavy_to_hover_is_refused():
+def test_vehicle_too_heavy_to_hover_is_refused():
     with pytest.raises(ValueError, match=r"below the 49.0 N"):
         build(load("paper"), AIRFRAME._replace(mass=20.0))

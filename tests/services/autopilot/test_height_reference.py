@@ -20,7 +20,7 @@ AHEAD = {0.04: [command("takeoff", 3.0), command("arm", NAN, 10.0)], 8: [command
 
 @pytest.mark.long
 @pytest.mark.parametrize(("reference", "least", "most"), [(0, 0.03, 0.1), (1, 0.005, 0.02), (2, 0.03, 0.1)])
-def test_the_height_comes_from_where_the_parameter_says(reference, least, most):
+def test_height_source_follows_parameter(reference, least, most):
     up = {0.04: [command("takeoff", 15.0), command("arm", NAN, 10.0)]}  # beyond the sonar's reach
     sets = [f"EKF2_HGT_REF={reference}", "MPC_TKO_SPEED=3"]
     flown = fly_by_sensors(20, up, *[f"autopilot.parameters.{each}" for each in sets])
@@ -29,7 +29,7 @@ def test_the_height_comes_from_where_the_parameter_says(reference, least, most):
     assert error(flown, 15.0) < 0.3
 
 
-def test_the_ground_moves_the_height_and_leaves_the_barometers_sum_alone():
+def test_ground_moves_height_and_leaves_barometers_sum_alone():
     """z counts from the ground, z + b_h does not: its variance, and that of all else, stays."""
     p, rng = estimator.PRESETS["rtk"], np.random.default_rng(3)
     s = estimator.initial(p, estimator.new_memory(), (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
@@ -51,7 +51,7 @@ def test_the_ground_moves_the_height_and_leaves_the_barometers_sum_alone():
 
 
 @pytest.mark.long
-def test_a_rangefinder_that_looks_down_stands_in_for_a_sonar():
+def test_downward_rangefinder_replaces_sonar():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.position=[0,0,-0.2]"]
     slope = "environment.terrain={slope=[0.1,0.0]}"
@@ -63,7 +63,7 @@ def test_a_rangefinder_that_looks_down_stands_in_for_a_sonar():
 
 @pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope=[0.1,0.0]", "steps={distance=[4.0],rise=[0.6]}"])
-def test_over_rising_ground_the_sonar_holds_the_height_above_it(ground):
+def test_sonar_keeps_height_over_rising_ground(ground):
     flown = fly_by_sensors(17, AHEAD, SONAR, f"environment.terrain={{{ground}}}")
     x, _, z = place(flown, 17.0)
     assert x == pytest.approx(14.0, abs=0.2)
@@ -73,12 +73,12 @@ def test_over_rising_ground_the_sonar_holds_the_height_above_it(ground):
 
 @pytest.mark.long
 @pytest.mark.parametrize("unit", ["barometer", "distance_sensor"])
-def test_the_other_sensor_takes_over(unit):
+def test_other_height_sensor_replaces_failed_sensor(unit):
     kind = WRONG if unit == "barometer" else OFF
     flown = fly_by_sensors(14, {8: [inject(unit, kind)]}, SONAR, ENABLED)
     assert height(flown, 14.0) == pytest.approx(height(flown, 8.0), abs=0.2)
 
 
-def test_a_reference_that_is_not_carried_is_refused():
+def test_missing_reference_is_rejected():
     with pytest.raises(ConfigError, match=r"EKF2_HGT_REF.*\[sensors\.sonar\]"):
         load("hover", [SONAR, "autopilot.estimator=kalman", *[f"sensors.{name}={{}}" for name in NEEDED]])

@@ -53,15 +53,15 @@ LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33
 
 def rejected(flown, start, source):
     """Share of the estimates from a time on in which a source was refused or missing."""
-    found = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
-    return float(np.mean(found))
+    result = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
+    return float(np.mean(result))
 
 
 def enable(value, id=0):
     return command("parameter", value, text="SYS_FAILURE_EN", id=id)
 
 
-def test_it_is_guarded_by_the_parameter_at_any_time_and_knows_what_there_is():
+def test_injection_needs_parameter_and_present_unit():
     script = {0.04: [inject("motor", OFF, id=1)], 0.1: [enable(1.0, id=2)]}
     script[0.2] = [inject("motor", OFF, id=3), inject("gps", OFF, id=4), inject("battery", SLOW, id=5)]
     script[0.24] = [inject("motor", DELAYED, id=9), inject("motor", OFF, 5, id=10)]
@@ -69,7 +69,7 @@ def test_it_is_guarded_by_the_parameter_at_any_time_and_knows_what_there_is():
     motor = UNITS.index("motor")
     script[0.24] += [command("inject_failure", motor, OFF, math.nan, bits, id=k) for k, bits in ((11, 5.0), (12, 16.0))]
     script[0.4] = [inject("motor", OFF, id=8)]
-    flown = fly(0.6, script)
+    flown = fly(0.6, script, "autopilot.parameters.SYS_FAILURE_EN=0")
     refused = dict.fromkeys((1, 4, 5, 8, 9, 10, 12), DENIED)
     expected = dict.fromkeys((2, 3, 6, 7, 11), ACCEPTED) | refused
     assert {k: v for k, v in results(flown).items() if k} == expected
@@ -86,7 +86,7 @@ FAILING = [unit for unit in UNITS if unit not in OF_SYSTEMS]
 
 
 def received(kind, seconds=4.0, start=1.0):
-    """What sensors and estimator hand over on the ground where every sensor fails in one way from `start` [s] on."""
+    """Return the outputs of sensors and estimator on the ground if every sensor fails in one way from `start` [s]."""
     scene = load("groundstation", [ENABLED, *LOOKING, "autopilot.follow_trajectory=false", f"run.duration={seconds}"])
     setup = resolve(scene)
     operator = scripted({start: [inject(unit, kind, id=k + 1) for k, unit in enumerate(FAILING)]})
@@ -96,7 +96,7 @@ def received(kind, seconds=4.0, start=1.0):
     graph.advance(setup.last_tick + 1)
     for name in SENSORS:
         period = graph.ports[name].period
-        rows = [graph.all_rows(port, period) for port in (name, f"{name}.received")]
+        rows = [graph.history(port, period) for port in (name, f"{name}.received")]
         first = -(-round(start * RATE) // period) + 1  # the first reading that is surely hit
         yield name, round(DELAY * RATE / period), first, *rows
 
@@ -106,7 +106,7 @@ VALUES = {"imu": 6, "magnetometer": 3, "gps": 3, "barometer": 1, "sonar": 1, "op
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT], ids=KINDS[1:])
-def test_what_arrives_is_what_the_kind_of_failure_says(kind):
+def test_received_reading_follows_failure_type(kind):
     for name, late, first, sent, got in received(kind):
         assert np.array_equal(sent[: first - 1], got[: first - 1])  # sound before
         there, numbers = got[first:, -1] > 0.0, slice(0, VALUES[name])
@@ -133,13 +133,13 @@ def test_what_arrives_is_what_the_kind_of_failure_says(kind):
             assert (got_then != sent_then).any(axis=1).all()
 
 
-def test_a_battery_that_is_off_reads_empty_and_the_vehicle_lands():
+def test_battery_off_failure_reads_empty_and_lands():
     flown = fly(8, UP | {6: [inject("battery", OFF)]}, ENABLED)
     assert "the battery is nearly empty: land" in said(flown)
     assert at(flown, "status", 8.0, lambda m: m.battery_warning) == 3
 
 
-def test_a_motor_that_is_off_is_noticed():
+def test_motor_off_failure_is_detected():
     flown = fly(6.6, UP | {6: [inject("motor", OFF, 3)]}, ENABLED)
     assert at(flown, "status", 6.5, lambda m: m.failed_motor) == 3
     assert any("a motor has failed" in text for text in said(flown))
@@ -149,11 +149,11 @@ def test_a_motor_that_is_off_is_noticed():
 
 
 def voltages(flown, start):
-    """What the motors get [V] from a time on."""
+    """Return the motor voltages [V] from a time on."""
     return flown.column("actuators", lambda m: tuple(m.motor_voltage))[flown.times("actuators") > start]
 
 
-def test_a_motor_that_is_stuck_keeps_its_speed_and_the_others_hold_the_vehicle():
+def test_stuck_motor_keeps_speed_and_others_compensate():
     flown = fly(9, UP | {6: [inject("motor", STUCK, 3)], 6.5: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
     volts = voltages(flown, 6.1)
     assert len(set(volts[:, 2])) == 1
@@ -162,7 +162,7 @@ def test_a_motor_that_is_stuck_keeps_its_speed_and_the_others_hold_the_vehicle()
     assert height(flown, 8.0) > 2.0
 
 
-def test_a_motor_that_is_wrong_gives_too_little_is_noticed_and_the_vehicle_lands_upright():
+def test_weak_motor_is_detected_and_vehicle_lands_upright():
     flown = fly(16, UP | {6: [inject("motor", WRONG, 3)]}, ENABLED)
     assert "a motor has failed: land" in said(flown)
     assert at(flown, "status", 6.5, lambda m: m.failed_motor) == 3
@@ -173,7 +173,7 @@ def test_a_motor_that_is_wrong_gives_too_little_is_noticed_and_the_vehicle_lands
     assert not at(flown, "status", 16.0, lambda m: m.armed)
 
 
-def test_motors_that_are_slow_follow_one_command_of_twenty():
+def test_slow_motor_follows_every_twentieth_command():
     flown = fly(8, UP | {6: [inject("motor", SLOW)], 6.2: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
     changes = np.flatnonzero(np.diff(voltages(flown, 6.3)[:, 0]) != 0.0)
     assert len(changes) > 10
@@ -181,7 +181,7 @@ def test_motors_that_are_slow_follow_one_command_of_twenty():
     assert height(flown, 8.0) > 2.0
 
 
-def test_motors_that_are_sound_again_follow_at_once():
+def test_repaired_motors_follow_at_once():
     flown = fly(8, UP | {6: [inject("motor", STUCK)], 6.1: [inject("motor", SOUND, 2, id=8)]}, ENABLED)
     volts = voltages(flown, 6.2)
     assert len(set(volts[:, 0])) == 1
@@ -192,13 +192,13 @@ def test_motors_that_are_sound_again_follow_at_once():
     ("level", "text"),
     [(1, "the battery is low"), (2, "the battery is critical: return"), (3, "the battery is nearly empty: land")],
 )
-def test_a_battery_that_is_wrong_reports_the_charge_that_the_parameter_chooses(level, text):
+def test_wrong_battery_reports_charge_of_parameter(level, text):
     flown = fly(7, UP | {6: [inject("battery", WRONG)]}, ENABLED, f"autopilot.parameters.SYS_FAIL_BAT_LVL={level}")
     assert at(flown, "status", 6.9, lambda m: m.battery_warning) == level
     assert text in said(flown)
 
 
-def test_a_battery_that_is_stuck_does_not_warn():
+def test_stuck_battery_does_not_warn():
     emptying = [ENABLED, "effects.battery.initial_charge=0.1502"]
     sound, stuck = fly(12, UP, *emptying), fly(12, UP | {0.1: [inject("battery", STUCK)]}, *emptying)
     assert "the battery is low" in said(sound)
@@ -221,13 +221,13 @@ def test_each_of_six_motors_can_fail():
     assert height(flown, 6.9) > 2.0
 
 
-def test_without_gps_it_warns_and_descends_and_holds_once_it_is_back():
+def test_lost_gps_descends_then_holds_on_recovery():
     script = {14: [inject("gps", OFF)], 27: [inject("gps", SOUND, id=8)]}
     flown = fly_by_sensors(
         31, script, ENABLED, "autopilot.parameters.MPC_LAND_SPEED=0.2", "autopilot.parameters.MIS_TAKEOFF_ALT=4"
     )
-    told = said(flown)
-    assert told.index("injected: gps off") < told.index("the position is lost: descend in 9 s")
+    reported = said(flown)
+    assert reported.index("injected: gps off") < reported.index("the position is lost: descend in 9 s")
     assert mode(flown, 24.5) == "descend"
     assert mode(flown, 30.5) == "hold"
 
@@ -242,7 +242,7 @@ def test_without_gps_it_warns_and_descends_and_holds_once_it_is_back():
     ],
     ids=lambda value: value if isinstance(value, str) else KINDS[value],
 )
-def test_a_sensor_that_fails_is_refused_and_the_others_carry_on(unit, kind):
+def test_sensor_that_fails_is_refused_and_others_carry_on(unit, kind):
     flown = fly_by_sensors(13, {9: [inject(unit, kind)]}, ENABLED)
     assert results(flown)[7] == ACCEPTED
     assert rejected(flown, 10.0, {"distance_sensor": "sonar"}.get(unit, unit)) > 0.5
@@ -252,7 +252,7 @@ def test_a_sensor_that_fails_is_refused_and_the_others_carry_on(unit, kind):
 
 @pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
 @pytest.mark.parametrize("units", [("gps", "magnetometer"), ("barometer", "distance_sensor")])
-def test_what_a_sensor_still_gives_is_taken_in(units, kind):
+def test_remaining_readings_are_fused(units, kind):
     flown = fly_by_sensors(13, {9: [inject(unit, kind, id=k + 1) for k, unit in enumerate(units)]}, ENABLED)
     assert error(flown, 9.0) < 0.2
     if kind != DELAYED:
@@ -262,17 +262,17 @@ def test_what_a_sensor_still_gives_is_taken_in(units, kind):
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, SLOW, DELAYED], ids=lambda kind: KINDS[kind])
 @pytest.mark.parametrize("unit", ["accelerometer", "gyro"])
-def test_without_an_inertial_sensor_the_vehicle_does_not_stay_where_it_is(unit, kind):
-    flown = fly_by_sensors(14.5, {9: [inject(unit, kind)]}, ENABLED)
-    assert math.dist(place(flown, 14.5), place(flown, 9.0)) > 1.0
+def test_vehicle_drifts_without_inertial_sensor(unit, kind):
+    flown = fly_by_sensors(15.5, {9: [inject(unit, kind)]}, ENABLED)
+    assert math.dist(place(flown, 15.5), place(flown, 9.0)) > 1.0
     if unit == "gyro" or kind in (OFF, SLOW):  # it tumbles
-        told = said(flown)
-        after = told[told.index(f"injected: {unit} {KINDS[kind]}") + 1 :]
+        reported = said(flown)
+        after = reported[reported.index(f"injected: {unit} {KINDS[kind]}") + 1 :]
         assert {"a motor has failed: land", "the position is lost: descend in 9 s"} & set(after)
 
 
 @pytest.mark.parametrize("unit", ["accelerometer", "gyro"])
-def test_an_inertial_sensor_that_is_off_by_a_bias_is_felt_and_outages_are_bridged(unit):
+def test_inertial_bias_is_noticed_and_outage_bridged(unit):
     biased = fly_by_sensors(13, {9: [inject(unit, WRONG)]}, ENABLED)
     assert 0.05 < error(biased, 9.0) < 3.0
     assert place(biased, 13.0)[2] > 2.0

@@ -35,8 +35,8 @@ ALL = [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT]
 
 def rejected(flown, start, source):
     """Share of the estimates from a time on in which a source was refused or missing."""
-    found = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
-    return float(np.mean(found))
+    result = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
+    return float(np.mean(result))
 
 
 def by_flow(kind):
@@ -48,16 +48,18 @@ def by_flow(kind):
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
-def test_without_a_receiver_a_flow_that_fails_is_refused_and_the_vehicle_descends(kind):
+def test_failed_flow_without_gps_causes_descent(kind):
     flown = by_flow(kind)
     assert rejected(flown, 14.0, "optical_flow") > 0.9
-    told = said(flown)
-    assert told.index(f"injected: optical_flow {KINDS[kind]}") < told.index("the position is lost: descend in 9 s")
+    reported = said(flown)
+    assert reported.index(f"injected: optical_flow {KINDS[kind]}") < reported.index(
+        "the position is lost: descend in 9 s"
+    )
     assert mode(flown, 26.0) == "descend"
 
 
 @pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
-def test_what_a_camera_still_gives_carries_the_flight(kind):
+def test_remaining_flow_readings_sustain_flight(kind):
     flown = by_flow(kind)
     assert mode(flown, 26.0) == "hold"
     assert math.dist(place(flown, 26.0), place(flown, 13.0)) < 2.0
@@ -65,7 +67,7 @@ def test_what_a_camera_still_gives_carries_the_flight(kind):
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
-def test_beside_a_receiver_a_flow_that_fails_changes_nothing(kind):
+def test_failed_flow_with_gps_does_not_affect_flight(kind):
     flown = fly_by_sensors(13, {9: [inject("optical_flow", kind)]}, ENABLED, FLOW)
     sound = fly_by_sensors(13, {}, ENABLED, FLOW)
     assert place(flown, 13.0) == place(sound, 13.0)
@@ -76,7 +78,7 @@ def test_beside_a_receiver_a_flow_that_fails_changes_nothing(kind):
 
 
 @pytest.mark.parametrize("kind", [OFF, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
-def test_a_rangefinder_that_looks_down_fails_as_the_distance_sensor(kind):
+def test_rangefinder_that_looks_down_fails_as_distance_sensor(kind):
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3"]
     script = {0.04: UP_TO_3, 8: [inject("distance_sensor", kind)]}
@@ -86,19 +88,19 @@ def test_a_rangefinder_that_looks_down_fails_as_the_distance_sensor(kind):
     assert height(flown, 13.0) == pytest.approx(height(flown, 8.0), abs=0.3)
 
 
-def test_a_wrong_distance_is_followed_where_it_is_the_reference_of_the_height():
+def test_wrong_distance_is_followed_as_height_reference():
     flown = fly_by_sensors(13, {8: [inject("distance_sensor", WRONG)]}, ENABLED, "autopilot.parameters.EKF2_HGT_REF=2")
     assert height(flown, 13.0) == pytest.approx(height(flown, 8.0) - EXCESS_RANGE, abs=0.1)
 
 
-def test_a_stuck_distance_does_not_keep_the_vehicle_down():
+def test_stuck_distance_does_not_keep_vehicle_down():
     script = {8: [inject("distance_sensor", STUCK)], 9: [command("goto", 0.0, 0.0, 6.0, 0.0, 2.0)]}
     flown = fly_by_sensors(14, script, ENABLED)
     assert height(flown, 14.0) == pytest.approx(6.0, abs=0.1)
     assert error(flown, 9.0) < 0.1
 
 
-def test_a_rangefinder_that_the_autopilot_does_not_read_cannot_fail():
+def test_rangefinder_that_autopilot_does_not_read_cannot_fail():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     ahead = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.elevation_deg=0"]
     script = {0.1: [inject("distance_sensor", OFF)]}
@@ -108,7 +110,7 @@ def test_a_rangefinder_that_the_autopilot_does_not_read_cannot_fail():
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
-def test_an_airspeed_that_fails_is_told_as_it_arrives_and_nothing_flies_by_it(kind):
+def test_failed_airspeed_is_reported_and_not_used(kind):
     flown = fly_by_sensors(12, {9: [inject("airspeed", kind)]}, ENABLED, TUBE)
     assert results(flown)[7] == ACCEPTED
     after = flown.times("differential_pressure") > 9.1

@@ -10,7 +10,7 @@ from lapwing.services.autopilot.gains import load
 from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops
 
 
-def test_integrator_with_delay_is_the_closed_form():
+def test_integrator_with_delay_is_closed_form():
     k, delay = 5.0, 0.05
     s = 1j * FREQUENCIES
     m = margins(k / s * np.exp(-delay * s))
@@ -29,7 +29,7 @@ def test_double_integrator_with_pid_can_also_be_too_weak():
 
 
 @pytest.mark.parametrize(("gain", "crossover"), [(1e9, math.inf), (1e-9, 0.0)])
-def test_a_gain_that_is_never_one_has_no_crossover(gain, crossover):
+def test_gain_never_one_has_no_crossover(gain, crossover):
     s = 1j * FREQUENCIES
     assert margins(gain / s)[:2] == (crossover, math.inf)
 
@@ -57,7 +57,7 @@ def discrete_radius(pid, gain, delay):
 
 @pytest.mark.parametrize("delay", [0, 1])
 @pytest.mark.parametrize("name", ["paper", "tuned"])
-def test_gain_margin_is_where_the_discrete_loop_becomes_unstable(name, delay):
+def test_gain_margin_is_where_discrete_loop_becomes_unstable(name, delay):
     p = build(load(name), AIRFRAME)
     arm = 4.0 * AIRFRAME.rotor_x[0]
     for loop, pid, effect in (

@@ -34,7 +34,7 @@ def test_each_demand_turns_about_its_own_axis_only(axis):
     assert torque == pytest.approx([8.0 * arm if k == axis else 0.0 for k in range(3)], abs=1e-12)
 
 
-def test_lift_turns_nothing():
+def test_lift_causes_no_torque():
     force, torque = wrench(mix(SHARES, VirtualControls(3.0, 0.0, 0.0, 0.0)))
     assert force == pytest.approx((0.0, 0.0, 12.0))
     assert torque == pytest.approx(0.0, abs=1e-12)
@@ -44,20 +44,20 @@ def test_lift_turns_nothing():
 @settings(deadline=None)
 @example(2.0, -2.0, -2.0, -2.0)  # possible with this yaw only: the collective makes room for the tilt alone
 def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll, pitch, yaw):
-    wanted = VirtualControls(collective, roll, pitch, yaw)
-    given_ = saturate(SHARES, wanted, TOP)
+    expected = VirtualControls(collective, roll, pitch, yaw)
+    given_ = saturate(SHARES, expected, TOP)
     thrust = mix(SHARES, given_)
     assert min(thrust) >= -1e-9
     assert max(thrust) <= TOP + 1e-9
-    free = mix(SHARES, wanted) + mix(SHARES, wanted._replace(yaw=0.0))
+    free = mix(SHARES, expected) + mix(SHARES, expected._replace(yaw=0.0))
     if min(free) >= 0.0 and max(free) <= TOP:
-        assert given_ == pytest.approx(wanted, abs=1e-12)
-    assert all(abs(a) <= abs(b) + 1e-12 and a * b >= 0.0 for a, b in zip(given_[1:], wanted[1:], strict=True))
+        assert given_ == pytest.approx(expected, abs=1e-12)
+    assert all(abs(a) <= abs(b) + 1e-12 and a * b >= 0.0 for a, b in zip(given_[1:], expected[1:], strict=True))
 
 
 @given(st.floats(0.0, 48.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0), ANY)
 @settings(deadline=None)
-def test_yaw_gets_what_the_others_leave_and_no_less(collective, roll, pitch, yaw):
+def test_yaw_gets_remaining_range(collective, roll, pitch, yaw):
     given_ = saturate(SHARES, VirtualControls(collective, roll, pitch, yaw), TOP)
     assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
     bare = mix(SHARES, given_._replace(yaw=0.0))

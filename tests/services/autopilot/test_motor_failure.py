@@ -24,9 +24,9 @@ def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
     thrust = np.full(4, HOVER)
     x, y = np.array(FRAME.rotor_x), np.array(FRAME.rotor_y)
     for _ in range(round(seconds / TICK)):
-        asked = HOVER * (1.0 + 0.3 * random.standard_normal(4)).clip(0.2, 2.0)
-        s = watch.step(p, s, TICK, tuple(omega), height, tuple(asked))
-        thrust += (1.0 - np.exp(-TICK / 0.02)) * (asked - thrust)
+        requested = HOVER * (1.0 + 0.3 * random.standard_normal(4)).clip(0.2, 2.0)
+        s = watch.step(p, s, TICK, tuple(omega), height, tuple(requested))
+        thrust += (1.0 - np.exp(-TICK / 0.02)) * (requested - thrust)
         torque = np.array([(y * left * thrust).sum() + push[0], -(x * left * thrust).sum() + push[1], 0.0])
         inertia = np.array(FRAME.inertia_body)
         omega += TICK * (torque - np.cross(omega, inertia * omega)) / inertia
@@ -35,28 +35,28 @@ def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 @pytest.mark.parametrize("share", [0.0, 0.5])
-def test_the_rotor_that_lacks_thrust_is_named(rotor, share):
+def test_rotor_that_lacks_thrust_is_named(rotor, share):
     left = np.ones(4)
     left[rotor - 1] = share
     assert campaign_setup(left).failed == rotor
 
 
-def test_sound_rotors_and_a_vehicle_that_all_rotors_carry_less_well_are_not_blamed():
+def test_equal_thrust_loss_is_no_motor_failure():
     for seed in range(5):
         assert campaign_setup(np.ones(4), seconds=5.0, seed=seed).failed == 0
     assert campaign_setup(np.full(4, 0.6)).failed == 0
 
 
-def test_a_push_along_an_axis_is_nobodys_fault():
+def test_push_along_axis_blames_no_motor():
     assert campaign_setup(np.ones(4), push=(6.0, 0.0)).failed == 0
     assert campaign_setup(np.ones(4), push=(0.0, -6.0)).failed == 0
 
 
-def test_on_the_ground_the_feet_may_push():
+def test_on_ground_feet_may_push():
     assert campaign_setup(np.array([1.0, 1.0, 0.0, 1.0]), height=0.1).failed == 0
 
 
-def test_the_disturbance_is_the_angular_acceleration_that_lacks():
+def test_disturbance_is_angular_acceleration_that_lacks():
     left = np.array([0.8, 1.0, 1.0, 1.0])  # too little to be blamed
     s = campaign_setup(left)
     assert s.failed == 0

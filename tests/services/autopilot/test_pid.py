@@ -3,7 +3,7 @@ import pytest
 from lapwing.services.autopilot.pid import Pid, integrate, output
 
 
-def test_output_on_a_ramp_of_error_is_the_closed_form():
+def test_output_on_ramp_of_error_is_closed_form():
     gains, dt, integral = Pid(2.0, 3.0, 5.0), 1e-4, 0.0
     for k in range(1, 20_001):
         integral = integrate(gains, integral, 0.7 * k * dt, 0.0, dt)
@@ -13,7 +13,7 @@ def test_output_on_a_ramp_of_error_is_the_closed_form():
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_integral_stops_only_in_the_direction_of_saturation(sign):
+def test_integral_stops_only_in_direction_of_saturation(sign):
     gains = Pid(sign, sign, 0.0)
     pushing, relieving = 2.0, -2.0  # errors; the output that was cut had the sign of sign * pushing
     assert integrate(gains, 1.0, pushing, sign, 0.1) == 1.0

@@ -28,20 +28,20 @@ def test_commands_come_again_at_their_ticks(tmp_path):
     assert resimulate(log) == (flown, flown)
 
 
-def test_the_commands_of_a_plan_come_once(tmp_path):
+def test_commands_of_plan_come_once(tmp_path):
     log = tmp_path / "plan.mcap"
     setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), {"drone1": tuple(UP[0.04])})
     flown = fly(log, setup)
     assert resimulate(log) == (flown, flown)
 
 
-def test_a_run_that_listened_to_nobody_is_flown_again_too(tmp_path):
+def test_run_without_operator_is_resimulated(tmp_path):
     log = tmp_path / "hover.mcap"
     flown = fly(log, resolve(load("hover", ["run.duration=2"])))
     assert resimulate(log) == (flown, flown)
 
 
-def test_the_log_alone_is_enough(tmp_path):
+def test_log_alone_is_enough(tmp_path):
     copy = shutil.copytree(SCENES, tmp_path / "scenes")
     scene = load(copy / "hover.toml", ["run.duration=2", "airframe.mass.total=9.5", "gains.tilt_limit=0.5"])
     shutil.rmtree(copy)

@@ -1,4 +1,4 @@
-"""What the autopilot could not fly is refused before it flies."""
+"""Scenes that the autopilot cannot fly are rejected before the flight."""
 
 import pytest
 
@@ -23,12 +23,12 @@ SENSORS = {"autopilot.estimator": "kalman", "sensors": {"imu": {}, "magnetometer
         ({"airframe.motor.max_voltage": 32.0, **ELECTRIC}, "V per motor, the limit is 32.0 V"),
     ],
 )
-def test_a_vehicle_that_cannot_hover(overrides, message):
+def test_vehicle_that_cannot_hover(overrides, message):
     with pytest.raises(SceneError, match=f"airframe.*{message}"):
         load("hover", overrides)
 
 
-def test_the_limit_is_that_of_the_performance_card():
+def test_limit_is_that_of_performance_card():
     """Just below its maximum thrust the vehicle is taken, just above it is not."""
     heaviest = performance.maximum_thrust(DRONE, 1.225) / performance.GRAVITY
     scene = {**ELECTRIC, "environment.home.height": 0.0}
@@ -37,12 +37,12 @@ def test_the_limit_is_that_of_the_performance_card():
         load("hover", {**scene, "vehicle.mass": 1.001 * heaviest})
 
 
-def test_a_slung_load_that_the_rotors_cannot_lift():
+def test_slung_load_that_rotors_cannot_lift():
     with pytest.raises(SceneError, match=r"slung_load.mass: expected a lighter load .*got 20: the rotors lift at most"):
         load("slung_load", {"slung_load.mass": 20.0})
 
 
-def test_a_field_without_a_heading():
+def test_field_without_heading():
     with pytest.raises(
         SceneError, match=r"environment.magnetic_field: expected at least 1e-06 T, got 0 T horizontally"
     ):

@@ -64,19 +64,19 @@ CASES = {
     "no trajectory": (GROUND, 6.0, {0.04: [command("takeoff", 2.0), command("arm", NAN, 10.0)]}, []),
 }  # fmt: skip
 ROUNDS = {"nobody says anything": 4.0 * RATE / 5 + 1}
-"""How often the commander is asked in these flights."""
+"""Number of commander steps in these flights."""
 
 
 def operator_of(script, answers_every):
     """The commands of a script at the first tick at which they can be taken."""
 
     def operator(tick):
-        found = []
+        result = []
         for when, commands in script.items():
             start, end = when if isinstance(when, tuple) else (when, when)
             ticks = range(round(start * RATE), round(end * RATE) + 1, 25)
-            found += [c for t in ticks if 0 <= tick - t < answers_every for c in commands]
-        return found
+            result += [c for t in ticks if 0 <= tick - t < answers_every for c in commands]
+        return result
 
     return operator
 
@@ -85,25 +85,25 @@ def flown(name, monkeypatch, always):
     """(the flight, how often the commander was asked)"""
     scene, seconds, script, overrides = CASES[name]
     setup = resolve(load(scene, [*overrides, f"run.duration={seconds}"]))
-    asked = []
+    requested = []
 
-    def act(self, tick, act=CommanderBlock.act):
-        asked.append(tick)
+    def on_tick(self, tick, act=CommanderBlock.on_tick):
+        requested.append(tick)
         following = act(self, tick)
         return tick + 1 if always else following
 
     with monkeypatch.context() as patch:
-        patch.setattr(CommanderBlock, "act", act)
+        patch.setattr(CommanderBlock, "on_tick", on_tick)
         log = memory_log.fly(setup, operator_of(script, setup.services["autopilot"].parameters.answers_every))
-    return log, len(asked)
+    return log, len(requested)
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_it_flies_as_if_it_were_asked_always(name, monkeypatch):
+def test_sparse_commander_equals_commander_every_tick(name, monkeypatch):
     always, most = flown(name, monkeypatch, always=True)
-    seldom, asked = flown(name, monkeypatch, always=False)
-    assert asked < most or name == "no trajectory"
-    assert asked == ROUNDS.get(name, asked)
+    seldom, requested = flown(name, monkeypatch, always=False)
+    assert requested < most or name == "no trajectory"
+    assert requested == ROUNDS.get(name, requested)
     assert seldom.topics.keys() == always.topics.keys()
     for topic in always.topics:
         assert seldom.payloads(topic) == always.payloads(topic), topic

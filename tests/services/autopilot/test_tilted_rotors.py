@@ -19,7 +19,7 @@ from lapwing.studies.tune.linearise import hover
 SCENE = "hexacopter_tilted"
 
 
-def test_the_autopilot_knows_the_force_and_the_torques_of_the_plant():
+def test_autopilot_knows_force_and_torques_of_plant():
     scene = load(SCENE, {"airframe.mass.centre": [0.01, -0.02, 0.03]})
     known, frame = known_airframe(scene), airframe(scene)
     thrust = np.array([3.0, 4.0, 5.0, 2.0, 3.5, 4.5])
@@ -34,7 +34,7 @@ def test_axes_along_z_are_those_of_rotors_without_axes():
     assert np.array_equal(tilted, effectiveness(x, y, reaction))
 
 
-def test_a_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
+def test_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     flown = fly(load(SCENE))
     assert str(flown.outcome).startswith("Landed")
     assert "upright" in str(flown.outcome)
@@ -49,7 +49,7 @@ def test_a_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     )
 
 
-def test_the_spin_up_reaction_is_that_of_the_plant():
+def test_spin_up_reaction_is_that_of_plant():
     scene = load(SCENE)
     assert known_airframe(scene).spin_up_zero == pytest.approx(hover(scene).spin_up_zero, rel=0.1)
 

@@ -14,18 +14,18 @@ TABLE = '[effects.rotor_table]\nfile = "prop.txt"'
 
 @pytest.fixture
 def path(tmp_path):
-    found = tmp_path / "table.toml"
-    found.write_text(Path("lapwing/scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", TABLE))
-    return found
+    result = tmp_path / "table.toml"
+    result.write_text(Path("lapwing/scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", TABLE))
+    return result
 
 
-def test_rotor_constants_come_from_the_table(path):
+def test_rotor_constants_come_from_table(path):
     path.with_name("prop.txt").write_text("J CT CP\n0.0 0.10 0.04\n0.2 0.08 0.04\n")
     scene = load(path)
     path.with_name("prop.txt").unlink()
-    found = rotor_constants(scene)
-    assert found.thrust == pytest.approx(0.1 * 0.5588**4 / (4 * math.pi**2))
-    assert found.with_density
+    result = rotor_constants(scene)
+    assert result.thrust == pytest.approx(0.1 * 0.5588**4 / (4 * math.pi**2))
+    assert result.with_density
 
 
 def test_missing_or_incomplete_table_is_rejected(path):

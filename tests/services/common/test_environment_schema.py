@@ -30,7 +30,7 @@ def test_environment_has_standard_defaults():
     assert environment(load("hover")) == STANDARD
 
 
-def test_all_services_share_the_environment():
+def test_all_services_share_environment():
     setup = resolve(scene := load("delivery_mission", PLACE))
     around = environment(scene)
     assert gravity(scene) == around.gravity == normal_gravity(47.3)
@@ -42,11 +42,11 @@ def test_all_services_share_the_environment():
     assert (filter_.home, filter_.atmosphere, filter_.gravity) == (around.home, around.atmosphere, around.gravity)
     assert filter_.magnetic_field_world == around.magnetic_field_world != STANDARD.magnetic_field_world
     assert filter_.sonar_height_max == 0.0  # the filter takes the ground for level
-    assert setup.beside["mavlink"].home == around.home
-    assert setup.beside["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
+    assert setup.auxiliary["mavlink"].home == around.home
+    assert setup.auxiliary["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
 
 
-def test_barometer_and_rotors_share_the_atmosphere():
+def test_barometer_and_rotors_share_atmosphere():
     scene = load("delivery_mission", {**PLACE, "sensors.barometer.preset": "ideal", "sensors.gps.preset": "standard"})
     sensors, plant = Alone(scene, "sensors"), resolve(scene).services["plant"].parameters
     sensors.step(truth=sensors.setup.port("truth").like)
@@ -64,9 +64,9 @@ def test_recorded_scene_needs_no_terrain_file(tmp_path):
     again = from_resolved(scene.resolved, "hover")
     (tmp_path / "hill.npy").unlink()
     assert again == scene
-    found, ground = environment(again), environment(scene).terrain
-    assert found.home == environment(scene).home
-    assert surface(found.terrain, 1.0, 2.0) == surface(ground, 1.0, 2.0)
+    result, ground = environment(again), environment(scene).terrain
+    assert result.home == environment(scene).home
+    assert surface(result.terrain, 1.0, 2.0) == surface(ground, 1.0, 2.0)
     at_home = heights[0, 2] + 0.1 * 4.0 / 3.0  # column 2, a third between rows 1 and 2
     assert surface(ground, 4.5, 2.5)[0] == pytest.approx(heights[3, 5] - at_home)
 
@@ -124,12 +124,12 @@ def test_start_inside_obstacle_is_rejected():
         {"box": [{"position": [0.3, 0.0], "size": [0.2, 4.0], "top": 5.0}]},
     ],
 )
-def test_start_on_a_wall_is_rejected(terrain):
+def test_start_on_wall_is_rejected(terrain):
     with pytest.raises(SceneError, match=r"environment.terrain: no room .* it would lean by 8\d degrees"):
         resolve(load("hover", {"environment.terrain": terrain}))
 
 
-def test_start_pose_is_on_top_of_a_box():
+def test_start_pose_is_on_top_of_box():
     roof = {"environment.terrain.box": [{"position": [0.0, 0.0], "size": [3.0, 3.0], "top": 2.0}]}
     assert start_pose(load("hover", roof))[0] == pytest.approx((0.0, 0.0, 2.35))
     assert isinstance(environment(load("hover", {"environment.terrain.slope": [0.0, 0.0]})).terrain, Level)

@@ -14,18 +14,18 @@ def items(path):
     return read(path)[0].items
 
 
-def test_delivery_plan_has_the_mission_items():
-    found = items(DELIVERY)
-    assert [i.action for i in found] == ["speed", "takeoff", *["waypoint"] * 4, "land"]
-    assert tuple(found[4].position) == pytest.approx((10.0, 10.0, 10.0), abs=1e-3)
-    assert found[4].yaw == pytest.approx(0.0)  # heading east
-    assert found[5].yaw == pytest.approx(math.pi / 2)  # heading north
-    assert found[5].hold_time == 5.0
+def test_delivery_plan_has_mission_items():
+    result = items(DELIVERY)
+    assert [i.action for i in result] == ["speed", "takeoff", *["waypoint"] * 4, "land"]
+    assert tuple(result[4].position) == pytest.approx((10.0, 10.0, 10.0), abs=1e-3)
+    assert result[4].yaw == pytest.approx(0.0)  # heading east
+    assert result[5].yaw == pytest.approx(math.pi / 2)  # heading north
+    assert result[5].hold_time == 5.0
 
 
-def test_plan_altitudes_start_at_the_resting_height():
-    found = read(DELIVERY, 0.35)[0].items
-    assert [i.position.z for i in found[1:6]] == pytest.approx([10.35] * 5, abs=1e-3)
+def test_plan_altitudes_start_at_resting_height():
+    result = read(DELIVERY, 0.35)[0].items
+    assert [i.position.z for i in result[1:6]] == pytest.approx([10.35] * 5, abs=1e-3)
 
 
 def test_waypoints_skip_home_and_renumber_jumps(tmp_path):
@@ -38,11 +38,11 @@ def test_waypoints_skip_home_and_renumber_jumps(tmp_path):
         "3 0 2 177 2 1 0 0 0 0 0 1",
     ]
     path.write_text("\n".join(rows))
-    found = items(path)
-    assert [i.action for i in found] == ["takeoff", "waypoint", "jump"]
-    assert found[1].position.y == pytest.approx(11.1, abs=0.1)
-    assert found[1].position.z == 5.0
-    assert found[2].values == (1.0, 1.0)
+    result = items(path)
+    assert [i.action for i in result] == ["takeoff", "waypoint", "jump"]
+    assert result[1].position.y == pytest.approx(11.1, abs=0.1)
+    assert result[1].position.z == 5.0
+    assert result[2].values == (1.0, 1.0)
 
 
 @pytest.mark.parametrize(

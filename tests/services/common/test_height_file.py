@@ -26,8 +26,8 @@ def write(path, heights, crs="EPSG:4326", transform=None, **tags):
     west, north = LONGITUDE - 0.5 * columns * STEP, LATITUDE + 0.5 * rows * STEP
     transform = transform or rasterio.transform.from_origin(west, north, STEP, STEP)
     bands = 1 if heights.ndim == 2 else len(heights)
-    given = {"dtype": heights.dtype, "crs": crs, "transform": transform, "nodata": tags.pop("nodata", None)}
-    with rasterio.open(path, "w", "GTiff", width=columns, height=rows, count=bands, **given) as file:
+    values = {"dtype": heights.dtype, "crs": crs, "transform": transform, "nodata": tags.pop("nodata", None)}
+    with rasterio.open(path, "w", "GTiff", width=columns, height=rows, count=bands, **values) as file:
         file.write(heights if heights.ndim == 3 else heights[None])
         for name, value in tags.items():
             setattr(file, name, value)
@@ -43,11 +43,11 @@ def test_geographic_heights_match_pymap3d(tmp_path):
     """Compare a plane in degrees with pymap3d; file rows run from north to south."""
     row, column = np.mgrid[0:40, 0:60]
     north, east = (20 - row - 0.5) * STEP, (column + 0.5 - 30) * STEP
-    found = ground(write(tmp_path / "hill.tif", 700.0 + 5e3 * north + 2e3 * east))
+    result = ground(write(tmp_path / "hill.tif", 700.0 + 5e3 * north + 2e3 * east))
     for x, y in PLACES:
         latitude, longitude, _ = pymap3d.enu2geodetic(x, y, 0.0, LATITUDE, LONGITUDE, 500.0)
         expected = 5e3 * (latitude - LATITUDE) + 2e3 * (longitude - LONGITUDE)
-        assert surface(found, x, y)[0] == pytest.approx(expected, abs=2e-3)
+        assert surface(result, x, y)[0] == pytest.approx(expected, abs=2e-3)
 
 
 def test_projected_heights_turn_by_meridian_convergence(tmp_path):
@@ -55,11 +55,11 @@ def test_projected_heights_turn_by_meridian_convergence(tmp_path):
     column = np.mgrid[0:80, 0:80][1]
     easting, northing = 462_200.0, 5_238_700.0  # near home, within the file
     transform = rasterio.transform.from_origin(easting - 400.0, northing + 400.0, 10.0, 10.0)
-    found = ground(write(tmp_path / "utm.tif", 0.3 * 10.0 * column, "EPSG:32632", transform))
+    result = ground(write(tmp_path / "utm.tif", 0.3 * 10.0 * column, "EPSG:32632", transform))
     convergence = math.atan(math.tan(math.radians(LONGITUDE - 9.0)) * math.sin(math.radians(LATITUDE)))
     scale = 0.9996 * (1.0 + 0.5 * (37_800.0 / 6.38e6) ** 2)
-    east = (surface(found, 150.0, 0.0)[0] - surface(found, -150.0, 0.0)[0]) / 300.0
-    north = (surface(found, 0.0, 150.0)[0] - surface(found, 0.0, -150.0)[0]) / 300.0
+    east = (surface(result, 150.0, 0.0)[0] - surface(result, -150.0, 0.0)[0]) / 300.0
+    north = (surface(result, 0.0, 150.0)[0] - surface(result, 0.0, -150.0)[0]) / 300.0
     assert math.atan2(north, east) == pytest.approx(-convergence, abs=1e-4)
     assert math.hypot(east, north) == pytest.approx(0.3 * scale, rel=1e-4)
 
@@ -107,7 +107,7 @@ def test_file_without_geotiff_is_rejected(tmp_path, content):
     assert "\n" not in str(error.value)
 
 
-def test_reach_of_an_array_is_rejected(tmp_path):
+def test_reach_of_array_is_rejected(tmp_path):
     np.save(tmp_path / "hill.npy", FLAT)
     with pytest.raises(SceneError, match=r"grid.reach: needs a GeoTIFF"):
         ground(tmp_path / "hill.npy", corner=[-20.0, -20.0])

@@ -1,5 +1,7 @@
 """Airframe mesh: file formats, and the way from file to report."""
 
+import base64
+import json
 import re
 import struct
 
@@ -12,7 +14,7 @@ from lapwing.services.common.mesh_schema import pack, unpack
 from lapwing.services.common.run_schema import SHIPPED
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.flight_provenance import Origin
-from lapwing.studies.report import motion_3d
+from lapwing.studies.view3d.vehicle_bodies import motion
 from tests.studies import synthetic_flights
 
 # A pyramid on a square, its top off the middle: no two axes can be mistaken for one another.
@@ -42,6 +44,47 @@ def obj():
     return f"# a pyramid\no pyramid\n{places}vn 0 0 1\nf 4 3 2 1\n{sides}".encode()
 
 
+def gltf(scale=1.0, **changes):
+    """The pyramid in a node that is moved, turned by 90 degrees about y (up) and scaled; y is up, z ahead."""
+    ahead, left, up = CORNERS.T
+    turned = np.column_stack([-ahead, up, left]) / scale - np.array([0.0, 1.0, 0.0])  # undone by the node
+    points = turned.astype("<f4").tobytes()
+    rows = np.array(FACES, "<u2").tobytes()
+    half = 0.5**0.5
+    tree = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [
+            {"children": [1], "translation": [0.0, scale, 0.0], "scale": [scale] * 3},
+            {"mesh": 0, "rotation": [0, half, 0, half]},
+        ],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}, "indices": 1}]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(CORNERS), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5123, "count": 3 * len(FACES), "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": len(points)},
+            {"buffer": 0, "byteOffset": len(points), "byteLength": len(rows)},
+        ],
+        "buffers": [{"byteLength": len(points + rows)}],
+        **changes,
+    }
+    return tree, points + rows
+
+
+def embedded(tree, binary):
+    uri = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
+    return json.dumps({**tree, "buffers": [{"uri": uri, "byteLength": len(binary)}]}).encode()
+
+
+def glb(tree, binary):
+    text = json.dumps(tree).encode()
+    text += b" " * (-len(text) % 4)
+    chunks = struct.pack("<II", len(text), 0x4E4F534A) + text + struct.pack("<II", len(binary), 0x004E4942) + binary
+    return b"glTF" + struct.pack("<II", 2, 12 + len(chunks)) + chunks
+
+
 def volume(mesh):
     """Return the volume [m^3] of a closed surface with counter-clockwise faces."""
     a, b, c = (mesh.vertices[mesh.faces[:, k]].astype(float) for k in range(3))
@@ -55,6 +98,8 @@ def volume(mesh):
         ("solid.STL", binary(b"solid, says the head of many a binary file")),
         ("b.stl", ascii_stl()),
         ("c.obj", obj()),
+        ("d.glb", glb(*gltf())),
+        ("e.gltf", embedded(*gltf(scale=0.5))),
     ],
 )
 def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
@@ -62,6 +107,7 @@ def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
     mesh = read(tmp_path / name)
     assert len(mesh.vertices) == len(CORNERS)  # corners at the same place are one
     assert volume(mesh) == pytest.approx(VOLUME, rel=1e-6)
+    assert sorted(map(tuple, mesh.vertices.round(6))) == sorted(map(tuple, CORNERS.round(6)))
     again = unpack(pack(mesh))
     assert np.array_equal(again.vertices, mesh.vertices)
     assert np.array_equal(again.faces, mesh.faces)
@@ -71,7 +117,7 @@ def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
     ("name", "content", "message"),
     [
         ("no.stl", None, "no such file"),
-        ("a.step", b"", "expected the path of an .stl or .obj file, got '../a.step'"),
+        ("a.step", b"", "expected the path of a file that ends in .stl, .obj, .glb, .gltf, got '../a.step'"),
         ("a.stl", b"", "not an STL file"),
         ("a.stl", binary()[:-7], "not an STL file"),
         ("a.stl", b"solid x\nvertex 1 2 3\nvertex 1 2 3\n", "fewer than three corners"),
@@ -81,6 +127,15 @@ def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
         ("a.stl", bytes(80) + struct.pack("<I", MOST + 1) + bytes(50 * (MOST + 1)), f"expected at most {MOST}"),
         ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: "),
         ("a.obj", b"v 0 0 0\nf a b c\n", "line 2: "),
+        ("a.glb", glb(*gltf())[:-20], "cut off"),
+        ("a.glb", glb(*gltf())[:30], "not a glTF 2.0 file"),
+        ("a.glb", b"glTF", "not a glTF 2.0 file"),
+        ("a.gltf", b"[1]", "not a glTF 2.0 file"),
+        ("a.gltf", b"no", "not a glTF 2.0 file"),
+        ("a.glb", glb(*gltf(extensionsRequired=["KHR_draco_mesh_compression"])), "export it without compression"),
+        ("a.glb", glb(*gltf(buffers=[{"uri": "a.bin"}])), "in another file; export it as .glb"),
+        ("a.glb", glb(*gltf(nodes=[{"children": [0]}])), "more than 32 levels"),
+        ("a.glb", glb(*gltf(scenes=[{}])), "no triangles"),
         ("a.obj", obj().replace(b"0.4", b"400").replace(b"0.3", b"300"), "a mesh in metres"),
     ],
 )
@@ -105,7 +160,7 @@ def scene(folder, mesh):
     return path
 
 
-def test_run_configuration_stores_the_mesh(tmp_path):
+def test_run_configuration_stores_mesh(tmp_path):
     (tmp_path / "own.stl").write_bytes(binary())
     loaded = load(scene(tmp_path, "own.stl"), ["airframe.mass.centre=[0.1, 0.0, 0.0]"])
     setup = resolve(loaded)
@@ -113,11 +168,12 @@ def test_run_configuration_stores_the_mesh(tmp_path):
     assert from_resolved(setup.resolved).resolved == loaded.resolved
     truth = {"pose.position": (0.0, 0.0, 1.0), "pose.orientation": synthetic_flights.LEVEL, "rotor_speed": (0.0,) * 4}
     flight = synthetic_flights.flight(3, ground_truth=truth, scene=Origin.of_setup(setup).scene)
-    (body,) = motion_3d.motion(flight).bodies
-    assert body.surface.vertices.min(axis=0) == pytest.approx([-0.1, 0.0, 0.0])  # from the centre of mass
-    assert body.surface.vertices.max(axis=0) == pytest.approx([0.3, 0.3, 0.2])
-    assert len(body.surface.faces) == len(FACES)
-    assert (len(body.strokes), len(body.rotors)) == (0, 4)  # instead of arms and feet
+    (body,) = motion(flight).bodies
+    (hull,) = body.solids  # instead of arms and feet
+    assert hull.vertices.min(axis=0) == pytest.approx([-0.1, 0.0, 0.0])  # from the centre of mass
+    assert hull.vertices.max(axis=0) == pytest.approx([0.3, 0.3, 0.2])
+    assert len(hull.faces) == len(FACES)
+    assert len(body.rotors) == 4
 
 
 def test_mesh_is_rejected_as_override(tmp_path):

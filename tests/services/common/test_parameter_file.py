@@ -57,16 +57,16 @@ def test_invalid_parameter_file_is_rejected_in_one_line(tmp_path, text, message)
     assert "\n" not in str(caught.value)
 
 
-def test_final_parameters_of_a_run_are_saved(tmp_path):
+def test_final_parameters_of_run_are_saved(tmp_path):
     def set_(name, value):
         return OperatorCommand("parameter", "test", 1, (value,), name)
 
-    given = {
+    values = {
         5: [set_("MPC_XY_CRUISE", 3.5), set_("MPC_XY_CRUISE", 1e9), set_("NO_SUCH", 1.0)],
         20: [set_("NAV_DLL_ACT", 3.0)],
     }
     log, saved = tmp_path / "run.mcap", tmp_path / "after.params"
-    fly_single(resolve(load(HOVER, OPERATED)), log, operator=lambda tick: given.get(tick, ()))
+    fly_single(resolve(load(HOVER, OPERATED)), log, operator=lambda tick: values.get(tick, ()))
     result = lapwing("parameters", log, "--save", saved)
     assert result.returncode == 0, result.stderr
     after = read(saved)

@@ -19,7 +19,7 @@ def without_gravity(*overrides):
     return load("hover", {"effects": {"rotor_thrust": {}, "ground_contact": {}}, **dict(overrides)})
 
 
-def test_gravity_comes_from_the_gravity_effect():
+def test_gravity_comes_from_gravity_effect():
     assert gravity(load("hover")) == 9.80665
     assert gravity(load("hover", ["environment.gravity=3.7"])) == 3.7
     assert gravity(without_gravity()) == 0.0
@@ -44,7 +44,7 @@ def test_start_pose_on_level_ground():
 
 
 @pytest.mark.long
-def test_vehicle_rests_on_a_slope():
+def test_vehicle_rests_on_slope():
     scene = load("hover", ["environment.terrain.slope=[0.1, 0.0]"])
     position, attitude = start_pose(scene)
     up = rotation_matrix(attitude)
@@ -60,7 +60,7 @@ def test_vehicle_rests_on_a_slope():
     assert truth.pose.orientation.w > 0.99
 
 
-def test_rate_must_divide_the_communication_rate():
+def test_rate_must_divide_communication_rate():
     scene = load("hover")
     assert ticks(scene, 50, "rates.pose") == 5
     with pytest.raises(ConfigError, match=r"^rates.pose: expected a rate that divides communication.rate = 250 Hz"):
@@ -75,7 +75,7 @@ def test_missing_airframe_is_rejected():
 
 
 @pytest.mark.parametrize("overrides", [["vehicle.mass=9.5"], {"vehicle.mass": 9.5}, ["airframe.mass.total=9.5"]])
-def test_vehicle_mass_sets_the_airframe_mass(overrides):
+def test_vehicle_mass_sets_airframe_mass(overrides):
     assert airframe(load("hover", overrides)).mass.total == 9.5
 
 

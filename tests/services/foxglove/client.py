@@ -11,7 +11,7 @@ PATIENCE = 0.05  # [s] for a pong, which a server does not give that waits for t
 
 
 class Client:
-    """As small a client as will do (RFC 6455; no message of ours is fragmented)."""
+    """Minimal WebSocket client (RFC 6455) without fragmented messages."""
 
     def __init__(self, port, timeout=30.0):
         self._socket = socket.create_connection(("127.0.0.1", port), timeout=timeout)
@@ -49,7 +49,7 @@ class Client:
         self._socket.sendall(data)
 
     def answers(self):
-        """Whether a ping is answered before the server closes, or waits for more."""
+        """Return True if the server answers a ping before it closes or waits."""
         self._socket.settimeout(PATIENCE)
         try:
             return self.outlives(b"")
@@ -57,7 +57,7 @@ class Client:
             return False
 
     def outlives(self, data):
-        """Whether a ping behind these bytes is answered; not where the server closes instead."""
+        """Return True if the server answers a ping after these bytes; False if it closes."""
         self._pings += 1
         number = self._pings.to_bytes(4, "big")
         try:
@@ -89,8 +89,8 @@ class Client:
             message = self.next()
             if isinstance(message, dict) and message["op"] == "advertise":
                 channels |= {channel["topic"]: channel for channel in message["channels"]}
-        wanted = [{"id": k, "channelId": channels[topic]["id"]} for k, topic in enumerate(topics)]
-        self.say(op="subscribe", subscriptions=wanted)
+        expected = [{"id": k, "channelId": channels[topic]["id"]} for k, topic in enumerate(topics)]
+        self.say(op="subscribe", subscriptions=expected)
         return [channels[topic] for topic in topics]
 
     def _frame(self):

@@ -1,4 +1,4 @@
-"""What a client of the Foxglove WebSocket protocol gets: the topics, their payloads as they are, and the time."""
+"""Data of a Foxglove WebSocket client: topics, unchanged payloads, time."""
 
 import re
 import socket
@@ -20,7 +20,7 @@ pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
 TICK = 4_000_000  # [ns]
 
 
-def test_payloads_go_on_as_they_are_with_the_simulation_time():
+def test_payloads_are_forwarded_with_simulation_time():
     with Server("127.0.0.1:0") as server:
         server.declare("/drone1/imu", Imu.type_name)
         server.declare("/foreign", "not/ours")
@@ -52,7 +52,7 @@ def test_payloads_go_on_as_they_are_with_the_simulation_time():
         assert times == sorted(times)
 
 
-def test_what_is_no_frame_is_answered_with_the_end_and_not_told(capfd):
+def test_invalid_frame_closes_connection(capfd):
     with Server("127.0.0.1:0") as server:
         for rubbish in (b"GET", bytes(20), b"\x81\x84" + bytes(4) + b"null", b"\xff" * 10):
             client = Client(server.port)
@@ -61,6 +61,55 @@ def test_what_is_no_frame_is_answered_with_the_end_and_not_told(capfd):
             client.close()
         assert Client(server.port).outlives(b"")
     assert capfd.readouterr() == ("", "")
+
+
+def handshake(port, *headers):
+    """Return the first line of the answer to a request."""
+    lines = ["GET / HTTP/1.1", "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13"]
+    lines += ["Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Protocol: foxglove.sdk.v1", *headers]
+    with socket.create_connection(("127.0.0.1", port), timeout=30.0) as page:
+        page.sendall("\r\n".join([*lines, "", ""]).encode())
+        return page.recv(4096).split(b"\r\n")[0].decode()
+
+
+OWN_HOST = "Host: 127.0.0.1:8765"
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        (OWN_HOST,),
+        ("Host: localhost:8765",),
+        ("Host: [::1]:8765",),
+        (OWN_HOST, "Origin: https://app.foxglove.dev"),
+        (OWN_HOST, "Origin: http://localhost:8080"),
+        (OWN_HOST, "Origin: http://127.0.0.1"),
+        (OWN_HOST, "Origin: file://"),
+    ],
+)
+def test_viewer_is_accepted(headers):
+    with Server("127.0.0.1:0") as server:
+        assert " 101 " in handshake(server.port, *headers)
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        (),
+        ("Host: attacker.example:8765",),
+        ("Host: localhost.attacker.example",),
+        (OWN_HOST, "Host: attacker.example"),
+        (OWN_HOST, "Origin: https://attacker.example"),
+        (OWN_HOST, "Origin: https://app.foxglove.dev.attacker.example"),
+        (OWN_HOST, "Origin: null"),
+        (OWN_HOST, "Origin: http://[::1"),
+        (OWN_HOST, "Origin: file://", "Origin: https://attacker.example"),
+    ],
+)
+def test_foreign_page_is_refused(headers):
+    with Server("127.0.0.1:0") as server:
+        assert " 403 " in handshake(server.port, *headers)
+        assert " 101 " in handshake(server.port, OWN_HOST)
 
 
 @pytest.fixture
@@ -72,7 +121,7 @@ def log(tmp_path):
     return path
 
 
-def test_a_replay_is_shown(log):
+def test_replay_is_shown(log):
     (endpoint, door) = loopback_endpoints(["a", "b"]).values()
     port = int(door.rpartition(":")[2])
     command = [sys.executable, "-m", "lapwing", "replay", str(log), "--loop", "--listen", endpoint]
@@ -91,12 +140,12 @@ def test_a_replay_is_shown(log):
 
 
 @pytest.mark.parametrize("text", ["", "8765", "localhost", "localhost:x", "localhost:99999", "a b:1"])
-def test_what_is_no_address_is_refused(text):
+def test_invalid_foxglove_address_is_rejected(text):
     with pytest.raises(ValueError, match="expected HOST:PORT, for example"):
         parse_address(text)
 
 
-def test_an_address_that_is_taken_is_told():
+def test_used_address_is_reported():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(ValueError, match=f"--foxglove 127.0.0.1:{port}: cannot be listened on"):
@@ -104,8 +153,8 @@ def test_an_address_that_is_taken_is_told():
 
 
 @pytest.mark.parametrize("text", ["0.0.0.0:1", "[::]:1", "10.0.0.1:1", "robot:1", "127.0.0.1.org:1", "localhost.org:1"])
-def test_only_who_asks_for_it_lets_other_machines_look_on(text):
-    with pytest.raises(ValueError, match=r"anybody could look on there: expected .* or --insecure"):
+def test_remote_viewers_need_insecure(text):
+    with pytest.raises(ValueError, match=r"any program there could read the run; expected .* or --insecure"):
         Server(text)
     check_address(text, True)
 
@@ -115,18 +164,18 @@ def test_this_machine_alone_may_always_look_on(text):
     check_address(text, False)
 
 
-def test_a_run_that_other_machines_could_look_on_is_refused(tmp_path):
+def test_run_that_other_machines_could_look_on_is_refused(tmp_path):
     words = ["run", "hover", "--foxglove", "0.0.0.0:8799", "--log", str(tmp_path / "a.mcap")]
     run = subprocess.run([sys.executable, "-m", "lapwing", *words], capture_output=True, text=True, timeout=300)
     assert run.returncode == 2
-    assert re.fullmatch(r"lapwing: --foxglove 0.0.0.0:8799: anybody could look on there: .*\n", run.stderr)
+    assert re.fullmatch(r"lapwing: --foxglove 0.0.0.0:8799: any program there could read the run; .*\n", run.stderr)
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
     ("scene", "vehicle", "more"), [("hover", "drone1", []), ("fleet", "right", ["--insecure"])], ids=["hover", "fleet"]
 )
-def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
+def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
     (door,) = loopback_endpoints(["a"]).values()
     port = int(door.rpartition(":")[2])
     path = tmp_path / "flight.mcap"
@@ -137,6 +186,8 @@ def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
         "1",
         "--set",
         "run.duration=3",
+        "--set",
+        "success.require=[]",
         "--log",
         str(path),
         "--json",
@@ -145,6 +196,7 @@ def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
     ]
     with subprocess.Popen([sys.executable, "-m", "lapwing", *words, "--foxglove", f"127.0.0.1:{port}"]) as run:
         client = patient(port, run)
+        assert " 403 " in handshake(port, OWN_HOST, "Origin: https://attacker.example")
         client.subscribe(f"/{vehicle}/ground_truth", f"/{vehicle}/events")
         got, events = [], []
         while (message := client.next()) is not None:
@@ -160,3 +212,6 @@ def test_a_run_is_shown_while_it_flies(tmp_path, scene, vehicle, more):
     assert len(got) > 100
     assert events
     assert set(events) <= set(kept)
+    # the viewer subscribed before the flight, and left after its end; `kept` also has events found afterwards
+    assert {e for e in kept if e[0] < 100_000_000} <= set(events)
+    assert {e for e in kept if e[0] >= 2_900_000_000 and b"phase" in e[1]} <= set(events)

@@ -5,8 +5,8 @@ import random
 from fake_vehicle import PARAMETERS, PERIOD, StandIn
 
 from lapwing.messages import OperatorInput
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.adapter import Adapter
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.resolve import describe
 from lapwing.services.scene_resolver import load
 
@@ -94,8 +94,8 @@ class Station:
         return [m for m in self.got if m.get_type() == kind]
 
     def last(self, kind):
-        found = self.all(kind)
-        return found[-1] if found else None
+        result = self.all(kind)
+        return result[-1] if result else None
 
     def command(self, number, *params, seconds=3.0):
         """Result of a command, given once."""

@@ -22,7 +22,7 @@ class Flown(Bench):
         self.waiting, self.stations = [], []
         self._interval_ns, self._ticks = setup.interval_ns, round(self.period * setup.rate)
         self.graph = BlockDiagram(setup, create_all(setup, self._given), PAGE)
-        self.adapter = Adapter(setup.beside["mavlink"], self.waiting.append)
+        self.adapter = Adapter(setup.auxiliary["mavlink"], self.waiting.append)
 
     def _given(self, tick):
         commands = list(self.waiting)
@@ -43,7 +43,7 @@ class Flown(Bench):
         for _ in range(count):
             first = self.graph.tick
             self.graph.advance(first + self._ticks)
-            pages = self.graph.pages(first, first + self._ticks)
+            pages = self.graph.record_batches(first, first + self._ticks)
             for page in sorted(pages, key=lambda page: page.topic is ESTIMATE):  # which moves time on
                 newest = slice(None) if page.topic in (STATUS, COMMAND_ACKS) else slice(-1, None)
                 for tick, payload in zip(page.ticks[newest], page.payloads[newest], strict=True):

@@ -39,6 +39,13 @@ PARAMETERS = (
     Parameter("MPC_XY_P", "1/s", 0.95, -100.0, 100.0, ""),
     Parameter("SYS_FAILURE_EN", "", 1.0, 0.0, 1.0, "", True),
     Parameter("NAV_DLL_ACT", "", 2.0, 0.0, 3.0, "", True),
+    *[
+        Parameter(name, "", value, 0.0, 4.0, "", True)
+        for name, value in (
+            *(("FS_FENCE_ACT", 2.0), ("FS_BAT_CRIT_ACT", 2.0)),
+            *(("FS_BAT_EMER_ACT", 3.0), ("FS_MOTOR_ACT", 3.0)),
+        )
+    ],
     *[Parameter(f"FILL_{k}", "", float(k), 0.0, 100.0, "") for k in range(40)],
 )
 

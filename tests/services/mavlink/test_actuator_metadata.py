@@ -1,4 +1,4 @@
-"""What ground stations are told of the motors, checked as QGroundControl reads it."""
+"""Actuator metadata for ground stations, checked as by QGroundControl."""
 
 import json
 
@@ -98,12 +98,12 @@ def served():
     return files(describe(load("groundstation")))
 
 
-def test_it_has_the_form_of_the_format(served):
+def test_actuator_metadata_match_schema(served):
     jsonschema.validate(json.loads(served[ACTUATORS]), SCHEMA)
 
 
-def test_every_required_motor_is_driven_by_an_output(served):
-    """As QGroundControl looks at it: else its summary asks for set-up."""
+def test_every_required_motor_is_driven_by_output(served):
+    """QGroundControl's summary would otherwise request a setup."""
     described = json.loads(served[ACTUATORS])
     values = {p["name"]: p["default"] for p in json.loads(served[PARAMETERS])["parameters"]}
     (subgroup,) = described["outputs_v1"][0]["subgroups"]
@@ -118,7 +118,7 @@ def test_every_required_motor_is_driven_by_an_output(served):
     assert values["CA_ROTOR_COUNT"] == geometry["actuators"][0]["count"] == 4
 
 
-def test_the_geometry_is_forward_right_down(served):
+def test_geometry_is_forward_right_down(served):
     """Rotor 1 of the delivery drone sits ahead on the left and turns clockwise (its airframe)."""
     (group,) = json.loads(served[ACTUATORS])["mixer_v1"]["config"][0]["actuators"]
     value = {p["function"]: p["value"] for p in group["per-item-parameters"]}
@@ -129,7 +129,7 @@ def test_the_geometry_is_forward_right_down(served):
     assert value["spin-dir"] == [0.0, 1.0, 0.0, 1.0]
 
 
-def test_ardupilots_stations_are_told_of_none():
-    served = files(describe(load("groundstation", ["mavlink.flavour=ardupilot"])))
+def test_ardupilot_stations_get_no_facts():
+    served = files(describe(load("groundstation", ["mavlink.firmware=ardupilot"])))
     assert ACTUATORS not in served
     assert len(json.loads(served[GENERAL])["metadataTypes"]) == 1  # the parameters

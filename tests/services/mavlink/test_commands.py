@@ -7,7 +7,7 @@ from adapter_harness import Bench
 
 from lapwing.messages import CommandAck
 from lapwing.services.common.failure_types import KINDS, UNITS
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.firmware import ardupilot, px4
 
 NAN = math.nan
@@ -19,28 +19,28 @@ def asked(bench, kind):
     return bench.vehicle.kinds[kind].values
 
 
-def test_a_takeoff_above_the_sea_is_one_above_home():
+def test_takeoff_altitude_above_sea_converts_to_home():
     bench = Bench()
     bench.vehicle.armed = True
     assert bench.station().command(22, 0.0, 0.0, 0.0, NAN, NAN, NAN, 292.0) == mavlink.MAV_RESULT_ACCEPTED
     assert asked(bench, "takeoff")[0] == pytest.approx(12.0)  # the world's origin lies at 280 m
 
 
-def test_a_takeoff_without_a_height_climbs_by_the_parameter():
+def test_takeoff_without_height_climbs_by_parameter():
     bench = Bench()
     bench.vehicle.armed = True
     bench.station().command(22, NAN, NAN, NAN, NAN, NAN, NAN, NAN)
     assert asked(bench, "takeoff")[0] == pytest.approx(2.5 + RESTING_HEIGHT)
 
 
-def test_ardupilot_counts_a_takeoff_from_home():
-    bench = Bench("mavlink.flavour=ardupilot")
+def test_ardupilot_counts_takeoff_from_home():
+    bench = Bench("mavlink.firmware=ardupilot")
     bench.vehicle.armed = True
     bench.station().command(22, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 12.0)
     assert asked(bench, "takeoff")[0] == pytest.approx(12.0 + RESTING_HEIGHT)
 
 
-def test_what_a_reposition_does_not_say_stays():
+def test_reposition_keeps_unspecified_values():
     bench = Bench()
     bench.vehicle.armed, bench.vehicle.position = True, [3.0, 4.0, 5.0]
     bench.step()
@@ -55,13 +55,13 @@ def test_what_a_reposition_does_not_say_stays():
 
 
 @pytest.mark.parametrize("number", [21, 20, 17])
-def test_what_the_autopilot_refuses_is_refused(number):
+def test_autopilot_rejection_is_acknowledged(number):
     bench = Bench()
     bench.vehicle.do_return = bench.vehicle.enter
     assert bench.station().command(number) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-def test_progress_is_passed_on_before_the_end():
+def test_progress_is_passed_on_before_end():
     bench = Bench()
     results = iter([CommandAck(result=CommandAck.IN_PROGRESS, progress=0.4)])
     bench.vehicle.deaf = {"link"}
@@ -77,7 +77,7 @@ def test_progress_is_passed_on_before_the_end():
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_ACCEPTED
 
 
-def test_an_autopilot_that_does_not_answer_is_answered_for():
+def test_autopilot_that_does_not_answer_is_answered_for():
     bench = Bench()
     bench.vehicle.deaf = {"arm"}
     station = bench.station()
@@ -86,15 +86,15 @@ def test_an_autopilot_that_does_not_answer_is_answered_for():
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-def test_a_recorded_flight_takes_no_commands():
+def test_recorded_flight_takes_no_commands():
     bench = Bench(recorded=True)
     assert bench.station().command(400, 1.0) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-@pytest.mark.parametrize("flavour", [px4, ardupilot])
-def test_every_mode_that_is_shown_can_be_entered(flavour):
+@pytest.mark.parametrize("firmware", [px4, ardupilot])
+def test_every_listed_mode_can_be_entered(firmware):
     for mode in ("hold", "mission", "return", "land", "position_control", "stabilized", "acro", "altitude_control"):
-        assert flavour.mode_kind(flavour.mode_number(mode)) == mode
+        assert firmware.mode_kind(firmware.mode_number(mode)) == mode
 
 
 def test_px4s_numbers():
@@ -106,7 +106,7 @@ def test_px4s_numbers():
 
 
 @pytest.mark.parametrize(("number", "params"), [(176, (1.0, 77.0, 3.0)), (176, (4.0,)), (178, (3.0, 5.0))])
-def test_what_does_not_exist_is_refused_aloud(number, params):
+def test_unknown_command_is_rejected_with_text(number, params):
     bench = Bench()
     station = bench.station()
     assert station.command(number, *params) == mavlink.MAV_RESULT_UNSUPPORTED
@@ -117,7 +117,7 @@ def test_what_does_not_exist_is_refused_aloud(number, params):
     assert other.last("STATUSTEXT").text == f"no flight mode {77 << 16}"
 
 
-def test_a_heading_alone_is_turned_to_on_the_spot():
+def test_heading_alone_is_turned_to_on_spot():
     bench = Bench()
     bench.vehicle.armed = True
     bench.step()
@@ -153,8 +153,8 @@ def test_home_region_of_interest_and_orbit():
     assert asked(bench, "orbit")[3:5] == pytest.approx((12.0, 1.0))
 
 
-def test_a_place_as_ardupilots_stations_write_it():
-    bench = Bench("mavlink.flavour=ardupilot")
+def test_position_in_ardupilot_form_is_accepted():
+    bench = Bench("mavlink.firmware=ardupilot")
     bench.vehicle.armed = True
     bench.step()
     station = bench.station()
@@ -174,9 +174,9 @@ def position_target(station, name, frame, mask):
 
 
 @pytest.mark.parametrize("name", [LOCAL, GLOBAL])
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_every_setpoint_is_followed_or_refused_by_name(name, flavour):
-    bench = Bench(f"mavlink.flavour={flavour}")
+@pytest.mark.parametrize("firmware", ["px4", "ardupilot"])
+def test_every_setpoint_is_followed_or_refused_by_name(name, firmware):
+    bench = Bench(f"mavlink.firmware={firmware}")
     bench.vehicle.armed, bench.vehicle.landed = True, False
     bench.step()
     station, kinds = bench.station(), bench.vehicle.kinds
@@ -196,8 +196,8 @@ def test_every_setpoint_is_followed_or_refused_by_name(name, flavour):
                 assert name in "".join(m.text for m in station.all("STATUSTEXT"))
 
 
-def test_ardupilots_guided_follows_setpoints_at_once_and_a_place_for_good():
-    bench = Bench("mavlink.flavour=ardupilot")
+def test_ardupilot_guided_follows_setpoints_and_keeps_position():
+    bench = Bench("mavlink.firmware=ardupilot")
     bench.step()
     station = bench.station()
     position_target(station, LOCAL, 1, 0xDF8)
@@ -234,7 +234,7 @@ def test_body_rates_and_thrusts_of_either_kind():
     ]  # fmt: skip
 
 
-def test_velocities_along_the_vehicles_axes_are_turned():
+def test_velocities_along_vehicles_axes_are_turned():
     bench = Bench()
     bench.vehicle.yaw = 0.5 * math.pi  # north
     bench.step()
@@ -246,7 +246,7 @@ def test_velocities_along_the_vehicles_axes_are_turned():
     assert all(map(math.isnan, (*values[:3], *values[6:])))
 
 
-def test_offsets_count_from_the_vehicle():
+def test_offsets_count_from_vehicle():
     bench = Bench()
     bench.vehicle.position, bench.vehicle.yaw = [1.0, 2.0, 3.0], 0.0  # east
     bench.step()
@@ -256,13 +256,13 @@ def test_offsets_count_from_the_vehicle():
     assert asked(bench, "offboard_position")[:3] == pytest.approx((6.0, 2.0, 4.0))
 
 
-def test_sticks_point_where_the_pilot_pushes():
+def test_sticks_point_where_pilot_pushes():
     bench = Bench()
     bench.station().send("manual_control", 1, 500, 1000, 750, -1000, 0)
     assert asked(bench, "manual") == pytest.approx((0.5, -1.0, 0.5, 1.0))
 
 
-def test_a_heartbeat_keeps_the_link_for_a_while():
+def test_heartbeat_keeps_link_for_while():
     bench = Bench()
     station = bench.station()
     station.send("heartbeat", 6, 8, 0, 0, 0, 3)
@@ -273,7 +273,7 @@ def test_a_heartbeat_keeps_the_link_for_a_while():
     assert links[-1] < 4.0
 
 
-def test_failures_bear_the_numbers_of_mavlink_and_impossible_ones_are_unsupported():
+def test_failure_injection_uses_mavlink_numbers():
     bench = Bench()
     bench.vehicle.do_inject_failure = lambda c: 0
     station = bench.station()
@@ -298,6 +298,6 @@ def test_failures_bear_the_numbers_of_mavlink_and_impossible_ones_are_unsupporte
         for kind in range(8):
             expected = mavlink.MAV_RESULT_ACCEPTED if kind in kinds else mavlink.MAV_RESULT_UNSUPPORTED
             assert station.command(420, unit, kind, 1.0) == expected
-        told = "".join(m.text for m in station.all("STATUSTEXT"))
-        assert f"INJECT_FAILURE: type 7 unsupported; {words}" in told
+        reported = "".join(m.text for m in station.all("STATUSTEXT"))
+        assert f"INJECT_FAILURE: type 7 unsupported; {words}" in reported
     assert station.command(420, mavlink.FAILURE_UNIT_SENSOR_BARO, 8.0, 0.0) == mavlink.MAV_RESULT_UNSUPPORTED

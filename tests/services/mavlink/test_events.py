@@ -15,8 +15,8 @@ from lapwing.services.autopilot.commander.mode_table import MODES
 from lapwing.services.autopilot.estimator import NAMES
 from lapwing.services.common import status_texts
 from lapwing.services.common.event_kinds import KINDS
+from lapwing.services.common.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.component_metadata import EVENTS, GENERAL, files
-from lapwing.services.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.event_log import KEPT, EventLog
 from lapwing.services.mavlink.event_metadata import events
 from lapwing.services.mavlink.events import arming_checks, definitions, flight
@@ -66,19 +66,19 @@ class Reader:
                 self.ask()
 
     def ask(self):
-        wanted = (self.last + 1) % 65536
-        self.station.send_own("REQUEST_EVENT", 1, 1, wanted, wanted)
+        expected = (self.last + 1) % 65536
+        self.station.send_own("REQUEST_EVENT", 1, 1, expected, expected)
 
     def values(self, m):
         group, event = self.known[m.id & 0xFFFFFF]
-        found, offset = [], 0
+        result, offset = [], 0
         for argument in event.get("arguments", ()):
             kind = self.component["enums"].get(argument["type"], {"type": argument["type"]})
             layout = "<" + NUMBERS[kind["type"]]
             (value,) = struct.unpack_from(layout, bytes(m.arguments), offset)
             offset += struct.calcsize(layout)
-            found.append((value, kind))
-        return group, event, found
+            result.append((value, kind))
+        return group, event, result
 
     def read(self, m):
         assert m.id >> 24 == 1
@@ -99,19 +99,19 @@ class Reader:
 
 
 def reader(bench, **more):
-    found = Reader(station := bench.station(**more), events())
+    result = Reader(station := bench.station(**more), events())
     station.send_own = lambda name, *fields: station.raw(message_class(name)(*fields).pack(station.codec))
-    return found
+    return result
 
 
-def test_the_messages_are_those_of_common_xml():
+def test_messages_equal_common_xml():
     published = {410: (160, 53), 411: (106, 3), 412: (33, 6), 413: (77, 7)}  # mavlink/common.h: CRC_EXTRA, length
     for number, (seed, length) in published.items():
-        found = mavlink.mavlink_map[number]
-        assert (found.crc_extra, found.unpacker.size) == (seed, length)
+        result = mavlink.mavlink_map[number]
+        assert (result.crc_extra, result.unpacker.size) == (seed, length)
 
 
-def test_a_flight_is_told():
+def test_flight_is_reported():
     bench = Bench()
     one = reader(bench)
     bench.step(5)
@@ -148,7 +148,7 @@ def test_a_flight_is_told():
 
 
 @pytest.mark.parametrize("reason", status_texts.FAILSAFES)
-def test_every_failsafe_has_a_number(reason):
+def test_every_failsafe_has_number(reason):
     bench = Bench()
     one = reader(bench)
     bench.step(2)
@@ -157,7 +157,7 @@ def test_every_failsafe_has_a_number(reason):
     assert one.said()[-1] == f"Failsafe: {reason}, now hold"
 
 
-def test_contact_and_motors_at_their_limit_are_told():
+def test_contact_and_saturation_are_reported():
     bench = Bench()
     one = reader(bench)
     highest = bench.adapter.vehicle.description.max_voltage
@@ -175,7 +175,7 @@ def test_contact_and_motors_at_their_limit_are_told():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_events_that_get_lost_are_asked_for_and_sent_again(seed):
+def test_lost_events_are_sent_again_on_request(seed):
     bench = Bench()
     one, sound = reader(bench, loss=0.3, seed=seed), reader(bench)
     for k in range(60):
@@ -189,14 +189,14 @@ def test_events_that_get_lost_are_asked_for_and_sent_again(seed):
     assert not one.lost
 
 
-def test_what_is_kept_no_longer_is_named_with_the_next_that_is():
+def test_expired_event_request_names_oldest_available():
     log = EventLog()
     for k in range(KEPT + 5):
         log.add(1, 6, bytes([k]), k)
     (error,) = log.replies(3, 3, (255, 190))
     assert (error.target_system, error.sequence, error.sequence_oldest_available) == (255, 3, 6)
-    found = list(log.replies(6, 8, (255, 190)))
-    assert [(m.get_type(), m.sequence) for m in found] == [("EVENT", 6), ("EVENT", 7), ("EVENT", 8)]
+    result = list(log.replies(6, 8, (255, 190)))
+    assert [(m.get_type(), m.sequence) for m in result] == [("EVENT", 6), ("EVENT", 7), ("EVENT", 8)]
     everything = list(log.replies(106, 105, (255, 190)))  # the whole round: an error for the part that cannot be there
     assert len(everything) == KEPT + 1
     assert everything[0].get_type() == "RESPONSE_EVENT_ERROR"
@@ -212,7 +212,7 @@ def test_sequence_numbers_begin_again():
     assert [m.sequence for m in log.replies(65535, 1, (255, 190))] == [65535, 0, 1]
 
 
-def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
+def test_arming_checks_are_reported_in_protocol_order():
     bench = Bench()
     bench.vehicle.arming_blockers = (
         status_texts.NO_READINGS.format("gps"),
@@ -222,9 +222,9 @@ def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
     )
     one = reader(bench)
     bench.step(2)
-    found = [(group, name) for group, name, _ in one.told]
-    assert found[0] == ("arming_check", "arming_check_summary")
-    assert found[-1] == ("health", "health_summary")
+    result = [(group, name) for group, name, _ in one.told]
+    assert result[0] == ("arming_check", "arming_check_summary")
+    assert result[-1] == ("health", "health_summary")
     assert one.said("arming_check")[1:] == [
         "No good readings of the gps",
         "The battery is low",
@@ -242,7 +242,7 @@ def test_what_hinders_arming_is_reported_in_the_order_of_the_protocol():
     assert summary[3][0] == (1 << len(arming_checks.MODES)) - 1
 
 
-def test_a_report_comes_with_a_change_and_with_a_new_station_and_not_else():
+def test_report_is_sent_on_change_and_to_new_station():
     bench = Bench()
     one = reader(bench)
     bench.step(100)
@@ -258,7 +258,7 @@ def test_a_report_comes_with_a_change_and_with_a_new_station_and_not_else():
     assert len(one.told) == 2
 
 
-def test_a_report_comes_to_whoever_asks_for_one():
+def test_report_is_sent_on_request():
     bench = Bench()
     one = reader(bench)
     bench.step(100)
@@ -268,7 +268,7 @@ def test_a_report_comes_to_whoever_asks_for_one():
     assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]
 
 
-def test_texts_that_events_tell_too_end_with_a_tab():
+def test_texts_with_event_end_with_tab():
     bench = Bench()
     station = bench.station()
     bench.vehicle.text = ["armed", "the position is lost: descend in 9 s", "the position is lost: hold"]
@@ -276,16 +276,22 @@ def test_texts_that_events_tell_too_end_with_a_tab():
     bench.vehicle.status = {"failsafe": True, "text": "the position is lost"}
     bench.vehicle.text = ["the position is lost: hold", "the position is lost: hold"]
     bench.step()
-    told = [m.text for m in station.all("STATUSTEXT")]
+    reported = [m.text for m in station.all("STATUSTEXT")]
     severities = [m.severity for m in station.all("STATUSTEXT")]
     information, warning, critical = (getattr(mavlink, f"MAV_SEVERITY_{s}") for s in ("INFO", "WARNING", "CRITICAL"))
     assert severities == [information, warning, warning, critical, critical]
     last = "the position is lost: hold"
-    assert told == ["armed\t", "the position is lost: descend in 9 s", last, f"{last}\t", last]  # once for one event
+    assert reported == [
+        "armed\t",
+        "the position is lost: descend in 9 s",
+        last,
+        f"{last}\t",
+        last,
+    ]  # once for one event
 
 
-def test_ground_stations_of_ardupilot_are_told_by_texts_alone():
-    bench = Bench("mavlink.flavour=ardupilot")
+def test_ardupilot_stations_get_texts_without_events():
+    bench = Bench("mavlink.firmware=ardupilot")
     station = bench.station()
     bench.vehicle.text = ["armed"]
     bench.vehicle.armed = True
@@ -293,12 +299,12 @@ def test_ground_stations_of_ardupilot_are_told_by_texts_alone():
     assert not station.all("EVENT")
     assert not station.all("CURRENT_EVENT_SEQUENCE")
     assert station.last("STATUSTEXT").text == "armed"
-    found = files(describe(load("lapwing/scenes/hover.toml", ["mavlink.flavour=ardupilot"])))
-    assert EVENTS not in found
-    assert GENERAL in found
+    result = files(describe(load("lapwing/scenes/hover.toml", ["mavlink.firmware=ardupilot"])))
+    assert EVENTS not in result
+    assert GENERAL in result
 
 
-def test_all_that_the_autopilot_knows_has_its_number():
+def test_all_that_autopilot_knows_has_its_number():
     assert {failsafe.reason for failsafe in FAILSAFES} == set(status_texts.FAILSAFES)
     assert set(MODES) <= set(flight.MODES)
     assert set(NAMES) <= set(arming_checks.SOURCES)
@@ -306,12 +312,12 @@ def test_all_that_the_autopilot_knows_has_its_number():
     assert set(entered) == set(arming_checks.WITHOUT_POSITION)
 
 
-def test_every_kind_that_can_be_told_of_a_flight_has_an_event():
+def test_every_event_kind_has_definition():
     not_of_the_link = {"warning", "phase", "slack"}  # of the run, the models, a scene's trajectory, a load
     assert {d.kind for d in definitions().values()} == set(KINDS) - not_of_the_link
 
 
-def test_the_metadata_keeps_the_rules_of_libevents():
+def test_metadata_keeps_rules_of_libevents():
     described = json.loads(files(describe(load("lapwing/scenes/groundstation.toml")))[EVENTS])
     assert described["version"] == 2
     component = described["components"]["1"]

@@ -7,8 +7,8 @@ import pytest
 from adapter_harness import Bench
 from pymavlink.dialects.v20 import all as mavlink
 
+from lapwing.services.common.mavlink.dialect import id_of
 from lapwing.services.mavlink.component_metadata import GENERAL, PARAMETERS, files
-from lapwing.services.mavlink.dialect import id_of
 from lapwing.services.mavlink.file_server import DATA, FileServer, crc32
 from lapwing.services.mavlink.resolve import describe
 from lapwing.services.scene_resolver import load
@@ -37,32 +37,32 @@ def refused(server, *arguments, **more):
     return data[0]
 
 
-def test_a_file_is_opened_and_read_by_pieces(server):
+def test_file_is_opened_and_read_by_pieces(server):
     sequence, session, opcode, of, _, _, data = parsed(server.replies(request(OPEN, b"/etc/a.bin"))[0])
     assert (sequence, opcode, of, struct.unpack("<I", data)[0]) == (8, 128, OPEN, len(CONTENT))
-    found = b""
-    while len(found) < len(CONTENT):
-        (reply,) = server.replies(request(READ, session=session, size=DATA, offset=len(found)))
-        assert parsed(reply)[5] == len(found)
-        found += parsed(reply)[6]
-    assert found == CONTENT
+    result = b""
+    while len(result) < len(CONTENT):
+        (reply,) = server.replies(request(READ, session=session, size=DATA, offset=len(result)))
+        assert parsed(reply)[5] == len(result)
+        result += parsed(reply)[6]
+    assert result == CONTENT
     assert refused(server, READ, session=session, size=DATA, offset=len(CONTENT)) == 6  # end of file
 
 
-def test_a_burst_is_numbered_and_says_when_it_is_over(server):
+def test_burst_is_numbered_and_marks_its_end(server):
     session = parsed(server.replies(request(OPEN, b"etc/a.bin"))[0])[1]
-    found, bursts = b"", 0
-    while len(found) < len(CONTENT):
-        replies = [parsed(p) for p in server.replies(request(BURST, session=session, size=DATA, offset=len(found)))]
+    result, bursts = b"", 0
+    while len(result) < len(CONTENT):
+        replies = [parsed(p) for p in server.replies(request(BURST, session=session, size=DATA, offset=len(result)))]
         assert [r[0] for r in replies] == list(range(8, 8 + len(replies)))
         assert [r[4] for r in replies] == [0] * (len(replies) - 1) + [1]
-        found += b"".join(r[6] for r in replies)
+        result += b"".join(r[6] for r in replies)
         bursts += 1
-    assert found == CONTENT
+    assert result == CONTENT
     assert bursts == 4
 
 
-def test_a_repeated_request_gets_the_same_reply_and_opens_no_second_session(server):
+def test_repeated_request_gets_same_reply_in_same_session(server):
     first = server.replies(request(OPEN, b"etc/a.bin"))
     assert [server.replies(request(OPEN, b"etc/a.bin")) for _ in range(10)] == [first] * 10
     assert parsed(server.replies(request(OPEN, b"etc/a.bin", sequence=9))[0])[1] == 1
@@ -98,11 +98,11 @@ def test_folders_are_listed(server):
         ((OPEN, b"\xff\xfe"), 10),
     ],
 )
-def test_what_cannot_be_done_is_refused_with_the_reason(server, arguments, error):
+def test_impossible_file_request_is_rejected_with_reason(server, arguments, error):
     assert refused(server, *arguments) == error
 
 
-def test_the_checksum_is_the_protocols(server):
+def test_checksum_is_protocols(server):
     def slow(data):
         crc = 0
         for byte in data:
@@ -115,7 +115,7 @@ def test_the_checksum_is_the_protocols(server):
     assert struct.unpack("<I", parsed(server.replies(request(14, b"etc/b/c.txt"))[0])[6])[0] == slow(b"hello")
 
 
-def test_the_metadata_describes_every_parameter_that_is_listed():
+def test_metadata_describes_every_parameter_that_is_listed():
     bench = Bench()
     station = bench.station()
     bench.step(2)
@@ -127,15 +127,15 @@ def test_the_metadata_describes_every_parameter_that_is_listed():
     def fetch(path):
         station.send("file_transfer_protocol", 0, 1, 1, list(request(OPEN, path.encode())))
         _, session, *_ = parsed(bytes(station.last("FILE_TRANSFER_PROTOCOL").payload))
-        found = b""
+        result = b""
         while True:
             station.got.clear()
-            payload = request(BURST, session=session, size=DATA, offset=len(found))
+            payload = request(BURST, session=session, size=DATA, offset=len(result))
             station.send("file_transfer_protocol", 0, 1, 1, list(payload))
             replies = [parsed(bytes(r.payload)) for r in station.all("FILE_TRANSFER_PROTOCOL")]
             if replies[0][2] == 129:
-                return found
-            found += b"".join(r[6] for r in replies)
+                return result
+            result += b"".join(r[6] for r in replies)
 
     general = fetch(GENERAL)
     assert crc32(general) == m.file_crc
@@ -154,7 +154,7 @@ def test_the_metadata_describes_every_parameter_that_is_listed():
     assert described["NAV_DLL_ACT"]["type"] == "Int32"
 
 
-def test_the_metadata_says_what_needs_a_restart_and_what_cannot_be_set():
+def test_metadata_marks_restart_and_read_only():
     content = files(describe(load("lapwing/scenes/groundstation.toml")))[PARAMETERS]
     described = {p["name"]: p for p in json.loads(content)["parameters"]}
     assert [name for name, p in described.items() if p.get("rebootRequired")] == ["EKF2_HGT_REF"]
@@ -162,6 +162,6 @@ def test_the_metadata_says_what_needs_a_restart_and_what_cannot_be_set():
     assert "readOnly" not in described["NAV_DLL_ACT"]
 
 
-def test_a_scenes_metadata_is_json_without_nan():
+def test_scenes_metadata_is_json_without_nan():
     for content in files(describe(load("lapwing/scenes/groundstation.toml"))).values():
         json.loads(content, parse_constant=pytest.fail)

@@ -11,8 +11,8 @@ from pymavlink import mavutil
 from lapwing.cosim.log import LogReader
 from lapwing.messages import OperatorInput, VehicleState
 from lapwing.runs.resimulate import resimulate
-from lapwing.services.mavlink.dialect import mavlink
-from lapwing.services.mavlink.links import numbered
+from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.mavlink.links import for_vehicle_index
 
 SETS = ("autopilot.follow_trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=20")
 
@@ -26,7 +26,7 @@ def heard(station, kind, system, seconds=120.0):
 
 
 def order(station, system, number, *params):
-    """What a system answers to a command."""
+    """Return the acknowledgement of a system to a command."""
     station.mav.command_long_send(system, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
     while (ack := heard(station, "COMMAND_ACK", system)).command != number:
         pass
@@ -55,7 +55,7 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
     assert process.returncode in (0, 3, 4)
     with LogReader(log) as read:
         assert read.complete
-        told = {
+        reported = {
             name: [
                 c.kind
                 for *_, m in read.messages([f"/{name}/vehicle_command"])
@@ -65,10 +65,10 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
         }
         up = {
             name: max(VehicleState.decode(m).pose.position.z for *_, m in read.messages([f"/{name}/ground_truth"]))
-            for name in told
+            for name in reported
         }
-    assert set(told["left"]) | set(told["scout"]) <= {"link"}  # that a station is there
-    assert {"arm", "takeoff"} <= set(told["right"])
+    assert set(reported["left"]) | set(reported["scout"]) <= {"link"}  # that a station is there
+    assert {"arm", "takeoff"} <= set(reported["right"])
     assert up["right"] > 1.0 > max(up["left"], up["scout"])
     before, after = resimulate(log)
     assert before == after
@@ -82,8 +82,8 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
         ("tcpin:127.0.0.1:5760", ["tcpin:127.0.0.1:5760", "tcpin:127.0.0.1:5761"]),
     ],
 )
-def test_those_who_listen_have_a_port_each_and_those_who_send_share_the_station(url, links):
-    assert [numbered(url, i) for i in range(2)] == links
+def test_listening_links_get_ports_and_sending_share(url, links):
+    assert [for_vehicle_index(url, i) for i in range(2)] == links
 
 
 @pytest.mark.parametrize(
@@ -93,6 +93,6 @@ def test_those_who_listen_have_a_port_each_and_those_who_send_share_the_station(
         ("udpin:127.0.0.1:65535", "port 65535: the link of vehicle 1 would be at 65536"),
     ],
 )
-def test_a_link_that_there_cannot_be_is_refused(url, said):
+def test_impossible_fleet_link_is_rejected(url, said):
     with pytest.raises(ValueError, match=said):
-        numbered(url, 1)
+        for_vehicle_index(url, 1)

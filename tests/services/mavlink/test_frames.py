@@ -5,7 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from lapwing.services.mavlink.frames import euler, saturated, swap_attitude, swap_body, swap_world, swap_yaw, wrap
+from lapwing.services.common.mavlink.frames import (
+    euler,
+    saturated,
+    swap_attitude,
+    swap_body,
+    swap_world,
+    swap_yaw,
+    wrap,
+)
 
 C = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
 D = np.diag([1, -1, -1.0])
@@ -22,13 +30,13 @@ def matrix(q):
     )
 
 
-def test_vectors_are_permuted_as_the_matrices_say():
+def test_vector_permutations_equal_matrices():
     v = (1.0, 2.0, 3.0)
     np.testing.assert_array_equal(swap_world(v), C @ v)
     np.testing.assert_array_equal(swap_body(v), D @ v)
 
 
-def test_attitude_is_the_product_of_the_matrices():
+def test_attitude_is_product_of_matrices():
     for seed in range(20):
         q = np.random.default_rng(seed).normal(size=4)
         q /= np.linalg.norm(q)
@@ -44,7 +52,7 @@ def test_facing_east_is_heading_90_degrees():
     assert swap_yaw(swap_yaw(0.3)) == pytest.approx(0.3)
 
 
-def test_nose_up_is_positive_pitch_and_right_side_down_positive_roll():
+def test_pitch_is_positive_nose_up_and_roll_right_side_down():
     up = swap_attitude((math.cos(-0.1), 0.0, math.sin(-0.1), 0.0))  # FLU: a turn about y to the left lifts by -0.2
     assert euler(up)[1] == pytest.approx(0.2)
     right = swap_attitude((math.cos(0.1), math.sin(0.1), 0.0, 0.0))
@@ -58,7 +66,7 @@ def test_angles_are_wrapped():
     assert math.isnan(wrap(math.inf))
 
 
-def test_whole_numbers_are_cut_off_at_the_limits_of_their_field():
+def test_whole_numbers_are_cut_off_at_limits_of_their_field():
     assert saturated(1.6, 8) == 2
     assert saturated(1e9, 16) == 32767
     assert saturated(-1e9, 16) == -32768

@@ -7,8 +7,8 @@ from collections import Counter
 import pytest
 from adapter_harness import Bench
 
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.channel import Channel
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.endpoint import MAX_DATAGRAM
 from lapwing.services.mavlink.framing import frame
 from lapwing.services.mavlink.signing import Signature
@@ -39,21 +39,21 @@ def example(kind, seed, empty=False):
     return kind(*[by_wire[i] for i in kind.orders])
 
 
-def test_every_message_of_the_dialect_has_the_bytes_of_pymavlink():
+def test_every_message_of_dialect_has_bytes_of_pymavlink():
     fast = 0
     for kind in mavlink.mavlink_map.values():
         for seed in range(4):
             codec = mavlink.MAVLink(None, SYSTEM, 1)
             codec.seq = 60 * seed
             message = example(kind, seed, empty=seed == 0)
-            found = frame(message, codec.seq, SYSTEM, 1)
-            fast += found is not None
-            assert found in (None, example(kind, seed, empty=seed == 0).pack(codec)), kind.msgname
+            result = frame(message, codec.seq, SYSTEM, 1)
+            fast += result is not None
+            assert result in (None, example(kind, seed, empty=seed == 0).pack(codec)), kind.msgname
     assert fast > 4 * 100
 
 
 @pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
-def test_a_channel_numbers_its_frames_and_a_codec_reads_them(signature):
+def test_channel_numbers_its_frames_and_codec_reads_them(signature):
     channel, reader = Channel(SYSTEM, signature, True, Counter()), mavlink.MAVLink(None, 255, 190)
     if signature:
         reader.signing.secret_key = bytes(32)
@@ -64,7 +64,7 @@ def test_a_channel_numbers_its_frames_and_a_codec_reads_them(signature):
 
 
 @pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
-def test_a_number_beyond_a_float_of_32_bits_is_not_sent_and_counted(signature):
+def test_number_beyond_float_of_32_bits_is_not_sent_and_counted(signature):
     counts = Counter()
     channel = Channel(SYSTEM, signature, True, counts)
     assert channel.encode(mavlink.MAVLink_attitude_message(0, 1e39, 0.0, 0.0, 0.0, 0.0, 0.0)) == b""
@@ -75,7 +75,7 @@ def test_a_number_beyond_a_float_of_32_bits_is_not_sent_and_counted(signature):
     assert got.get_seq() == 0
 
 
-def test_what_is_due_at_once_leaves_in_as_few_datagrams_as_any_network_carries():
+def test_simultaneous_messages_share_datagrams():
     bench, pieces = Bench(), []
     bench.adapter.connect(True, True, pieces.append)
     bench.step(100)
@@ -85,9 +85,9 @@ def test_what_is_due_at_once_leaves_in_as_few_datagrams_as_any_network_carries()
     assert 200 < max(map(len, pieces)) <= MAX_DATAGRAM
 
 
-def test_a_frame_is_written_out_as_the_guide_says():
+def test_frame_bytes_match_mavlink_guide():
     """MAVLink guide, "Packet Serialization": marker, length, flags, number, sender, message id, payload, checksum."""
-    found = frame(mavlink.MAVLink_heartbeat_message(2, 12, 81, 65536, 4, 3), 5, 1, 1)
-    assert found[:10] == bytes([0xFD, 9, 0, 0, 5, 1, 1, 0, 0, 0])
-    assert found[10:19] == struct.pack("<IBBBBB", 65536, 2, 12, 81, 4, 3)
-    assert mavlink.x25crc(found[1:19] + bytes([50])).crc == struct.unpack("<H", found[19:])[0]  # 50: CRC_EXTRA
+    result = frame(mavlink.MAVLink_heartbeat_message(2, 12, 81, 65536, 4, 3), 5, 1, 1)
+    assert result[:10] == bytes([0xFD, 9, 0, 0, 5, 1, 1, 0, 0, 0])
+    assert result[10:19] == struct.pack("<IBBBBB", 65536, 2, 12, 81, 4, 3)
+    assert mavlink.x25crc(result[1:19] + bytes([50])).crc == struct.unpack("<H", result[19:])[0]  # 50: CRC_EXTRA

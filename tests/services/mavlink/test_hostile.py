@@ -1,4 +1,4 @@
-"""What nobody should send: refused as the protocol says, counted, and the vehicle undisturbed."""
+"""Invalid messages are rejected as the protocol requires, counted, and do not affect the vehicle."""
 
 import random
 import socket
@@ -10,7 +10,7 @@ from fake_vehicle import flying, free_port, until
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.protocols.commands import RULES
 
@@ -24,7 +24,7 @@ def shared():
 
 @settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.binary(max_size=600))
-def test_random_bytes_do_nothing(shared, data):
+def test_random_bytes_are_ignored(shared, data):
     station = shared.station()
     station.raw(data)
     station.raw(b"\xfd" + data)
@@ -44,7 +44,7 @@ def frames(bench):
         yield cls(*fields).pack(codec)
 
 
-def test_every_message_there_is_with_zeros_and_cut_short_and_damaged():
+def test_all_messages_zeroed_truncated_and_damaged():
     bench = Bench()
     station = bench.station()
     chance = random.Random(1)
@@ -66,7 +66,7 @@ ODD = {
 }
 
 
-def test_every_message_that_is_answered_with_odd_values():
+def test_all_handled_messages_survive_odd_values():
     bench = Bench()
     station = bench.station()
     bench.step(2)
@@ -102,7 +102,7 @@ def odd(cls, chance):
     return cls(*fields)
 
 
-def test_a_vehicle_that_has_lost_its_mind_is_still_reported():
+def test_vehicle_that_has_lost_its_mind_is_still_reported():
     bench = Bench()
     station = bench.station()
     bench.vehicle.armed, bench.vehicle.mode = True, "offboard"
@@ -113,7 +113,7 @@ def test_a_vehicle_that_has_lost_its_mind_is_still_reported():
     assert station.last("HEARTBEAT")
 
 
-def test_a_wrong_checksum_costs_only_its_own_frame():
+def test_wrong_checksum_costs_only_its_own_frame():
     bench = Bench()
     station = bench.station()
     good = mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(station.codec)
@@ -143,7 +143,7 @@ def test_missions_of_too_many_items_are_refused_at_once(count):
     assert station.last("MISSION_REQUEST_INT") is None
 
 
-def test_a_mission_of_a_kind_that_is_none():
+def test_unknown_mission_kind_is_rejected():
     bench = Bench()
     station = bench.station()
     station.send("mission_count", 1, 1, 3, 77)
@@ -178,7 +178,7 @@ def test_senseless_commands_are_answered(number, params, result):
 
 
 @pytest.mark.parametrize("bad", [NAN, INF, -INF, 1e38])
-def test_senseless_setpoints_leave_the_vehicle_where_it_is(bad):
+def test_invalid_setpoints_do_not_move_vehicle(bad):
     bench = Bench()
     station = bench.station()
     bench.vehicle.armed = True
@@ -189,7 +189,7 @@ def test_senseless_setpoints_leave_the_vehicle_where_it_is(bad):
     assert bench.vehicle.position == [0.0, 0.0, 0.0]
 
 
-def test_intervals_that_are_too_short_do_not_flood_the_client():
+def test_intervals_that_are_too_short_do_not_flood_client():
     bench = Bench()
     station = bench.station()
     assert station.command(511, 30.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # ATTITUDE each microsecond
@@ -198,7 +198,7 @@ def test_intervals_that_are_too_short_do_not_flood_the_client():
     assert len(station.all("ATTITUDE")) == 50
 
 
-def test_an_interval_that_is_too_long_for_its_message_is_cut_off():
+def test_too_long_interval_is_clamped():
     bench = Bench()
     station = bench.station()
     assert station.command(511, 30.0, 1e38) == mavlink.MAV_RESULT_ACCEPTED
@@ -206,7 +206,7 @@ def test_an_interval_that_is_too_long_for_its_message_is_cut_off():
     assert station.last("MESSAGE_INTERVAL").interval_us == 0x7FFFFFFF
 
 
-def test_a_flood_is_bounded_and_the_vehicle_flies_on():
+def test_flood_is_bounded_and_vehicle_flies_on():
     port = free_port()
     frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
     with flying(f"udpin:127.0.0.1:{port}") as running, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as attacker:

@@ -8,7 +8,7 @@ import time
 import pytest
 from fake_vehicle import flying, free_port, until
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.links.link import Budget
 from lapwing.services.mavlink.telemetry_timing import Pacing
 
@@ -18,17 +18,17 @@ def frame():
 
 
 def heard(read):
-    codec, found = mavlink.MAVLink(None), []
+    codec, result = mavlink.MAVLink(None), []
     codec.robust_parsing = True
 
     def look():
-        found.extend(m.get_type() for m in codec.parse_buffer(read()) or ())
-        return "PARAM_VALUE" in found
+        result.extend(m.get_type() for m in codec.parse_buffer(read()) or ())
+        return "PARAM_VALUE" in result
 
     return until(look)
 
 
-def test_frames_in_pieces_over_tcp_and_a_client_that_goes():
+def test_frames_in_pieces_over_tcp_and_client_that_goes():
     port = free_port(socket.SOCK_STREAM)
     with flying(f"tcpin:127.0.0.1:{port}") as running:
         with socket.create_connection(("127.0.0.1", port)) as client:
@@ -39,7 +39,7 @@ def test_frames_in_pieces_over_tcp_and_a_client_that_goes():
         assert until(lambda: not running.hub.adapter.sessions)
 
 
-def test_a_serial_line_is_watched_but_its_commands_are_refused():
+def test_serial_line_is_watched_but_its_commands_are_refused():
     master, slave = pty.openpty()
     with flying(f"serial:{os.ttyname(slave)}:57600") as running:
         os.write(master, frame())
@@ -53,19 +53,19 @@ def test_a_serial_line_is_watched_but_its_commands_are_refused():
     os.close(slave)
 
 
-def test_a_port_that_is_taken_is_named():
+def test_used_port_is_named():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         url = f"tcpin:127.0.0.1:{taken.getsockname()[1]}"
         with pytest.raises(ValueError, match=f"--mavlink {url}: address already in use"), flying(url):
             pass
 
 
-def test_a_budget_is_a_seconds_worth():
+def test_budget_is_seconds_worth():
     budget = Budget(100.0)
     assert 100 <= sum(budget.take() for _ in range(1000)) < 200
 
 
-def test_jitter_is_the_step_beyond_its_due_and_pacing_the_widest_lag():
+def test_jitter_is_step_beyond_its_due_and_pacing_widest_lag():
     pacing = Pacing(2.0)
     for simulated, wall in ((0.0, 10.0), (0.02, 10.01), (0.04, 10.025), (0.06, 10.03)):
         pacing.note(simulated, wall)

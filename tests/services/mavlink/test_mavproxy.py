@@ -71,7 +71,7 @@ def station(tmp_path):
         end()
 
 
-def test_missions_parameters_arming_and_the_log(station, tmp_path):
+def test_missions_parameters_arming_and_log(station, tmp_path):
     (tmp_path / "mission.txt").write_text(MISSION)
     running, console = station()
     assert console.shows(f"Received {len(running.hub.adapter.parameters.names)} parameters")
@@ -94,20 +94,20 @@ def test_missions_parameters_arming_and_the_log(station, tmp_path):
     console.end()
     log = next(tmp_path.rglob("flight.tlog"))
     mavlogdump = Path(pymavlink.__file__).parent / "tools" / "mavlogdump.py"
-    said = subprocess.run(
+    output = subprocess.run(
         [sys.executable, mavlogdump, "--types", "GLOBAL_POSITION_INT,HEARTBEAT", str(log)],
         capture_output=True,
         text=True,
         check=True,
         timeout=60,
     ).stdout
-    assert said.count("GLOBAL_POSITION_INT {") > 50
-    assert "autopilot : 12" in said
+    assert output.count("GLOBAL_POSITION_INT {") > 50
+    assert "autopilot : 12" in output
 
 
 def test_arducopters_modes(station):
     """MAVProxy cannot set PX4's modes, which have two numbers; ArduPilot's it can."""
-    running, console = station("mavlink.flavour=ardupilot")
+    running, console = station("mavlink.firmware=ardupilot")
     console.type("arm throttle")
     assert until(lambda: running.vehicle.armed)
     for name, mode in {"LOITER": "position_control", "RTL": "return", "LAND": "land"}.items():

@@ -85,15 +85,15 @@ def test_arm_take_off_go_to_return_land_disarm():
     assert session(story).vehicle.kinds["link"].source.startswith("245/")
 
 
-def test_a_refused_command_is_told_with_its_reason():
+def test_rejected_command_has_reason():
     async def story(drone, vehicle):
         vehicle.arming_blockers = ("no GPS fix",)
         await first(drone.telemetry.health(), lambda health: not health.is_armable)
-        told = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "no GPS fix" in s.text))
+        reported = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "no GPS fix" in s.text))
         await asyncio.sleep(0.3)
         with pytest.raises(ActionError, match="DENIED"):
             await drone.action.arm()
-        assert "cannot arm" in (await told).text
+        assert "cannot arm" in (await reported).text
         with pytest.raises(ActionError):
             await drone.action.takeoff()
         assert not vehicle.armed
@@ -211,7 +211,7 @@ def test_parameters_rates_and_sticks():
     session(story)
 
 
-def test_orbit_failures_and_the_log(tmp_path):
+def test_orbit_failures_and_log(tmp_path):
     path = tmp_path / "flight.mcap"
     path.write_bytes(bytes(range(250)) * 200)
 
@@ -244,11 +244,11 @@ def test_events_and_arming_checks_are_read():
         assert {"gyro", "gps", "battery", "attitude_estimate"} <= {c.name for c in report.health_components}
         vehicle.arming_blockers = ()
         await first(drone.events.health_and_arming_checks(), lambda r: r.current_mode_intention.can_arm_or_run)
-        told = []
+        reported = []
 
         async def listen():
             async for event in drone.events.events():
-                told.append(event)
+                reported.append(event)
 
         listening = asyncio.ensure_future(listen())
         await asyncio.sleep(0.3)
@@ -256,12 +256,12 @@ def test_events_and_arming_checks_are_read():
         await drone.action.takeoff()
         await first(drone.telemetry.in_air(), bool)
         vehicle.status = {"failsafe": True, "text": "the battery is critical"}
-        while not any(event.event_name == "failsafe" for event in told):
+        while not any(event.event_name == "failsafe" for event in reported):
             await asyncio.sleep(0.02)
         listening.cancel()
-        texts = [event.message for event in told]
+        texts = [event.message for event in reported]
         assert [text for text in texts if text in ("Armed", "Takeoff detected")] == ["Armed", "Takeoff detected"]
-        failsafe = next(event for event in told if event.event_name == "failsafe")
+        failsafe = next(event for event in reported if event.event_name == "failsafe")
         assert failsafe.message.startswith("Failsafe: the battery is critical, now ")
         assert (failsafe.event_namespace, str(failsafe.log_level)) == ("lapwing", "CRITICAL")
 

@@ -7,8 +7,8 @@ from adapter_harness import Bench
 
 from lapwing.messages import CommandAck, CommandAcks, MissionItem, OperatorCommand, OperatorInput, Vector3, header
 from lapwing.messages.topics import COMMAND_ACKS, OPERATOR
-from lapwing.services.mavlink.geo_coordinates import Datum
-from lapwing.services.mavlink.mission_export import to_mavlink
+from lapwing.services.common.mavlink.geo_coordinates import Datum
+from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.mavlink.mission_import import from_mavlink
 
 NAN = math.nan
@@ -50,7 +50,7 @@ RALLY = [item("rally", 30.0, 40.0, 10.0)]
     ("items", "kind"),
     [(ITEMS, 0), (FENCE, 1), (RALLY, 2)],  # MAV_MISSION_TYPE
 )
-def test_there_and_back_is_the_same(items, kind):
+def test_mission_upload_and_download_are_equal(items, kind):
     places = (
         "takeoff",
         "waypoint",
@@ -84,7 +84,7 @@ def given(bench, time_ns, command, result):
     bench.adapter.take(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
 
 
-def test_a_plans_mission_can_be_downloaded_and_a_refused_one_not():
+def test_accepted_plan_is_downloadable_and_rejected_is_not():
     bench = Bench()
     station = bench.station()
     bench.step(5)
@@ -94,6 +94,6 @@ def test_a_plans_mission_can_be_downloaded_and_a_refused_one_not():
         station.send("mission_request_list", 1, 1, kind)
         assert station.last("MISSION_COUNT").count == count
     station.send("mission_request_int", 1, 1, 1, 0)
-    found = station.last("MISSION_ITEM_INT")
-    assert (found.command, found.param1, found.frame) == (16, 3.0, 6)
-    assert found.z == pytest.approx(24.65, abs=0.02)  # above home, where it stands 0.35 m above the ground
+    result = station.last("MISSION_ITEM_INT")
+    assert (result.command, result.param1, result.frame) == (16, 3.0, 6)
+    assert result.z == pytest.approx(24.65, abs=0.02)  # above home, where it stands 0.35 m above the ground

@@ -7,7 +7,7 @@ from adapter_harness import Bench
 from fake_vehicle import PARAMETERS
 
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.px4_facts import px4_facts
 from lapwing.services.mavlink.resolve import describe
 from lapwing.services.scene_resolver import load
@@ -55,26 +55,26 @@ def facts(scene, *overrides):
 
 
 @pytest.mark.parametrize("page", ASKED)
-def test_everything_that_the_pages_ask_for_is_there(page):
+def test_parameters_of_ground_station_pages_exist(page):
     scene = load("lapwing/scenes/groundstation.toml")
     assert not set(ASKED[page].split()) - set(facts("lapwing/scenes/groundstation.toml")) - set(table(scene))
 
 
-def test_nothing_asks_for_set_up():
-    found = facts("lapwing/scenes/groundstation.toml")
-    assert found["SYS_AUTOSTART"] == 4001
-    assert all(found[f"CAL_{name}0_ID"] for name in ("GYRO", "ACC", "MAG"))
-    assert found["COM_RC_IN_MODE"] == 1
-    assert (found["BAT1_N_CELLS"], found["BAT1_V_EMPTY"]) == (12, 3.0)
+def test_ground_station_requires_no_setup():
+    result = facts("lapwing/scenes/groundstation.toml")
+    assert result["SYS_AUTOSTART"] == 4001
+    assert all(result[f"CAL_{name}0_ID"] for name in ("GYRO", "ACC", "MAG"))
+    assert result["COM_RC_IN_MODE"] == 1
+    assert (result["BAT1_N_CELLS"], result["BAT1_V_EMPTY"]) == (12, 3.0)
 
 
-def test_what_is_not_fitted_says_so():
-    found = facts("lapwing/scenes/hover.toml")
-    assert found["BAT1_SOURCE"] == -1
-    assert "BAT1_V_CHARGED" not in found
-    assert found["SYS_HAS_NUM_DIST"] == 0
+def test_missing_sensor_is_declared():
+    result = facts("lapwing/scenes/hover.toml")
+    assert result["BAT1_SOURCE"] == -1
+    assert "BAT1_V_CHARGED" not in result
+    assert result["SYS_HAS_NUM_DIST"] == 0
     assert facts("lapwing/scenes/delivery_mission.toml")["SYS_HAS_NUM_DIST"] == 1
-    assert found["PD_GRIPPER_EN"] == 0  # QGroundControl hides the button
+    assert result["PD_GRIPPER_EN"] == 0  # QGroundControl hides the button
     assert facts("lapwing/scenes/delivery_full.toml")["PD_GRIPPER_EN"] == 1
 
 
@@ -84,22 +84,22 @@ def test_names_fit_into_their_field_and_none_is_there_twice():
     assert len(set(names)) == len(names)
 
 
-def test_facts_are_listed_with_the_parameters_and_cannot_be_set():
+def test_facts_are_listed_with_parameters_and_cannot_be_set():
     bench = Bench()
     station = bench.station()
     station.send("param_request_list", 1, 1)
     bench.step(20)
-    found = {m.param_id: m for m in station.all("PARAM_VALUE")}
-    assert {p.name for p in PARAMETERS} < set(found)
-    assert len(found) == found["SYS_AUTOSTART"].param_count
-    assert integer(found["SYS_AUTOSTART"]) == 4001
-    assert sorted(m.param_index for m in found.values()) == list(range(len(found)))
+    result = {m.param_id: m for m in station.all("PARAM_VALUE")}
+    assert {p.name for p in PARAMETERS} < set(result)
+    assert len(result) == result["SYS_AUTOSTART"].param_count
+    assert integer(result["SYS_AUTOSTART"]) == 4001
+    assert sorted(m.param_index for m in result.values()) == list(range(len(result)))
     station.send("param_set", 1, 1, b"SYS_AUTOSTART", 0.0, mavlink.MAV_PARAM_TYPE_INT32)
     assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_READ_ONLY
     assert integer(station.last("PARAM_VALUE")) == 4001
 
 
-def test_a_change_is_told_to_every_station_with_what_follows_from_it():
+def test_parameter_change_is_broadcast_with_dependent_facts():
     bench = Bench()
     one, two = bench.station(), bench.station(system=254)
     assert integer(read(two, "NAV_RCL_ACT")) == 2  # return, as for the data link
@@ -107,11 +107,70 @@ def test_a_change_is_told_to_every_station_with_what_follows_from_it():
     three = struct.unpack("<f", struct.pack("<i", 3))[0]
     one.send("param_set", 1, 1, b"NAV_DLL_ACT", three, mavlink.MAV_PARAM_TYPE_INT32)
     bench.step(3)
-    assert [(m.param_id, integer(m)) for m in two.all("PARAM_VALUE")] == [("NAV_DLL_ACT", 3), ("NAV_RCL_ACT", 3)]
-    assert [m.param_id for m in one.all("PARAM_VALUE")] == ["NAV_DLL_ACT", "NAV_RCL_ACT"]
+    twice = 2 * [("NAV_DLL_ACT", 3), ("NAV_RCL_ACT", 3)]  # as PX4 does: MAVSDK's subscriptions rely on it
+    assert [(m.param_id, integer(m)) for m in two.all("PARAM_VALUE")] == twice
+    assert [(m.param_id, integer(m)) for m in one.all("PARAM_VALUE")] == twice
 
 
-def test_a_refused_value_is_told_to_the_asker_alone():
+def whole(value):
+    return struct.unpack("<f", struct.pack("<i", value))[0]
+
+
+def set_whole(bench, station, name, value):
+    station.got.clear()
+    station.send("param_set", 1, 1, name.encode(), whole(value), mavlink.MAV_PARAM_TYPE_INT32)
+    bench.step(4)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "counterparts"),
+    [
+        ("GF_ACTION", 0, {"FS_FENCE_ACT": 0}),
+        ("GF_ACTION", 2, {"FS_FENCE_ACT": 1}),
+        ("GF_ACTION", 5, {"FS_FENCE_ACT": 3}),
+        ("COM_LOW_BAT_ACT", 0, {"FS_BAT_CRIT_ACT": 0, "FS_BAT_EMER_ACT": 0}),
+        ("COM_LOW_BAT_ACT", 2, {"FS_BAT_CRIT_ACT": 3, "FS_BAT_EMER_ACT": 3}),
+        ("NAV_RCL_ACT", 1, {"NAV_DLL_ACT": 1}),
+        ("COM_ACT_FAIL_ACT", 3, {"FS_MOTOR_ACT": 2}),
+        ("COM_ACT_FAIL_ACT", 1, {"FS_MOTOR_ACT": 1}),
+        ("COM_RCL_EXCEPT", 7, {}),
+    ],
+)
+def test_px4_parameter_sets_its_counterparts(name, value, counterparts):
+    bench = Bench()
+    station, other = bench.station(), bench.station(system=254)
+    set_whole(bench, station, name, value)
+    assert {k: bench.vehicle.parameters[k] for k in counterparts} == counterparts
+    for each in (station, other):
+        assert integer(read(each, name)) == value
+    assert {integer(m) for m in other.all("PARAM_VALUE") if m.param_id == name} == {value}
+
+
+@pytest.mark.parametrize(("name", "value"), [("GF_ACTION", 4), ("COM_LOW_BAT_ACT", 1), ("COM_RCL_EXCEPT", 32)])
+def test_px4_value_without_counterpart_is_rejected(name, value):
+    bench = Bench()
+    station = bench.station()
+    before = integer(read(station, name))
+    set_whole(bench, station, name, value)
+    assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert integer(station.last("PARAM_VALUE")) == before
+
+
+def test_changed_counterpart_is_shown_in_px4_parameter():
+    bench = Bench()
+    station = bench.station()
+    set_whole(bench, station, "GF_ACTION", 0)
+    set_whole(bench, station, "FS_FENCE_ACT", 2)
+    assert integer(read(station, "GF_ACTION")) == 3
+
+
+def test_parameters_of_client_tests_exist():
+    names = "COM_RCL_EXCEPT RTL_APPR_FORCE SIM_GPS_USED FD_ACT_EN MC_AIRMODE CA_FAILURE_MODE COM_ACT_FAIL_ACT"
+    assert set(names.split()) <= set(facts("lapwing/scenes/hover.toml"))
+    assert table(load("lapwing/scenes/hover.toml"))["SYS_FAILURE_EN"].default == 1.0
+
+
+def test_rejected_value_is_reported_to_sender_only():
     bench = Bench()
     one, two = bench.station(), bench.station(system=254)
     one.send("param_set", 1, 1, b"MIS_TAKEOFF_ALT", 1e6, mavlink.MAV_PARAM_TYPE_REAL32)
@@ -121,7 +180,7 @@ def test_a_refused_value_is_told_to_the_asker_alone():
 
 
 def test_ardupilot_has_none_of_px4s():
-    bench = Bench("mavlink.flavour=ardupilot")
+    bench = Bench("mavlink.firmware=ardupilot")
     station = bench.station()
     read(station, "SYS_AUTOSTART")
     assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST

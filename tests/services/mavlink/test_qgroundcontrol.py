@@ -1,8 +1,7 @@
-"""What QGroundControl's buttons do: its messages, one by one, to the vehicle that flies.
+"""Messages of QGroundControl's buttons to a flying vehicle.
 
-The messages are those that its PX4 plug-in sends (PX4FirmwarePlugin.cc, Vehicle.cc); docs/reference/mavlink.md has
-them as a
-table, whose buttons are the methods of `QGroundControl`.
+The messages are those of its PX4 plug-in (PX4FirmwarePlugin.cc, Vehicle.cc). The table in docs/reference/mavlink.md
+lists the buttons; `QGroundControl` has a method for each.
 """
 
 import math
@@ -12,7 +11,7 @@ import pytest
 from adapter_harness import Station, item
 from autopilot_harness import Flown
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.firmware import px4
 
 pytestmark = pytest.mark.long
@@ -74,8 +73,8 @@ class QGroundControl(Station):
         return self.command(400, 0.0)
 
     def takeoff(self, above=10.0):
-        found = self.command(22, -1.0, 0.0, 0.0, NAN, NAN, NAN, self.altitude + above)
-        return found or self.arm()
+        result = self.command(22, -1.0, 0.0, 0.0, NAN, NAN, NAN, self.altitude + above)
+        return result or self.arm()
 
     def land(self):
         return self.set_mode("Land")
@@ -142,7 +141,7 @@ def station():
     return flown.station_of(QGroundControl)
 
 
-def test_buttons_of_a_flight_without_a_mission(station):
+def test_buttons_of_flight_without_mission(station):
     fly, until, start = station.bench, station.bench.until, station.place
 
     def above():
@@ -186,7 +185,7 @@ def test_buttons_of_a_flight_without_a_mission(station):
     assert (station.place[0] - start[0]) * NORTH == pytest.approx(20.0, abs=0.5)
 
 
-def test_buttons_of_a_mission_and_the_emergency_stop(station):
+def test_buttons_of_mission_and_emergency_stop(station):
     until = station.bench.until
     for seq, (command, north) in enumerate(((22, 0.0), (16, 15.0), (16, 30.0), (20, 0.0))):
         if not seq:
@@ -215,18 +214,18 @@ def test_buttons_of_a_mission_and_the_emergency_stop(station):
     assert until(lambda: not station.armed, 2.0)
 
 
-def test_arming_and_the_gripper(station):
+def test_arming_and_gripper(station):
     assert station.gripper(mavlink.GRIPPER_ACTION_RELEASE) == mavlink.MAV_RESULT_UNSUPPORTED  # no payload
     assert station.arm() == ACCEPTED
     assert station.disarm() == ACCEPTED
     assert not station.armed
 
 
-def test_the_table_in_the_documentation_has_these_buttons():
+def test_table_in_documentation_has_these_buttons():
     text = Path("docs/reference/mavlink.md").read_text()
     table = text[text.index("| button ") :].split("\n\n")[0]
     buttons = [name.strip() for row in table.splitlines()[2:] for name in row.split("|")[1].split(",")]
-    said = {name.lower().replace(" ", "_") for name in buttons if not name.startswith("shown where")}
+    output = {name.lower().replace(" ", "_") for name in buttons if not name.startswith("shown where")}
     tried = {name.rstrip("_") for name in vars(QGroundControl) if not name.startswith("_")}
     helpers = {"step", "newest", "altitude", "place", "mode", "armed", "at", "set_mode"}
-    assert said - {"log_download"} == tried - helpers  # which test_mavsdk.py tries
+    assert output - {"log_download"} == tried - helpers  # which test_mavsdk.py tries

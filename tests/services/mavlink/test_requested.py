@@ -1,4 +1,4 @@
-"""What PX4's ground stations ask for besides the usual telemetry: modes, setpoints, motors, odometry, identity."""
+"""Messages on request of PX4's ground stations: modes, setpoints, motors, odometry, identity."""
 
 import math
 
@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from lapwing.messages import Actuators, MagneticField, Setpoint, Vector3, VehicleState, header
 from lapwing.messages.topics import ACTUATORS, IMU, MAG, SETPOINT, TRUTH
 from lapwing.messages.types import Imu
-from lapwing.services.mavlink.dialect import id_of, message_class
+from lapwing.services.common.mavlink.dialect import id_of, message_class
 
 NAN = math.nan
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
@@ -39,13 +39,13 @@ def test_all_modes_are_listed_and_each_can_be_chosen():
     assert {m.standard_mode for m in modes} == {0, 1, 4, 5, 6, 7, 8}
     assert not any(m.properties & mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE for m in modes)
     for m in modes:
-        assert bench.adapter.vehicle.flavour.mode_kind(m.custom_mode)
+        assert bench.adapter.vehicle.firmware.mode_kind(m.custom_mode)
     assert ask(bench, station, "AVAILABLE_MODES", 3.0).mode_index == 3
     assert len(station.all("AVAILABLE_MODES")) == 1
     assert station.command(512, id_of("AVAILABLE_MODES"), 99.0) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
 
-def test_the_current_mode_is_one_of_them():
+def test_current_mode_is_available():
     bench = Bench()
     bench.vehicle.mode = "return"
     bench.step(2)
@@ -55,7 +55,7 @@ def test_the_current_mode_is_one_of_them():
     assert m.intended_custom_mode == m.custom_mode
 
 
-def test_a_standard_mode_is_entered_by_its_number():
+def test_standard_mode_is_entered_by_its_number():
     bench = Bench()
     bench.vehicle.armed = True
     station = bench.station()
@@ -78,7 +78,7 @@ def followed(armed=True, **changed):
     return bench, station
 
 
-def test_the_setpoint_is_shown_in_ned_and_on_the_earth():
+def test_setpoint_is_shown_in_ned_and_on_earth():
     _, station = followed()
     m = station.last("POSITION_TARGET_LOCAL_NED")
     assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, -10.0))  # from where it stood
@@ -90,20 +90,20 @@ def test_the_setpoint_is_shown_in_ned_and_on_the_earth():
     assert (m.lat_int - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)
 
 
-def test_what_is_not_followed_is_masked():
+def test_unused_setpoint_fields_are_masked():
     _, station = followed(position=Vector3(NAN, NAN, 5.0), yaw=NAN)
     m = station.last("POSITION_TARGET_LOCAL_NED")
     assert m.type_mask == 0b0000_0100_0000_0011
     assert station.last("POSITION_TARGET_GLOBAL_INT") is None
 
 
-def test_nothing_is_followed_while_disarmed():
+def test_setpoint_is_empty_while_disarmed():
     _, station = followed(armed=False)
     for kind in ("POSITION_TARGET_LOCAL_NED", "POSITION_TARGET_GLOBAL_INT", "ATTITUDE_TARGET"):
         assert station.last(kind) is None
 
 
-def test_the_attitude_setpoint_faces_where_the_vehicle_shall():
+def test_attitude_setpoint_faces_where_vehicle_shall():
     bench, station = followed()
     m = station.last("ATTITUDE_TARGET")
     w, x, y, z = m.q
@@ -133,7 +133,7 @@ def test_motors_and_their_outputs():
     assert m.actuator[4] == 0.0
 
 
-def test_odometry_has_the_estimators_variances_along_its_axes():
+def test_odometry_has_estimators_variances_along_its_axes():
     bench = Bench()
     bench.vehicle.position = [1.0, 2.0, 3.0]
     plain = bench.vehicle.messages
@@ -174,7 +174,7 @@ def test_flight_times():
     assert armed.arming_time_utc < m.takeoff_time_utc < 1e3 * m.landing_time
 
 
-def test_identity_and_what_is_not_fitted():
+def test_identity_and_missing_parts():
     bench = Bench()
     bench.step(2)
     station = bench.station()
@@ -186,9 +186,9 @@ def test_identity_and_what_is_not_fitted():
     assert (m.chancount, m.chan1_raw, m.rssi) == (0, 0xFFFF, 255)
 
 
-@pytest.mark.parametrize(("flavour", "bit"), [("px4", "BYTEWISE"), ("ardupilot", "C_CAST")])
-def test_the_encoding_of_whole_parameters_is_announced(flavour, bit):
-    bench = Bench(f"mavlink.flavour={flavour}")
+@pytest.mark.parametrize(("firmware", "bit"), [("px4", "BYTEWISE"), ("ardupilot", "C_CAST")])
+def test_encoding_of_whole_parameters_is_announced(firmware, bit):
+    bench = Bench(f"mavlink.firmware={firmware}")
     bench.step(2)
     m = ask(bench, bench.station(), "AUTOPILOT_VERSION")
     encodings = {
@@ -208,7 +208,7 @@ def test_inertial_readings_in_whole_numbers():
     assert (m.xmag, m.ymag, m.zmag) == (10, -250, 380)
 
 
-def test_the_wind_is_the_velocity_of_the_air_where_the_vehicle_is():
+def test_wind_is_velocity_of_air_where_vehicle_is():
     bench = Bench()
     truth = VehicleState(wind=Vector3(3.0, 1.0, 0.5))
     truth = truth._replace(pose=truth.pose._replace(position=truth.pose.position._replace(z=12.0)))

@@ -13,7 +13,7 @@ from pymavlink import mavutil
 
 from lapwing.cosim.log import LogReader
 from lapwing.messages import OperatorInput
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.signing import read_key
 
 pytestmark = pytest.mark.long
@@ -140,7 +140,7 @@ def test_command_before_heartbeat_is_denied(tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["mavlink", "foxglove", "ros2", "time stamps"])
-def test_link_that_cannot_start_ends_the_run_before_take_off(tmp_path, key, kind):
+def test_link_that_cannot_start_ends_run_before_take_off(tmp_path, key, kind):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"
         (tmp_path / "file").write_text("")

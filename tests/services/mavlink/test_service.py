@@ -16,7 +16,7 @@ from pymavlink import mavutil
 
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.runs.single_process_run import fly_single
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.links import check
 from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
@@ -47,7 +47,7 @@ def heard(connection, kind, seconds=120.0):
     return message
 
 
-def test_a_client_flies_the_autopilot_of_a_live_run(tmp_path):
+def test_client_flies_autopilot_of_live_run(tmp_path):
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
 
@@ -74,15 +74,15 @@ def test_a_client_flies_the_autopilot_of_a_live_run(tmp_path):
         assert order(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
         while heard(station, "HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
             pass
-        said, _ = process.communicate(timeout=600)
+        output, _ = process.communicate(timeout=600)
     station.close()
-    assert process.returncode == 0, said
-    assert re.search(r"mavlink: telemetry: jitter median [\d.]+ ms, p99 [\d.]+ ms", said)
+    assert process.returncode == 0, output
+    assert re.search(r"mavlink: telemetry: jitter median [\d.]+ ms, p99 [\d.]+ ms", output)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds processes in /proc")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
-def test_a_link_that_dies_or_freezes_does_not_hold_up_the_flight(tmp_path, how):
+def test_link_that_dies_or_freezes_does_not_hold_up_flight(tmp_path, how):
     port, key_prefix = free_port(), f"test-mavlink-{how.name.lower()}"
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", "4"]
@@ -90,11 +90,11 @@ def test_a_link_that_dies_or_freezes_does_not_hold_up_the_flight(tmp_path, how):
         adapter = adapter_of(process)
         heard(station, "ATTITUDE")
         os.kill(adapter, how)
-        said, _ = process.communicate(timeout=600)
+        output, _ = process.communicate(timeout=600)
     station.close()
-    assert process.returncode == 0, said
+    assert process.returncode == 0, output
     if how == signal.SIGKILL:
-        assert "mavlink: ended before the flight (signal 9)" in said
+        assert "mavlink: ended before the flight (signal 9)" in output
     with LogReader(tmp_path / f"{key_prefix}.mcap") as log:
         assert log.complete
 
@@ -108,12 +108,12 @@ def test_a_link_that_dies_or_freezes_does_not_hold_up_the_flight(tmp_path, how):
         ("udpin:127.0.0.1:99999", "expected one of serial"),
     ],
 )
-def test_a_url_that_cannot_be_is_refused_with_the_forms_there_are(url, fault):
+def test_invalid_url_is_rejected_with_valid_forms(url, fault):
     with pytest.raises(ValueError, match=re.escape(f"--mavlink {url}: {fault}")):
         check(url)
 
 
-def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
+def test_replayed_log_shows_on_link_and_takes_no_commands(tmp_path):
     log = tmp_path / "flight.mcap"
     vehicle = StandIn()
     vehicle.armed, vehicle.mode, vehicle.target = True, "takeoff", [0.0, 0.0, 30.0]
@@ -137,7 +137,7 @@ def test_a_replayed_log_shows_on_a_link_and_takes_no_commands(tmp_path):
     station.close()
 
 
-def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
+def test_flood_does_not_change_bit_of_flight(tmp_path):
     port, sent = free_port(), 0
     frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
     more = ["--mavlink", f"udpin:127.0.0.1:{port}", "--speed", "2"]
@@ -152,30 +152,30 @@ def test_a_flood_does_not_change_a_bit_of_the_flight(tmp_path):
                 except OSError:  # nobody listens yet, or any more
                     break
             time.sleep(0.001)
-        said, _ = process.communicate(timeout=600)
-    assert process.returncode == 0, said
+        output, _ = process.communicate(timeout=600)
+    assert process.returncode == 0, output
     assert sent > 100_000
-    assert re.search(r"\d+ faster than a link takes", said), said
+    assert re.search(r"\d+ faster than a link takes", output), output
     quiet = tmp_path / "quiet.mcap"
     fly_single(resolve(load(HOVER, ["autopilot.accept_commands=true"])), quiet)
     with LogReader(tmp_path / "test-mavlink-flood.mcap") as flooded, LogReader(quiet) as read:
         assert flooded.digest() == read.digest()
 
 
-def test_the_mission_of_a_plan_can_be_downloaded(tmp_path):
+def test_mission_of_plan_can_be_downloaded(tmp_path):
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--plan", "lapwing/scenes/plans/delivery.plan", "--speed", "2"]
     with run(tmp_path, "test-mavlink-plan", *more) as process:
         heard(station, "HEARTBEAT")
         station.mav.mission_request_list_send(1, 1, 0)
-        found = []
+        result = []
         for number in range(heard(station, "MISSION_COUNT").count):
             station.mav.mission_request_int_send(1, 1, number, 0)
-            found.append(heard(station, "MISSION_ITEM_INT"))
+            result.append(heard(station, "MISSION_ITEM_INT"))
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=60)
     station.close()
-    assert [m.command for m in found] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
-    assert found[5].param1 == 5.0
-    assert found[4].z == pytest.approx(10.0, abs=0.02)  # above home: it stands 0.35 m above the ground
+    assert [m.command for m in result] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
+    assert result[5].param1 == 5.0
+    assert result[4].z == pytest.approx(10.0, abs=0.02)  # above home: it stands 0.35 m above the ground

@@ -1,4 +1,4 @@
-"""Setpoints of either flavour, flown by the autopilot: each does what its mask and its frame say."""
+"""Setpoints of either firmware, flown by the autopilot: each does what its mask and its frame say."""
 
 import math
 
@@ -42,11 +42,11 @@ class Client(Station):
         )
 
 
-@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_what_is_asked_for_is_flown(flavour):
-    bench = Flown("hover", f"mavlink.flavour={flavour}")
+@pytest.mark.parametrize("firmware", ["px4", "ardupilot"])
+def test_mavlink_setpoints_are_flown(firmware):
+    bench = Flown("hover", f"mavlink.firmware={firmware}")
     station = bench.station_of(Client)
-    station.px4 = flavour == "px4"
+    station.px4 = firmware == "px4"
     bench.step(10)
     assert station.last("LOCAL_POSITION_NED").z == pytest.approx(0.0, abs=0.02)  # where it stands
     above = station.last("GLOBAL_POSITION_INT").alt * 1e-3 if station.px4 else 0.0

@@ -5,7 +5,7 @@ import hashlib
 import pytest
 from adapter_harness import Bench
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.signing import TimeStampStore, read_key
 
 KEY = hashlib.sha256(b"correct horse").digest()
@@ -32,7 +32,7 @@ def test_unsigned_and_wrongly_signed_are_refused_and_counted(key):
     assert bench.counts[REFUSED] == 1
 
 
-def test_a_replayed_packet_is_refused_also_by_another_way():
+def test_replayed_packet_is_refused_also_by_another_way():
     bench = Bench(key=KEY)
     station, thief = bench.station(key=KEY), bench.station(local=False)
     station.send("command_long", *ARM)
@@ -45,7 +45,7 @@ def test_a_replayed_packet_is_refused_also_by_another_way():
     assert bench.counts[REFUSED] == 2
 
 
-def test_a_forged_time_stamp_does_not_shut_out_the_keys_holder():
+def test_forged_time_stamp_does_not_shut_out_keys_holder():
     bench = Bench(key=KEY)
     station = bench.station(key=KEY)
     station.send("heartbeat", 6, 8, 0, 0, 0, 3)
@@ -58,7 +58,7 @@ def test_a_forged_time_stamp_does_not_shut_out_the_keys_holder():
     assert bench.vehicle.armed
 
 
-def test_without_a_key_other_machines_watch_but_do_not_command():
+def test_without_key_other_machines_watch_but_do_not_command():
     bench = Bench()
     stranger = bench.station(local=False)
     assert stranger.command(400, 1.0) == mavlink.MAV_RESULT_DENIED
@@ -81,7 +81,7 @@ def test_insecure_takes_commands_from_anywhere():
     assert bench.station(local=False).command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
 
 
-def test_command_needs_a_heartbeat_of_its_endpoint():
+def test_command_needs_heartbeat_of_its_endpoint():
     bench = Bench()
     bench.station()
     station = bench.station(heartbeat=False)
@@ -124,7 +124,7 @@ def test_stored_time_stamps_belong_to_key_and_vehicle(tmp_path):
     assert TimeStampStore(tmp_path / "stamps", bytes(32), 1).load() == {}
 
 
-def test_new_stream_older_than_a_minute_is_rejected():
+def test_new_stream_older_than_minute_is_rejected():
     bench = Bench(key=KEY)
     old = bench.station(key=KEY)
     old.codec.signing.timestamp -= 61 * 10**5
@@ -133,7 +133,7 @@ def test_new_stream_older_than_a_minute_is_rejected():
     assert not bench.vehicle.armed
 
 
-def test_a_key_file_holds_one_passphrase(tmp_path):
+def test_key_file_holds_one_passphrase(tmp_path):
     path = tmp_path / "key"
     path.write_text("correct horse\n")
     assert read_key(path) == KEY

@@ -2,10 +2,10 @@
 
 from adapter_harness import Bench
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 
-def test_heartbeats_say_that_it_starts_once_a_second_until_it_speaks():
+def test_heartbeat_reports_start_until_first_message():
     bench = Bench(starting=True)
     station = bench.station()
     for k in range(25):
@@ -20,7 +20,7 @@ def test_heartbeats_say_that_it_starts_once_a_second_until_it_speaks():
     assert not station.got
 
 
-def test_parameters_and_what_it_is_are_told_while_it_starts():
+def test_parameters_and_identity_are_sent_during_start():
     bench = Bench(starting=True)
     station = bench.station()
     station.send("param_request_list", 1, 1)
@@ -31,7 +31,7 @@ def test_parameters_and_what_it_is_are_told_while_it_starts():
     assert station.last("AUTOPILOT_VERSION")
 
 
-def test_commands_are_turned_away_for_the_time_being():
+def test_commands_are_turned_away_for_time_being():
     bench = Bench(starting=True)
     station = bench.station()
     station.send("command_long", 1, 1, 400, 0, 1.0, *[0.0] * 6)

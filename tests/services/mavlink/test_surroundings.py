@@ -2,12 +2,32 @@
 
 import math
 
+import numpy as np
 import pytest
 from adapter_harness import Bench
 
-from lapwing.messages import FluidPressure, NavSatFix, NavSatStatus, OpticalFlow, Range, header
-from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, GPS, OPTICAL_FLOW, RANGEFINDER, SONAR
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.messages import (
+    FluidPressure,
+    LaserScan,
+    NavSatFix,
+    NavSatStatus,
+    OpticalFlow,
+    PointCloud2,
+    PointField,
+    Range,
+    header,
+)
+from lapwing.messages.topics import (
+    AIRSPEED,
+    AIRSPEED_RECEIVED,
+    GPS,
+    LASER_SCAN,
+    OPTICAL_FLOW,
+    POINT_CLOUD,
+    RANGEFINDER,
+    SONAR,
+)
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.external_sensors import orientation
 
 HEAD = header(0, "drone1")
@@ -36,7 +56,7 @@ def turned(q, v):
     return [v[k] + 2.0 * w * once[k] + 2.0 * twice[k] for k in range(3)]
 
 
-def test_directions_have_the_numbers_of_mavlink():
+def test_directions_have_numbers_of_mavlink():
     names = {(0, 0): "NONE", (-45, 0): "YAW_45", (90, 0): "YAW_270", (180, 0): "YAW_180", (30, 90): "PITCH_90"}
     names |= {(0, -90): "PITCH_270"}
     for (azimuth, elevation), name in names.items():
@@ -45,7 +65,7 @@ def test_directions_have_the_numbers_of_mavlink():
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(20.0, 0.0), (0.0, -45.0), (-100.0, 30.0)])
-def test_any_other_direction_is_a_turn_from_ahead(azimuth, elevation):
+def test_any_other_direction_is_turn_from_ahead(azimuth, elevation):
     number, q = orientation(azimuth, elevation)
     assert number == mavlink.MAV_SENSOR_ROTATION_CUSTOM
     a, e = math.radians(azimuth), math.radians(elevation)
@@ -58,13 +78,13 @@ def test_sonar_and_rangefinder_are_two_distance_sensors():
     ahead = Range(HEAD, radiation_type=Range.INFRARED, min_range=0.05, max_range=40.0, range=math.inf)
     more = [*FITTED, "sensors.rangefinder.elevation_deg=0.0", "sensors.rangefinder.azimuth_deg=-90.0"]
     station = shown((SONAR, down), (RANGEFINDER, ahead), more=more)
-    found = {m.id: m for m in station.all("DISTANCE_SENSOR")}
-    assert (found[0].current_distance, found[0].orientation) == (150, mavlink.MAV_SENSOR_ROTATION_PITCH_270)
-    assert (found[1].current_distance, found[1].orientation) == (4001, mavlink.MAV_SENSOR_ROTATION_YAW_90)
-    assert (found[0].type, found[1].type) == (1, 0)
+    result = {m.id: m for m in station.all("DISTANCE_SENSOR")}
+    assert (result[0].current_distance, result[0].orientation) == (150, mavlink.MAV_SENSOR_ROTATION_PITCH_270)
+    assert (result[1].current_distance, result[1].orientation) == (4001, mavlink.MAV_SENSOR_ROTATION_YAW_90)
+    assert (result[0].type, result[1].type) == (1, 0)
 
 
-def test_flow_has_the_signs_of_mavlink():
+def test_flow_has_signs_of_mavlink():
     """Ahead makes the flow about y positive, to the right that about x negative; a right-handed turn is positive."""
     v, d = (2.0, -3.0), 4.0  # [m/s] ahead, to the right (FLU), [m]
     flow = OpticalFlow(HEAD, (v[1] / d, -v[0] / d), (0.1, 0.2), d, 1e-4)
@@ -80,7 +100,7 @@ def test_flow_has_the_signs_of_mavlink():
     assert (m.quality, m.distance) == (0, -1.0)
 
 
-def test_airspeed_is_that_of_the_tube_and_over_the_ground_without_one():
+def test_airspeed_is_that_of_tube_and_over_ground_without_one():
     tail = shown((AIRSPEED, FluidPressure(HEAD, -5.0, 0.0))).last("VFR_HUD")
     ahead = shown((AIRSPEED, FluidPressure(HEAD, 0.5 * 1.225 * 8.0**2, 0.0))).last("VFR_HUD")
     assert (tail.airspeed, ahead.airspeed) == pytest.approx((0.0, 8.0))
@@ -88,7 +108,7 @@ def test_airspeed_is_that_of_the_tube_and_over_the_ground_without_one():
     assert none.airspeed == none.groundspeed
 
 
-def test_airspeed_is_what_the_autopilot_gets_of_it():
+def test_airspeed_is_value_received_by_autopilot():
     read = (AIRSPEED, FluidPressure(HEAD, 0.5 * 1.225 * 8.0**2, 0.0))
     half = shown(read, (AIRSPEED_RECEIVED, FluidPressure(HEAD, 0.5 * 1.225 * 4.0**2, 0.0))).last("VFR_HUD")
     assert half.airspeed == pytest.approx(4.0)
@@ -104,7 +124,7 @@ BITS = {
 }
 
 
-def test_the_status_has_their_bits_where_they_are_fitted():
+def test_status_bits_follow_fitted_sensors():
     bare = shown(more=()).last("SYS_STATUS")
     assert not bare.onboard_control_sensors_present & sum(BITS.values())
     silent = shown().last("SYS_STATUS")
@@ -126,7 +146,7 @@ def test_the_status_has_their_bits_where_they_are_fitted():
         ("optical_flow", BITS["optical_flow"]),
     ],
 )
-def test_the_status_shows_what_the_estimator_refuses(source, bit):
+def test_status_shows_rejected_sources(source, bit):
     bench = Bench(*FITTED)
     bench.vehicle.more = [
         (GPS, NavSatFix(HEAD, NavSatStatus(NavSatStatus.STATUS_FIX))),
@@ -139,3 +159,22 @@ def test_the_status_shows_what_the_estimator_refuses(source, bit):
     bench.vehicle.rejected = (source,)
     bench.step(120)
     assert not station.last("SYS_STATUS").onboard_control_sensors_health & bit
+
+
+def test_obstacles_are_clockwise_from_ahead():
+    """A wall to the left (azimuth 90 degrees) is in sector 54 of 72, 270 degrees clockwise."""
+    ranges = [math.inf] * 360
+    ranges[180 + 90], ranges[180] = 3.0, -math.inf
+    scan = LaserScan(HEAD, -math.pi, math.radians(179.0), math.radians(1.0), 0.0, 0.1, 0.15, 12.0, tuple(ranges), ())
+    m = shown((LASER_SCAN, scan)).last("OBSTACLE_DISTANCE")
+    assert (m.distances[54], m.distances[0], m.distances[18]) == (300, 15, 1201)
+    assert (m.increment_f, m.max_distance, m.min_distance) == (5.0, 1200, 15)
+    assert m.frame == mavlink.MAV_FRAME_BODY_FRD
+
+
+def test_obstacles_of_point_cloud_leave_ground_out():
+    fields = tuple(PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate("xyz"))
+    points = np.array([[4.0, 0.0, 0.1], [2.0, 0.0, -0.5], [math.nan] * 3], "<f4")
+    cloud = PointCloud2(HEAD, 1, 3, fields, False, 12, 36, tuple(points.tobytes()), False)
+    m = shown((POINT_CLOUD, cloud)).last("OBSTACLE_DISTANCE")
+    assert (m.distances[0], m.distances[36]) == (400, 0xFFFF)

@@ -7,7 +7,7 @@ from adapter_harness import Bench
 
 from lapwing.messages import BatteryState, Vector3, VehicleState
 from lapwing.messages.topics import BATTERY, TRUTH
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 
 def shown(bench, kind, steps=60):
@@ -22,7 +22,7 @@ def moved():
     return bench
 
 
-def test_position_on_the_earth():
+def test_position_on_earth():
     m = shown(moved(), "GLOBAL_POSITION_INT")
     assert (m.lat - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)  # metres to a degree there
     assert (m.lon - 147907000) * 1e-7 * 84_418 == pytest.approx(30.0, rel=2e-3)
@@ -35,7 +35,7 @@ def test_local_position_is_north_east_down():
     assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, 0.35 - 12.0))  # from where it stood
 
 
-def test_rates_are_those_of_the_table_and_stations_may_change_them():
+def test_stream_rates_have_defaults_and_can_be_changed():
     bench = Bench()
     ground, onboard = bench.station(), bench.station(system=2)
     onboard.send("heartbeat", mavlink.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, 0, 3)
@@ -48,7 +48,7 @@ def test_rates_are_those_of_the_table_and_stations_may_change_them():
     assert counts["HEARTBEAT"] == (12, 12)  # one of them at the first status
 
 
-def test_another_mode_is_told_at_once():
+def test_mode_change_is_announced():
     bench = Bench()
     station = bench.station()
     bench.step(60)
@@ -58,7 +58,7 @@ def test_another_mode_is_told_at_once():
     assert station.last("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 
 
-def test_what_hinders_arming_is_shown_and_long_texts_come_in_pieces():
+def test_arming_blockers_are_sent_and_long_texts_split():
     bench = Bench()
     station = bench.station()
     bench.vehicle.arming_blockers = ("no GPS fix",)
@@ -71,7 +71,7 @@ def test_what_hinders_arming_is_shown_and_long_texts_come_in_pieces():
     assert len({m.id for m in pieces}) == 1
 
 
-def test_a_vehicle_that_falls_freely_feels_its_acceleration_along_its_axes():
+def test_odometry_in_free_fall_is_along_body_axes():
     bench = Bench()
     half = 0.5 * math.radians(90.0)
     truth = VehicleState(acceleration=Vector3(0.0, 9.80665, 0.0))
@@ -82,7 +82,7 @@ def test_a_vehicle_that_falls_freely_feels_its_acceleration_along_its_axes():
     assert (m.xacc, m.yacc, m.zacc) == (1000, 0, 0)
 
 
-def test_progress_of_a_mission():
+def test_progress_of_mission():
     bench = Bench()
     bench.vehicle.items, bench.vehicle.current, bench.vehicle.reached, bench.vehicle.state = (), 1, 0, 3
     station = bench.station()
@@ -91,7 +91,7 @@ def test_progress_of_a_mission():
     assert station.last("MISSION_ITEM_REACHED") is None  # there is no mission
 
 
-def test_the_origin_is_echoed_exactly():
+def test_origin_is_echoed_exactly():
     bench = Bench()
     station = bench.station()
     station.send("set_gps_global_origin", 1, 473977418, 85455939, 488123)
@@ -111,7 +111,7 @@ def test_clocks_are_compared():
     assert (m.time_usec, m.seq, m.target_system, m.target_component) == (7, 3, 255, 190)
 
 
-def test_what_the_vehicle_lacks_is_refused_not_left_unanswered():
+def test_request_of_missing_message_is_rejected():
     bench = Bench()
     station = bench.station()
     station.send("log_request_list", 1, 1, 0, 0xFFFF)
@@ -124,7 +124,7 @@ def test_what_the_vehicle_lacks_is_refused_not_left_unanswered():
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.2])
-def test_the_runs_log_is_downloaded_while_it_grows(tmp_path, loss):
+def test_growing_log_is_downloaded(tmp_path, loss):
     path = tmp_path / "flight.mcap"
     path.write_bytes(bytes(range(256)) * 99)
     bench = Bench(log=path)
@@ -150,7 +150,7 @@ def test_the_runs_log_is_downloaded_while_it_grows(tmp_path, loss):
     assert got == path.read_bytes()[: entry.size]
 
 
-def test_the_battery_cell_by_cell_and_how_low_it_is():
+def test_battery_status_has_cells_and_charge_state():
     bench = Bench()
     battery = BatteryState(
         voltage=42.0, current=-20.0, charge=1.2, design_capacity=10.0, percentage=0.12, cell_voltage=(3.5,) * 12
@@ -172,7 +172,7 @@ def test_the_battery_cell_by_cell_and_how_low_it_is():
     assert not health & (mavlink.MAV_SYS_STATUS_SENSOR_BATTERY | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS)
 
 
-def test_home_is_where_it_was_armed_and_told_at_once():
+def test_home_is_arming_position_and_announced():
     bench = Bench()
     station = bench.station()
     bench.step(5)
@@ -203,7 +203,7 @@ def test_take_off_to_ten_metres_above_home_climbs_ten():
     assert bench.vehicle.target[2] == pytest.approx(10.35, abs=1e-3)
 
 
-def test_home_keeps_the_heading_with_which_it_was_armed():
+def test_home_keeps_heading_at_arming():
     bench = Bench()
     station = bench.station()
     bench.vehicle.yaw = 0.0  # east

@@ -8,7 +8,7 @@ import pytest
 from adapter_harness import Bench, Station, item
 from fake_vehicle import PARAMETERS, flying, free_port, until
 
-from lapwing.services.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 
 BAD = {"loss": 0.1, "twice": 0.1}
 
@@ -40,56 +40,56 @@ class RetryingStation(Station):
         return self.last("MISSION_ACK").type
 
     def download(self):
-        found = {}
+        result = {}
 
         def ask():
             if (count := self.last("MISSION_COUNT")) is None:
                 self.send("mission_request_list", 1, 1, 0)
-            elif len(found) < count.count:
-                self.send("mission_request_int", 1, 1, len(found), 0)
+            elif len(result) < count.count:
+                self.send("mission_request_int", 1, 1, len(result), 0)
 
         def answer(m):
-            if m.get_type() == "MISSION_ITEM_INT" and m.seq == len(found):
-                found[m.seq] = m
+            if m.get_type() == "MISSION_ITEM_INT" and m.seq == len(result):
+                result[m.seq] = m
             if m.get_type() in ("MISSION_COUNT", "MISSION_ITEM_INT"):
                 ask()
 
         self.watch, self.again = answer, ask
         ask()
         assert self.bench.until(
-            lambda: self.last("MISSION_COUNT") and len(found) == self.last("MISSION_COUNT").count, 60
+            lambda: self.last("MISSION_COUNT") and len(result) == self.last("MISSION_COUNT").count, 60
         )
-        return list(found.values())
+        return list(result.values())
 
     def parameters(self):
-        found = {}
+        result = {}
 
         def count():
-            return next(iter(found.values())).param_count if found else 0
+            return next(iter(result.values())).param_count if result else 0
 
         def answer(m):
             if m.get_type() == "PARAM_VALUE":
-                found[m.param_index] = m
+                result[m.param_index] = m
 
         def again():
-            for index in set(range(count())) - set(found):
+            for index in set(range(count())) - set(result):
                 self.send("param_request_read", 1, 1, b"", index)
-            if not found:
+            if not result:
                 self.send("param_request_list", 1, 1)
 
         self.watch, self.again = answer, again
         self.send("param_request_list", 1, 1)
-        assert self.bench.until(lambda: found and len(found) == count(), 60.0)
-        return found
+        assert self.bench.until(lambda: result and len(result) == count(), 60.0)
+        return result
 
 
 def retrying_station(bench, **more):
-    found = RetryingStation(bench, **more)
-    bench.stations.append(found)
-    return found
+    result = RetryingStation(bench, **more)
+    bench.stations.append(result)
+    return result
 
 
-def test_the_items_of_a_mission_show_in_the_landed_state():
+def test_items_of_mission_show_in_landed_state():
     bench = Bench()
     client = retrying_station(bench)
     commands = (mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_NAV_WAYPOINT, mavlink.MAV_CMD_NAV_LAND)
@@ -108,7 +108,7 @@ def test_the_items_of_a_mission_show_in_the_landed_state():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_transfers_complete_over_a_bad_line(seed):
+def test_transfers_complete_over_bad_line(seed):
     bench = Bench()
     client = retrying_station(bench, seed=seed, **BAD)
     items = [item(k, north=float(k), up=2.0 + k) for k in range(60)]
@@ -120,7 +120,7 @@ def test_transfers_complete_over_a_bad_line(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_transfers_are_quick_although_one_in_five_is_lost_each_way(seed):
+def test_transfers_are_fast_with_20_percent_loss(seed):
     bench = Bench()
     client = retrying_station(bench, seed=seed, loss=0.2)
     items = [item(k, north=float(k), up=2.0 + k) for k in range(50)]
@@ -132,7 +132,7 @@ def test_transfers_are_quick_although_one_in_five_is_lost_each_way(seed):
     assert bench.vehicle.seconds - start < 5.0
 
 
-def test_a_last_acknowledgement_that_is_lost_comes_again():
+def test_lost_last_acknowledgement_is_repeated():
     bench = Bench()
     client = bench.station()
     client.send("mission_count", 1, 1, 1, 0)
@@ -163,7 +163,7 @@ def test_items_arrive_in_any_order_and_more_than_once():
     assert len(client.all("MISSION_ACK")) == 1
 
 
-def test_of_two_who_upload_at_once_the_second_is_refused_and_the_first_completes():
+def test_second_concurrent_upload_is_rejected():
     bench = Bench()
     one, two = bench.station(), bench.station(system=254)
     one.send("mission_count", 1, 1, 2, 0)
@@ -179,7 +179,7 @@ def test_of_two_who_upload_at_once_the_second_is_refused_and_the_first_completes
     assert two.last("MISSION_REQUEST_INT").seq == 0
 
 
-def test_an_upload_that_stops_is_asked_for_again_and_given_up():
+def test_stalled_upload_is_retried_then_cancelled():
     bench = Bench()
     client = bench.station()
     client.send("mission_count", 1, 1, 2, 0)
@@ -189,7 +189,7 @@ def test_an_upload_that_stops_is_asked_for_again_and_given_up():
     assert bench.counts["upload that stopped"] == 1
 
 
-def test_the_acknowledgement_is_repeated_to_who_missed_it():
+def test_acknowledgement_is_repeated_for_repeated_item():
     bench = Bench()
     client = bench.station()
     client.send("mission_count", 1, 1, 1, 0)
@@ -213,7 +213,7 @@ def test_the_acknowledgement_is_repeated_to_who_missed_it():
         ({"command": 5001, "params": (2.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
     ],
 )
-def test_an_item_that_cannot_be_flown_leaves_the_old_mission(changed, result):
+def test_item_that_cannot_be_flown_leaves_old_mission(changed, result):
     bench = Bench()
     client = bench.station()
     for up, more in ((7.0, {}), (9.0, changed)):
@@ -224,7 +224,7 @@ def test_an_item_that_cannot_be_flown_leaves_the_old_mission(changed, result):
     assert bench.vehicle.items[0].position.z == pytest.approx(7.35, abs=1e-3)
 
 
-def test_cameras_keep_their_number_in_the_mission_but_do_nothing():
+def test_camera_items_keep_their_index_without_effect():
     bench = Bench()
     client = bench.station()
     client.send("mission_count", 1, 1, 3, 0)
@@ -248,7 +248,7 @@ def test_everything_is_cleared_with_one_acknowledgement():
 
 
 def test_ardupilots_first_item_is_home_and_not_flown_to():
-    bench = Bench("mavlink.flavour=ardupilot")
+    bench = Bench("mavlink.firmware=ardupilot")
     client = bench.station()
     client.send("mission_count", 1, 1, 2, 0)
     client.send("mission_item_int", *item(0, frame=0, up=280.0))
@@ -258,7 +258,7 @@ def test_ardupilots_first_item_is_home_and_not_flown_to():
 
 
 def test_whole_parameters_travel_as_bytes_or_by_value():
-    for overrides, wire in (((), struct.unpack("<f", struct.pack("<i", 3))[0]), (("mavlink.flavour=ardupilot",), 3.0)):
+    for overrides, wire in (((), struct.unpack("<f", struct.pack("<i", 3))[0]), (("mavlink.firmware=ardupilot",), 3.0)):
         bench = Bench(*overrides)
         client = bench.station()
         client.send("param_set", 1, 1, b"NAV_DLL_ACT", wire, mavlink.MAV_PARAM_TYPE_INT32)
@@ -268,7 +268,7 @@ def test_whole_parameters_travel_as_bytes_or_by_value():
 
 
 @pytest.mark.parametrize("value", [1e9, float("nan"), float("inf"), -5.0])
-def test_a_parameter_out_of_bounds_is_refused_and_its_value_told(value):
+def test_parameter_out_of_bounds_is_rejected_with_value(value):
     bench = Bench()
     client = bench.station()
     client.send("param_set", 1, 1, b"MIS_TAKEOFF_ALT", value, mavlink.MAV_PARAM_TYPE_REAL32)
@@ -279,7 +279,7 @@ def test_a_parameter_out_of_bounds_is_refused_and_its_value_told(value):
     assert client.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
 
 
-def test_over_udp_with_losses_mavsdk_still_gets_its_mission_through():
+def test_mavsdk_uploads_mission_over_lossy_udp():
     mission_raw = pytest.importorskip("mavsdk.mission_raw", reason="mavsdk is not installed: pip install -e .[clients]")
     import asyncio
 

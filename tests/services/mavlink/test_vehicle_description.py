@@ -11,11 +11,11 @@ from lapwing.services.scene_resolver import load
 FOLDER = Path("services/mavlink")
 
 
-def test_a_scenes_vehicle_is_described_whole():
+def test_scenes_vehicle_is_described_whole():
     d = describe(
-        load("lapwing/scenes/groundstation.toml", ["vehicle.name=bee", "mavlink.system=7", "communication.rate=500"])
+        load("lapwing/scenes/groundstation.toml", ["vehicle.name=bee", "mavlink.system_id=7", "communication.rate=500"])
     )
-    assert (d.name, d.system, d.flavour, len(d.rotors), d.tick_ns) == ("bee", 7, "px4", 4, 2_000_000)
+    assert (d.name, d.system_id, d.firmware, len(d.rotors), d.tick_ns) == ("bee", 7, "px4", 4, 2_000_000)
     assert d.sensors == ("barometer", "gps", "imu", "magnetometer", "sonar")
     assert (d.battery.cells, d.battery.empty_voltage) == (12, 3.0)
     assert 4.0 < d.battery.charged_voltage < 4.2
@@ -24,19 +24,19 @@ def test_a_scenes_vehicle_is_described_whole():
     assert "MIS_TAKEOFF_ALT" in {p.name for p in d.parameters}
 
 
-def test_what_a_scene_lacks_is_not_described():
+def test_missing_parts_are_not_described():
     d = describe(load("lapwing/scenes/hover.toml"))
     assert (d.sensors, d.battery, d.accepts_commands) == ((), None, False)
 
 
-def test_without_an_autopilot_there_is_nothing_to_describe():
+def test_scene_without_autopilot_has_no_description():
     assert resolve(load("lapwing/scenes/gyrostat_blocked.toml")) is None
 
 
-def test_an_unknown_flavour_names_the_choices():
+def test_unknown_firmware_error_lists_choices():
     from lapwing.services.mavlink import firmware
 
-    with pytest.raises(ValueError, match=r"unknown flavour 'px'; did you mean px4\? \(flavours: ardupilot, px4\)"):
+    with pytest.raises(ValueError, match=r"unknown firmware 'px'; did you mean px4\? \(firmwares: ardupilot, px4\)"):
         firmware.get("px")
 
 
@@ -54,11 +54,11 @@ def imports(path):
             yield from (name.name for name in node.names)
 
 
-def test_the_scene_is_known_to_the_description_alone():
+def test_scene_is_known_to_description_alone():
     for path in FOLDER.rglob("*.py"):
         if path.name not in ("resolve.py", "schema.py"):
-            found = {n for n in imports(path) if n.startswith(SCENE)}
-            assert not found, path
+            result = {n for n in imports(path) if n.startswith(SCENE)}
+            assert not result, path
 
 
 def test_handlers_and_telemetry_know_neither_adapter_nor_hub():
@@ -66,7 +66,7 @@ def test_handlers_and_telemetry_know_neither_adapter_nor_hub():
         assert not {n for n in imports(path) if ".adapter" in n or ".link_server" in n or ".endpoint" in n}, path
 
 
-def test_nothing_is_imported_for_types_alone():
+def test_no_import_for_type_hints_only():
     for path in FOLDER.rglob("*.py"):
         assert "TYPE_CHECKING" not in path.read_text(), path
 

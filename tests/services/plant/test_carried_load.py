@@ -61,7 +61,7 @@ def flown(setup):
 
 
 @pytest.mark.long
-def test_under_one_vehicle_it_moves_as_where_both_are_one_system(tmp_path):
+def test_one_carrier_equals_slung_load_model(tmp_path):
     """`slung_load` integrates vehicle and load together, and looks at nothing from ahead."""
     alone = '[vehicle]\nairframe = "delivery_drone"\n'
     together = alone + 'model = "slung_load"\n'
@@ -78,16 +78,18 @@ def test_under_one_vehicle_it_moves_as_where_both_are_one_system(tmp_path):
 
 
 def hook(truth):
-    """Where the cable is fastened at the end [m], world."""
+    """Return the final position of the cable's attachment [m], world."""
     x, y, z, w = map(float, truth.orientation[-1])
     return truth.position[-1] + rotate((w, x, y, z), (0.1, 0.0, -0.1))
 
 
-def test_hanging_still_the_cables_carry_its_weight_and_lean_by_it(flown):
-    told, left, right = (flown.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth"))
-    assert told.force[-1, 0] == pytest.approx((0.0, 0.0, 2.0 * 9.80665), abs=0.5)  # it swings a little along x
-    assert told.force[-1, 0, 2] == pytest.approx(2.0 * 9.80665, abs=0.05)
-    place = told.position[-1, 0]
+def test_static_cables_carry_weight(flown):
+    reported, left, right = (
+        flown.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth")
+    )
+    assert reported.force[-1, 0] == pytest.approx((0.0, 0.0, 2.0 * 9.80665), abs=0.5)  # it swings a little along x
+    assert reported.force[-1, 0, 2] == pytest.approx(2.0 * 9.80665, abs=0.05)
+    place = reported.position[-1, 0]
     assert place[2] > 1.0
     hooks = [hook(truth) for truth in (left, right)]
     lengths = [np.linalg.norm(hook - place) for hook in hooks]
@@ -99,16 +101,16 @@ def test_hanging_still_the_cables_carry_its_weight_and_lean_by_it(flown):
     assert left.position[-1, 1] < 0.999  # pulled inwards
 
 
-def test_only_the_first_tells_of_the_load(flown):
+def test_first_carrier_publishes_load(flown):
     assert "left/body_states" in flown.topics
     assert "right/body_states" not in flown.topics
 
 
-def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
+def test_carried_load_is_equal_with_diagram_per_service(setup, flown):
     assert fly_apart(setup, None).digest == flown.digest
 
 
-def test_a_set_up_survives_text(setup):
+def test_set_up_survives_text(setup):
     assert first_difference(from_json(to_json(setup)), setup) is None
     assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
 
@@ -125,18 +127,18 @@ def test_a_set_up_survives_text(setup):
             r"effects\.shared_slung_load\.length: .*m away, in the middle of its carriers",
         ),
         ("effects.shared_slung_load.stiffness=1e5", r"effects\.shared_slung_load\.stiffness: .*softer cable"),
-        ("vehicle.0.vehicle.model=multibody", "tells of bodies of its own"),
+        ("vehicle.0.vehicle.model=multibody", "publishes its own bodies"),
     ],
 )
-def test_refuses_what_cannot_be_carried(tmp_path, override, message):
+def test_invalid_shared_load_is_rejected(tmp_path, override, message):
     with pytest.raises(SceneError, match=message):
         resolve(two(tmp_path, override))
 
 
-def test_the_shipped_scene_lifts_it(tmp_path):
+def test_shipped_scene_lifts_load(tmp_path):
     setup = resolve(load("carried_load", ["run.duration=14.0"]))
     log = fly(setup)
-    told = log.view("left/body_states")
-    assert math.isclose(told.position[0, 0, 2], 0.0)
-    assert told.position[-1, 0, 2] > 2.5
-    assert told.force[-1, 0, 2] == pytest.approx(3.0 * 9.80665, abs=3.0)
+    reported = log.view("left/body_states")
+    assert math.isclose(reported.position[0, 0, 2], 0.0)
+    assert reported.position[-1, 0, 2] > 2.5
+    assert reported.force[-1, 0, 2] == pytest.approx(3.0 * 9.80665, abs=3.0)

@@ -24,16 +24,20 @@ def up_of_body(orientation):
 
 
 def missing(flight):
-    """What thrust, weight and the forces on the feet leave of mass times acceleration [N], shape (n, 3)."""
-    truth, told, mass = flight.truth, flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
-    assert np.array_equal(told.times, truth.times)
+    """Return thrust, weight and foot forces minus mass times acceleration [N], shape (n, 3)."""
+    truth, reported, mass = (
+        flight.truth,
+        flight.topic("contact_forces"),
+        flight.origin.scene["airframe"]["mass"]["total"],
+    )
+    assert np.array_equal(reported.times, truth.times)
     thrust = truth.rotor_thrust.sum(axis=1)[:, None] * up_of_body(truth.orientation)
     weight = np.array([0.0, 0.0, -mass * G])
-    return mass * truth.acceleration - thrust - weight - told.force.sum(axis=1)
+    return mass * truth.acceleration - thrust - weight - reported.force.sum(axis=1)
 
 
 @pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
-def test_with_thrust_and_weight_they_are_mass_times_acceleration_from_take_off_to_rest(friction):
+def test_forces_sum_to_mass_times_acceleration(friction):
     """Bounces of the landing included, in which the ground does more than carry the weight."""
     flight = lapwing.fly("hover", {**ASKED, "effects.ground_contact.friction": friction})
     force = flight.topic("contact_forces").force
@@ -44,22 +48,22 @@ def test_with_thrust_and_weight_they_are_mass_times_acceleration_from_take_off_t
     assert not force[airborne].any()
 
 
-def test_standing_still_they_are_the_weight_a_quarter_on_each_foot():
+def test_each_foot_carries_quarter_at_rest():
     flight = lapwing.fly("hover", STANDING)
-    told, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
+    reported, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
     feet = len(flight.origin.scene["airframe"]["contact"]["feet"])
-    still = told.force[25:225]
+    still = reported.force[25:225]
     assert still.sum(axis=1) == pytest.approx(np.tile([0.0, 0.0, mass * G], (200, 1)), abs=1e-6)
     assert still[:, :feet, 2] == pytest.approx(mass * G / feet, rel=1e-6)
     assert not still[:, feet:].any()  # the hull is in the air
-    assert told.position[100, :feet, 2] == pytest.approx(0.0, abs=1e-4)
+    assert reported.position[100, :feet, 2] == pytest.approx(0.0, abs=1e-4)
 
 
-def test_on_a_slope_friction_and_normal_forces_make_the_weight():
+def test_on_slope_friction_and_normal_forces_make_weight():
     flight = lapwing.fly("hover", {**STANDING, "environment.terrain.slope": [0.2, 0.0]})
-    told, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
-    assert told.force[100].sum(axis=0) == pytest.approx([0.0, 0.0, mass * G], abs=1e-3)
-    lower, upper = told.force[100, [1, 2], 2].sum(), told.force[100, [0, 3], 2].sum()
+    reported, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
+    assert reported.force[100].sum(axis=0) == pytest.approx([0.0, 0.0, mass * G], abs=1e-3)
+    lower, upper = reported.force[100, [1, 2], 2].sum(), reported.force[100, [0, 3], 2].sum()
     assert lower > 1.05 * upper  # the centre of mass is over the lower feet
 
 
@@ -72,20 +76,20 @@ def test_of_vehicles_of_several_bodies_too(model):
     assert flight.topic("contact_forces").force[10].sum(axis=0)[2] == pytest.approx(mass * G, rel=1e-3)
 
 
-def test_a_scene_that_does_not_ask_tells_nothing_of_them_and_one_that_does_flies_the_same():
-    asked, plain = lapwing.fly("hover", ASKED), lapwing.fly("hover")
+def test_contact_topic_is_optional_and_does_not_change_flight():
+    requested, plain = lapwing.fly("hover", ASKED), lapwing.fly("hover")
     assert not plain.has("contact_forces")
-    assert np.array_equal(asked.truth.position, plain.truth.position)
+    assert np.array_equal(requested.truth.position, plain.truth.position)
 
 
 @pytest.mark.parametrize("scene", ["gyrostat_chaotic", "cooperative_load", "os4_motors"])
-def test_where_nothing_touches_the_ground_they_cannot_be_asked_for(scene):
+def test_contact_topic_needs_contact_effect(scene):
     with pytest.raises(
-        SceneError, match=r"rates.contact_forces: no effect of the scene tells of forces on feet; expected a"
+        SceneError, match=r"rates.contact_forces: no effect of the scene computes contact forces; expected a"
     ):
         resolve(load(scene, {"rates.contact_forces": 50}))
 
 
-def test_their_rate_divides_the_exchange_rate():
+def test_their_rate_divides_exchange_rate():
     with pytest.raises(SceneError, match=r"rates.contact_forces: expected a rate that divides communication.rate"):
         load("hover", {"rates.contact_forces": 70})

@@ -58,7 +58,7 @@ def flown(setup):
     return fly(setup)
 
 
-def test_who_is_below_feels_the_wash_and_who_is_above_does_not(flown):
+def test_downwash_acts_only_below(flown):
     above, below = (flown.view(f"{name}/ground_truth").wind for name in ("above", "below"))
     assert -0.2 < above[-1, 2] < 0.0  # what the one below draws down
     assert below[-1, 2] < -2.0
@@ -67,11 +67,11 @@ def test_who_is_below_feels_the_wash_and_who_is_above_does_not(flown):
     assert height[-1] < height[500] - 0.02  # pushed down
 
 
-def test_in_a_graph_for_each_service_it_is_the_same(setup, flown):
+def test_interaction_is_equal_with_diagram_per_service(setup, flown):
     assert fly_apart(setup, None).digest == flown.digest
 
 
-def test_who_meets_nobody_flies_as_one_without_the_effects(tmp_path, setup):
+def test_isolated_vehicle_equals_flight_without_effects(tmp_path, setup):
     """No wash and no contact: the same bits as if they knew nothing of one another."""
     far = ["vehicle.1.initial_position=[0.0, 500.0]", "run.duration=1.0"]
     there = fly(resolve(scene(tmp_path, *far)))
@@ -83,7 +83,7 @@ def _unacquainted(setup, tmp_path, far):
     return resolve(scene(tmp_path, *far).vehicles[1]).services
 
 
-def test_a_set_up_survives_text_and_another_seed(setup, tmp_path):
+def test_set_up_survives_text_and_another_seed(setup, tmp_path):
     assert first_difference(from_json(to_json(setup)), setup) is None
     assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
     assert first_difference(reseed(setup, 7), resolve(scene(tmp_path, "run.seed=7"))) is None
@@ -99,7 +99,7 @@ def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
 
 
 @pytest.mark.parametrize(("start", "away"), [("[0.0, 0.0]", "0"), ("[0.0, 0.9]", "0.9")])
-def test_vehicles_that_touch_at_the_start_are_refused(tmp_path, start, away):
-    said = f"vehicle.1.initial_position: expected at least 1.55 m between them, got a place {away} m from above"
-    with pytest.raises(ValueError, match=said):
+def test_vehicles_that_touch_at_start_are_refused(tmp_path, start, away):
+    output = f"vehicle.1.initial_position: expected at least 1.55 m between them, got a place {away} m from above"
+    with pytest.raises(ValueError, match=output):
         resolve(scene(tmp_path, f"vehicle.1.initial_position={start}"))

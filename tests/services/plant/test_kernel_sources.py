@@ -1,4 +1,4 @@
-"""What the plant's kernel is kept for: an edit of an effect that the scene does not name compiles nothing anew."""
+"""Edits of an effect that a scene does not use do not recompile its kernel."""
 
 import numba
 
@@ -12,7 +12,7 @@ from lapwing.services.scene_resolver import load, resolve
 SHARED = {"lapwing.dynamics.effects.payload_release"}  # what hangs below is weighed in any scene
 
 
-def test_the_sources_of_a_plant_hold_no_effect_that_its_scene_does_not_name():
+def test_plant_sources_contain_named_effects_only():
     part = create(resolve(load("hover")), "plant").parts[0]
     made_of = key(advance, (numba.typeof(part.parameters), numba.typeof(part.state)), None, ())
     reached = {f"lapwing.dynamics.effects.{name}" for name in effects.names()} & _all(made_of.modules)

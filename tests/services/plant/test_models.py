@@ -29,7 +29,7 @@ def ticks(scene, count):
 
 
 @pytest.mark.parametrize(("path", "model"), [(SATELLITE, gyrostat), (OS4, os4)])
-def test_a_scene_moves_as_the_library_does(path, model):
+def test_scene_moves_as_library_does(path, model):
     scene = load(path)
     count, solver = 20, scene.lookup("solver")
     steps = round(1.0 / scene.lookup("communication.rate") / solver.step)
@@ -41,7 +41,7 @@ def test_a_scene_moves_as_the_library_does(path, model):
         assert (q.w, q.x, q.y, q.z) == tuple(row[first : first + 4])
 
 
-def test_the_satellite_reaches_its_attitude():
+def test_satellite_reaches_its_attitude():
     scene = load(SCENES / "gyrostat_attitude.toml")
     truth = ticks(scene, 7201)[-1]
     half = np.linalg.norm((0.6, -0.9, 1.1)) / 2
@@ -50,12 +50,12 @@ def test_the_satellite_reaches_its_attitude():
     assert (q.w, q.x, q.y, q.z) == pytest.approx((np.cos(half), *(np.sin(half) * axis)), abs=1e-6)
 
 
-def test_experiments_3_and_4_fall_as_the_published_forces_say():
+def test_experiments_3_and_4_follow_published_forces():
     falls = [ticks(load(SCENES / f"os4_experiment_{n}.toml"), 751)[-1].acceleration.z for n in (3, 4)]
     assert falls[1] < falls[0] < 0.0
 
 
-def test_motors_reach_the_speed_at_which_torque_and_drag_balance():
+def test_motors_reach_speed_at_which_torque_and_drag_balance():
     scene = load(SCENES / "os4_motors.toml")
     speed = ticks(scene, 751)[-1].rotor_speed[0]
     current = (5.8 - 0.0205 * speed) / 0.6
@@ -82,7 +82,7 @@ def three(path):
 
 
 @pytest.mark.parametrize("number", [2, 3])
-def test_links_keep_their_lengths_and_the_load_its_path(number, tmp_path):
+def test_links_keep_their_lengths_and_load_its_path(number, tmp_path):
     scene = load(LOAD) if number == 2 else three(tmp_path / "three.toml")
     flown = carry(scene, 2001)
     lengths = scene.lookup("cooperative_load.link_length")
@@ -95,7 +95,7 @@ def test_links_keep_their_lengths_and_the_load_its_path(number, tmp_path):
     assert len(lift.thrust) == number
 
 
-def test_the_formation_flies_alike_in_processes_and_in_one(tmp_path):
+def test_formation_flies_alike_in_processes_and_in_one(tmp_path):
     digests = set()
     for mode in ("multi-process", "single-process"):
         figures = tmp_path / f"{mode}.json"
@@ -152,7 +152,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_scene_is_refused_with_its_key(name):
+def test_wrong_scene_is_refused_with_its_key(name):
     path, override, message = WRONG[name]
     with pytest.raises(SceneError) as error:
         load(path, [override])
@@ -174,7 +174,7 @@ def test_numbers_that_run_away_are_named_with_their_time():
         ("gyrostat_feedback", "does not fit the model gyrostat: it is for a torque that does not depend on the rate"),
     ],
 )
-def test_an_integrator_that_does_not_fit_is_refused_with_those_that_do(name, message):
+def test_unsuitable_integrator_error_lists_suitable(name, message):
     with pytest.raises(SceneError, match=rf"solver.integrator: rigid_splitting {message}") as error:
         load(name, ["solver.integrator=rigid_splitting"])
     assert "expected one of cf4, " in str(error.value)

@@ -32,7 +32,7 @@ def lifted(overrides, ticks=50, volts=full):
     return plant.message(TRUTH), plant.message(BODIES)
 
 
-def test_it_rises_as_the_reduced_model_does():
+def test_multibody_climb_equals_reduced_model():
     one, _ = lifted(CALM)
     several, bodies = lifted([FLOWN, *CALM])
     assert several.pose.position.z == pytest.approx(one.pose.position.z, abs=1e-6)
@@ -68,7 +68,7 @@ def test_propellers_break_in_flight(coordinates):
     assert bodies.torque[2].z == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_pitch_through_90_degrees_ends_euler_angles_and_nothing_else():
+def test_pitch_of_90_degrees_ends_only_euler_angles():
     """Two rotors on one side only, once it has risen; the angles' divisor is looked at before it is divided by."""
 
     def thrown(tick):
@@ -86,7 +86,7 @@ def test_a_pitch_through_90_degrees_ends_euler_angles_and_nothing_else():
     assert 2.0 * (q.y * q.y + q.x * q.x) > 1.0  # past the vertical: the z axis points down
 
 
-def test_euler_angles_that_diverge_for_another_reason_say_so():
+def test_divergence_of_euler_angles_names_cause():
     with pytest.raises(LockStepError, match=r"not finite at t = 0.004 s: .*; take a smaller step than 0.001 s"):
         lifted([FLOWN, "multibody.coordinates=euler", *CALM], 1, lambda tick: (math.nan,) * 4)
 
@@ -137,7 +137,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_wrong_scene_is_refused_with_its_key(name):
+def test_wrong_scene_is_refused_with_its_key(name):
     before, override, message = WRONG[name]
     with pytest.raises(SceneError) as error:
         load(MISSION, [*before, override])

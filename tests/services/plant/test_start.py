@@ -25,7 +25,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("overrides", CASES.values(), ids=CASES)
-def test_it_stands_still_from_the_first_tick_on(overrides):
+def test_vehicle_rests_from_first_tick(overrides):
     truth = lapwing.fly("hover", {**STANDING, **overrides}).truth
     assert abs(truth.acceleration).max() < 1e-6
     assert abs(truth.angular_velocity).max() < 1e-8
@@ -33,7 +33,7 @@ def test_it_stands_still_from_the_first_tick_on(overrides):
     assert truth.ground_contact.all()
 
 
-def test_on_ground_too_steep_for_its_friction_it_slides():
+def test_vehicle_slides_on_steep_ground():
     truth = lapwing.fly("hover", {**STANDING, "environment.terrain.slope": [0.7, 0.0]}).truth
     assert truth.velocity[-1, 0] < -0.1
     assert np.ptp(truth.attitude, axis=0).max() < 0.1

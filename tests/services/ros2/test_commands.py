@@ -1,4 +1,4 @@
-"""What other nodes may ask, and what becomes of it."""
+"""Commands of other ROS 2 nodes, and their conversion."""
 
 import math
 
@@ -60,21 +60,21 @@ def commands():
         ("motors", Actuators(header(0, ""), (1.0, 2.0, 3.0, 4.0), True), "offboard_motors", (1.0, 2.0, 3.0, 4.0)),
     ],
 )
-def test_a_message_is_a_command(commands, name, message, kind, values):
+def test_message_is_command(commands, name, message, kind, values):
     assert commands.messages[f"/drone1/command/{name}"] is type(message)
     (command,) = commands.read(f"/drone1/command/{name}", message.encode())
     assert (command.kind, command.source, command.id) == (kind, "ros2", 1)
     assert command.values == pytest.approx(values, abs=1e-12, nan_ok=True)
 
 
-def test_every_command_there_is_can_be_given_and_says_where_it_comes_from(commands):
-    given = (OperatorCommand("goto", "255/190", 7, (1.0, 2.0, 3.0)), OperatorCommand("land", "", 8))
-    found = commands.read("/drone1/command/operator", OperatorInput(header(0, "world"), given).encode())
-    assert found == (given[0]._replace(source="ros2/255/190"), given[1]._replace(source="ros2/"))
+def test_all_commands_are_accepted_with_source(commands):
+    values = (OperatorCommand("goto", "255/190", 7, (1.0, 2.0, 3.0)), OperatorCommand("land", "", 8))
+    result = commands.read("/drone1/command/operator", OperatorInput(header(0, "world"), values).encode())
+    assert result == (values[0]._replace(source="ros2/255/190"), values[1]._replace(source="ros2/"))
     assert commands.report() == "2 commands taken"
 
 
-def test_what_cannot_be_understood_is_counted_and_changes_nothing(commands):
+def test_unknown_message_is_counted_and_ignored(commands):
     elsewhere = PoseStamped(header(0, "base_link"))
     assert commands.read("/drone1/command/arm", b"no message") == ()
     assert commands.read("/drone1/command/pose", elsewhere.encode()) == ()

@@ -14,7 +14,7 @@ from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpo
 SESSION = "5a16d9fcc7d8d7d0a7d6c4a6d2a4d1b8"
 
 
-def test_the_key_of_a_topic_is_that_of_the_design_document():
+def test_key_of_topic_is_that_of_design_document():
     assert Endpoint("/chatter", "std_msgs/msg/String").key(0) == (
         "0/chatter/std_msgs::msg::dds_::String_/RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     )
@@ -43,7 +43,7 @@ def test_keys_and_tokens_are_those_of_another_implementation(name, kind):
     assert node_token(7, SESSION) == keyexpr.node_liveliness_keyexpr(theirs.node)
 
 
-def test_the_attachment_is_that_of_another_implementation():
+def test_attachment_is_that_of_another_implementation():
     pytest.importorskip("zenoh_ros2_sdk", reason="needs the extra `clients`")
     from zenoh_ros2_sdk.attachment import Attachment
 
@@ -51,7 +51,7 @@ def test_the_attachment_is_that_of_another_implementation():
     assert unpack(Attachment(5, 7, gid).to_bytes()) == (5, 7, gid)
 
 
-def test_the_package_for_ros_names_what_its_messages_need():
+def test_ros_package_declares_message_dependencies():
     package = Path("deploy/ros2/lapwing_msgs")
     assert (package / "msg").resolve() == (FOLDER / "lapwing_msgs").resolve()
     ours = [name for name in TYPES if name.startswith("lapwing_msgs/")]

@@ -10,11 +10,11 @@ import time
 import numpy as np
 import pytest
 
-from lapwing.cosim.log import LogReader
+from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
 from lapwing.messages.types import FOLDER
-from lapwing.services.process_table import ROS2, needed
+from lapwing.services.process_table import ROS2, required_processes
 from lapwing.services.ros2.commands import SOURCE
 from lapwing.services.ros2.node import ROUTER, Node, parse_router
 from lapwing.services.scene_resolver import load, resolve
@@ -55,7 +55,7 @@ def graph(port, tmp_path):
 
 
 class Graph:
-    """What the other program has in the graph."""
+    """The other program's view of the ROS 2 graph."""
 
     def __init__(self, port):
         self._where = {"domain_id": DOMAIN, "router_ip": "127.0.0.1", "router_port": port}
@@ -70,9 +70,9 @@ class Graph:
     def publisher(self, topic, message):
         from zenoh_ros2_sdk import ROS2Publisher
 
-        found = ROS2Publisher(topic, message.type_name, **self._where)
-        self.entities.append(found)
-        return found
+        result = ROS2Publisher(topic, message.type_name, **self._where)
+        self.entities.append(result)
+        return result
 
     def subscribe(self, topic, message):
         """A queue of what comes."""
@@ -117,7 +117,7 @@ def plain(message):
     return message
 
 
-def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
+def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
     run = fly(tmp_path, port, "--speed", "2", "--set", "run.duration=14")
     try:
         clock, poses = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/pose", PoseStamped)
@@ -139,11 +139,11 @@ def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
                     started = True
                     mode.publish(data="offboard")
                     arm.publish(data=True)
-        said = run.communicate(timeout=PATIENCE)[0]
+        output = run.communicate(timeout=PATIENCE)[0]
     finally:
         run.kill()
-    assert run.returncode == 0, said
-    assert "commands taken\n" in said
+    assert run.returncode == 0, output
+    assert "commands taken\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
         types = {topic: [kind] for topic, kind in log.topics().items()}
         recorded = [PoseStamped.decode(payload) for *_, payload in log.messages(["/drone1/pose"])]
@@ -153,8 +153,8 @@ def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
     place = recorded.index(next(m for m in recorded if plain(m) == plain(heard[0])))
     assert [plain(m) for m in heard] == [plain(m) for m in recorded[place : place + len(heard)]]
     assert clock.qsize() >= len(heard) - 1
-    told = [events.get_nowait() for _ in range(events.qsize())]
-    assert ("arming", "armed") in {(event.name, event.msg) for event in told}
+    reported = [events.get_nowait() for _ in range(events.qsize())]
+    assert ("arming", "armed") in {(event.name, event.msg) for event in reported}
     commands = [command for message in inputs for command in message.commands]
     assert {c.source for c in commands} == {SOURCE}
     assert [c.kind for c in commands if c.kind != "offboard_position"] == ["offboard", "arm"]
@@ -164,7 +164,7 @@ def test_nodes_see_the_run_and_command_it(tmp_path, port, graph):
     assert abs(position.z - 3.0) < 0.5
 
 
-def test_a_node_drives_the_motors(tmp_path, port, graph):
+def test_node_drives_motors(tmp_path, port, graph):
     run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=12", "--set", "autopilot.estimator=ground_truth")
     try:
         poses = graph.subscribe("/drone1/pose", PoseStamped)
@@ -178,36 +178,36 @@ def test_a_node_drives_the_motors(tmp_path, port, graph):
                 second = pose.header.stamp.sec
                 mode.publish(data="offboard")
                 arm.publish(data=True)
-        said = run.communicate(timeout=PATIENCE)[0]
+        output = run.communicate(timeout=PATIENCE)[0]
     finally:
         run.kill()
-    assert run.returncode == 0, said
+    assert run.returncode == 0, output
     with LogReader(tmp_path / "a.mcap") as log:
         _, recorded = log.history("/drone1/actuators")
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
-    given = [command for message in inputs for command in message.commands if command.kind == "offboard_motors"]
-    assert {(command.source, command.values) for command in given} == {(SOURCE, tuple(volts))}
+    values = [command for message in inputs for command in message.commands if command.kind == "offboard_motors"]
+    assert {(command.source, command.values) for command in values} == {(SOURCE, tuple(volts))}
     assert np.all(recorded["motor_voltage"] == volts, axis=1).any()
 
 
-def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, graph):
+def test_ros_nodes_observe_fleet_and_command_one_vehicle(tmp_path, port, graph):
     more = ["--speed", "1", "--set", "run.duration=8", "--set", "autopilot.accept_commands=true"]
     run = fly(tmp_path, port, *more, scene="fleet")
     try:
         clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/right/events", Log)
         arm, mode = graph.publisher("/right/command/arm", Bool), graph.publisher("/right/command/mode", String)
-        topics, asked = {}, False
+        topics, requested = {}, False
         while (now := clock.get(timeout=PATIENCE).clock).sec < 3:
             topics = topics or graph.topics()
-            if not asked and now.sec >= 1:
-                asked = True
+            if not requested and now.sec >= 1:
+                requested = True
                 mode.publish(data="hold")
                 arm.publish(data=True)
-        said = run.communicate(timeout=PATIENCE)[0]
+        output = run.communicate(timeout=PATIENCE)[0]
     finally:
         run.kill()
-    assert run.returncode == 0, said
-    assert "ros2: right: 2 commands taken\n" in said
+    assert run.returncode == 0, output
+    assert "ros2: right: 2 commands taken\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
         types = {topic: [kind] for topic, kind in log.topics().items()}
         inputs = {
@@ -216,12 +216,12 @@ def test_of_a_fleet_every_vehicle_is_seen_and_one_is_commanded(tmp_path, port, g
         }
     types.pop("/wall_time")
     assert types.items() <= topics.items()
-    commands = {name: [c.kind for message in told for c in message.commands] for name, told in inputs.items()}
+    commands = {name: [c.kind for message in reported for c in message.commands] for name, reported in inputs.items()}
     assert commands == {"left": [], "right": ["hold", "arm"], "scout": []}
     assert ("mode", "hold") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
 
-def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tmp_path, port, graph):
+def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
     sets = [
         "--set",
         "run.duration=8",
@@ -230,7 +230,7 @@ def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tm
         "--set",
         "autopilot.estimator=ground_truth",
     ]
-    names = [*needed(resolve(load("groundstation", sets[1::2]))), ROS2]
+    names = [*required_processes(resolve(load("groundstation", sets[1::2]))), ROS2]
     table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, MONITOR]).items())
     common = ["groundstation", *sets, "--set", "success.require=[]", "--endpoints", table, "--key-prefix", "elsewhere"]
     log = ["--log", str(tmp_path / "a.mcap")]
@@ -251,39 +251,60 @@ def test_a_run_whose_services_are_started_elsewhere_is_seen_and_commanded_too(tm
             start("service", name, *own.get(name, []))
         run = start("run", *log)
         clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/events", Log)
-        arm, asked = graph.publisher("/drone1/command/arm", Bool), False
+        arm, requested = graph.publisher("/drone1/command/arm", Bool), False
         while clock.get(timeout=PATIENCE).clock.sec < 3:
-            if not asked:
-                asked = True
+            if not requested:
+                requested = True
                 arm.publish(data=True)
-        said, told = run.communicate(timeout=PATIENCE)[0], node.communicate(timeout=PATIENCE)[0]
+        output, reported = run.communicate(timeout=PATIENCE)[0], node.communicate(timeout=PATIENCE)[0]
     finally:
         for process in started:
             process.kill()
             process.communicate()
-    assert (run.returncode, node.returncode) == (0, 0), said
-    assert "1 commands taken\n" in told
+    assert (run.returncode, node.returncode) == (0, 0), output
+    assert "1 commands taken\n" in reported
     with LogReader(tmp_path / "a.mcap") as log:
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     assert [(c.source, c.kind) for message in inputs for c in message.commands] == [(SOURCE, "arm")]
     assert ("arming", "armed") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
 
-def test_the_second_node_on_a_machine_joins_the_first_ones_router(port):
+def test_second_node_on_machine_joins_first_ones_router(port):
     with Node(DOMAIN, f"127.0.0.1:{port}") as first, Node(DOMAIN, f"127.0.0.1:{port}") as second:
-        asked = second.subscribe({"/clock": Clock})
+        requested = second.subscribe({"/clock": Clock})
         first.declare("/clock", Clock.type_name)
         first.declare("/foreign", "not/msg/Ours")
         first.put("/foreign", 0, b"")
         sent = Clock(stamp(5)).encode()
-        deadline, found = time.monotonic() + PATIENCE, None
-        while found is None and time.monotonic() < deadline:  # the subscription takes a while to be known
+        deadline, result = time.monotonic() + PATIENCE, None
+        while result is None and time.monotonic() < deadline:  # the subscription takes a while to be known
             first.put("/clock", 5, sent)
-            found = asked.get()
-    assert found == ("/clock", sent)
+            result = requested.get()
+    assert result == ("/clock", sent)
 
 
-def test_what_is_no_router_is_told(port):
+def test_replay_appears_in_ros_graph(tmp_path, port):
+    log, sent = tmp_path / "flight.mcap", [Clock(stamp(k)).encode() for k in range(200)]
+    with LogWriter(log, {}, {}) as writer:
+        for k, payload in enumerate(sent):
+            writer.write("/clock", Clock, payload, k * 4_000_000)
+    router, (endpoint,) = f"127.0.0.1:{port}", loopback_endpoints(["a"]).values()
+    words = ["replay", log, "--loop", "--listen", endpoint, "--key-prefix", "test-ros2-replay", "--insecure"]
+    words += ["--ros2", DOMAIN, "--ros2-router", router]
+    with Node(DOMAIN, router) as reader:
+        arrived, result = reader.subscribe({"/clock": Clock}), None
+        with subprocess.Popen([sys.executable, "-m", "lapwing", *map(str, words)]) as player:
+            deadline = time.monotonic() + PATIENCE
+            while result is None and player.poll() is None and time.monotonic() < deadline:
+                time.sleep(0.05)
+                result = arrived.get()
+            player.terminate()
+    assert result is not None
+    assert result[0] == "/clock"
+    assert result[1] in sent
+
+
+def test_missing_router_is_reported(port):
     with (
         socket.create_server(("127.0.0.1", port)),
         pytest.raises(ValueError, match=f"--ros2: cannot connect to tcp/127.0.0.1:{port}: .* expected a Zenoh router"),
@@ -292,15 +313,15 @@ def test_what_is_no_router_is_told(port):
 
 
 @pytest.mark.parametrize("text", ["", "7447", "localhost", "localhost:x", "localhost:99999", "a b:1"])
-def test_what_is_no_address_is_refused(text):
+def test_invalid_router_address_is_rejected(text):
     with pytest.raises(ValueError, match=f"expected HOST:PORT, for example {ROUTER}"):
         parse_router(text, False)
 
 
-def test_another_machine_needs_to_be_asked_for():
+def test_remote_address_needs_insecure():
     assert parse_router("[::1]:7447", False) == ("tcp/[::1]:7447", True)
     assert parse_router("robot:7447", True) == ("tcp/robot:7447", False)
-    with pytest.raises(ValueError, match="robot:7447: is not this machine, and anybody there could command"):
+    with pytest.raises(ValueError, match="robot:7447: programs of that host could send commands"):
         parse_router("robot:7447", False)
 
 
@@ -317,7 +338,7 @@ print(now)
 
 
 @pytest.mark.skipif(os.environ.get("LAPWING_ROS2") != "1", reason="needs ROS 2 with rmw_zenoh, and LAPWING_ROS2=1")
-def test_ros2_itself_sees_the_run_and_commands_it(tmp_path, port):
+def test_ros2_installation_observes_and_commands_run(tmp_path, port):
     nodes = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ROS_DOMAIN_ID": str(DOMAIN), "PYTHONUNBUFFERED": "1"}
     nodes["ZENOH_CONFIG_OVERRIDE"] = f'connect/endpoints=["tcp/127.0.0.1:{port}"]'
     environment = os.environ | nodes
@@ -343,13 +364,13 @@ def test_ros2_itself_sees_the_run_and_commands_it(tmp_path, port):
         time.sleep(5.0)  # the mode is accepted while setpoints come
         publish("mode", "std_msgs/msg/String", "{data: offboard}")
         publish("arm", "std_msgs/msg/Bool", "{data: true}")
-        said = run.communicate(timeout=PATIENCE)[0]
+        output = run.communicate(timeout=PATIENCE)[0]
     finally:
         run.kill()
         if target:
             target.kill()
-    assert run.returncode == 0, said
-    assert "commands taken\n" in said
+    assert run.returncode == 0, output
+    assert "commands taken\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
         _, flown = log.history("/drone1/pose")
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]

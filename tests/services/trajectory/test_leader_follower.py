@@ -5,9 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from lapwing.cosim.diagram.multi_vehicle import member
 from lapwing.cosim.scene import SceneError
 from lapwing.services.scene_resolver import parse, resolve
 from lapwing.services.trajectory.leader_follower import step
+from lapwing.studies.mission import mission_of
 from tests.cosim.memory_log import fly
 
 SCENE = """
@@ -66,7 +68,7 @@ def leading(core, tick):
     return own.step(core.leader, 0.0, tick, ())[1][0]
 
 
-def test_follower_keeps_its_place_relative_to_the_leader(tmp_path):
+def test_follower_keeps_its_place_relative_to_leader(tmp_path):
     core = path(tmp_path)
     start, end = at(core, 0), at(core, 2500)
     assert start.position_world[:2] == pytest.approx((-2.0, 1.5))
@@ -92,18 +94,18 @@ def test_follower_derivatives_match_finite_differences(tmp_path, tick):
     core, h = path(tmp_path), 0.004
     before, now, after = (at(core, tick + k) for k in (-1, 0, 1))
     for value, slope in (("position_world", "velocity_world"), ("velocity_world", "acceleration_world")):
-        found = np.subtract(getattr(after, value), getattr(before, value)) / (2.0 * h)
-        assert getattr(now, slope) == pytest.approx(found, abs=2e-4)
+        result = np.subtract(getattr(after, value), getattr(before, value)) / (2.0 * h)
+        assert getattr(now, slope) == pytest.approx(result, abs=2e-4)
     assert now.yaw_rate == pytest.approx((after.yaw - before.yaw) / (2.0 * h), abs=1e-4)
 
 
-def test_follower_setpoint_follows_the_leader(tmp_path):
+def test_follower_setpoint_follows_leader(tmp_path):
     scene = parse(tmp_path / "two.toml", SCENE)
     flown = fly(resolve(scene))
-    told, core = flown.view("wing/setpoint"), path(tmp_path)
-    assert told.position[400] == pytest.approx(at(core, 400).position_world)
+    reported, core = flown.view("wing/setpoint"), path(tmp_path)
+    assert reported.position[400] == pytest.approx(at(core, 400).position_world)
     assert flown.messages("wing/setpoint")[400].phase == "beside"
-    assert flown.view("wing/ground_truth").position[-1] == pytest.approx(told.position[-1], abs=0.15)
+    assert flown.view("wing/ground_truth").position[-1] == pytest.approx(reported.position[-1], abs=0.15)
 
 
 @pytest.mark.parametrize(
@@ -120,9 +122,25 @@ def test_invalid_leader_is_rejected(tmp_path, override, message):
         resolve(parse(tmp_path / "two.toml", SCENE, [override]))
 
 
-def test_phases_equal_to_the_leaders_are_rejected(tmp_path):
+def test_phases_equal_to_leaders_are_rejected(tmp_path):
     text = SCENE.split('[[vehicle.trajectory.phase]]\nname = "beside"')[0]
     climb = SCENE.split("[[vehicle]]")[1].split("initial_position = [1.0, 0.5]\n")[1]
     text = text.replace("[[vehicle]]", climb.replace("vehicle.", "") + "[[vehicle]]", 1).replace(climb, "", 1)
     with pytest.raises(SceneError, match=r"vehicle.1.trajectory.phase: .*repeats the phases of leader"):
         resolve(parse(tmp_path / "two.toml", text))
+
+
+@pytest.mark.parametrize(("duration", "cut_short"), [(2.0, True), (7.5, True), (9.0, False)])
+def test_short_run_is_no_failure_of_follower(tmp_path, duration, cut_short):
+    """The leader ends its trajectory at 8 s, the follower its displacement at 5 s."""
+    setup = resolve(parse(tmp_path / "two.toml", SCENE, [f"run.duration={duration}"]))
+    for name in ("leader", "wing"):
+        mission = mission_of(member(setup, name), np.zeros(3))
+        assert mission.is_longer is cut_short
+
+
+def test_follower_that_ends_in_air_completes(tmp_path):
+    setup = resolve(parse(tmp_path / "two.toml", SCENE.replace("to = 0.0", "to = 2.0"), ["run.duration=20.0"]))
+    assert mission_of(member(setup, "wing"), np.zeros(3)).final_phase == "closer"
+    setup = resolve(parse(tmp_path / "two.toml", SCENE, ["run.duration=20.0"]))
+    assert mission_of(member(setup, "wing"), np.zeros(3)).final_phase is None

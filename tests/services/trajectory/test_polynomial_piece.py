@@ -39,7 +39,7 @@ def test_search_matches_numpy(durations, t):
     assert last_not_after(times, t) == max(np.searchsorted(times, t, side="right") - 1, 0)
 
 
-def test_joint_belongs_to_the_later_piece():
+def test_joint_belongs_to_later_piece():
     c = channel(Piece(1.0, (0.0, 1.0)), Piece(1.0, (5.0, -2.0)), Piece(0.0, (3.0,)))
     assert channel_at(c, 1.0) == (5.0, -2.0, 0.0)
     assert channel_at(c, np.nextafter(1.0, 0.0))[1] == 1.0
@@ -47,11 +47,11 @@ def test_joint_belongs_to_the_later_piece():
     assert channel_at(c, 99.0) == (3.0, 0.0, 0.0)
 
 
-def test_reference_is_offset_by_the_origin():
+def test_reference_is_offset_by_origin():
     ramp, still = channel(Piece(9.0, (0.0, 1.0))), channel(Piece(0.0, (0.0,)))
     p = Parameters(ramp, still, still, ramp, np.array([0.0, 2.0]), np.zeros(2), (1.0, 2.0, 3.0), 0.5)
-    r = evaluate(p, 4.0)
+    r = evaluate(p, 4.0, 0)
     assert r.position_world == (5.0, 2.0, 3.0)
     assert r.velocity_world == (1.0, 0.0, 0.0)
     assert (r.yaw, r.yaw_rate, r.phase) == (4.5, 1.0, 1)
-    assert evaluate(p, -1.0) == evaluate(p, 0.0)
+    assert evaluate(p, -1.0, 0) == evaluate(p, 0.0, 0)

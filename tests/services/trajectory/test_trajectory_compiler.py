@@ -39,14 +39,14 @@ def test_delivery_mission_reaches_corners_on_time():
     assert duration == pytest.approx(60.0 + TURN, abs=1e-12)
     corners = {0.0: (0, 0, 0), 10.0: (0, 0, 10), 15.0: (0, 0, 10), 25.0: (10, 0, 10), 40.0: (10, 10, 10)}
     for t, (x, y, z) in corners.items():
-        assert evaluate(parameters, t).position_world == (x, y, z + 0.35)
+        assert evaluate(parameters, t, 0).position_world == (x, y, z + 0.35)
     for k, t in enumerate((0.0, 10.0, 15.0, 25.0, 30.0, 40.0, 45.0, 45.0 + TURN, 50.0 + TURN)):
-        assert evaluate(parameters, t).phase == k
-        assert evaluate(parameters, t + 1e-6).phase == k
-    assert evaluate(parameters, 4.0).velocity_world == (0.0, 0.0, 1.0)
-    assert evaluate(parameters, 12.0).velocity_world == (0.0, 0.0, 0.0)
-    assert evaluate(parameters, 46.0).yaw_rate == pytest.approx(0.3, rel=1e-15)
-    end = evaluate(parameters, duration)
+        assert evaluate(parameters, t, 0).phase == k
+        assert evaluate(parameters, t + 1e-6, 0).phase == k
+    assert evaluate(parameters, 4.0, 0).velocity_world == (0.0, 0.0, 1.0)
+    assert evaluate(parameters, 12.0, 0).velocity_world == (0.0, 0.0, 0.0)
+    assert evaluate(parameters, 46.0, 0).yaw_rate == pytest.approx(0.3, rel=1e-15)
+    end = evaluate(parameters, duration, 0)
     assert (end.position_world, end.yaw, end.velocity_world) == ((10.0, 10.0, 0.35), math.pi / 2, (0.0, 0.0, 0.0))
 
 
@@ -58,8 +58,8 @@ def test_phase_lasts_as_long_as_its_longest_channel():
     }
     parameters, _, duration, _ = compile({"phase": [phase]})
     assert duration == 13.0
-    assert evaluate(parameters, 5.0).position_world == (1.0, 5.0, 0.0)
-    assert evaluate(parameters, 12.0).velocity_world == (0.0, 0.0, 0.0)
+    assert evaluate(parameters, 5.0, 0).position_world == (1.0, 5.0, 0.0)
+    assert evaluate(parameters, 12.0, 0).velocity_world == (0.0, 0.0, 0.0)
 
 
 def test_step_jumps_in_no_time():
@@ -153,7 +153,7 @@ def test_invalid_trajectory_key_is_rejected_in_one_line(override, message):
     assert message in str(error.value)
 
 
-def test_final_phase_follows_the_last_flight():
+def test_final_phase_follows_last_flight():
     up = {"name": "up", "z": {"kind": "ramp", "to": 2.0, "rate": 1.0}}
     down = {"name": "down", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}}
     again = [{**up, "name": "up again"}, {**down, "name": "down again"}, {"name": "stand", "duration": 1.0}]

@@ -4,7 +4,7 @@ from lapwing.services.autopilot.commander.altitude_flight import AltitudeFlight
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 NAME = "altitude_control"
 

@@ -5,7 +5,7 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput,
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.modes.land import descent_speed
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 NAME = "descend"
 RECOVERY_TIME = 1.0  # [s] of known position before the descent ends

@@ -9,8 +9,8 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput,
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import clamp_norm
-from lapwing.services.autopilot.interface import Setpoint
 from lapwing.services.autopilot.land_detector import CUT_HEIGHT
+from lapwing.services.common.ports import Setpoint
 
 NAME = "offboard"
 ACCELERATION_TIME = 0.5  # [s] assumed duration of an acceleration
@@ -23,7 +23,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         if not guidance.offboard_available:
             refused = guidance.inputs.offboard_refused
-            raise ValueError(f"offboard: no setpoints are coming{refused and f'; the last was refused: {refused}'}")
+            raise ValueError(f"offboard: no setpoints received{refused and f'; the last was rejected: {refused}'}")
         self._attitude: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:

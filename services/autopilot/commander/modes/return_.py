@@ -4,7 +4,7 @@ from lapwing.dynamics.vector import norm, subtract
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
-from lapwing.services.autopilot.commander.geofence_routing import Point, way_round
+from lapwing.services.autopilot.commander.geofence_routing import Point, route_around
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.leg import Leg
 
@@ -72,7 +72,7 @@ def _way(guidance: Guidance) -> list[Point]:
         goal = place
     else:
         goal = min([*safe, *([place] if place and kind == NEAREST else [])], key=lambda p: math.dist(p, (x, y)))
-    return way_round(guidance.fence, (x, y), goal)
+    return route_around(guidance.fence, (x, y), goal)
 
 
 def _place(item: object) -> Point | None:

@@ -7,7 +7,7 @@ from lapwing.services.autopilot.commander.attitude_flight import AttitudeFlight,
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.interface import Setpoint
+from lapwing.services.common.ports import Setpoint
 
 NAME = "stabilized"
 

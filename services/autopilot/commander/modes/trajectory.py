@@ -4,11 +4,11 @@ from lapwing.services.autopilot.commander.commander_input import Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
 
-NAME = "phases"
+NAME = "trajectory"
 
 
 class Mode(FlightMode):
     """Trajectory mode; it cannot be entered again after it was left."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        raise ValueError("phases: the trajectory of the scene has been left")
+        raise ValueError("trajectory: the trajectory of the scene has been left")

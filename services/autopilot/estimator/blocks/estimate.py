@@ -5,7 +5,7 @@ from typing import NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
 from lapwing.kernels import always_inline
 from lapwing.services.autopilot import estimator
-from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters, wakeup_due
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
 from lapwing.services.common.ports import StateEstimate
@@ -15,7 +15,7 @@ class FilterEstimate(NamedTuple):
     """Parameters of the block."""
 
     filter: Estimator
-    attention: WakeupParameters
+    wakeup: WakeupParameters
     before: StateEstimate  # output until the filter has started
 
 
@@ -26,5 +26,5 @@ def step(
     """Output the estimate at `tick`."""
     battery, flight = inputs
     e = estimator.estimate(p.filter, s.filter) if s.begun else p.before
-    due = attention_due(p.attention, tick, e.health, battery, flight)
+    due = wakeup_due(p.wakeup, tick, e.health, battery, flight)
     return s, (e,), WAKE_PYTHON if due else CONTINUE

@@ -5,14 +5,14 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, WAKE_PYTHON, InputSample
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import always_inline
-from lapwing.services.autopilot.commander_wakeup import WakeupParameters, attention_due
+from lapwing.services.autopilot.commander_wakeup import WakeupParameters, wakeup_due
 from lapwing.services.common.ports import StateEstimate
 
 
 class TrueEstimate(NamedTuple):
     """Parameters of the block."""
 
-    attention: WakeupParameters
+    wakeup: WakeupParameters
 
 
 @always_inline
@@ -24,5 +24,5 @@ def step(p: TrueEstimate, s: Any, tick: int, inputs: tuple[InputSample, ...]) ->
         x.position_world, x.attitude, x.velocity_world, x.omega_body, x.acceleration_world,
         ZERO, ZERO, ZERO, ZERO, ZERO, 0, 0,
     )  # fmt: skip
-    due = attention_due(p.attention, tick, 0, battery, flight)
+    due = wakeup_due(p.wakeup, tick, 0, battery, flight)
     return s, (e,), WAKE_PYTHON if due else CONTINUE

@@ -9,7 +9,7 @@ from lapwing.kernels import always_inline
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
-from lapwing.services.autopilot.land_detector import ON_GROUND
+from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
 
 STANDSTILL_RATIO = 0.02  # relative difference of specific force and gravity at rest
 STANDSTILL_EVERY = 10  # IMU readings between two zero-velocity updates
@@ -41,8 +41,11 @@ def step(
         omega_variance = r.omega_variance if r.valid else -1.0
         force_variance = r.specific_force_variance if r.valid else -1.0
         valid = omega_variance >= 0.0 and force_variance >= 0.0
-        x = estimator.predict(p.filter, x, r.omega_body, r.specific_force_body, omega_variance, force_variance, valid)
-        on_ground = not flight.due or (flight.value.stage == ON_GROUND and tick >= flight.value.still_from)
+        cut = flight.due and flight.value.landed_state == LANDED
+        x = estimator.predict(
+            p.filter, x, r.omega_body, r.specific_force_body, omega_variance, force_variance, valid, cut
+        )
+        on_ground = not flight.due or (flight.value.landed_state == ON_GROUND and tick >= flight.value.still_from)
         if on_ground and tick % p.standstill_every == 0:
             x = estimator.update_standstill(p.filter, x, omega_variance, force_variance)
     return NavigationState(begun, x), (), CONTINUE

@@ -17,5 +17,5 @@ class NavigationState(NamedTuple):
 def blank() -> NavigationState:
     """Return the state before the first reading."""
     nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
-    inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False)
+    inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False, 0)
     return NavigationState(False, State(nominal, inertial, new_memory()))

@@ -41,7 +41,7 @@ def route():
     ],
     ids=lambda c: c.kind,
 )
-def test_a_copied_and_a_pickled_state_go_on_the_same(given):
+def test_copied_and_pickled_state_behave_alike(given):
     session = in_the_air(given, command("manual", 0.3, 0.2, 0.1, 0.4))
     session.run(0.5)
     copied, pickled = copy.deepcopy(session.commander.state), pickle.loads(pickle.dumps(session.commander.state))
@@ -54,7 +54,7 @@ def test_a_copied_and_a_pickled_state_go_on_the_same(given):
         assert [repr(other.step(view)) for view in views] == [repr(r) for r in requests]
 
 
-def test_a_mission_goes_on_from_a_pickled_state():
+def test_mission_continues_from_pickled_state():
     session = Session(WAITING)
     session.step(
         estimate=GROUND, commands=(command("mission_upload", items=route()), command("mission"), command("arm"))
@@ -67,7 +67,7 @@ def test_a_mission_goes_on_from_a_pickled_state():
     assert session.step().status.mission_current == 3
 
 
-def test_the_parameters_that_are_asked_for_are_of_their_tick():
+def test_parameter_values_belong_to_their_tick():
     session = Session(WAITING)
     first = session.step(commands=(command("parameter", 3.0, text="MPC_XY_CRUISE"),))
     session.step(commands=(command("parameter", 4.0, text="MPC_XY_CRUISE"),))
@@ -79,7 +79,7 @@ def test_the_parameters_that_are_asked_for_are_of_their_tick():
     ]
 
 
-def test_arming_waits_for_the_checks():
+def test_arming_waits_for_checks():
     session = Session(WAITING)
     unsure = GROUND._replace(health=64)
     session.step(estimate=unsure, commands=(command("arm", float("nan"), 1.0),))
@@ -89,7 +89,7 @@ def test_arming_waits_for_the_checks():
     assert [a.result for a in session.acknowledgements] == [CommandAck.IN_PROGRESS, CommandAck.ACCEPTED]
 
 
-def test_a_setpoint_made_from_the_estimate_asks_for_a_new_one_at_every_tick():
+def test_estimate_setpoint_requests_estimate_every_tick():
     session = in_the_air(command("descend"))
     request = session.step(estimate=HIGH._replace(position_world=(7.0, 8.0, 5.0)))
     assert request.estimate_every_tick
@@ -98,7 +98,7 @@ def test_a_setpoint_made_from_the_estimate_asks_for_a_new_one_at_every_tick():
     assert not session.step().estimate_every_tick
 
 
-def test_after_a_landing_the_controller_is_reset_and_the_vehicle_disarms():
+def test_after_landing_controller_is_reset_and_vehicle_disarms():
     session = in_the_air(command("land"))
     assert not session.step().reset_controller
     landed = session.step(motors_cut=True)
@@ -108,7 +108,7 @@ def test_after_a_landing_the_controller_is_reset_and_the_vehicle_disarms():
     assert session.texts == ["armed", "landed", "disarmed: landed"]
 
 
-def test_a_failsafe_is_announced_and_acts_after_its_delay():
+def test_failsafe_is_announced_and_acts_after_its_delay():
     session = in_the_air()
     lost = HIGH._replace(health=GPS_LOST)
     session.run(9.0, estimate=lost)
@@ -117,7 +117,7 @@ def test_a_failsafe_is_announced_and_acts_after_its_delay():
     assert session.texts[2:] == ["the position is lost: descend"]
 
 
-def test_an_operator_takes_over_from_the_trajectory_where_it_is():
+def test_operator_takes_over_from_trajectory():
     session = Session(CONSTANTS._replace(has_trajectory=True))
     assert session.step().setpoint is None
     request = session.step(commands=(command("hold"),))
@@ -126,7 +126,7 @@ def test_an_operator_takes_over_from_the_trajectory_where_it_is():
     assert session.step().status.armed
 
 
-def test_a_takeoff_item_in_the_air_or_beyond_reach_does_not_stop_the_commander():
+def test_unreachable_takeoff_item_is_skipped():
     session = in_the_air(command("goto", 1.0, 2.0, 9.0))
     session.run(8.0)
     items = [item("takeoff"), item("waypoint", 9.0, 2.0, 4.0)]

@@ -22,7 +22,7 @@ def reached(flight):
 
 
 @pytest.mark.parametrize("last", [item("land", 4.0, 0.0, 0.0), item("return")], ids=["land", "return"])
-def test_a_mission_that_ends_on_the_ground_completes_disarms_and_flies_again(last):
+def test_landed_mission_completes_disarms_and_repeats(last):
     flight = mission(item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0), last, parameters={"RTL_RETURN_ALT": 3.0})
     for _ in range(2):
         assert flight.until(lambda s: s.mission_state == 5)
@@ -36,7 +36,7 @@ def test_a_mission_that_ends_on_the_ground_completes_disarms_and_flies_again(las
     assert reached(flight) == [0, 1, 2] * 2
 
 
-def test_a_mission_is_started_and_armed_by_one_command():
+def test_mission_is_started_and_armed_by_one_command():
     items = item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0), item("land")
     flight = Flight(command("mission_upload", items=items)).told(command("mission_start", 1.0))
     assert (flight.status.mode, flight.status.armed, flight.status.mission_current) == ("mission", True, 1)
@@ -46,7 +46,7 @@ def test_a_mission_is_started_and_armed_by_one_command():
     assert other.texts == ["mission: there is none; upload one first"]
 
 
-def test_a_landing_amid_a_mission_takes_off_again_without_being_disarmed():
+def test_mission_continues_after_landing_without_disarming():
     flight = mission(
         item("takeoff", z=3.0), item("land", 4.0, 0.0), item("delay", hold=5.0), item("takeoff", z=3.0),
         item("land", 0.0, 0.0),
@@ -57,7 +57,7 @@ def test_a_landing_amid_a_mission_takes_off_again_without_being_disarmed():
     assert flight.setpoint.position_world == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
 
 
-def test_a_straight_line_is_flown_without_braking_and_a_corner_within_its_radius():
+def test_line_has_no_braking_and_corner_keeps_radius():
     far = [item("waypoint", 15.0 * k, 0.0, 3.0) for k in range(1, 5)]
     flight = mission(item("takeoff", z=3.0), *far, item("waypoint", 60.0, 40.0, 3.0))
     assert flight.until(lambda s: s.mission_state == 5)
@@ -75,7 +75,7 @@ def test_a_straight_line_is_flown_without_braking_and_a_corner_within_its_radius
     assert flight.setpoint.position_world == pytest.approx((60.0, 40.0, 3.0), abs=0.1)
 
 
-def test_an_item_that_waits_is_stopped_at():
+def test_item_that_waits_is_stopped_at():
     flight = mission(
         item("takeoff", z=3.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0), item("waypoint", 40.0, 0.0, 3.0)
     )
@@ -86,7 +86,7 @@ def test_an_item_that_waits_is_stopped_at():
 @pytest.mark.parametrize(
     ("mode", "yaw"), [(0, -0.5 * math.pi), (1, math.pi), (2, 0.0), (3, -0.5 * math.pi), (4, -0.5 * math.pi), (5, 0.0)]
 )
-def test_the_nose_points_where_the_parameter_says(mode, yaw):
+def test_heading_follows_yaw_mode_parameter(mode, yaw):
     flight = mission(
         item("takeoff", z=3.0), item("waypoint", 20.0, 0.0, 3.0, hold=0.1), item("waypoint", 20.0, -6.0, 3.0),
         item("waypoint", 20.0, -6.1, 3.0, hold=9.0), parameters={"MPC_YAW_MODE": mode, "NAV_ACC_RAD": 0.2},
@@ -95,13 +95,13 @@ def test_the_nose_points_where_the_parameter_says(mode, yaw):
     assert math.cos(flight.setpoint.yaw - yaw) > math.cos(0.5)
 
 
-def test_an_items_own_yaw_goes_before_and_must_be_reached():
+def test_items_own_yaw_goes_before_and_must_be_reached():
     flight = mission(item("takeoff", z=3.0), item("waypoint", 6.0, 0.0, 3.0, yaw=2.0), item("waypoint", 9.0, 0.0, 3.0))
     assert flight.until(lambda s: s.mission_current == 2)
     assert flight.setpoint.yaw == pytest.approx(2.0, abs=math.radians(12.0))
 
 
-def test_a_speed_of_the_mission_ends_with_it():
+def test_mission_speed_ends_with_mission():
     flight = mission(item("takeoff", z=3.0), item("speed", values=(2.0,)), item("waypoint", 20.0, 0.0, 3.0))
     assert flight.until(lambda s: s.mission_state == 5)
     assert max(flight.speeds((10.0, 0.0), 3.0)) == pytest.approx(2.0, abs=0.01)
@@ -109,7 +109,7 @@ def test_a_speed_of_the_mission_ends_with_it():
     assert max(flight.speeds((40.0, 0.0), 3.0)) == pytest.approx(5.0, abs=0.01)
 
 
-def test_heights_count_from_where_it_stands():
+def test_heights_are_relative_to_home():
     flight = Flight(command("takeoff"), command("arm"))
     assert flight.until(lambda s: s.mode == "hold")
     assert flight.on(2.0).setpoint.position_world[2] == pytest.approx(2.85, abs=0.05)
@@ -117,7 +117,7 @@ def test_heights_count_from_where_it_stands():
     assert flight.setpoint.position_world[2] == pytest.approx(15.35, abs=0.05)
 
 
-def test_what_has_nothing_to_do_does_not_stop_it():
+def test_item_without_effect_is_skipped():
     far = [i for k in range(1, 4) for i in (item("waypoint", 15.0 * k, 0.0, 3.0), item("delay"), item("delay"))]
     flight = mission(item("takeoff", z=3.0), *far)
     assert flight.until(lambda s: s.mission_state == 5)
@@ -125,7 +125,7 @@ def test_what_has_nothing_to_do_does_not_stop_it():
     assert reached(flight)[-1] == 9
 
 
-def test_loiter_to_an_altitude_and_for_ever():
+def test_loiter_to_altitude_and_for_ever():
     flight = mission(item("takeoff", z=3.0), item("loiter_to_alt", 9.0, 0.0, 8.0), item("loiter", 9.0, 9.0, 8.0))
     assert flight.until(lambda s: s.mission_current == 2)
     over = [s.position_world for s, _ in flight.track if s.position_world[2] > 3.2]
@@ -135,7 +135,7 @@ def test_loiter_to_an_altitude_and_for_ever():
     assert flight.setpoint.position_world == pytest.approx((9.0, 9.0, 8.0), abs=0.05)
 
 
-def test_the_nose_points_at_the_region_of_interest_until_it_is_none():
+def test_nose_points_at_region_of_interest():
     flight = mission(
         item("takeoff", z=3.0), item("roi", 20.0, 20.0, 0.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0),
         item("roi"), item("waypoint", 40.0, 0.0, 3.0, hold=2.0),
@@ -148,7 +148,7 @@ def test_the_nose_points_at_the_region_of_interest_until_it_is_none():
     assert flight.setpoint.yaw == pytest.approx(-0.5 * math.pi, abs=0.05)
 
 
-def test_conditions_are_waited_for_on_the_way():
+def test_conditions_are_waited_for_on_way():
     for condition in (item("condition", radius=10.0), item("condition", hold=4.0)):
         flight = mission(
             item("takeoff", z=3.0), condition, item("speed", values=(2.0,)), item("waypoint", 40.0, 0.0, 3.0)
@@ -158,7 +158,7 @@ def test_conditions_are_waited_for_on_the_way():
         assert max(flight.speeds((36.0, 0.0), 1.0)) == pytest.approx(2.0, abs=0.2)
 
 
-def test_a_relative_turn_and_another_home():
+def test_relative_turn_and_another_home():
     flight = mission(
         item("takeoff", z=3.0), item("waypoint", 0.0, 9.0, 3.0, hold=3.0), item("yaw", yaw=-1.0, values=(1.0,)),
         item("set_home"), item("waypoint", 9.0, 9.0, 3.0), item("return"), parameters={"MPC_YAW_MODE": 5},
@@ -169,7 +169,7 @@ def test_a_relative_turn_and_another_home():
     assert flight.setpoint.position_world[:2] == pytest.approx((0.0, 9.0), abs=0.3)
 
 
-def test_it_circles_a_place_facing_it():
+def test_orbit_faces_its_centre():
     flight = Flight(command("takeoff", 5.0), command("arm"))
     assert flight.until(lambda s: s.mode == "hold")
     flight.told(command("orbit", 20.0, 0.0, 8.0, 8.0, 2.0)).on(25.0)

@@ -1,4 +1,4 @@
-"""What hinders arming: what lasts, not a single reading that was refused."""
+"""Arming is blocked by lasting conditions, not by a single rejected reading."""
 
 import pytest
 from commander_session import CONSTANTS, Session
@@ -16,13 +16,13 @@ def shown(bits, seconds, constants=CONSTANTS):
     return list(request.status.arming_blockers), session.commander.state.source_outage
 
 
-def test_a_refused_reading_is_no_reason_but_a_source_that_stays_away_is():
+def test_only_absent_source_blocks_arming():
     for bit, name in enumerate(SOURCES):
         assert shown(1 << bit, 0.1)[0] == []
         assert shown(1 << bit, 1.0)[0] == [f"no good readings of the {name}"]
 
 
-def test_an_uncertain_estimate_is_a_reason_at_once():
+def test_uncertain_estimate_is_reason_at_once():
     assert shown(64, 0.02)[0] == ["the position is uncertain"]
     assert shown(128, 0.02)[0] == ["the attitude is uncertain"]
     assert shown(NOT_STARTED, 0.02)[0] == ["the estimator has not started"]
@@ -36,7 +36,7 @@ def test_time_counts_at_new_estimates_alone():
     assert session.commander.state.source_outage[0] == pytest.approx(200 * 0.02)
 
 
-def test_without_an_operator_nobody_arms_and_nothing_is_counted():
-    reasons, outage = shown(1, 1.0, CONSTANTS._replace(has_operator=False))
-    assert reasons == []
+def test_without_operator_no_arming_or_timeouts():
+    blockers, outage = shown(1, 1.0, CONSTANTS._replace(has_operator=False))
+    assert blockers == []
     assert outage == [0.0] * len(SOURCES)

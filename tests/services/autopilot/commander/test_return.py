@@ -8,7 +8,7 @@ from commander_session import Flight
 from flights import command, item
 
 from lapwing.services.autopilot.commander.fence import Fence
-from lapwing.services.autopilot.commander.geofence_routing import way_round
+from lapwing.services.autopilot.commander.geofence_routing import route_around
 
 BOX = [(10.0, -15.0), (20.0, -15.0), (20.0, 10.0), (10.0, 10.0)]
 
@@ -18,14 +18,14 @@ def polygon(action, corners):
 
 
 def lengths(fence, start, goal):
-    way = [start, *way_round(fence, start, goal)]
+    way = [start, *route_around(fence, start, goal)]
     for a, b in itertools.pairwise(way):
         for k in range(101):
             assert fence.allows(a[0] + 0.01 * k * (b[0] - a[0]), a[1] + 0.01 * k * (b[1] - a[1]))
     return sum(math.dist(a, b) for a, b in itertools.pairwise(way))
 
 
-def test_the_way_round_is_short_and_keeps_to_the_fence():
+def test_way_round_is_short_and_keeps_to_fence():
     out = Fence(polygon("fence_exclusion", BOX))
     assert 38.0 < lengths(out, (30.0, 0.0), (0.0, 0.0)) < 42.0
     assert lengths(out, (30.0, 20.0), (0.0, 20.0)) == 30.0
@@ -43,7 +43,7 @@ def away(*commands, **parameters):
     return flight.told(*commands, command("goto", 30.0, 0.0, 5.0)).on(15.0)
 
 
-def test_a_return_goes_round_the_fence():
+def test_return_goes_round_fence():
     fence = Fence(polygon("fence_exclusion", BOX))
     flight = away()
     flight.track.clear()
@@ -64,7 +64,7 @@ def test_a_return_goes_round_the_fence():
         (3, (80.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_a_return_obeys_its_type(kind, rally, end):
+def test_return_obeys_its_type(kind, rally, end):
     items = [item("takeoff", z=5.0), item("waypoint", 30.0, 20.0, 5.0), item("land", 30.0, 30.0, 0.0)]
     flight = away(
         command("mission_upload", items=items),
@@ -77,7 +77,7 @@ def test_a_return_obeys_its_type(kind, rally, end):
     assert (min(flight.speeds((30.0, 20.0), 3.0), default=None) is None) == (kind not in (1, 2))
 
 
-def test_a_return_waits_where_it_is_told_to():
+def test_return_waits_at_configured_height():
     flight = away(RTL_LAND_DELAY=5.0, RTL_DESCEND_ALT=3.0)
     flight.told(command("return"))
     assert flight.until(lambda s: s.phase == "wait")

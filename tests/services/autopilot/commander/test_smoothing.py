@@ -22,7 +22,7 @@ def led(target, seconds, limits=LIMITS, start=(0.0, 0.0, 10.0), velocity=(0.0, 0
 
 
 @pytest.mark.parametrize("target", [(30.0, 0.0, 10.0), (3.0, -4.0, 2.0), (0.2, 0.1, 10.3), (0.0, 0.0, 40.0)])
-def test_it_arrives_without_overshoot_and_within_its_limits(target):
+def test_smoothing_has_no_overshoot_and_keeps_limits(target):
     p, v, a = led(target, 40.0)
     assert p[-1] == pytest.approx(target, abs=1e-3)
     assert np.linalg.norm(v[-1]) < 1e-3
@@ -35,19 +35,19 @@ def test_it_arrives_without_overshoot_and_within_its_limits(target):
     assert ((p - (0.0, 0.0, 10.0)) @ way / (way @ way)).max() < 1.0 + 0.02 / np.linalg.norm(way)
 
 
-def test_velocity_and_acceleration_are_the_derivatives():
+def test_velocity_and_acceleration_are_derivatives():
     p, v, a = led((10.0, 5.0, 12.0), 8.0)
     assert np.diff(p, axis=0) / DT == pytest.approx((v[1:] + v[:-1]) / 2.0, abs=1e-3)
     assert np.diff(v, axis=0) / DT == pytest.approx((a[1:] + a[:-1]) / 2.0, abs=1e-9)
 
 
-def test_it_stops_from_full_speed():
+def test_smoothing_stops_from_full_speed():
     p, _, _ = led((0.0, 0.0, 10.0), 20.0, velocity=(5.0, 0.0, 0.0))
     assert p[-1] == pytest.approx((0.0, 0.0, 10.0), abs=1e-3)
     assert p[:, 0].max() < 25.0 / 2.0 / 2.0 + 5.0
 
 
-def test_yaw_takes_the_shorter_way():
+def test_yaw_takes_shorter_way():
     smoothing = PositionSmoothing((0.0, 0.0, 1.0), 3.0)
     for _ in range(2000):
         smoothing.turn_to(-3.0, LIMITS, DT)
@@ -56,6 +56,6 @@ def test_yaw_takes_the_shorter_way():
     assert wrap_angle(smoothing.yaw) == pytest.approx(-3.0, abs=1e-3)
 
 
-def test_the_speed_of_approach_has_no_step():
+def test_speed_of_approach_has_no_step():
     bend = 1.0
     assert braking_speed(bend - 1e-9, 2.0) == pytest.approx(braking_speed(bend + 1e-9, 2.0), abs=1e-6)

@@ -26,17 +26,17 @@ def imported(path, known):
             yield from {alias.name for alias in node.names} & known
 
 
-def test_no_import_cycle_and_nobody_below_knows_the_commander():
-    found = modules()
-    graph = {name: set(imported(path, set(found))) - {name} for name, path in found.items()}
+def test_imports_are_acyclic_and_below_commander():
+    result = modules()
+    graph = {name: set(imported(path, set(result))) - {name} for name, path in result.items()}
     order = list(TopologicalSorter(graph).static_order())  # CycleError names a cycle
-    assert len(order) == len(found) > 20
+    assert len(order) == len(result) > 20
     assert [name for name in graph if f"{PACKAGE}.commander" in graph[name]] == []
     for name in graph:
         if name.startswith(f"{PACKAGE}.modes"):
             assert f"{PACKAGE}.state" not in graph[name]
 
 
-def test_every_module_of_a_mode_is_in_the_table():
-    found = [import_module(name) for name in modules() if name.startswith(f"{PACKAGE}.modes.")]
-    assert {m.NAME: m.Mode for m in found if hasattr(m, "NAME")} == MODES
+def test_every_module_of_mode_is_in_table():
+    result = [import_module(name) for name in modules() if name.startswith(f"{PACKAGE}.modes.")]
+    assert {m.NAME: m.Mode for m in result if hasattr(m, "NAME")} == MODES

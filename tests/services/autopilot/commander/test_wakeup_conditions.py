@@ -13,7 +13,7 @@ from lapwing.services.autopilot.commander.commander import Commander
 from lapwing.services.autopilot.commander.wakeup_conditions import (
     BatteryThresholds,
     battery_thresholds,
-    needs_attention,
+    needs_wakeup,
 )
 from lapwing.services.autopilot.initial_estimate import EXACT
 
@@ -64,7 +64,7 @@ orders = st.dictionaries(st.integers(0, 150), st.lists(st.sampled_from(COMMANDS)
 
 
 def constants(actions, delay, operator=False):
-    """Of a vehicle that follows its trajectory, with these failsafes."""
+    """Return the constants of a vehicle that follows its trajectory, with these failsafes."""
     values = dict(zip(NAMES, actions, strict=True)) | {"COM_POS_FS_DELAY": delay}
     table = {name: p._replace(default=float(values.get(name, p.default))) for name, p in CONSTANTS.parameters.items()}
     return CONSTANTS._replace(parameters=table, has_trajectory=True, has_operator=operator)
@@ -116,36 +116,36 @@ def skip(commander, missed):
 
 
 UNSAID = {"acknowledgements": (), "texts": (), "parameters": None, "faults": None}
-"""What is told once."""
+"""Outputs sent once."""
 
 
 def check_same(known, flight, orders=()):
     """Fly with a commander that is called at every tick, and one that is called as seldom as it allows."""
     always, seldom = Commander(known), Commander(known)
-    told = views(flight, orders)
-    view, due = next(told)
+    reported = views(flight, orders)
+    view, due = next(reported)
     last, until, missed = None, 0.0, []
     while True:
-        wanted = always.step(view)
+        expected = always.step(view)
         thresholds = battery_thresholds(seldom.state.guidance.parameters)
         conditions = view.estimate.health, view.battery_charge, view.failed_motor, due
         operated = known.has_operator and (due or view.commands)
-        if len(missed) + 1 >= until or operated or needs_attention(thresholds, *conditions):
+        if len(missed) + 1 >= until or operated or needs_wakeup(thresholds, *conditions):
             if known.has_operator and missed:
                 skip(seldom, missed)
             last = seldom.step(view)
-            missed, until = [], last.quiet / DT if last.quiet < math.inf else math.inf
-            assert last.quiet == 0.0 or last.setpoint is None
+            missed, until = [], last.valid_for / DT if last.valid_for < math.inf else math.inf
+            assert last.valid_for == 0.0 or last.setpoint is None
         else:
             missed.append(view)
-            assert wanted.acknowledgements == wanted.texts == ()
-        assert repr(last._replace(quiet=0.0, **UNSAID)) == repr(wanted._replace(quiet=0.0, **UNSAID))
+            assert expected.acknowledgements == expected.texts == ()
+        assert repr(last._replace(valid_for=0.0, **UNSAID)) == repr(expected._replace(valid_for=0.0, **UNSAID))
         if not missed:
-            assert (last.acknowledgements, last.texts) == (wanted.acknowledgements, wanted.texts)
-            if known.has_operator or wanted.status.mode != "mission":
+            assert (last.acknowledgements, last.texts) == (expected.acknowledgements, expected.texts)
+            if known.has_operator or expected.status.mode != "mission":
                 assert plain(seldom.state) == plain(always.state)
         try:
-            view, due = told.send(wanted)
+            view, due = reported.send(expected)
         except StopIteration:
             return
 
@@ -157,7 +157,7 @@ def check_same(known, flight, orders=()):
 @example([(7, {}), (5, {"motor": 2}), (9, {})], (0, 3, 0, 0, 0), 0.5)
 @example([(40, {"health": 1}), (5, ({"health": 1}, {"motor": 2}))], (0, 3, 0, 0, 0), 0.5)
 @example([(7, {}), (5, {"charge": 0.14}), (9, {"thrust": 0.0}), (9, {}), (8, {"charge": 0.14})], (1,) * 5, 0.5)
-def test_calls_in_between_change_nothing(flight, actions, delay):
+def test_extra_calls_do_not_change_output(flight, actions, delay):
     check_same(constants(actions, delay), flight)
 
 
@@ -177,49 +177,49 @@ SHORT_LINK = {3: [COMMANDS[0]], 5: [COMMANDS[3], COMMANDS[5]]}
 @example([(60, {})], (4,) * 5, 0.1, {17: [command("goto", 4.0, 1.0, 5.0)]})
 @example([(60, {"thrust": 0.0, "health": 1})], (4,) * 5, 0.1, {27: [command("arm", math.nan, 1.0)]})
 @example([(60, {})], (4,) * 5, 0.1, {17: [command("parameter", 0.6, text="BAT_LOW_THR")]})
-def test_nor_where_an_operator_is_listened_to(flight, actions, delay, orders):
+def test_nor_where_operator_is_listened_to(flight, actions, delay, orders):
     check_same(constants(actions, delay, operator=True), flight, orders)
 
 
-def test_a_sound_flight_along_the_trajectory_is_quiet_and_follows():
+def test_nominal_trajectory_flight_needs_no_wakeup():
     for operator in (False, True):
         commander = Commander(constants((1,) * 5, 1.0, operator))
         for charge in (math.nan, 0.5):
             request = commander.step(VIEW._replace(battery_charge=charge))
-            assert request.quiet == math.inf
+            assert request.valid_for == math.inf
             assert request.setpoint is None
             assert request.texts == request.acknowledgements == ()
 
 
-def test_what_is_counted_is_not_quiet_and_is_forgotten_once_it_is_over():
+def test_delay_of_failsafe_limits_validity():
     commander = Commander(constants((1,) * 5, 1.0))
     lost = VIEW._replace(estimate=EXACT._replace(health=GPS_LOST))
-    assert not commander.step(lost).quiet
-    assert commander.step(VIEW).quiet
+    assert not commander.step(lost).valid_for
+    assert commander.step(VIEW).valid_for
     requests = [commander.step(lost) for _ in range(round(1.1 / VIEW.dt))]
     assert [r.status.mode for r in requests].index("hold") in (249, 250)
-    assert not commander.step(VIEW).quiet  # the trajectory has been left
+    assert not commander.step(VIEW).valid_for  # the trajectory has been left
 
 
-def test_it_is_quiet_until_a_link_or_setpoints_would_be_missed():
+def test_next_wakeup_is_link_or_setpoint_timeout():
     known = constants((1,) * 5, 1.0, operator=True)
     timeout = {name: known.parameters[name].default for name in ("COM_DL_LOSS_T", "COM_OF_LOSS_T")}
     linked = Commander(known).step(VIEW._replace(commands=(command("link"),)))
-    assert linked.quiet == timeout["COM_DL_LOSS_T"] - VIEW.dt
+    assert linked.valid_for == timeout["COM_DL_LOSS_T"] - VIEW.dt
     offboard = Commander(known).step(VIEW._replace(commands=(command("offboard_position", 1.0, 2.0, 3.0),)))
-    assert offboard.quiet == timeout["COM_OF_LOSS_T"] - VIEW.dt
+    assert offboard.valid_for == timeout["COM_OF_LOSS_T"] - VIEW.dt
 
 
-def test_without_a_trajectory_it_is_never_quiet():
+def test_commander_without_trajectory_runs_every_tick():
     for operator in (True, False):
-        assert not Commander(CONSTANTS._replace(has_trajectory=False, has_operator=operator)).step(VIEW).quiet
+        assert not Commander(CONSTANTS._replace(has_trajectory=False, has_operator=operator)).step(VIEW).valid_for
 
 
-def test_it_compiles_into_a_loop():
+def test_wakeup_conditions_compile_into_loop():
     @numba.njit
     def first(thresholds, health, charge):
         for tick in range(100):
-            if needs_attention(thresholds, health, charge - 0.01 * tick, 0, tick % LOOK == 0):
+            if needs_wakeup(thresholds, health, charge - 0.01 * tick, 0, tick % LOOK == 0):
                 return tick
         return -1
 

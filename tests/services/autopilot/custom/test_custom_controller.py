@@ -85,7 +85,7 @@ def scene(tmp_path):
     return made
 
 
-def test_a_controller_in_python_flies_and_its_command_holds_between_its_steps(scene):
+def test_python_controller_flies_and_holds_its_command(scene):
     flight = fly(scene("own_python", IN_PYTHON, "Altitude"))
     assert flight.landed
     assert flight.rmse["z"] < 0.1
@@ -97,24 +97,24 @@ def test_a_controller_in_python_flies_and_its_command_holds_between_its_steps(sc
     assert (np.diff(pairs[:, 0], axis=0) != 0.0).any()
 
 
-def test_a_compiled_controller_gives_the_same_bits_as_its_twin_in_python(scene):
+def test_compiled_controller_equals_python_controller(scene):
     in_python = fly(scene("own_python", IN_PYTHON, "Altitude"))
     compiled = fly(scene("own_compiled", COMPILED, "altitude"))
     assert compiled.digest == in_python.digest
 
 
-def test_options_reach_the_constructor(scene):
+def test_options_reach_constructor(scene):
     more = fly(scene("own_python", IN_PYTHON, "Altitude", "autopilot.controller_options.extra=12.0"))
     assert more.rmse["z"] > 0.1  # 12 N too much over 60 N/m
 
 
-def test_voltages_are_clipped_to_what_the_motors_take(scene):
+def test_voltages_are_clipped_to_range(scene):
     flight = fly(scene("own_volts", VOLTS, "Full", "run.duration=0.5"))
     volts = flight.actuators["motor_voltage"]
     assert volts.max(axis=0) == pytest.approx([44.4, 44.4, 44.4, 0.0])
 
 
-def test_the_set_up_carries_the_text_and_needs_no_file(scene, tmp_path):
+def test_set_up_carries_text_and_needs_no_file(scene, tmp_path):
     own = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5")
     before = fly(own).digest
     (tmp_path / "own_python.py").unlink()
@@ -123,26 +123,26 @@ def test_the_set_up_carries_the_text_and_needs_no_file(scene, tmp_path):
     assert own.sources["modules.own_python.py"].decode() == IN_PYTHON
 
 
-def test_a_log_is_flown_again_without_the_file_once_its_code_may_be_run(scene, tmp_path):
+def test_log_resimulates_without_file_with_allowed_code(scene, tmp_path):
     own, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
     fly_single(resolve(own), log)
     (tmp_path / "own_python.py").unlink()
-    with pytest.raises(ValueError, match=r"carries code of its author \(modules.own_python.py\)"):
+    with pytest.raises(ValueError, match=r"contains code of its author \(modules.own_python.py\)"):
         resimulate(log)
     before, after = resimulate(log, allow_code=True)
     assert before == after
 
 
-def test_the_process_of_the_autopilot_runs_the_text_of_the_set_up_to_the_same_bits(scene, tmp_path):
+def test_autopilot_process_runs_controller_text_of_configuration(scene, tmp_path):
     own, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
-    given = ProcessSpec("mission", resolve(own), {}, "test-own-controller", log=str(log))
+    values = ProcessSpec("mission", resolve(own), {}, "test-own-controller", log=str(log))
     (tmp_path / "own_python.py").unlink()
-    fly_processes(given, Silent())
+    fly_processes(values, Silent())
     with LogReader(log) as read:
         assert read.digest() == fly(own).digest
 
 
-def test_an_edited_module_is_run_as_it_is_now(scene):
+def test_edited_module_is_reloaded(scene):
     fly(scene("own_edited", IN_PYTHON, "Altitude", "run.duration=1.5"))
     edited = fly(scene("own_edited", IN_PYTHON.replace("60.0", "30.0"), "Altitude", "run.duration=1.5"))
     original = fly(scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"))
@@ -152,14 +152,14 @@ def test_an_edited_module_is_run_as_it_is_now(scene):
     assert fly(scene("own_edited", text, "altitude", "run.duration=1.5")).digest == edited.digest
 
 
-def test_an_error_in_flight_names_the_controller_the_line_and_the_time(scene):
+def test_error_in_flight_names_controller_line_and_time(scene):
     text = IN_PYTHON.replace("        return T", "        if time > 1.0:\n            1 / 0\n        return T")
     flight = fly(scene("own_python", text, "Altitude"))
-    said = r"controller own_python:Altitude: ZeroDivisionError: division by zero \(own_python.py, line \d+\)"
-    assert re.fullmatch(f"{said} at t = 1.008 s", flight.failure)
+    output = r"controller own_python:Altitude: ZeroDivisionError: division by zero \(own_python.py, line \d+\)"
+    assert re.fullmatch(f"{output} at t = 1.008 s", flight.failure)
 
 
-def test_a_command_that_is_not_finite_is_refused(scene):
+def test_non_finite_command_is_rejected(scene):
     text = IN_PYTHON.replace(
         "        return T", "        if time > 1.0:\n            self.weight = float('nan')\n        return T"
     )
@@ -189,7 +189,7 @@ def test_a_command_that_is_not_finite_is_refused(scene):
         ),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_one_line_with_the_key(scene, module, text, name, overrides, said):
+def test_error_is_one_line_with_key(scene, module, text, name, overrides, said):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
@@ -198,7 +198,7 @@ def test_what_is_wrong_is_one_line_with_the_key(scene, module, text, name, overr
     assert "\n" not in line
 
 
-def test_a_module_that_is_not_there_is_reported_with_the_line_of_the_scene(tmp_path):
+def test_missing_module_error_names_scene_line(tmp_path):
     path = tmp_path / "hover.toml"
     path.write_text(HOVER.read_text().replace('gains = "tuned"', 'controller = "nobody_has_this:C"'))
     with pytest.raises(

@@ -48,7 +48,7 @@ def scene(tmp_path):
     return made
 
 
-def test_it_is_flown_on_and_logged(scene):
+def test_custom_estimate_is_used_and_logged(scene):
     flight = fly(scene(DEAD_RECKONING, "DeadReckoning"))
     assert flight.failure == ""
     assert flight.rmse["z"] < 0.1
@@ -57,7 +57,7 @@ def test_it_is_flown_on_and_logged(scene):
     assert np.ptp(estimate) == pytest.approx(1.0, abs=0.1)
 
 
-def test_a_reading_is_shown_once_and_the_estimate_holds_between_steps(scene):
+def test_reading_is_shown_once_and_estimate_holds_between_steps(scene):
     text = DEAD_RECKONING.replace("rate = 250.0", "rate = 125.0").replace(
         'if "imu" in readings:', 'self.p = self.p + [float("gps" in readings), 0.0, 0.0]\n        if False:'
     )
@@ -67,7 +67,7 @@ def test_a_reading_is_shown_once_and_the_estimate_holds_between_steps(scene):
     assert (x[0:250:2] == x[1:251:2]).all()
 
 
-def test_what_is_wrong_is_one_line(scene):
+def test_custom_estimator_errors_are_one_line(scene):
     with pytest.raises(
         ConfigError, match=r"autopilot.estimator: own_estimator:DeadReckoning: TypeError: step returned"
     ):
@@ -79,5 +79,5 @@ def test_what_is_wrong_is_one_line(scene):
     with pytest.raises(ConfigError, match="unknown estimator 'sensor'; expected one of ground_truth, kalman"):
         load("hover", ["autopilot.estimator=sensor"])
     text = DEAD_RECKONING.replace("        x, y", "        if time > 1.0: 1 / 0\n        x, y")
-    said = "estimator own_estimator:DeadReckoning: ZeroDivisionError: division by zero"
-    assert said in fly(scene(text, "DeadReckoning")).failure
+    output = "estimator own_estimator:DeadReckoning: ZeroDivisionError: division by zero"
+    assert output in fly(scene(text, "DeadReckoning")).failure

@@ -1,0 +1,62 @@
+"""Controller block of the PX4 cascade, between land detector and motors."""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
+from lapwing.kernels import always_inline, python_function
+from lapwing.services.autopilot import motor_failure
+from lapwing.services.autopilot.block import Controller, block_outputs
+from lapwing.services.autopilot.control import Command
+from lapwing.services.autopilot.land_detector import (
+    FLYING,
+    INITIAL_LANDED_STATE,
+    LANDED,
+    LandedState,
+    update_landed_state,
+)
+from lapwing.services.autopilot.mixer import at_rest
+from lapwing.services.autopilot.px4 import law
+
+
+class Px4Controller(NamedTuple):
+    """Parameters of the block."""
+
+    common: Controller
+    law: Any  # cell of `law.Parameters`
+
+
+class Px4State(NamedTuple):
+    """State of the block."""
+
+    landed_state: LandedState
+    law: law.State
+    failure_detector: motor_failure.State
+    still_from: int  # [tick]
+    charge: float  # of the battery, fraction; NaN: unknown
+
+
+def start(p: Px4Controller) -> Px4State:
+    """Return the initial state."""
+    watched = python_function(motor_failure.start)(p.common.failure_detector)
+    return Px4State(INITIAL_LANDED_STATE, law.START, watched, 0, float("nan"))
+
+
+@always_inline
+def step(p: Px4Controller, s: Px4State, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Px4State, tuple, int]:
+    """Compute the motor command at `tick`."""
+    c = p.common
+    e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
+    setpoint = inputs[3].value if order.follow else order.setpoint
+    landed, watched, still_from = s.landed_state, s.failure_detector, s.still_from
+    if order.restart_at == tick:
+        landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
+        watched = motor_failure.start(c.failure_detector)
+    charge = battery.value.charge if battery.due else s.charge
+    landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
+    if landed.name == FLYING:
+        controlled, given = law.step(p.law.value, s.law, c.interval, e, setpoint, watched.failed)
+    else:
+        off = at_rest(c.law.value.shares[0])
+        controlled, given = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
+    watched, outputs = block_outputs(c, watched, still_from, charge, order, e, setpoint, landed.name, given)
+    return Px4State(landed, controlled, watched, still_from, charge), outputs, CONTINUE

@@ -1,0 +1,70 @@
+"""Topic encoders of what flies the vehicle: motor commands and status."""
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
+from lapwing.messages import Actuators, Status, Vector3, header
+from lapwing.messages import topics as topic
+from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.services.common import ports
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand
+
+
+def actuators_wire(port: Port) -> TopicEncoder:
+    """Return the encoder of the motor commands."""
+    command = Actuators(header(0, "body"), port.like.motor_voltage, False, port.like.thrust)
+    return TopicEncoder(topic.ACTUATORS, ports.ACTUATORS, 1, _actuators, lambda: command)
+
+
+def status_wire(every: int, texts: Sequence[str], words: Sequence[Any]) -> TopicEncoder:
+    """Return the encoder of the status.
+
+    Args:
+        every: ticks between two messages.
+        texts: phase names by index; may grow.
+        words: status texts by index; may grow.
+    """
+    return TopicEncoder(topic.STATUS, ports.STATUS, every, _status, _status_sample(texts, words), _status_texts)
+
+
+def _actuators(x: MotorCommand, time_ns: np.ndarray) -> Fields:
+    return {
+        **stamp_columns(time_ns),
+        "motor_voltage": x.motor_voltage,
+        "armed": x.armed,
+        "thrust": x.thrust,
+        "attitude_reference": x.attitude_reference,
+    }
+
+
+def _status_sample(texts: Sequence[str], words: Sequence[Any]) -> Callable[[int, int, int], Any]:
+    def sample(phase: int, number: int, armed: int) -> Any:
+        w = words[number]
+        return Status(
+            header(0, "body"), w.mode, texts[phase], text=w.failsafe,
+            mission_current=w.mission_current, mission_count=w.mission_count, mission_reached=w.mission_reached,
+            mission_state=w.mission_state, offboard_available=w.offboard_available,
+            arming_blockers=() if armed else tuple(w.arming_blockers),
+            failsafe=bool(w.failsafe), home=Vector3(*w.home),
+        )  # fmt: skip
+
+    return sample
+
+
+def _status_texts(x: AutopilotStatus) -> list[Any]:
+    return [x.phase, x.status_text_id, x.armed]
+
+
+def _status(x: AutopilotStatus, time_ns: np.ndarray) -> Fields:
+    return {
+        **stamp_columns(time_ns),
+        "armed": x.armed,
+        "landed": x.landed,
+        "finished": x.finished,
+        "battery_warning": x.battery_warning,
+        "failed_motor": x.failed_motor,
+    }

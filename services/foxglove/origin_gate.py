@@ -1,0 +1,160 @@
+"""Gate before the WebSocket server: connections of foreign web pages are refused before the server sees them.
+
+A browser lets any page open a WebSocket to this machine, and names the page in Origin. A page whose name was bound anew
+to a local address (DNS rebinding) is named in Host. foxglove-sdk checks neither. The SDK's server therefore listens at
+a random address of 127.0.0.0/8, which a page cannot find, and this gate at the public one.
+"""
+
+import asyncio
+import ipaddress
+import secrets
+import socket
+import threading
+from collections.abc import Iterable
+from contextlib import suppress
+from urllib.parse import urlsplit
+
+from lapwing.services.common.address import is_loopback
+
+LONGEST_HEAD = 8192  # [bytes] of a request
+HEAD_TIMEOUT = 10.0  # [s] for it to arrive
+END_TIMEOUT = 2.0  # [s] for clients to read what was sent before the end
+CHUNK = 65536  # [bytes]
+HOSTED = ("https://app.foxglove.dev", "https://studio.foxglove.dev")  # pages that are viewers
+DESKTOP = "file://"  # pages of an installed viewer
+_END = b"\r\n\r\n"
+
+
+def hidden_address() -> str:
+    """Return a random loopback address."""
+    return str(ipaddress.IPv4Address(0x7F000002 + secrets.randbelow(2**24 - 4)))
+
+
+def refusal(head: bytes, host: str) -> str | None:
+    """Return the reason to refuse a request, None for one of a viewer.
+
+    Args:
+        head: request line and headers.
+        host: that the server was asked to listen on.
+    """
+    result: dict[str, list[str]] = {}
+    for line in head.decode("latin-1").split("\r\n")[1:]:
+        name, _, value = line.partition(":")
+        result.setdefault(name.strip().lower(), []).append(value.strip())
+    hosts, origins = result.get("host", []), result.get("origin", [])
+    if len(hosts) != 1 or not _is_own(_name(f"//{hosts[0]}"), host):
+        return f"Host {', '.join(hosts) or 'missing'}: expected an address of this machine"
+    if origins and not all(_is_viewer(origin, host) for origin in origins):
+        return f"Origin {', '.join(origins)}: is not a viewer's"
+    return None
+
+
+def _is_viewer(origin: str, host: str) -> bool:
+    name = _name(origin)
+    return origin in (*HOSTED, DESKTOP) or (bool(name) and (is_loopback(name) or name == host))
+
+
+def _is_own(name: str, host: str) -> bool:
+    """Return True for an address and for the names that the user has chosen; a foreign page has a name."""
+    with suppress(ValueError):
+        return bool(ipaddress.ip_address(name))
+    return name in ("localhost", host) and bool(name)
+
+
+def _name(url: str) -> str:
+    try:
+        return urlsplit(url).hostname or ""
+    except ValueError:
+        return ""
+
+
+class OriginGate:
+    """Thread that forwards the connections of viewers.
+
+    Attributes:
+        port: at which it listens.
+        refused: connections that were closed.
+    """
+
+    def __init__(self, host: str, port: int, server: tuple[str, int]):
+        """Begin to listen.
+
+        Args:
+            host, port: public address.
+            server: address of the WebSocket server.
+
+        Raises:
+            OSError: the address cannot be listened on.
+        """
+        self._host, self._server, self.refused = host, server, 0
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        self._socket = socket.create_server((host, port), family=family)
+        self.port: int = self._socket.getsockname()[1]
+        self._loop = asyncio.new_event_loop()
+        self._open: set[asyncio.Task[None]] = set()
+        self._listening = threading.Event()
+        self._thread = threading.Thread(target=self._loop.run_until_complete, args=(self._serve(),), daemon=True)
+        self._thread.start()
+        self._listening.wait()
+
+    async def _serve(self) -> None:
+        self._ended = asyncio.Event()
+        server = await asyncio.start_server(self._accept, sock=self._socket, limit=LONGEST_HEAD)
+        self._listening.set()
+        await self._ended.wait()
+        server.close()
+        if self._open:
+            _, late = await asyncio.wait(self._open, timeout=END_TIMEOUT)
+            await _cancelled(late)
+
+    async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._open.add(task)
+        try:
+            with suppress(OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
+                head = await asyncio.wait_for(reader.readuntil(_END), HEAD_TIMEOUT)
+                if reason := refusal(head, self._host):
+                    self.refused += 1
+                    text = reason.encode("ascii", "replace")
+                    status = b"HTTP/1.1 403 Forbidden\r\nConnection: close\r\nContent-Type: text/plain\r\n"
+                    writer.write(status + b"Content-Length: %d\r\n\r\n%b" % (len(text), text))
+                    await writer.drain()
+                else:
+                    await self._forward(head, reader, writer)
+        finally:
+            writer.close()
+            self._open.discard(task)
+
+    async def _forward(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        behind, ahead = await asyncio.open_connection(*self._server)
+        ahead.write(head)
+        to_server = asyncio.create_task(_pump(reader, ahead))
+        try:
+            await _pump(behind, writer)
+        finally:
+            await _cancelled([to_server])
+            ahead.close()
+
+    def close(self) -> None:
+        """Let clients read what the server has sent, and stop. Stop the server first."""
+        self._loop.call_soon_threadsafe(self._ended.set)
+        self._thread.join()
+        self._loop.close()
+
+
+async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Copy until the end, and end the copy, too."""
+    with suppress(OSError):
+        while data := await reader.read(CHUNK):
+            writer.write(data)
+            await writer.drain()
+        if writer.can_write_eof():
+            writer.write_eof()
+
+
+async def _cancelled(tasks: Iterable["asyncio.Task[None]"]) -> None:
+    for task in tasks:
+        task.cancel()
+        with suppress(asyncio.CancelledError):
+            await task

@@ -1,0 +1,40 @@
+"""Offboard setpoints in fast runs: repeated until their sender is late by wall time too.
+
+The autopilot counts COM_OF_LOSS_T in simulation time. In a run faster than real time a sender would be lost after a
+fraction of it in wall time: at five times real time a pause of 0.2 s loses 1 s.
+"""
+
+from collections.abc import Callable, Sequence
+
+from lapwing.services.mavlink.clock import Clock, Instant
+from lapwing.services.mavlink.command_queue import CommandQueue
+
+INTERVAL = 200_000_000  # [ns] of simulation time between two repetitions
+
+
+class SetpointKeeper:
+    """The newest offboard setpoint and its repetitions."""
+
+    def __init__(self, clock: Clock, commands: CommandQueue, timeout: Callable[[], float]):
+        """Create a keeper without a setpoint; `timeout` returns the time [s] after which setpoints are lost."""
+        self._clock, self._commands, self._timeout = clock, commands, timeout
+        self._held: tuple[str, str, Sequence[float], Instant] | None = None
+        self._next = 0  # [ns] of the next repetition
+
+    def hold(self, kind: str, source: str, values: Sequence[float]) -> None:
+        """Take a setpoint that was just sent."""
+        self._held = kind, source, values, self._clock.now
+        self._next = self._clock.now.time_ns + INTERVAL
+
+    def step(self) -> None:
+        """Repeat the setpoint while, at the present speed, its loss then comes no later than by wall time."""
+        if self._held is None or self._clock.now.time_ns < self._next:
+            return
+        kind, source, values, then = self._held
+        now, timeout = self._clock.now, self._timeout()
+        simulated, wall = (now.time_ns - then.time_ns) * 1e-9, now.wall - then.wall
+        if not wall * (1.0 + timeout / simulated) <= timeout:  # NaN: the vehicle has no time-out
+            self._held = None
+            return
+        self._next = now.time_ns + INTERVAL
+        self._commands.put(kind, source, values=values)
