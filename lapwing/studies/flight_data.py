@@ -14,12 +14,16 @@ from lapwing.cosim.log import LogReader
 from lapwing.messages import TYPES
 from lapwing.messages.topics import (
     ACTUATORS,
+    BATTERY,
     BODIES,
     CONTACT,
     ESTIMATE,
+    ESTIMATE_COVARIANCE,
     EVENTS,
     LIFT,
+    RANGEFINDER,
     SETPOINT,
+    SONAR,
     STATUS,
     TRUTH,
     Topic,
@@ -35,10 +39,11 @@ from lapwing.studies.port_columns import columns_of
 from lapwing.studies.topic_view import TopicView
 
 AXES = tuple(tracking.AXES)
-IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS)  # of which a vehicle is drawn as it moves
+IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # of which a vehicle is drawn as it moves
 
 
-SHOWN = (*IN_SPACE, STATUS, ESTIMATE, LIFT, EVENTS)  # of which outcome, events, figures and report are made
+# Topics from which outcome, events, metrics and report are made.
+SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS)
 
 
 class FlightData(FlightTopics):
@@ -49,6 +54,7 @@ class FlightData(FlightTopics):
     Attributes:
         origin: where it comes from, with the log's metadata.
         vehicle: name.
+        name: of the flight in a comparison; "" for that of its log.
         fleet: what is true of every vehicle that flew, "ground_truth" by name; this one among them.
         others: the other vehicles that flew, each a flight with what is shown of it in space.
         failure: why it ended before its time; "" where it did not, or where a log does not say.
@@ -59,20 +65,21 @@ class FlightData(FlightTopics):
         """Create a flight from topics by their name without the vehicle's: "ground_truth", "gps/fix", "clock"."""
         super().__init__(topics, origin)
         self.failure, self.diverged = failure, diverged
+        self.name = ""
         self.fleet = {self.vehicle: self._topics["ground_truth"]} if "ground_truth" in self._topics else {}
         self.others: tuple[FlightData, ...] = ()
 
     @classmethod
     def read(cls, path: str | Path, vehicle: str | None = None, only: Collection[Topic] | None = None) -> Self:
-        """A recorded flight.
+        """Read a recorded flight.
 
         Args:
-            path: of the MCAP log.
-            vehicle: its name; by default that of the first topic /NAME/ground_truth.
-            only: the topics wanted, None for all.
+            path: path of the MCAP log.
+            vehicle: name; by default that of the first topic /NAME/ground_truth.
+            only: topics to read; None: all.
 
         Raises:
-            ValueError: no such file, no MCAP log, no flight in it, or a damaged message.
+            ValueError: the file is missing or no MCAP log, has no flight, or a damaged message.
         """
         with LogReader(path) as log:
             known = [name for name, kind in log.topics().items() if kind in TYPES]
@@ -86,14 +93,14 @@ class FlightData(FlightTopics):
 
     @classmethod
     def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
-        """The recorded flights of all vehicles of a log, which is read once.
+        """Read the flights of all vehicles in one pass over the log.
 
         Args:
-            path: of the MCAP log.
-            only: the topics wanted, of every vehicle, None for all.
+            path: path of the MCAP log.
+            only: topics to read of every vehicle; None: all.
 
         Raises:
-            ValueError: as of `read`.
+            ValueError: see `read`.
         """
         with LogReader(path) as log:
             known = [name for name, kind in log.topics().items() if kind in TYPES]
@@ -111,24 +118,24 @@ class FlightData(FlightTopics):
             views = {key.removeprefix(f"/{name}").removeprefix("/"): TopicView(*histories[key]) for key in keys}
             return cls(views, Origin.of_log(source, name, log.metadata, log.attachments), failure, diverged)
 
-        found: Self = of(vehicle, [key for key in histories if key.startswith(f"/{vehicle}/") or "/" not in key[1:]])
+        result: Self = of(vehicle, [key for key in histories if key.startswith(f"/{vehicle}/") or "/" not in key[1:]])
         shown = {name: [key for topic in IN_SPACE if (key := topic.key(name)) in histories] for name in fleet}
-        found.others = tuple(of(name, shown[name]) for name in fleet if name != vehicle)
-        truths = {other.vehicle: other.truth for other in found.others}
-        found.fleet = {name: truths.get(name, found.truth) for name in fleet}
-        return found
+        result.others = tuple(of(name, shown[name]) for name in fleet if name != vehicle)
+        truths = {other.vehicle: other.truth for other in result.others}
+        result.fleet = {name: truths.get(name, result.truth) for name in fleet}
+        return result
 
     @classmethod
     def of(
         cls, graph: BlockDiagram, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
     ) -> Self:
-        """A flight that was flown in this process.
+        """Return a flight that was simulated in this process.
 
         Args:
-            graph: at the end; its rows keep all ticks of what these topics are made of.
-            only: the topics wanted, None for all that are recorded.
-            failure: why it ended before its time.
-            diverged: whether that is a state that was no longer finite.
+            graph: block diagram at the end, with the full history of these topics.
+            only: topics to keep; None: all recorded ones.
+            failure: reason of an early end.
+            diverged: True if the reason is a non-finite state.
         """
         said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
         return cls(said, Origin.of_setup(graph.setup), failure, diverged)
@@ -137,18 +144,18 @@ class FlightData(FlightTopics):
     def of_each(
         cls, graph: BlockDiagram, only: Collection[Topic] | None = None, failure: str = "", diverged: bool = False
     ) -> list[Self]:
-        """The flights of all vehicles of a run; arguments as of `of`."""
+        """Return the flights of all vehicles of a run. See `of` for arguments."""
         if graph.setup.vehicle:
             return [cls.of(graph, only, failure, diverged)]
         said = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
-        found = []
+        result = []
         for own in members(graph.setup):
             views = {_short(of_all(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
-            found.append(cls(views, Origin.of_setup(own), failure, diverged))
-        truths = {flight.vehicle: flight.truth for flight in found if flight.has("ground_truth")}
-        for flight in found:
-            flight.fleet, flight.others = truths, tuple(other for other in found if other is not flight)
-        return found
+            result.append(cls(views, Origin.of_setup(own), failure, diverged))
+        truths = {flight.vehicle: flight.truth for flight in result if flight.has("ground_truth")}
+        for flight in result:
+            flight.fleet, flight.others = truths, tuple(other for other in result if other is not flight)
+        return result
 
     def __repr__(self) -> str:
         said = str(self.outcome) if len(self.truth) else "nothing was flown"
@@ -190,11 +197,11 @@ class FlightData(FlightTopics):
         n = len(self.reference)
         if n == 0:
             return {}
-        found = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
-        return dict(zip(AXES, found.T, strict=True))
+        result = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
+        return dict(zip(AXES, result.T, strict=True))
 
     def rmse_of(self, pose: TopicView) -> dict[str, float]:
-        """Root-mean-square error of each axis [m], [rad] of the pose of a topic; of a flight with a reference."""
+        """Return the root-mean-square error of each axis [m], [rad] of a pose topic, for a flight with a reference."""
         n = self._tracked
         return tracking.rmse(self._reference, pose.position[:n], pose.attitude[:n], self.armed)
 
@@ -242,13 +249,13 @@ class FlightData(FlightTopics):
             said = self.topic("events")
             return [Event(*event) for event in zip(said.times.tolist(), said.name, said.msg, strict=True)]
         status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
-        found = events(self.truth, status, setpoint, self.armed, self.origin.scene)
+        result = events(self.truth, status, setpoint, self.armed, self.origin.scene)
         load = self.origin.scene.get("cooperative_load")
         if (
             load and self.has("body_states") and self.has("rotor_wrench")
-        ):  # nobody steers: no other kind of event is told
-            found += slack(self.topic("body_states"), self.topic("rotor_wrench"), load)
-        return found
+        ):  # no autopilot: there are no other kinds of events
+            result += slack(self.topic("body_states"), self.topic("rotor_wrench"), load)
+        return result
 
     @property
     def landed(self) -> bool:
@@ -265,12 +272,12 @@ def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) 
 
 
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
-    """The vehicles whose truth is among the topics of a log, in the order of its scene."""
-    found = [name.split("/")[1] for name in topics if name.endswith("/ground_truth")]
+    """Return the vehicles whose truth is among the topics of a log, in the order of its scene."""
+    result = [name.split("/")[1] for name in topics if name.endswith("/ground_truth")]
     said = metadata.get("vehicle", "").split(", ")
-    return sorted(found, key=lambda name: said.index(name) if name in said else len(said))
+    return sorted(result, key=lambda name: said.index(name) if name in said else len(said))
 
 
 def _short(topic: Topic) -> str:
-    """The topic's name without the vehicle's."""
+    """Return the topic's name without the vehicle's."""
     return topic.name.removeprefix("{vehicle}/")

@@ -13,7 +13,7 @@ from lapwing.studies.saturation import intervals, saturation
 from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
-BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
+BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
 ORDER = tuple(KINDS)  # at the same time
 
 
@@ -38,19 +38,19 @@ def events(
         scene: tables of the scene.
     """
     end = float(truth.times[-1]) if len(truth) else 0.0
-    found = [Event(time, "fault", text) for time, text in planned_faults(scene) if time <= end]
+    result = [Event(time, "fault", text) for time, text in planned_faults(scene) if time <= end]
     if status is not None and len(status):
-        found += _status_events(status)
-        found += _contacts(truth)
-        found += [Event(warning.start, "warning", warning.text) for warning in validity_warnings(truth, scene)]
+        result += _status_events(status)
+        result += _contacts(truth)
+        result += [Event(warning.start, "warning", warning.text) for warning in validity_warnings(truth, scene)]
         highest = scene.get("airframe", {}).get("motor", {}).get("max_voltage")
         if highest is not None and len(armed):
-            found += _saturation(truth, armed, highest)
+            result += _saturation(truth, armed, highest)
     if setpoint is not None and len(setpoint):
         phases = changes(setpoint.times, setpoint.phase)
-        found += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
-    found = [event._replace(time=round(event.time, 9)) for event in found]  # nanoseconds, as the log counts
-    return ordered(found)
+        result += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
+    result = [event._replace(time=round(event.time, 9)) for event in result]  # nanoseconds, as the log counts
+    return ordered(result)
 
 
 def ordered(found: Iterable[Event]) -> list[Event]:
@@ -67,30 +67,30 @@ def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[E
         load: table [cooperative_load] of the scene.
     """
     forces = link_tension(bodies, lift, load)
-    found = []
+    result = []
     for k in range(forces.shape[1]):
         for push in pushes(bodies.times[: len(forces)], forces[:, k]):
             text = f"link {k + 1} pushes until {push.stop:.3f} s with up to {push.most:.3g} N: a cable would be slack"
-            found.append(Event(round(push.start, 9), "slack", text))
-    return sorted(found)
+            result.append(Event(round(push.start, 9), "slack", text))
+    return sorted(result)
 
 
 def planned_faults(scene: dict[str, Any]) -> list[tuple[float, str]]:
     """Return time [s] and description of each planned fault of a scene, in order."""
-    found: list[tuple[float, str]] = []
+    result: list[tuple[float, str]] = []
     damage = scene.get("effects", {}).get("rotor_damage")
     if damage is not None:
         left = damage.get("remaining_thrust", 0.0)
-        found.append((damage.get("time", 0.0), f"rotor {damage.get('rotor')} keeps {100.0 * left:g} % of its thrust"))
+        result.append((damage.get("time", 0.0), f"rotor {damage.get('rotor')} keeps {100.0 * left:g} % of its thrust"))
     for event in scene.get("multibody", {}).get("event", ()):
-        found.append((event["time"], f"propeller {event['propeller']} becomes {event['failure'].replace('_', ' ')}"))
+        result.append((event["time"], f"propeller {event['propeller']} becomes {event['failure'].replace('_', ' ')}"))
     for sensor, table in scene.get("sensors", {}).items():
         for fault in table.get("faults", ()) if isinstance(table, dict) else ():
             start, stop = fault.get("start", 0.0), fault.get("stop", math.inf)
             which = "" if fault.get("channel", "all") == "all" else f" of {fault['channel']}"
             until = f" until {stop:g} s" if stop < math.inf else ""
-            found.append((start, f"{sensor}: {fault['kind']}{which}{until}"))
-    return sorted(found)
+            result.append((start, f"{sensor}: {fault['kind']}{which}{until}"))
+    return sorted(result)
 
 
 def changes(t: np.ndarray, values: np.ndarray) -> Iterator[tuple[float, Any]]:
@@ -137,15 +137,15 @@ def _contacts(truth: TopicView) -> Iterator[Event]:
 
 def _saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator[Event]:
     """Yield one event for all times at which a motor is at a limit."""
-    found, t = saturation(truth, armed, highest), truth.times
-    times = intervals(found.any, t)
+    result, t = saturation(truth, armed, highest), truth.times
+    times = intervals(result.any, t)
     if not times:
         return
-    low, high = (np.flatnonzero(at.any(axis=0)) + 1 for at in (found.low, found.high))
+    low, high = (np.flatnonzero(at.any(axis=0)) + 1 for at in (result.low, result.high))
     where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))
     count = f" ({len(times)} times)" if len(times) > 1 else ""
-    share = f"{100.0 * found.share(found.lasted):.2g} % of the time in the air"
-    yield Event(float(t[times[0][0]]), "motors", f"{', '.join(where)} for {found.lasted:.2f} s{count}, {share}")
+    share = f"{100.0 * result.share(result.lasted):.2g} % of the time in the air"
+    yield Event(float(t[times[0][0]]), "motors", f"{', '.join(where)} for {result.lasted:.2f} s{count}, {share}")
 
 
 def _motors(numbers: np.ndarray) -> str:

@@ -6,6 +6,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from lapwing.cosim.config import provenance
+from lapwing.cosim.config.former_names import present_config, present_tables
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import from_json
 from lapwing.cosim.diagram.multi_vehicle import member
@@ -33,12 +34,12 @@ class Origin:
 
     @classmethod
     def of_log(cls, source: str, vehicle: str, metadata: Mapping[str, str], attachments: Mapping[str, bytes]) -> Self:
-        """The origin of a recorded flight."""
+        """Return the origin of a recorded flight."""
         return cls(source, vehicle, None, dict(metadata), dict(attachments))
 
     @classmethod
     def of_setup(cls, setup: RunConfig) -> Self:
-        """The origin of a flight in memory."""
+        """Return the origin of a flight in memory."""
         return cls(setup.scene, setup.vehicle, setup, {}, {})
 
     @cached_property
@@ -53,7 +54,7 @@ class Origin:
         if provenance.SETUP_FILE not in self._attachments:
             raise ValueError(f"{self.source}: has no attachment {provenance.SETUP_FILE}")
         try:
-            return member(from_json(self._attachments[provenance.SETUP_FILE].decode()), self.vehicle)
+            return member(present_config(from_json(self._attachments[provenance.SETUP_FILE].decode())), self.vehicle)
         except ValueError as fault:
             raise self._unreadable(fault) from None
 
@@ -68,15 +69,15 @@ class Origin:
             return self._setup.resolved
         try:  # the tables alone: they can be read even when classes of the set-up have changed
             tree = json.loads(self._attachments.get(provenance.SETUP_FILE, b"{}")).get("resolved", {})
-            found = from_json(json.dumps(tree))
+            result = present_tables(from_json(json.dumps(tree)))
         except ValueError as fault:
             raise self._unreadable(fault) from None
-        if not isinstance(found.get("vehicle"), list):
-            return found
+        if not isinstance(result.get("vehicle"), list):
+            return result
         own: dict[str, Any] = next(
-            (entry for entry in found["vehicle"] if entry["vehicle"]["name"] == self.vehicle), {}
+            (entry for entry in result["vehicle"] if entry["vehicle"]["name"] == self.vehicle), {}
         )
-        return {**found, **own}
+        return {**result, **own}
 
     @cached_property
     def metadata(self) -> dict[str, str]:

@@ -84,10 +84,10 @@ class FlightTopics:
         return sorted(self._topics)
 
     def topic(self, name: str) -> TopicView:
-        """A topic by its name without the vehicle's, for example "gps/fix".
+        """Return a topic by its name without the vehicle's, for example "gps/fix".
 
         Raises:
-            ValueError: it is not there; names those that are.
+            ValueError: it does not exist; names those that do.
         """
         if name not in self._topics:
             raise ValueError(f"{self.origin.source}: has no topic {name}; it has {', '.join(self.topics)}")
@@ -98,15 +98,15 @@ class FlightTopics:
         return topic in self._topics
 
     def times(self, topic: str) -> np.ndarray:
-        """Simulation times of a topic [s], shape (n,)."""
+        """Return the simulation times of a topic [s], shape (n,)."""
         return self.topic(topic).times
 
     def column(self, topic: str, field: str) -> np.ndarray:
-        """A field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
+        """Return a field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
         return self.topic(topic)[field]
 
     def to_dataframe(self, topic: str = "ground_truth") -> Any:
-        """A topic as a pandas DataFrame: a column for each number or text, the times [s] as index.
+        """Return a topic as a pandas DataFrame: a column per number or text, times [s] as index.
 
         Raises:
             ImportError: pandas is not installed.
@@ -120,7 +120,7 @@ class FlightTopics:
 
 
 def topic_of(name: str) -> Topic:
-    """The topic whose name without the vehicle's is given; ValueError if there is none."""
+    """Return the topic of a name without the vehicle's. Raise ValueError if there is none."""
     try:
         return topic_named(f"{{vehicle}}/{name}")
     except ValueError:

@@ -14,7 +14,7 @@ class Touch(NamedTuple):
 
     start: int  # row of the truth with the first contact
     stop: int  # row after the last contact
-    speed: float  # [m/s] downwards just before the hardest contact; 0 where the vehicle stands there from the beginning
+    speed: float  # [m/s] downwards just before the hardest contact; 0 if the vehicle starts on the ground
 
 
 def ground_contacts(truth: TopicView) -> list[Touch]:
@@ -22,11 +22,11 @@ def ground_contacts(truth: TopicView) -> list[Touch]:
     contact = truth.ground_contact
     changed = (np.flatnonzero(contact[1:] != contact[:-1]) + 1).tolist()
     edges = [0] * bool(contact[0]) + changed + [len(contact)] * bool(contact[-1]) if len(contact) else []
-    found: list[Touch] = []
+    result: list[Touch] = []
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         speed = max(-float(truth.velocity[start - 1, 2]), 0.0) if start else 0.0
-        if found and truth.times[start] - truth.times[found[-1].stop - 1] < BOUNCE:
-            found[-1] = Touch(found[-1].start, stop, max(found[-1].speed, speed))
+        if result and truth.times[start] - truth.times[result[-1].stop - 1] < BOUNCE:
+            result[-1] = Touch(result[-1].start, stop, max(result[-1].speed, speed))
         else:
-            found.append(Touch(start, stop, speed))
-    return found
+            result.append(Touch(start, stop, speed))
+    return result

@@ -1,4 +1,4 @@
-"""A vehicle's flight while it goes on: what is new, as a flight of its own, and the events in it."""
+"""Live flight of a vehicle: new samples as a separate flight, and their events."""
 
 from collections.abc import Iterable
 
@@ -7,14 +7,14 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.messages.topic_columns import history
-from lapwing.messages.topics import STATUS, Topic, of_all
+from lapwing.messages.topics import ESTIMATE, STATUS, Topic, of_all
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.flight_data import IN_SPACE, FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.topic_view import TopicView
 
-TAKEN = (*IN_SPACE, STATUS)
+TAKEN = (*IN_SPACE, STATUS, ESTIMATE)
 
 
 class LiveFlight:
@@ -23,7 +23,7 @@ class LiveFlight:
     def __init__(self, setup: RunConfig):
         """Create from the run configuration before the run; of a fleet that of one vehicle
         (`lapwing.cosim.diagram.multi_vehicle.members`)."""
-        self._setup = setup
+        self._setup, self.vehicle = setup, setup.vehicle
         self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
 
     def take(self, pages: Iterable[RecordBatch]) -> None:
@@ -38,7 +38,7 @@ class LiveFlight:
     def step(self, until_ns: int) -> FlightData | None:
         """Return the new samples up to an instant, starting with the newest sample before them.
 
-        None where the truth tells nothing new.
+        None without new ground truth.
         """
         views: dict[str, TopicView] = {}
         for topic, said in self._said.items():

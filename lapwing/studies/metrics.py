@@ -10,6 +10,7 @@ import numpy as np
 from lapwing.cosim.scene import Scene
 from lapwing.kernels import kernel
 from lapwing.services.common.success_criteria import Success
+from lapwing.studies.consistency import SOURCES, consistency
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.saturation import limits, saturation
@@ -38,6 +39,10 @@ METRICS: dict[str, str] = {
     **{
         f"within_3sigma.{axis}": "" for axis in "xyz"
     },  # share of the time with the truth within 3 sigma of the estimate
+    "nees": "",  # mean over time of the joint normalised error squared of attitude, velocity, position; 9 if consistent
+    "within_95.nees": "",  # share of the time with it below the 95 % quantile of its distribution
+    **{f"nis.{source}": "" for source in SOURCES},  # mean normalised innovation squared by dimension; 1 if consistent
+    "nis_samples": "",  # number of samples of each of these means
 }
 """Name and unit of every metric, in the order of the columns of a campaign's table."""
 
@@ -52,29 +57,29 @@ def metrics(flight: FlightData) -> dict[str, Any]:
     """Return the metrics of a flight by name; NaN for those that it does not have."""
     truth, outcome, armed = flight.truth, flight.outcome, flight.armed
     n, t = len(armed), truth.times
-    found: dict[str, Any] = dict.fromkeys(METRICS, math.nan)
-    found |= {"outcome": outcome.kind, "outcome_text": str(outcome), "time": outcome.time, "duration": float(t[-1])}
+    result: dict[str, Any] = dict.fromkeys(METRICS, math.nan)
+    result |= {"outcome": outcome.kind, "outcome_text": str(outcome), "time": outcome.time, "duration": float(t[-1])}
     for name in ("target_distance", "failsafe_time"):
         value = getattr(outcome, name)
-        found[name] = math.nan if value is None else value
-    found |= {"max_tilt": _tilt(truth.tilt_cosine.min()), "energy": flight.energy}
+        result[name] = math.nan if value is None else value
+    result |= {"max_tilt": _tilt(truth.tilt_cosine.min()), "energy": flight.energy}
     last = max((touch.start for touch in ground_contacts(truth)), default=0)
     if last:
         x, y, _ = map(float, truth.position[last])
-        found |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": _tilt(truth.tilt_cosine[last])}
-        found |= {"touchdown.speed": outcome.touchdown}
+        result |= {"touchdown.x": x, "touchdown.y": y, "touchdown.tilt": _tilt(truth.tilt_cosine[last])}
+        result |= {"touchdown.speed": outcome.touchdown}
     if n == 0:
-        return found
+        return result
     highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
     if highest is not None:
         limits = saturation(truth, armed, highest)
-        found["saturation"] = limits.share(limits.lasted)
+        result["saturation"] = limits.share(limits.lasted)
     if not armed.any():
-        return found
+        return result
     distance, beyond = flight.reach
-    found |= {f"rmse.{axis}": value for axis, value in flight.rmse.items()}
-    found |= {"max_distance": distance, "overshoot": max(0.0, beyond)}
-    return found | _of_estimate(flight, armed)
+    result |= {f"rmse.{axis}": value for axis, value in flight.rmse.items()}
+    result |= {"max_distance": distance, "overshoot": max(0.0, beyond)}
+    return result | _of_estimate(flight, armed) | consistency(flight)
 
 
 def compile_ahead() -> None:

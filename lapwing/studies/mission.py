@@ -5,7 +5,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.services.trajectory.block import TrajectoryPath
+from lapwing.services.common.firmware.schema import FIRMWARES
+from lapwing.services.trajectory.leader_follower import FollowedPath
+from lapwing.services.trajectory.polynomial_piece import Parameters
 from lapwing.studies.topic_view import TopicView
 
 
@@ -33,24 +35,35 @@ def mission_of(setup: RunConfig, start: np.ndarray) -> Mission | None:
         setup: run configuration.
         start: initial position in the world frame, shape (3,) [m].
     """
-    if "autopilot" not in setup.services:
+    flying = next((setup.services[name] for name in ("autopilot", *FIRMWARES) if name in setup.services), None)
+    if flying is None:
         return None
-    if items := _plan_items(setup.services["autopilot"].parameters):
+    if items := _plan_items(flying.parameters):
         return Mission(_plan_target(items, start))
     if "trajectory" not in setup.services:
         return None
     trajectory = setup.services["trajectory"].parameters
-    if not isinstance(trajectory.core, TrajectoryPath):  # it follows another vehicle
-        return Mission(None)
-    path = trajectory.core.path
-    if setup.duration <= max(
-        float(path.phase_start[-1]), *(float(c.start[-1]) for c in (path.x, path.y, path.z, path.yaw))
-    ):
+    core = trajectory.core
+    follows = isinstance(core, FollowedPath)
+    paths = [core.leader.path, core.relative.path] if follows else [core.path]
+    if setup.duration <= max(map(_last_start, paths)):
         return Mission(None, is_longer=True)
-    ends_in_air = trajectory.core.final >= len(trajectory.phases)
+    own = core.relative if follows else core
+    ends_in_air = own.final >= len(trajectory.phases) or (
+        follows and core.leader.final >= len(core.leader.path.phase_start)
+    )
+    final_phase = trajectory.phases[-1] if ends_in_air else None
+    if follows:
+        return Mission(None, final_phase)
+    path = core.path
     ends = (float(channel.coefficients[-1][0]) for channel in (path.x, path.y, path.z))
     x, y, z = (origin + end for origin, end in zip(path.origin_world, ends, strict=True))
-    return Mission((x, y, z), trajectory.phases[-1] if ends_in_air else None)
+    return Mission((x, y, z), final_phase)
+
+
+def _last_start(path: Parameters) -> float:
+    """Return the start of the last phase or piece of a path [s]."""
+    return max(float(path.phase_start[-1]), *(float(c.start[-1]) for c in (path.x, path.y, path.z, path.yaw)))
 
 
 def _plan_items(autopilot: Any) -> tuple[Any, ...]:

@@ -1,4 +1,4 @@
-"""Validity warnings: a flight in the vortex ring of its rotors, or beyond the edge of the terrain grid."""
+"""Validity warnings: vortex ring state, motor currents that no model limits, the edge of the terrain grid."""
 
 from typing import Any, NamedTuple
 
@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.studies.saturation import intervals
 from lapwing.studies.topic_view import TopicView
 
-SHORTEST = 0.5  # [s] in all; less is not reported
+SHORTEST = 0.5  # [s] in all; less is not reported, except of currents
 # Vortex ring state, in units of the induced velocity in hover: descent between these, slower across than this (after
 # Leishman, Principles of Helicopter Aerodynamics, section 2.13)
 SLOWEST_DESCENT, FASTEST_DESCENT, FASTEST_ACROSS = 0.5, 1.5, 1.0
@@ -21,7 +21,7 @@ class ValidityWarning(NamedTuple):
 
 
 def validity_warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:
-    """Return one warning for each model that is used outside its range for 0.5 s or more.
+    """Return one warning for each model that is used outside its range, for 0.5 s or more or with too high a current.
 
     Args:
         truth: true state.
@@ -32,6 +32,8 @@ def validity_warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityW
     if diameter and {"rotor_thrust", "air_density", "wind"} <= set(truth.fields):
         in_ring = in_vortex_ring(truth, diameter)
         warnings += _warning(truth, in_ring, "descent in vortex ring state", "the thrust is uncertain")
+    if "dc_motor" not in _table(scene, "effects") and {"motor_voltage", "rotor_speed"} <= set(truth.fields):
+        warnings += _unlimited_current(truth, scene)
     grid = _table(scene, "environment", "terrain", "grid")
     if grid.get("heights"):
         text = "the ground is assumed level across the edge"
@@ -39,17 +41,43 @@ def validity_warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityW
     return warnings
 
 
-def _warning(truth: TopicView, where: np.ndarray, name: str, consequence: str) -> list[ValidityWarning]:
-    """Return the warning on the times at which something holds, or none if they are shorter than `SHORTEST`."""
+def _unlimited_current(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:
+    """Return the warning on winding currents above the motor's printed peak, which only `dc_motor` keeps."""
+    motor = _table(scene, "airframe", "motor")
+    limit = motor.get("peak_current")
+    if limit is None:
+        return []
+    current = np.where(truth.ground_contact[:, None], 0.0, winding_current(truth, motor))
+    name = f"motor currents are not limited: up to {current.max(initial=0.0):.3g} A where {limit:g} A is the peak,"
+    text = "name effects.dc_motor to limit them"
+    return _warning(truth, (current > limit).any(axis=1), name, text, shortest=0.0)
+
+
+def winding_current(truth: TopicView, motor: dict[str, Any]) -> np.ndarray:
+    """Return the current [A] of each motor by voltage and back-EMF, shape (n, motors) (theory.md, eq. (2.9)).
+
+    Args:
+        truth: true state, n messages.
+        motor: table [motor] of the airframe.
+    """
+    constant = 30.0 / (np.pi * motor["speed_constant"] * motor["gear_ratio"])  # [V s/rad] at the rotor
+    resistance = motor["resistance"] + motor.get("esc_resistance", 0.0)
+    return (truth.motor_voltage - constant * truth.rotor_speed) / resistance
+
+
+def _warning(
+    truth: TopicView, where: np.ndarray, name: str, consequence: str, shortest: float = SHORTEST
+) -> list[ValidityWarning]:
+    """Return the warning on the times at which something holds, or none if they are shorter than `shortest` [s]."""
     step = np.diff(truth.times, append=truth.times[-1])
     seconds, flight = float(step[where].sum()), float(step[~truth.ground_contact].sum())
-    if seconds < SHORTEST:
+    if seconds < shortest or not where.any():
         return []
-    found = intervals(where, truth.times)
-    times = f" ({len(found)} times)" if len(found) > 1 else ""
+    result = intervals(where, truth.times)
+    times = f" ({len(result)} times)" if len(result) > 1 else ""
     share = 100.0 * min(1.0, seconds / max(flight, 1e-9))
     text = f"{name} for {seconds:.1f} s{times}, {share:.2g} % of the time in the air: {consequence}"
-    return [ValidityWarning(float(truth.times[found[0][0]]), text)]
+    return [ValidityWarning(float(truth.times[result[0][0]]), text)]
 
 
 def in_vortex_ring(truth: TopicView, diameter: float) -> np.ndarray:

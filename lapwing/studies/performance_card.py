@@ -10,9 +10,14 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from lapwing.dynamics.vehicles import performance
+from lapwing.dynamics.vehicles import hover_loads, performance
 from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
-from lapwing.services.autopilot.allocation import demand_effects, effectiveness, tables, tilted_effectiveness
+from lapwing.services.autopilot.allocation import (
+    effectiveness,
+    tables,
+    tilted_effectiveness,
+    virtual_control_effectiveness,
+)
 from lapwing.services.common.vehicle_schema import airframe, rotor_constants
 from lapwing.services.scene_resolver import load
 
@@ -46,13 +51,19 @@ def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Ro
         raise ValueError(f"the {count} rotors cannot lose one")
     most = performance.maximum_thrust(airframe, rotor=rotor) / B[0].sum()  # [N] of a rotor
     lifts = (most / max(collective for collective, *_ in shares) for shares in lost)
-    return float(demand_effects(B)[0] * min(lifts)) / (airframe.mass.total * performance.GRAVITY)
+    return float(virtual_control_effectiveness(B)[0] * min(lifts)) / (airframe.mass.total * performance.GRAVITY)
 
 
 # name of the figure, and of what is published of it: (what computes it, unit shown, SI units in one of it)
 _SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
     "thrust over weight": (performance.thrust_over_weight, "-", 1.0),
     "the same without a rotor": (thrust_over_weight_without_a_rotor, "-", 1.0),
+    "hover power": (hover_loads.power, "W", 1.0),
+    "hover current": (hover_loads.current, "A", 1.0),
+    "hover throttle": (hover_loads.throttle, "%", 0.01),
+    "motor current in hover": (hover_loads.motor_current, "A", 1.0),
+    "ESC margin in hover": (hover_loads.esc_margin, "%", 0.01),
+    "battery margin in hover": (hover_loads.battery_margin, "%", 0.01),
     "hover time": (performance.hover_time, "min", 60.0),
     "maximum payload": (performance.maximum_payload, "kg", 1.0),
     "maximum range": (performance.maximum_range, "km", 1000.0),
@@ -63,13 +74,13 @@ _SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
 
 
 def card(subject: Path) -> list[Row]:
-    """The figures of a vehicle.
+    """Return the performance of a vehicle.
 
     Args:
-        subject: an airframe's file, or a scene, whose vehicle is taken.
+        subject: airframe file, or scene with the vehicle.
 
     Raises:
-        ValueError: neither of the two, or the rotor thrust is undefined.
+        ValueError: the file is neither, or the rotor thrust is undefined.
     """
     vehicle, rotor = _vehicle(subject)
     rows = []
@@ -121,11 +132,18 @@ def show(console: Console, rows: list[Row]) -> None:
     if any(row.reason for row in rows):
         table.add_column("why they differ" if source else "why not")
     for row in rows:
-        cells = [f"{row.name} [{row.unit}]", "" if row.computed is None else f"{row.computed:.3g}"]
+        cells = [f"{row.name} [{row.unit}]", _number(row.computed)]
         if source:
-            cells.append("" if row.published is None else f"{row.published:.3g}")
+            cells.append(_number(row.published))
         table.add_row(*cells, *([row.reason] if len(table.columns) > len(cells) else []))
     console.print(table)
+
+
+def _number(value: float | None) -> str:
+    """Return three significant digits, without an exponent up to a million; "" for None."""
+    if value is None:
+        return ""
+    return f"{value:.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
 def write_json(path: Path, rows: list[Row]) -> None:

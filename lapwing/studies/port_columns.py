@@ -16,11 +16,11 @@ from lapwing.messages.topics import Topic, of_all
 def columns_of(
     graph: BlockDiagram, only: Collection[Topic] | None = None
 ) -> Iterator[tuple[Topic, np.ndarray, Mapping[str, Any]]]:
-    """Topic, times [ns] (n,) and columns of all that was said in a graph that has come to its end.
+    """Yield topic, times [ns] (n,) and columns of all messages of a finished block diagram.
 
     Args:
-        graph: has kept all rows of what these topics are made of.
-        only: the topics wanted, of every vehicle, None for all that are recorded.
+        graph: block diagram with the full history of these topics.
+        only: topics of every vehicle; None: all recorded ones.
     """
     interval = graph.setup.interval_ns
     for service in graph.services:
@@ -28,7 +28,7 @@ def columns_of(
             if graph.tick and (wire.topic.recorded if only is None else of_all(wire.topic) in only):
                 columns = PortColumns(graph, wire)
                 yield wire.topic, columns.ticks * interval, columns
-        for topic in service.spoken:
+        for topic in service.python_topics:
             said = [(tick, payload) for of, tick, payload in service.messages if of is topic]
             if said and (only is None or of_all(topic) in only):
                 ticks = np.array([tick for tick, _ in said], np.int64)
@@ -45,7 +45,7 @@ class PortColumns(Mapping[str, Any]):
         """Create from a topic of a finished block diagram with the full history of its port."""
         self._graph, self._wire = graph, wire
         self.ticks = due_ticks(0, graph.tick, wire.period)
-        self._rows = graph.all_rows(wire.port, wire.period)
+        self._rows = graph.history(wire.port, wire.period)
         tree = columns(graph.ports[wire.port].like, self._rows)
         self._fields = wire.fields(tree, self.ticks * graph.setup.interval_ns)
         self._texts = () if wire.texts is None else wire.texts(tree)
@@ -70,7 +70,7 @@ class PortColumns(Mapping[str, Any]):
         return history_of_pages(self._wire.topic.message, parts)
 
     def payloads(self) -> list[bytes]:
-        """The messages in their order, as CDR."""
+        """Return the messages in order, as CDR."""
         return self.messages.payloads()
 
     def __getitem__(self, name: str) -> Any:
@@ -97,13 +97,13 @@ class PortColumns(Mapping[str, Any]):
 
 @lru_cache(maxsize=256)
 def _shapes(message: Any, payload: bytes) -> dict[str, tuple[Any, tuple[int, ...]]]:
-    """Type and shape of each field of a message, without its time; the flights of a campaign share theirs."""
-    found = {name: np.asarray(column) for name, column in history(message, [payload]).items()}
-    return {name: (column.dtype, column.shape[1:]) for name, column in found.items()}
+    """Return type and shape of each field of a message, without its time; shared by the flights of a campaign."""
+    result = {name: np.asarray(column) for name, column in history(message, [payload]).items()}
+    return {name: (column.dtype, column.shape[1:]) for name, column in result.items()}
 
 
 def _distinct(texts: Sequence[np.ndarray]) -> list[tuple[int, ...]]:
-    """The different rows of some columns of whole numbers that change seldom."""
+    """Return the distinct rows of integer columns that rarely change."""
     changed = np.zeros(len(texts[0]), bool)
     changed[0] = True
     for column in texts:

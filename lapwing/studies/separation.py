@@ -22,23 +22,23 @@ class Separation(NamedTuple):
 
 
 def distances(truths: Mapping[str, TopicView]) -> Iterator[tuple[tuple[str, str], np.ndarray]]:
-    """Each pair of vehicles with their distance [m] over time, as long as both tell of themselves, shape (n,)."""
+    """Yield each pair of vehicles with their separation [m] over their common time, shape (n,)."""
     for (a, x), (b, y) in combinations(truths.items(), 2):
         n = min(len(x), len(y))
         yield (a, b), np.linalg.norm(x.position[:n] - y.position[:n], axis=1)
 
 
 def nearest(truths: Mapping[str, TopicView]) -> Separation:
-    """The least separation of at least two vehicles, by their true states."""
-    found = []
+    """Return the minimum separation of at least two vehicles, by their true states."""
+    result = []
     for pair, distance in distances(truths):
         k = int(np.argmin(distance))
-        found.append(Separation(float(distance[k]), float(truths[pair[0]].times[k]), pair))
-    return min(found)
+        result.append(Separation(float(distance[k]), float(truths[pair[0]].times[k]), pair))
+    return min(result)
 
 
 def least_over_time(truths: Mapping[str, TopicView]) -> np.ndarray:
-    """The least distance [m] of any two at each time that all tell of, shape (n,)."""
+    """Return the minimum separation [m] of any pair at each time common to all vehicles, shape (n,)."""
     n = min(len(truth) for truth in truths.values())
     least = np.full(n, np.inf)
     for _, distance in distances(truths):

@@ -22,7 +22,7 @@ PLACES = {"plant": (0, 1), "sensors": (1, 1), "trajectory": (0, 0), "autopilot":
 TAKEN = {"recorder": "every recorded topic", MAVLINK: "telemetry"}  # by those who do not listen to every topic
 STATION, LINK = "ground station", "MAVLink 2"
 TOP, BOTTOM, LAST, ASIDE = -1.15, -3.0, -5.0, 0.7  # rows below the services; arrows beside the middle
-NOTE = "* taken one or more ticks after it was given\nsolid: lock step; dashed outline: only where it is asked for"
+NOTE = "* input delay of one or more ticks\nsolid: lock step; dashed: started by an option"
 
 Point = tuple[float, float]
 
@@ -38,42 +38,42 @@ class Arrow(NamedTuple):
 
 
 def handed(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
-    """The ports for each pair (producer, consumer); "*" behind those that are taken later."""
-    found: dict[tuple[str, str], list[str]] = {}
+    """Return the ports of each pair (producer, consumer); "*" marks delayed ones."""
+    result: dict[tuple[str, str], list[str]] = {}
     producers = setup.producers
     for name, service in setup.services.items():
         for taken in service.inputs:
-            found.setdefault((producers[taken.port], name), []).append(taken.port + ("*" if taken.delay else ""))
-    return found
+            result.setdefault((producers[taken.port], name), []).append(taken.port + ("*" if taken.delay else ""))
+    return result
 
 
 def listeners(setup: RunConfig) -> list[ProcessEntry]:
-    """The processes that stand outside of the lock step; the MAVLink link where somebody steers."""
-    return [p for p in PROCESSES if not p.lock_step and (not p.resolves or p.name in setup.beside)]
+    """Return the auxiliary processes; the MAVLink link if there is an autopilot."""
+    return [p for p in PROCESSES if not p.lock_step and (not p.resolves or p.name in setup.auxiliary)]
 
 
 def places(setup: RunConfig) -> dict[str, Point]:
-    """Middle of each service."""
+    """Return the centre of each service."""
     return {name: (WIDE * x, HIGH * y) for name in setup.services for x, y in [PLACES.get(name, (0.5, 0.5))]}
 
 
 def arrows(setup: RunConfig) -> list[Arrow]:
-    """An arrow for each topic that a service takes of another, side by side; and those to and from who listens."""
-    at, pairs, found = places(setup), handed(setup), []
+    """Return an arrow per topic between services, and those of auxiliary processes."""
+    at, pairs, result = places(setup), handed(setup), []
     for one, other in dict.fromkeys((min(pair), max(pair)) for pair in pairs):
         ways = [(one, other, text) for text in pairs.get((one, other), ())]
         ways += [(other, one, text) for text in pairs.get((other, one), ())]
         for k, (producer, consumer, text) in enumerate(ways):
             offset = APART * (k - 0.5 * (len(ways) - 1))
-            found.append(Arrow(*_beside(at[producer], at[consumer], offset if producer == one else -offset), text))
+            result.append(Arrow(*_beside(at[producer], at[consumer], offset if producer == one else -offset), text))
     for entry, (x, y) in _listening(setup).items():
         steers = entry.name == MAVLINK
         left, taken = x - ASIDE * steers, TAKEN.get(entry.name, "every topic")
-        found.append(Arrow((left, TOP), (left, y + LOW), taken, GREY))
+        result.append(Arrow((left, TOP), (left, y + LOW), taken, GREY))
         if steers:
-            found.append(Arrow((x + ASIDE, y + LOW), (x + ASIDE, TOP), "commands", GREY))
-            found.append(Arrow((x, y - LOW), (x, LAST + LOW), LINK, GREY, both_ways=True))
-    return found
+            result.append(Arrow((x + ASIDE, y + LOW), (x + ASIDE, TOP), "commands", GREY))
+            result.append(Arrow((x, y - LOW), (x, LAST + LOW), LINK, GREY, both_ways=True))
+    return result
 
 
 def draw(setup: RunConfig, path: Path) -> None:
@@ -104,7 +104,7 @@ def _listening(setup: RunConfig) -> dict[ProcessEntry, Point]:
 
 
 def _beside(start: Point, end: Point, offset: float) -> tuple[Point, Point]:
-    """The line from the edge of one service to that of another, so far to the left of that between their middles."""
+    """Return the line between the edges of two services, offset to the left of the line between their centres."""
     dx, dy = end[0] - start[0], end[1] - start[1]
     length = math.hypot(dx, dy)
     x, y = -dy / length * offset, dx / length * offset
@@ -119,7 +119,7 @@ def _edge(middle: Point, at: Point, way: Point) -> Point:
 
 
 def _arrow(axes: Axes, arrow: Arrow) -> None:
-    """An arrow with its text, along it in the lock step."""
+    """Draw an arrow with its text, along it in the lock step."""
     looks = {"arrowstyle": "<|-|>" if arrow.both_ways else "-|>", "color": arrow.colour, "lw": 1.4}
     axes.annotate("", arrow.end, arrow.start, arrowprops={**looks, "shrinkA": 0, "shrinkB": 0})
     (x0, y0), (x1, y1) = arrow.start, arrow.end

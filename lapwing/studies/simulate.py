@@ -1,6 +1,6 @@
 """Flies a scene in this process, in memory and compiled, as fast as it goes."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from typing import TypeVar
 
 import numpy as np
@@ -10,53 +10,66 @@ from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import Topic, of_all
-from lapwing.services.common.operator_inbox import Operator, nobody
+from lapwing.services.common.operator_inbox import Operator, no_operator
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import resolve
 from lapwing.studies.flight_data import FlightData
 
 F = TypeVar("F", bound=FlightData)
 
-PAGE = 64  # ticks of ports that nobody asks for; the commander looks back less
+LOOK = 250  # [ticks] between two calls of an observer
+PAGE = 64  # [ticks] of ports without requested history; the commander looks back less
 
 
 def fly(
     run: RunConfig | Scene,
     only: Collection[Topic] | None = None,
-    operator: Operator = nobody,
+    operator: Operator = no_operator,
     kind: type[F] = FlightData,  # type: ignore[assignment]
     rows: dict[str, np.ndarray] | None = None,
+    observe: Callable[[int], None] | None = None,
 ) -> F:
     """Fly to the end, or until a state is not sound: its outcome is then "diverged".
 
     Args:
         run: what to fly.
         only: the topics wanted, None for all that are recorded; the fewer, the less memory and time.
-        operator: gives the commands that have come until a tick.
+        operator: returns the commands received until a tick.
         kind: the class of the flight, where more is to be had of it.
         rows: memory of the flight, for many that are looked at one after the other: the next one writes over it.
+        observe: called with the tick that is reached: when everything is compiled, and then every LOOK ticks.
     """
-    return kind.of(*_flown(run, only, operator, rows))
+    return kind.of(*_flown(run, only, operator, rows, observe))
 
 
 def fly_each(
     setup: RunConfig, only: Collection[Topic] | None = None, rows: dict[str, np.ndarray] | None = None
 ) -> list[FlightData]:
-    """The flights of all vehicles of a run, one or several; arguments as of `fly`."""
-    return FlightData.of_each(*_flown(setup, only, nobody, rows))
+    """Return the flights of all vehicles of a run. See `fly` for arguments."""
+    return FlightData.of_each(*_flown(setup, only, no_operator, rows))
 
 
 def _flown(
-    run: RunConfig | Scene, only: Collection[Topic] | None, operator: Operator, rows: dict[str, np.ndarray] | None
+    run: RunConfig | Scene,
+    only: Collection[Topic] | None,
+    operator: Operator,
+    rows: dict[str, np.ndarray] | None,
+    observe: Callable[[int], None] | None = None,
 ) -> tuple[BlockDiagram, Collection[Topic] | None, str, bool]:
-    """(the graph at its end, only, why that was before its time, whether a state is not sound)."""
+    """Return (block diagram at the end, `only`, reason of an early end, True for a non-finite state)."""
     setup = run if isinstance(run, RunConfig) else resolve(run)
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
     wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else of_all(wire.topic) in only)}
     graph, failure, diverged = BlockDiagram(setup, services, PAGE, wanted, rows), "", False
     try:
-        graph.advance(setup.last_tick + 1)
+        look = setup.last_tick + 1 if observe is None else LOOK
+        while graph.tick <= setup.last_tick and not graph.ended:
+            if observe is not None:
+                observe(graph.tick)
+            graph.advance(min(graph.tick + look, setup.last_tick + 1))
     except LockStepError as error:
         failure, diverged = str(error), isinstance(error, DivergedError)
+    finally:
+        graph.close()
     return graph, only, failure, diverged

@@ -59,7 +59,7 @@ def pushes(t: np.ndarray, tension: np.ndarray) -> list[Push]:
     rows = np.flatnonzero(tension < 0.0)
     if not len(rows):
         return []
-    found = []
+    result = []
     apart = (np.diff(rows) > 1) & (np.diff(t[rows]) > GAP)
     for piece in np.split(rows, np.flatnonzero(apart) + 1):
         first, last = piece[0], piece[-1]
@@ -67,5 +67,5 @@ def pushes(t: np.ndarray, tension: np.ndarray) -> list[Push]:
         if first > 0:
             before, after = tension[first - 1], tension[first]
             start -= float((t[first] - t[first - 1]) * after / (after - before))
-        found.append(Push(start, float(t[last]), float(-tension[piece].min())))
-    return found
+        result.append(Push(start, float(t[last]), float(-tension[piece].min())))
+    return result

@@ -4,9 +4,9 @@ from rich.console import Console
 
 
 def console(width: int | None = None) -> Console:
-    """A terminal that takes text as it is: in rich's own markup "[min]" is a style, and would be swallowed.
+    """Return a terminal without rich's markup, in which "[min]" would be a style.
 
     Args:
-        width: in letters; None: the terminal's, 80 where there is none.
+        width: in letters; None: the terminal's, 80 without one.
     """
     return Console(width=width, markup=False, highlight=False)

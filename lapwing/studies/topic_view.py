@@ -23,7 +23,7 @@ class TopicView:
         self._texts: dict[str, np.ndarray] = {}  # read once: each is made text by text
 
     def payloads(self) -> Iterator[tuple[int, bytes]]:
-        """Time [ns] and CDR of each message; of columns that were made from messages only."""
+        """Yield time [ns] and CDR of each message, for columns made from messages."""
         return zip(self._times_ns.tolist(), self._columns.payloads(), strict=True)  # type: ignore[attr-defined]
 
     @cached_property
@@ -64,18 +64,18 @@ class TopicView:
         return list(self._columns)
 
     def flat(self) -> dict[str, np.ndarray]:
-        """Every number and text as a column (n,): "pose.position.x", "rotor_speed.0", "phase"."""
-        found: dict[str, np.ndarray] = {}
+        """Return every number and text as a column (n,): "pose.position.x", "rotor_speed.0", "phase"."""
+        result: dict[str, np.ndarray] = {}
         for name in self._columns:
             column = self[name]
             if column.ndim == 1:
-                found[name] = column
+                result[name] = column
             elif f"{name}.0" not in self._columns and not any(n.startswith(f"{name}.") for n in self._columns):
-                found |= {f"{name}.{k}": column[:, k] for k in range(column.shape[1])}
-        return found
+                result |= {f"{name}.{k}": column[:, k] for k in range(column.shape[1])}
+        return result
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """A field by its dotted name; of str, or of tuples of str, as objects.
+        """Return a field by its dotted name; str, or tuples of str, as objects.
 
         Raises:
             KeyError: there is no such field, or not in every message.
@@ -86,12 +86,12 @@ class TopicView:
         if isinstance(column, np.ndarray):
             return column
         if any(isinstance(value, tuple) for value in column):
-            found = np.empty(len(column), object)
-            found[:] = column
+            result = np.empty(len(column), object)
+            result[:] = column
         else:
-            found = np.array(column)
-        self._texts[name] = found
-        return found
+            result = np.array(column)
+        self._texts[name] = result
+        return result
 
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):

@@ -14,26 +14,26 @@ DEGREE = np.pi / 180.0  # [rad]
 
 
 def shown(axis: str) -> tuple[str, float]:
-    """The unit in which people are shown an axis, and how many of it are 1 m or 1 rad: angles in degrees."""
+    """Return the display unit of an axis, and its factor from m or rad: angles in degrees."""
     return ("°", 1.0 / DEGREE) if AXES[axis] == "rad" else ("m", 1.0)
 
 
 def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
-    """Roll, pitch, yaw [rad] of unit quaternions of shape (n, 4), shape (n, 3); yaw without jumps."""
-    found, cosines = np.empty((3, len(xyzw))), np.empty((2, len(xyzw)))
-    _sines(found, cosines, plain(np.transpose(xyzw)))
-    roll, pitch, yaw = found
+    """Return roll, pitch, yaw [rad], shape (n, 3), of unit quaternions (n, 4); yaw without jumps."""
+    result, cosines = np.empty((3, len(xyzw))), np.empty((2, len(xyzw)))
+    _sines(result, cosines, plain(np.transpose(xyzw)))
+    roll, pitch, yaw = result
     np.arctan2(roll, cosines[0], out=roll)  # numpy takes vectors of angles at once, compiled code takes one
     np.arcsin(pitch, out=pitch)
     np.arctan2(yaw, cosines[1], out=yaw)
     if not (np.abs(np.diff(yaw)) < np.pi).all():
         yaw[:] = np.unwrap(yaw)
-    return found.T
+    return result.T
 
 
 @kernel
 def _sines(found: Any, cosines: Any, xyzw: Any) -> None:
-    """Sines of roll, pitch, yaw (3, n) and cosines of roll and yaw (2, n), up to a factor, of quaternions (4, n)."""
+    """Compute sines of roll, pitch, yaw (3, n), cosines of roll, yaw (2, n), up to a factor, of quaternions (4, n)."""
     for k in range(xyzw.shape[1]):
         x, y, z, w = xyzw[0, k], xyzw[1, k], xyzw[2, k], xyzw[3, k]
         found[0, k], cosines[0, k] = 2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)
@@ -43,7 +43,7 @@ def _sines(found: Any, cosines: Any, xyzw: Any) -> None:
 
 
 def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> np.ndarray:
-    """Reference minus truth of each axis [m], [rad], shape (k, 6), of the k rows with the motors armed.
+    """Return the reference minus truth of each axis [m], [rad], shape (k, 6), of the k rows with the motors armed.
 
     Args:
         reference: x, y, z [m], roll, pitch, yaw [rad], shape (n, 6).
@@ -51,9 +51,9 @@ def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, ar
         attitude: roll, pitch, yaw [rad], shape (n, 3).
         armed: shape (n,) of bool.
     """
-    found = np.empty((np.count_nonzero(armed), len(AXES)))
-    _errors(found, plain(reference), plain(position), plain(attitude), plain(armed, bool))
-    return found
+    result = np.empty((np.count_nonzero(armed), len(AXES)))
+    _errors(result, plain(reference), plain(position), plain(attitude), plain(armed, bool))
+    return result
 
 
 def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
@@ -64,18 +64,18 @@ def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
 def strided(values: np.ndarray) -> np.ndarray:
     """Return a read-only view with gaps between rows, as rows of ports have them, so that one
     compiled version serves all; a copy where they lie otherwise."""
-    found = np.asarray(values, float)
-    if found.flags.contiguous or not found.flags.aligned:
-        found = np.empty((*found.shape, 2))[..., 0]
-        found[...] = values
-    found = found.view()
-    found.flags.writeable = False
-    return found
+    result = np.asarray(values, float)
+    if result.flags.contiguous or not result.flags.aligned:
+        result = np.empty((*result.shape, 2))[..., 0]
+        result[...] = values
+    result = result.view()
+    result.flags.writeable = False
+    return result
 
 
 @always_inline
 def _turn(wanted: float, flown: float) -> float:
-    """The shortest way from one angle to another [rad]."""
+    """Return the shortest rotation from one angle to another [rad]."""
     turn = wanted - flown
     return turn if abs(turn) <= 0.5 * TURN else turn - TURN * np.rint(turn / TURN)
 
@@ -100,11 +100,10 @@ class Reference(NamedTuple):
 
 
 def rmse(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> dict[str, float]:
-    """Root-mean-square error of each axis [m], [rad] while the motors are armed, NaN where they never were; other
-    arguments as of `errors`."""
+    """Return the root-mean-square error of each axis [m], [rad] while armed, or NaN. See `errors` for arguments."""
     wanted = Reference(*(strided(values) for values in reference))
-    found = _mean_squares(*wanted, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
-    return dict(zip(AXES, map(math.sqrt, found), strict=True))
+    result = _mean_squares(*wanted, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
+    return dict(zip(AXES, map(math.sqrt, result), strict=True))
 
 
 @kernel
@@ -155,7 +154,7 @@ Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown
 
 @always_inline
 def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
-    """Extremes with another x."""
+    """Return the extremes extended by another x."""
     return (
         _greater(known[0], flown), _greater(known[1], -flown), _greater(known[2], wanted), _greater(known[3], -wanted),
     )  # fmt: skip
@@ -169,19 +168,19 @@ def _beyond(known: Extremes) -> float:
 
 @always_inline
 def _greater(a: float, b: float) -> float:
-    """The greater number, of two that are numbers."""
+    """Return the greater of two numbers."""
     return a if a > b else b
 
 
 def total(values: np.ndarray) -> float:
-    """The sum of all numbers (n, k)."""
+    """Return the sum of all numbers (n, k)."""
     return _total(strided(values))
 
 
 @kernel
 def _total(values: Any) -> float:
-    found = 0.0
+    result = 0.0
     for row in range(values.shape[0]):
         for k in range(values.shape[1]):
-            found += values[row, k]
-    return found
+            result += values[row, k]
+    return result

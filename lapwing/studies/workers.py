@@ -18,10 +18,10 @@ SILENT = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 @contextmanager
 def workers(number: int) -> Iterator[ProcessPoolExecutor]:
-    """A pool of processes that end with the block, at once where it ends with an error, and with this process.
+    """Yield a pool of processes that end with the block, at once on an error, and with this process.
 
     Raises:
-        ValueError: they cannot talk to one another here.
+        ValueError: inter-process communication is not available.
     """
     # spawned: a fork of a process with threads may hang, and would hold the other end of the pipe
     context = multiprocessing.get_context("spawn")
@@ -30,7 +30,7 @@ def workers(number: int) -> Iterator[ProcessPoolExecutor]:
         try:
             yield pool
         except BaseException:
-            ours.close()  # nobody waits for what is being worked on
+            ours.close()  # unfinished work is not needed
             raise
         finally:
             pool.shutdown(cancel_futures=True)

@@ -39,13 +39,13 @@ def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):
 
 def differences(a, b, topics):
     """Topic and field of every column that is not the same to the bit in two flights."""
-    found = []
+    result = []
     for topic in topics:
         one, other = a.topic(topic), b.topic(topic)
-        found += [(topic, "times")] if not np.array_equal(one.times, other.times) else []
-        found += [(topic, field) for field in set(one.fields) ^ set(other.fields)]
-        found += [(topic, f) for f in one.fields if f in other.fields and _bits(one[f]) != _bits(other[f])]
-    return found
+        result += [(topic, "times")] if not np.array_equal(one.times, other.times) else []
+        result += [(topic, field) for field in set(one.fields) ^ set(other.fields)]
+        result += [(topic, f) for f in one.fields if f in other.fields and _bits(one[f]) != _bits(other[f])]
+    return result
 
 
 def _bits(column):

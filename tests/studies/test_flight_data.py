@@ -41,7 +41,7 @@ def recorded(run, tmp_path_factory):
     return FlightData.read(path)
 
 
-def test_a_log_and_memory_say_the_same(recorded, in_memory):
+def test_log_and_memory_flight_are_equal(recorded, in_memory):
     assert set(in_memory.topics) == set(recorded.topics) - {"wall_time"}
     assert synthetic_flights.differences(in_memory, recorded, in_memory.topics) == []
     assert in_memory.digest == recorded.digest != ""
@@ -52,17 +52,17 @@ def test_a_log_and_memory_say_the_same(recorded, in_memory):
     assert recorded.metadata["setup"] == in_memory.metadata["setup"]
 
 
-def test_only_what_is_wanted_is_kept(run):
-    found = fly(run, (TRUTH, SETPOINT))
-    assert found.topics == ["ground_truth", "setpoint"]
+def test_only_requested_topics_are_kept(run):
+    result = fly(run, (TRUTH, SETPOINT))
+    assert result.topics == ["ground_truth", "setpoint"]
     with pytest.raises(ValueError, match="hover: has no topic status; it has ground_truth, setpoint"):
-        found.status  # noqa: B018
+        result.status  # noqa: B018
 
 
-def test_only_the_ports_that_are_asked_for_are_deep(run):
+def test_only_requested_ports_have_full_history(run):
     graph = BlockDiagram(run, create_all(run), 64, {"truth"})
     graph.advance(run.last_tick + 1)
-    deep, shallow = graph.all_rows("truth", 1), graph.rows("setpoint", np.arange(64))
+    deep, shallow = graph.history("truth", 1), graph.rows("setpoint", np.arange(64))
     assert len(deep) == TICKS + 1
     assert len(np.unique(deep[:, 2])) > 100  # the height at every tick, from the first on
     assert shallow.shape[0] == 64
@@ -70,17 +70,17 @@ def test_only_the_ports_that_are_asked_for_are_deep(run):
     assert graph.rows("setpoint", np.array([0])).tolist() == graph.rows("setpoint", np.array([128])).tolist()  # a ring
 
 
-def test_a_flight_goes_from_process_to_process(run):
-    found = fly(run, (TRUTH,))
-    again = pickle.loads(pickle.dumps(found))
-    assert np.array_equal(again.truth.position, found.truth.position)
-    assert again.energy == found.energy
+def test_flight_goes_from_process_to_process(run):
+    result = fly(run, (TRUTH,))
+    again = pickle.loads(pickle.dumps(result))
+    assert np.array_equal(again.truth.position, result.truth.position)
+    assert again.energy == result.energy
 
 
-def test_a_failure_is_told():
-    found = fly(load("gyrostat_feedback", ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]))
-    assert "not finite" in found.failure
-    assert np.isfinite(found.truth.position).all()
+def test_failure_is_reported():
+    result = fly(load("gyrostat_feedback", ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]))
+    assert "not finite" in result.failure
+    assert np.isfinite(result.truth.position).all()
 
 
 def ended(**truth):
@@ -105,7 +105,7 @@ def test_landed_means_upright_slow_and_in_contact():
     assert ended(**{"ground_contact": False, "pose.position": stood}).landed
 
 
-def test_landed_needs_the_autopilots_word():
+def test_landed_needs_autopilots_word():
     truth = {"pose.position": (0.0, 0.0, 0.0), "pose.orientation": synthetic_flights.LEVEL, "velocity": (0.0, 0.0, 0.0),
              "ground_contact": True}  # fmt: skip
     assert not synthetic_flights.flight(10, ground_truth=truth).landed
@@ -113,6 +113,6 @@ def test_landed_needs_the_autopilots_word():
     assert not synthetic_flights.flight(10, ground_truth=truth, status={"finished": True, "landed": False}).landed
 
 
-def test_a_flight_lands(in_memory):
+def test_flight_lands(in_memory):
     assert not in_memory.landed  # two seconds are not enough
     assert fly(load(SCENE)).landed

@@ -65,7 +65,7 @@ def test_events_are_listed_in_order():
     ]
 
 
-def test_flight_without_an_autopilot_has_no_events():
+def test_flight_without_autopilot_has_no_events():
     assert synthetic_flights.moved([0.0, 1.0]).events == []
 
 

@@ -46,7 +46,7 @@ def test_dataframe_without_pandas(in_memory, monkeypatch):
         in_memory.to_dataframe()
 
 
-def test_dataframe_has_a_column_for_every_number(in_memory):
+def test_dataframe_has_column_for_every_number(in_memory):
     pytest.importorskip("pandas")
     frame = in_memory.to_dataframe("ground_truth")
     assert len(frame) == TICKS + 1

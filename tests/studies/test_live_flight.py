@@ -21,17 +21,17 @@ def steps():
     """Return the first seconds of a mission whose services hand over at different times."""
     setup = resolve(load("hover", {"run.duration": 4.0}))
     graph = BlockDiagram(setup, create_all(setup), PAGE)
-    live, found, held = LiveFlight(setup), [], []
+    live, result, held = LiveFlight(setup), [], []
     while not graph.ended:
         before = graph.tick
         graph.advance(min(graph.tick + 30, setup.last_tick + 1))
-        pages = list(graph.pages(before, graph.tick))
+        pages = list(graph.record_batches(before, graph.tick))
         live.take(held + [page for page in pages if page.topic.name.endswith("ground_truth")])
         held = [page for page in pages if not page.topic.name.endswith("ground_truth")]  # come later
         if (step := live.step((before - 1) * setup.interval_ns)) is not None:
-            found.append(step)
+            result.append(step)
     live.take(held)
-    return [*found, live.step(setup.last_tick * setup.interval_ns)]
+    return [*result, live.step(setup.last_tick * setup.interval_ns)]
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def whole():
     return lapwing.fly("hover", {"run.duration": 4.0})
 
 
-def test_the_steps_are_the_flight_each_begun_with_the_last_message_before(steps, whole):
+def test_steps_are_flight_each_begun_with_last_message_before(steps, whole):
     assert len(steps) > 10
     for one, other in itertools.pairwise(steps):
         assert one.times("ground_truth")[-1] == other.times("ground_truth")[0]
@@ -49,10 +49,10 @@ def test_the_steps_are_the_flight_each_begun_with_the_last_message_before(steps,
     assert np.array_equal(np.concatenate(rows), whole.reference)
 
 
-def test_events_are_told_once_and_as_they_are_afterwards(steps, whole):
-    told, after = [], -1.0
+def test_events_are_reported_once(steps, whole):
+    reported, after = [], -1.0
     for step in steps:
-        told += new_events(step, after)
+        reported += new_events(step, after)
         after = float(step.truth.times[-1])
-    assert told == [event for event in whole.events if not KINDS[event.kind].afterwards]
-    assert {event.kind for event in told} >= {"arming", "mode", "phase", "contact"}
+    assert reported == [event for event in whole.events if not KINDS[event.kind].afterwards]
+    assert {event.kind for event in reported} >= {"arming", "mode", "phase", "contact"}

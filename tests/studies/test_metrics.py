@@ -54,20 +54,20 @@ def test_errors_of_known_offsets():
     assert set(f) == set(METRICS)
 
 
-def test_share_of_the_time_within_three_sigma():
+def test_share_of_time_within_three_sigma():
     ramp = np.zeros((N, 3))
     ramp[:, 1] = np.linspace(0.0, 0.6, N)  # three sigma are reached half-way
     f = metrics(flown(estimate={"pose.position": ramp}))
     assert [f[f"within_3sigma.{axis}"] for axis in "xyz"] == pytest.approx([1.0, 0.5, 1.0])
 
 
-def test_only_the_armed_part_counts():
+def test_only_armed_part_counts():
     armed = np.arange(N) < 10
     off = np.where(armed, 0.0, 5.0)[:, None] * np.ones(3)
     assert metrics(flown(truth={"pose.position": off}, armed=armed))["max_distance"] == 0.0
 
 
-def test_a_touch_down_has_its_place_speed_and_tilt():
+def test_touch_down_has_its_place_speed_and_tilt():
     touch, half = np.arange(N) > 300, np.sin(0.1)
     falling = np.where(touch, 0.0, -3.0)[:, None] * np.array([0.0, 0.0, 1.0])
     moving = np.arange(N)[:, None] * np.array([0.01, -0.02, 0.0])
@@ -78,13 +78,13 @@ def test_a_touch_down_has_its_place_speed_and_tilt():
     assert hit["touchdown.tilt"] == pytest.approx(0.2)
 
 
-def test_saturation_is_a_share_of_the_time_in_the_air():
+def test_saturation_is_share_of_time_in_air():
     voltage = np.where(np.arange(N) < 100, 40.0, 20.0)[:, None]
     f = metrics(flown(truth={"motor_voltage": voltage}))
     assert f["saturation"] == pytest.approx(0.25, abs=0.01)
 
 
-def test_metrics_report_the_outcome():
+def test_metrics_report_outcome():
     assert metrics(flown("not finite at t = 1 s", diverged=True))["outcome"] == "diverged"
     assert metrics(flown(finished=False))["outcome"] == "completed"
 
@@ -109,7 +109,7 @@ def test_expressions_over_figures(text, true):
     "text",
     ["", "rmse.x <", "x = 3", "__import__('os')", "rmse.x.__class__()", "[x for x in y]", "(1).real", "f'{x}'"],
 )
-def test_nothing_else_is_an_expression(text):
+def test_invalid_expressions_are_rejected(text):
     with pytest.raises(SceneError, match=r"success.require.0: expected an expression"):
         load("hover", {"success.require": [text]})
 
@@ -135,7 +135,7 @@ def test_success_arithmetic_takes_numbers_only():
     assert holds("2 * time - 1 == 3", {"time": 2.0})
 
 
-def test_default_success_requires_a_completed_mission():
+def test_default_success_requires_completed_mission():
     success = load("hover")[Success]
     assert [success.unmet({"outcome": v}) != [] for v in KINDS] == [k > 1 for k in range(len(KINDS))]
     with pytest.raises(SceneError, match=r"success.require.0: unknown figure 'rmse.zz'; did you mean rmse.z\?"):
@@ -146,33 +146,33 @@ def test_default_success_requires_a_completed_mission():
 def made():
     """Reference, position, attitude and what is armed of 300 times, all over the place."""
     random = np.random.default_rng(7)
-    wanted, flown, armed = random.normal(size=(300, 6)), random.normal(size=(300, 6)), random.random(300) > 0.4
-    return Reference(wanted[:, :3], 4.0 * wanted[:, 3:5], 4.0 * wanted[:, 5]), flown[:, :3], flown[:, 3:], armed
+    expected, flown, armed = random.normal(size=(300, 6)), random.normal(size=(300, 6)), random.random(300) > 0.4
+    return Reference(expected[:, :3], 4.0 * expected[:, 3:5], 4.0 * expected[:, 5]), flown[:, :3], flown[:, 3:], armed
 
 
-def test_one_pass_over_the_rows_finds_what_numpy_finds(made):
+def test_single_pass_statistics_equal_numpy(made):
     (position, roll_pitch, yaw), flown, attitude, armed = made
     errors = np.column_stack([position - flown, np.angle(np.exp(1j * (np.column_stack([roll_pitch, yaw]) - attitude)))])
     expected = np.sqrt((errors[armed] ** 2).mean(axis=0))
     assert list(rmse(*made).values()) == pytest.approx(expected, rel=1e-12)
     distance, farthest = reach(position, flown, armed)
-    wanted, flown = position[armed], flown[armed]
-    beyond = np.concatenate([flown.max(axis=0) - wanted.max(axis=0), wanted.min(axis=0) - flown.min(axis=0)])
-    assert distance == pytest.approx(np.linalg.norm(wanted - flown, axis=1).max(), rel=1e-12)
+    required, flown = position[armed], flown[armed]
+    beyond = np.concatenate([flown.max(axis=0) - required.max(axis=0), required.min(axis=0) - flown.min(axis=0)])
+    assert distance == pytest.approx(np.linalg.norm(required - flown, axis=1).max(), rel=1e-12)
     assert farthest == beyond.max()
 
 
-def test_what_is_no_number_stays_none(made):
+def test_missing_number_stays_none(made):
     _, flown, _, armed = made
     assert np.isnan(list(rmse(*made[:3], np.zeros(300, bool)).values())).all()
     flown[np.flatnonzero(armed)[7], 1] = np.nan
-    found = rmse(*made)
-    assert np.isnan([*reach(made[0].position, flown, armed), found["y"]]).all()
-    assert np.isfinite([found[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
+    result = rmse(*made)
+    assert np.isnan([*reach(made[0].position, flown, armed), result["y"]]).all()
+    assert np.isfinite([result[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
 
 
 @pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
-def test_the_layout_of_the_numbers_is_no_matter(made, laid):
+def test_layout_of_numbers_is_no_matter(made, laid):
     values = laid(made[1])
     assert np.array_equal(strided(values), values)
     assert total(values) == pytest.approx(values.sum(), rel=1e-12)
@@ -181,19 +181,19 @@ def test_the_layout_of_the_numbers_is_no_matter(made, laid):
 
 
 @pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray])
-def test_roll_pitch_yaw_make_the_rotation_again(laid):
+def test_roll_pitch_yaw_make_rotation_again(laid):
     angles = np.random.default_rng(3).uniform((-3.0, -1.5, -3.0), (3.0, 1.5, 3.0), (50, 3))
     roll, pitch, yaw = np.cos(angles.T / 2) + 1j * np.sin(angles.T / 2)
     w = roll.real * pitch.real * yaw.real + roll.imag * pitch.imag * yaw.imag
     x = roll.imag * pitch.real * yaw.real - roll.real * pitch.imag * yaw.imag
     y = roll.real * pitch.imag * yaw.real + roll.imag * pitch.real * yaw.imag
     z = roll.real * pitch.real * yaw.imag - roll.imag * pitch.imag * yaw.real
-    found = roll_pitch_yaw(laid(np.column_stack([x, y, z, w])))
-    assert np.allclose(np.exp(1j * found), np.exp(1j * angles), rtol=0.0, atol=1e-12)
-    assert (np.abs(np.diff(found[:, 2])) <= np.pi).all()
+    result = roll_pitch_yaw(laid(np.column_stack([x, y, z, w])))
+    assert np.allclose(np.exp(1j * result), np.exp(1j * angles), rtol=0.0, atol=1e-12)
+    assert (np.abs(np.diff(result[:, 2])) <= np.pi).all()
 
 
-def test_an_attitude_that_is_no_number_has_no_angles_and_one_beyond_rounding_a_right_one():
+def test_angles_of_non_finite_and_rounded_attitudes():
     assert np.isnan(roll_pitch_yaw(np.full((2, 4), np.nan))).all()
     half = np.sqrt(0.5) * (1.0 + 1e-15)
     assert roll_pitch_yaw(np.array([[0.0, half, 0.0, half], [0.0, -half, 0.0, half]]))[:, 1] == pytest.approx(

@@ -1,10 +1,12 @@
-"""Validity warnings of computed descents and of a path beyond a terrain grid."""
+"""Validity warnings of computed descents, of motor currents and of a path beyond a terrain grid."""
 
 import math
 
 import numpy as np
+import pytest
 import synthetic_flights
 
+import lapwing
 from lapwing.studies.model_validity import in_vortex_ring
 
 SCENE = {"airframe": {"propeller": {"diameter": 0.5}, "motor": {"max_voltage": 40.0}}}
@@ -20,6 +22,7 @@ def flown(velocity, turned=synthetic_flights.LEVEL, scene=SCENE, wind=(0.0, 0.0,
         "air_density": 1.2,
         "rotor_thrust": (10.0,) * 4,
         "motor_voltage": (20.0,) * 4,
+        "rotor_speed": (150.0,) * 4,
         "ground_contact": False,
     }
     return synthetic_flights.flight(
@@ -37,7 +40,7 @@ def test_vortex_ring_limits_in_induced_velocities():
     assert ring(0.9 * HOVER, 0.0, -HOVER)
 
 
-def test_vortex_ring_depends_on_air_along_the_rotor_axis():
+def test_vortex_ring_depends_on_air_along_rotor_axis():
     assert ring(0.0, 0.0, 0.0, wind=(0.0, 0.0, HOVER))
     quarter = math.sqrt(0.5)
     assert ring(-HOVER, 0.0, 0.0, turned=(0.0, quarter, 0.0, quarter))  # nose down: body z is world x
@@ -59,7 +62,7 @@ def test_short_vortex_ring_is_not_reported():
     assert not [event for event in flown(down).events if event.kind == "warning"]
 
 
-def test_flight_beyond_the_terrain_grid_is_reported():
+def test_flight_beyond_terrain_grid_is_reported():
     grid = {"heights": [[0.0, 1.0, 2.0], [0.0, 1.0, 2.0]], "corner": [-1.0, -2.0], "spacing": 2.0}
     x = np.linspace(0.0, 4.0, 400)
     walk = np.column_stack([x, 0 * x - 1.0, 0 * x + 9.0])
@@ -67,3 +70,24 @@ def test_flight_beyond_the_terrain_grid_is_reported():
     (warning,) = [e for e in flown((1.0, 0.0, 0.0), scene=scene, position=walk).events if e.kind == "warning"]
     assert round(warning.time, 1) == 3.0
     assert "beyond the edge of the terrain grid for 1.0 s" in warning.text
+
+
+MOTOR = {"max_voltage": 40.0, "speed_constant": 150.0, "gear_ratio": 2 / 3, "resistance": 0.085, "peak_current": 26.5}
+
+
+@pytest.mark.parametrize(("peak", "effects", "count"), [(66.0, {}, 1), (67.0, {}, 0), (66.0, {"dc_motor": {}}, 0)])
+def test_unlimited_motor_current_is_reported(peak, effects, count):
+    """(20 V - 150 rad/s K) / 0.085 ohm with K = 60 / (2 pi 150 rpm/V 2/3) is 66.8 A."""
+    scene = {"airframe": {"motor": {**MOTOR, "peak_current": peak}}, "effects": effects}
+    warnings = [event for event in flown((0.0, 0.0, 0.0), scene=scene).events if event.kind == "warning"]
+    assert len(warnings) == count
+    text = "motor currents are not limited: up to 66.8 A where 66 A is the peak, for 4.0 s"
+    assert all(warning.text.startswith(text) for warning in warnings)
+
+
+def test_run_of_papers_mission_names_unlimited_current():
+    """Mission of the paper as flown: 311 A, as found by hand from voltages and speeds."""
+    flight = lapwing.fly("delivery_paper")
+    (warning,) = [event for event in flight.events if event.kind == "warning"]
+    assert "up to 311 A where 26.5 A is the peak" in warning.text
+    assert warning.text.endswith("name effects.dc_motor to limit them")

@@ -43,7 +43,7 @@ def test_landing_reports_time_speed_place_and_target_distance():
     )
 
 
-def test_landing_far_from_the_target_is_landed_elsewhere():
+def test_landing_far_from_target_is_landed_elsewhere():
     outcome = fly(Mission((13.0, 7.0, 0.0)))
     assert (outcome.kind, outcome.target_distance) == ("landed elsewhere", pytest.approx(13.0))
     assert "13.0 m from the target" in str(outcome)
@@ -57,25 +57,25 @@ def test_failsafe_landing_names_reason_time_and_distance(finished):
     assert str(outcome).startswith("Ended in failsafe at 4.00 s: GPS lost at 2.00 s, upright on its feet")
 
 
-def test_failsafe_that_ended_in_the_air_does_not_count():
+def test_failsafe_that_ended_in_air_does_not_count():
     passed = {"failsafe": (T > 2.0) & (T < 3.0), "text": np.where((T > 2.0) & (T < 3.0), "GPS lost", "")}
     assert fly(status=passed).kind == "landed"
 
 
-def test_failsafe_in_the_air_at_the_end_times_out():
+def test_failsafe_in_air_at_end_times_out():
     flying = {"landed": T < 1.0, "armed": T >= 1.0}
     outcome = fly(finished=False, status=flying | failsafe(2.0), ground_contact=T < 1.0)
     assert (outcome.kind, outcome.failsafe) == ("timed out", "GPS lost")
 
 
-def test_turning_over_is_a_crash_despite_a_reported_landing():
+def test_turning_over_is_crash_despite_reported_landing():
     outcome = fly(**{"pose.orientation": np.where((T > 3.0)[:, None], ON_ITS_BACK, synthetic_flights.LEVEL)})
     assert (outcome.kind, outcome.time) == ("crashed", pytest.approx(3.01))
     assert outcome.how == "turned over"
     assert outcome.tilt == pytest.approx(np.pi)
 
 
-def test_hard_touch_is_a_crash_and_lists_later_accidents():
+def test_hard_touch_is_crash_and_lists_later_accidents():
     turned = np.where((T > 4.2)[:, None], ON_ITS_BACK, synthetic_flights.LEVEL)
     contact = (T < 1.0) | (T >= 4.0)
     fast = np.where(contact, 0.0, -5.3)[:, None] * UP
@@ -92,13 +92,13 @@ def test_hard_touch_is_a_crash_and_lists_later_accidents():
         ({"ground_contact": T < 1.0, "pose.position": np.outer(T, UP)}, "not on the ground"),
     ],
 )
-def test_finished_mission_without_rest_on_its_feet_is_a_crash(changed, message):
+def test_finished_mission_without_rest_on_its_feet_is_crash(changed, message):
     outcome = fly(**changed)
     assert outcome.kind == "crashed"
     assert message in outcome.how
 
 
-def test_touch_time_is_the_first_contact_of_a_bounce():
+def test_touch_time_is_first_contact_of_bounce():
     bouncing = (T < 1.0) | ((T >= 3.9) & (T < 3.92)) | (T >= 4.0)
     assert fly(ground_contact=bouncing).time == 3.9
 
@@ -112,11 +112,11 @@ def test_unfinished_mission_times_out_with_its_mode():
 
 
 @pytest.mark.parametrize("mission", [None, Mission(None, final_phase="land"), Mission(None, is_longer=True)])
-def test_flight_without_a_landing_to_make_is_completed(mission):
+def test_flight_without_landing_to_make_is_completed(mission):
     assert fly(mission, finished=False).kind == "completed"
 
 
-def test_disarming_in_hold_under_an_operator_is_a_landing():
+def test_disarming_in_hold_under_operator_is_landing():
     assert fly(finished=False, status={"mode": "hold"}).kind == "landed"
 
 
@@ -125,12 +125,12 @@ def test_divergence_and_abort_report_their_reason():
     assert str(fly(failure="ended by SIGINT", finished=False)) == "Aborted at 4.99 s: ended by SIGINT"
 
 
-def test_flight_without_an_autopilot_is_completed():
+def test_flight_without_autopilot_is_completed():
     flight = synthetic_flights.moved([0.0, 1.0, 2.0])
     assert (flight.outcome.kind, flight.landed) == ("completed", False)
 
 
-def test_mission_target_is_the_end_of_the_trajectory():
+def test_mission_target_is_end_of_trajectory():
     flight = lapwing.fly("hover", {"run.duration": 1.0})
     assert flight.mission.is_longer
     assert flight.outcome.kind == "completed"

@@ -1,7 +1,11 @@
 """The performance card: figures of the models beside the published ones."""
 
+import json
 import math
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -21,11 +25,11 @@ ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "lapwing/scenes/vehicles/delivery_drone.toml"
 
 
-def test_a_scene_and_its_vehicle_give_the_same_card():
+def test_scene_and_its_vehicle_give_same_card():
     assert card(VEHICLE) == card(ROOT / "lapwing/scenes/hover.toml")
 
 
-def test_units_of_the_card():
+def test_units_of_card():
     rows = {row.name: row for row in card(VEHICLE)}
     drone = load_airframe(VEHICLE)
     assert rows["hover time"].computed == pytest.approx(performance.hover_time(drone) / 60.0)
@@ -34,7 +38,7 @@ def test_units_of_the_card():
     assert rows["maximum tilt"].published == pytest.approx(58.9, abs=0.05)
 
 
-def test_where_nothing_is_chosen_the_models_come_near_the_paper():
+def test_default_models_come_near_paper():
     rows = {row.name: row for row in card(VEHICLE)}
     for name in ("hover time", "maximum payload", "maximum tilt"):
         assert rows[name].computed == pytest.approx(rows[name].published, rel=0.06), name
@@ -51,7 +55,7 @@ def test_json(tmp_path):
     assert '"hover time"' in (tmp_path / "card.json").read_text()
 
 
-def test_what_is_neither_scene_nor_vehicle_is_refused(tmp_path):
+def test_unknown_target_is_rejected(tmp_path):
     (tmp_path / "x.toml").write_text("[nonsense]\n")
     with pytest.raises(ValueError, match="nonsense"):
         card(tmp_path / "x.toml")
@@ -69,13 +73,13 @@ def airframe_without(tmp_path, *tables):
 
 def test_units_are_printed_within_80_columns(capsys):
     show(console(80), card(VEHICLE))
-    said = capsys.readouterr().out
-    assert "hover time [min]" in said
-    assert "maximum speed [m/s]" in said
-    assert max(map(len, said.splitlines())) <= 80
+    output = capsys.readouterr().out
+    assert "hover time [min]" in output
+    assert "maximum speed [m/s]" in output
+    assert max(map(len, output.splitlines())) <= 80
 
 
-def test_without_drag_or_battery_the_card_has_what_it_can(tmp_path, capsys):
+def test_card_without_drag_or_battery_is_partial(tmp_path, capsys):
     rows = {row.name: row for row in card(airframe_without(tmp_path, "drag", "battery", "published"))}
     whole = {row.name: row for row in card(VEHICLE)}
     for name in ("maximum payload", "ceiling", "maximum tilt"):
@@ -98,7 +102,7 @@ def scene_with_constants(tmp_path, vehicle):
 
 
 @pytest.mark.parametrize("tables", [("propeller",), ()], ids=["without a propeller", "with both"])
-def test_card_and_autopilot_go_by_the_rotors_that_are_in_force(tmp_path, tables):
+def test_card_and_autopilot_go_by_rotors_that_are_in_force(tmp_path, tables):
     scene = scene_with_constants(tmp_path, airframe_without(tmp_path, *tables))
     known = known_airframe(load(scene))
     assert known.motor.thrust_coefficient == 4.0e-4
@@ -115,14 +119,14 @@ def test_card_and_autopilot_go_by_the_rotors_that_are_in_force(tmp_path, tables)
     assert rows["ceiling"].reason == "[effects.rotor_quadratic] knows no density of the air"
 
 
-def test_an_airframe_of_which_nothing_says_what_its_rotors_give_is_refused_by_check(tmp_path):
+def test_airframe_without_rotor_model_is_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"no \[propeller\]; give a scene with \[effects.rotor_quadratic\]"):
         card(airframe_without(tmp_path, "propeller"))
     with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
         load("hover", {"vehicle.airframe": str(airframe_without(tmp_path, "propeller"))})
 
 
-def test_without_a_rotor_a_hexacopter_has_what_linear_programming_leaves_at_most():
+def test_hexacopter_without_rotor_equals_linear_programming():
     """All thrusts up to the highest, torques of roll, pitch and yaw 0: the autopilot's least squares come near it."""
     rows = {row.name: row for row in card(ROOT / "lapwing/scenes/vehicles/hexacopter.toml")}
     known = known_airframe(load("hexacopter"))
@@ -132,11 +136,28 @@ def test_without_a_rotor_a_hexacopter_has_what_linear_programming_leaves_at_most
         torques = B[1:] if any(share[3] for share in shares) else B[1:3]
         free = [(0.0, 0.0) if j == k else bound for j, bound in enumerate(bounds)]
         most.append(-linprog(-B[0], A_eq=torques, b_eq=np.zeros(len(torques)), bounds=free).fun / 6.0)
-    found = rows["the same without a rotor"].computed
-    assert 0.75 * min(most) * whole < found <= min(most) * whole * (1.0 + 1e-9)
-    assert found > 1.0  # it flies on
+    result = rows["the same without a rotor"].computed
+    assert 0.75 * min(most) * whole < result <= min(most) * whole * (1.0 + 1e-9)
+    assert result > 1.0  # it flies on
 
 
 def test_four_rotors_cannot_lose_one():
     row = next(row for row in card(VEHICLE) if row.name == "the same without a rotor")
     assert (row.computed, row.reason) == (None, "the 4 rotors cannot lose one")
+
+
+def test_command_prints_loads_and_margins_in_hover(tmp_path):
+    command = [sys.executable, "-m", "lapwing", "performance", "quad_x", "--json", str(tmp_path / "card.json")]
+    result = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"})
+    rows = {row["name"]: row for row in json.loads((tmp_path / "card.json").read_text())}
+    for name, unit in {
+        "hover power": "W",
+        "hover current": "A",
+        "hover throttle": "%",
+        "motor current in hover": "A",
+        "ESC margin in hover": "%",
+        "battery margin in hover": "%",
+    }.items():
+        assert f"{name} [{unit}]" in result.stdout
+        assert rows[name]["unit"] == unit
+    assert rows["hover power"]["computed"] == pytest.approx(223, abs=1)

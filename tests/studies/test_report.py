@@ -4,10 +4,12 @@ import base64
 import importlib
 import json
 import math
+import re
 import shutil
 import subprocess
 import sys
 from html.parser import HTMLParser
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -29,12 +31,13 @@ from lapwing.messages import (
     header,
 )
 from lapwing.studies.flight_data import AXES, FlightData
-from lapwing.studies.report import plotly_figure, plots, write
+from lapwing.studies.report import flight_header, paper, plotly_script, plotly_traces, plots, write
 from lapwing.studies.report.downsampling import thin
 from lapwing.studies.report.flight_header import MANY, differences
 from lapwing.studies.report.flight_phases import phases
 from lapwing.studies.report.overlay import overlay
-from lapwing.studies.report.plots import estimator, motors, position, propulsion
+from lapwing.studies.report.plot import Plot
+from lapwing.studies.report.plots import air, estimator, motors, position, propulsion
 from lapwing.studies.report.style import POINTS
 
 RATE, SECONDS = 50, 6.0
@@ -88,13 +91,13 @@ def messages(std=0.05, rotors=4, reference=True, east=0.0):
             ground_contact=t >= SECONDS,
         )
         yield "ground_truth", truth
-        asked = [value + offset for value, offset in zip(position + angles, OFFSET, strict=True)]
+        requested = [value + offset for value, offset in zip(position + angles, OFFSET, strict=True)]
         if reference:
             phase = "climb" if t < 3.0 else "hover"
-            yield "setpoint", Setpoint(stamp)._replace(position=Vector3(*asked[:3]), yaw=asked[5], phase=phase)
+            yield "setpoint", Setpoint(stamp)._replace(position=Vector3(*requested[:3]), yaw=requested[5], phase=phase)
             yield (
                 "actuators",
-                Actuators(stamp)._replace(armed=t >= 1.0, attitude_reference=Vector3(asked[3], asked[4], 0.0)),
+                Actuators(stamp)._replace(armed=t >= 1.0, attitude_reference=Vector3(requested[3], requested[4], 0.0)),
             )
         if tick % 5 == 0:
             estimated = pose._replace(position=Point(position[0] + ESTIMATE_ERROR, *position[1:]))
@@ -132,12 +135,12 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag, attrs):
         self.tags.append(tag)
-        found = dict(attrs)
+        result = dict(attrs)
         if tag == "section":
-            self.ids.append(found["id"])
+            self.ids.append(result["id"])
         self.addresses += [v for k, v in attrs if k in ("src", "href", "srcset", "data", "action")]
         if tag not in ("meta", "link", "input"):
-            self._open.append("json" if found.get("type") == "application/json" else tag)
+            self._open.append("json" if result.get("type") == "application/json" else tag)
 
     def handle_endtag(self, tag):
         assert self._open.pop() in (tag, "json")
@@ -164,25 +167,29 @@ def page(log):
 
 
 def values(array):
-    """The numbers of a typed array as plotly.js reads it."""
-    assert array["dtype"] == "f4"
-    return np.frombuffer(base64.b64decode(array["bdata"], validate=True), "<f4")
+    """The numbers of an array as page.js reads it."""
+    if isinstance(array, list):
+        return np.array(array, float)
+    if "bdata" in array:
+        return np.frombuffer(base64.b64decode(array["bdata"], validate=True), "<f4")
+    steps = np.frombuffer(base64.b64decode(array["steps"], validate=True), "<i2").astype(float)
+    return np.where(steps == -32768, np.nan, array["low"] + (steps + 32767) * array["step"])
 
 
-def test_every_plot_is_on_the_page_in_its_order(page):
+def test_every_plot_is_on_page_in_its_order(page):
     of_multirotors = [m for m in plots.modules() if "rigid_body" in getattr(m, "MODELS", ("rigid_body",))]
     names = [m.__name__.rpartition(".")[2] for m in of_multirotors if not getattr(m, "FLEET", False)]
-    assert page.ids == ["motion", *names]
-    assert list(page.plots) == ["motion", *names]
-    assert names[:2] == ["timeline", "position"]
+    assert names[:3] == ["mission_map", "timeline", "position"]
+    assert page.ids == [names[0], "space", *names[1:]]
+    assert list(page.plots) == [name for name in names if name != "battery"]
 
 
-def test_a_plot_carries_what_was_flown(log, page):
+def test_plot_contains_flight_data(log, page):
     x = page.plots["position"]["data"][0]
     flown = FlightData.read(log)
     assert x["name"] == "flown"
-    assert values(x["x"]) == pytest.approx(flown.truth.times)
-    assert values(x["y"]) == pytest.approx(flown.truth.position[:, 0], abs=1e-6)
+    assert values(x["x"]) == pytest.approx(flown.truth.times, abs=SECONDS / 65534)
+    assert values(x["y"]) == pytest.approx(flown.truth.position[:, 0], abs=2.0 / 65534)
 
 
 def test_axes_over_time_are_linked_and_say_their_unit(page):
@@ -203,24 +210,61 @@ def test_angles_are_in_degrees(page):
     assert values(error["y"]) == pytest.approx(math.degrees(OFFSET[3]), rel=1e-5)
 
 
-def test_the_path_turns_in_space(page):
-    trace = page.plots["path"]["data"][0]
-    assert trace["type"] == "scatter3d"
-    assert values(trace["z"])[-1] == pytest.approx(1.0 + 0.1 * SECONDS)
+def test_path_is_seen_from_above_and_from_two_sides(page):
+    above = page.plots["mission_map"]["data"][0]
+    south, _, east, _ = page.plots["path"]["data"]
+    assert [trace["type"] for trace in (above, south, east)] == ["scatter"] * 3
+    assert values(above["x"]) == pytest.approx(values(south["x"]))
+    assert values(above["y"]) == pytest.approx(values(east["x"]))
+    assert values(south["y"])[-1] == pytest.approx(1.0 + 0.1 * SECONDS)
 
 
-def test_the_timeline_says_who_did_what_when(page):
+def test_narrow_page_has_one_column_without_overlap(page):
+    for plot in page.plots.values():
+        places = sorted(plot["narrow"]["domains"].values(), reverse=True)
+        assert len(places) == sum(key.startswith("yaxis") for key in plot["layout"])
+        assert all(0.0 <= low < high <= 1.0 for low, high in places)
+        assert all(upper[0] > lower[1] for upper, lower in pairwise(places))
+
+
+@pytest.mark.parametrize("log_axis", [False, True])
+def test_arrays_keep_gaps_and_axis_resolution(log_axis):
+    inputs = np.geomspace(1e-6, 1e3, 300)
+    inputs[7] = np.nan
+    got = values(plotly_traces._array(inputs, log=log_axis))
+    assert np.isnan(got[7])
+    assert got == pytest.approx(inputs, nan_ok=True, **({"rel": 1e-6} if log_axis else {"rel": 0, "abs": 1e3 / 65534}))
+
+
+def test_array_beyond_its_axis_keeps_resolution_of_axis():
+    inputs = np.append(np.linspace(0.0, 1.0, 50), 1e6)
+    assert values(plotly_traces._array(inputs, shown=(0.0, 1.0))) == pytest.approx(inputs, rel=1e-6, abs=1e-7)
+
+
+def test_reduced_script_keeps_registered_kinds_of_traces():
+    reduced = plotly_script.reduced(plotly_script.script())
+    kinds = set(re.findall(r'moduleType:"trace",name:"(\w+)"', reduced))
+    assert {"scatter", "bar"} <= kinds
+    assert not kinds & {"scatter3d", "scattermap", "pie", "heatmap"}
+    assert len(plotly_script.compressed(reduced)) < 700_000
+
+
+def test_script_of_another_build_stays_whole():
+    assert plotly_script.reduced("Plotly = {}") == "Plotly = {}"
+
+
+def test_timeline_lists_service_event_and_time(page):
     bars = [(b["y"][0], b["text"][0], b["base"][0], b["x"][0]) for b in page.plots["timeline"]["data"]]
     assert ("phase", "climb", 0.0, 3.0) in bars
     assert [bar[:2] for bar in bars if bar[0] == "landed"] == [("landed", "landed")]
-    assert any("Never in this flight: mode, armed, failsafe" in text for text in page.texts)
+    assert any("None in this flight: mode, armed, failsafe" in text for text in page.texts)
 
 
-def test_motors_at_a_limit_are_marked(log):
+def test_motors_at_limit_are_marked(log):
     flown = FlightData.read(log)
     flown.origin.scene["airframe"] = {"motor": {"max_voltage": 34.0}}
-    marks, said = motors.limits(flown)
-    assert "limit of its voltage (0 or 34 V) in the air, in all for " in said
+    marks, output = motors.limits(flown)
+    assert "limit of its voltage (0 or 34 V) in the air, in all for " in output
     stretch = marks[-1]
     assert stretch.name == "at a limit"
     assert np.isnan(stretch.x[2::3]).all()
@@ -228,13 +272,13 @@ def test_motors_at_a_limit_are_marked(log):
     assert stretch.x[:2] == pytest.approx((1.0, math.pi - math.asin(0.8)), abs=1.0 / RATE)
 
 
-def test_the_page_needs_nothing_from_elsewhere(page):
+def test_page_has_no_external_resources(page):
     assert page.addresses == []
     assert not {"link", "iframe", "img"} & set(page.tags)
     assert not any("url(" in text or "@import" in text for text in page.texts)
 
 
-def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
+def test_neither_matplotlib_nor_plotly_is_imported_for_page(log):
     code = (
         "import sys; from pathlib import Path; from lapwing.studies.flight_data import FlightData;"
         "from lapwing.studies.report import write;"
@@ -245,21 +289,67 @@ def test_neither_matplotlib_nor_plotly_is_imported_for_a_page(log):
 
 
 @pytest.mark.long
-def test_the_same_plots_on_paper(log, page, tmp_path):
+def test_same_plots_on_paper(log, page, tmp_path):
     pdf = write(FlightData.read(log), tmp_path / "circle.pdf").read_bytes()
     assert pdf.startswith(b"%PDF")
-    assert pdf.count(b"/Type /Page\n") + pdf.count(b"/Type /Page ") == len(page.plots) - 1  # all but the motion
+    sizes = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", pdf)
+    assert 1 < len(sizes) <= 1 + len(page.plots)
+    assert {tuple(round(float(side) / 72.0 * 25.4) for side in size) for size in sizes} == {(210, 297)}  # [mm] A4
 
 
-def test_the_script_alone_is_taken_of_a_package_that_was_slimmed(tmp_path, monkeypatch):
+def test_paper_has_outcome_errors_facts_and_every_plot(log, page, monkeypatch, tmp_path):
+    written = []
+    monkeypatch.setattr(paper, "write_pdf", lambda path, *content: written.append(content))
+    flight = FlightData.read(log)
+    write(flight, tmp_path / "circle.pdf")
+    ((cover, plots),) = written
+    assert cover.outcomes == (str(flight.outcome),)
+    assert [row[0] for row in cover.rows] == ["x [m]", "y [m]", "z [m]", "roll [°]", "pitch [°]", "yaw [°]"]
+    assert dict(cover.facts)["digest"]
+    assert len(plots) == len(page.plots)
+
+
+def test_pages_hold_plots_in_order_within_their_height():
+    plots = [paper.Titled(str(k), Plot((), "", height)) for k, height in enumerate((5.0, 5.0, 5.0, 30.0, 1.0))]
+    pages = paper._packed(plots)
+    assert [titled for page in pages for titled in page] == plots
+    assert all(len(page) == 1 or sum(map(paper._height, page)) <= paper.INNER[1] for page in pages)
+
+
+def own_controller(flight, name, gains):
+    flight.origin.scene["autopilot"] = {"controller": name, "gains": gains}
+    flight.origin.scene["gains"] = {"altitude": {"p": float(len(gains))}}
+    return flight
+
+
+def test_own_controller_lists_no_gains(log):
+    flights = [own_controller(FlightData.read(log), *given) for given in ((None, "tuned"), ("mine:Lee", "paper"))]
+    assert flight_header.facts(flights[0])["gains"] == "tuned"
+    assert flight_header.facts(flights[0])["controller"] == "cascaded PID"
+    assert flight_header.facts(flights[1])["controller"] == "mine:Lee"
+    assert "gains" not in flight_header.facts(flights[1])
+    found = flight_header.differences(*(flight.origin.scene for flight in flights))
+    assert list(found) == ["autopilot.controller"]
+
+
+def test_turbulence_is_drawn_as_mean_and_range():
+    times, rng = np.arange(0.0, 10.0, 0.004), np.random.default_rng(1)
+    wind = np.array([3.0, 0.0, 0.0]) + rng.normal(size=(len(times), 3))
+    *bands, x, _, _ = air._wind(times, wind)
+    assert len(x.x) == 10
+    assert x.y == pytest.approx(wind[:, 0].reshape(10, 250).mean(axis=1))
+    assert bands[0].high == pytest.approx(wind[:, 0].reshape(10, 250).max(axis=1))
+
+
+def test_script_alone_is_taken_of_package_that_was_slimmed(tmp_path, monkeypatch):
     script = tmp_path / "plotly" / "package_data" / "plotly.min.js"
     monkeypatch.setattr(sys, "path", [str(tmp_path)])
     with pytest.raises(ValueError, match="pip install plotly"):
-        plotly_figure.script()
+        plotly_script.script()
     script.parent.mkdir(parents=True)
     script.write_text("Plotly = {}")
     importlib.invalidate_caches()
-    assert plotly_figure.script() == "Plotly = {}"
+    assert plotly_script.script() == "Plotly = {}"
 
 
 def test_another_ending_is_refused(log, tmp_path):
@@ -276,7 +366,7 @@ def test_two_flights_lie_over_each_other(log, tmp_path):
     assert any(text.startswith("weak: Landed") for text in page.texts)
 
 
-def test_what_differs_in_two_flights_has_their_names(log, tmp_path):
+def test_differences_of_two_flights_have_names(log, tmp_path):
     other = record(tmp_path / "moved.mcap", messages(east=1.0))  # it followed the same reference
     one, two = (position.draw(FlightData.read(path)) for path in (log, other))
     both = overlay(one, two, ("a", "b"))
@@ -285,7 +375,7 @@ def test_what_differs_in_two_flights_has_their_names(log, tmp_path):
     assert [mark.name for mark in both.panels[2].marks] == ["flown", "reference"]
 
 
-def test_the_keys_in_which_two_scenes_differ():
+def test_keys_in_which_two_scenes_differ():
     one = {"effects": {"gravity": {}, "wind": {"sigma": 1.0}}, "run": {"seed": 1}}
     other = {"effects": {"wind": {"sigma": 2.0}}, "run": {"seed": 1}}
     assert differences(one, other) == {"effects.gravity": ("yes", ""), "effects.wind.sigma": ("1", "2")}
@@ -298,11 +388,12 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
-def test_a_browser_draws_the_page_without_a_complaint(log, tmp_path):
+def test_browser_draws_page_without_complaint(log, tmp_path):
     page = report(log)
     text = page.read_text(encoding="utf-8")
     listen = 'window.addEventListener("error", (e) => document.body.setAttribute("complaint", e.message));'
     page = tmp_path / "told.html"
+    text = text.replace("<details>", "<details open>")
     page.write_text(text.replace("<body>", f"<body><script>{listen}</script>", 1), encoding="utf-8")
     quiet = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")
     words = (CHROMIUM, *quiet, "--window-size=1200,9000", "--virtual-time-budget=30000", "--dump-dom", page.as_uri())
@@ -312,7 +403,7 @@ def test_a_browser_draws_the_page_without_a_complaint(log, tmp_path):
     assert drawn.count("main-svg") >= 2 * text.count('<figure class="plot">')
 
 
-def test_errors_are_the_offsets_that_were_flown(log, page):
+def test_errors_are_offsets_that_were_flown(log, page):
     for index, (axis, offset) in enumerate(zip(AXES, OFFSET, strict=True)):
         unit, scale = ("m", 1.0) if index < 3 else ("°", 180.0 / math.pi)
         assert page.after(f"{axis} [{unit}]") == f"{scale * abs(offset):.4f}"
@@ -322,7 +413,7 @@ def test_errors_are_the_offsets_that_were_flown(log, page):
     assert page.after(page.after("y [m]")) != "0.2700"  # nothing published for y in this scene
 
 
-def test_summary_says_what_the_log_says(log, page):
+def test_summary_equals_log(log, page):
     flown = FlightData.read(log)
     assert page.after("digest") == flown.digest
     assert page.after("duration") == "6.00 s"
@@ -341,7 +432,7 @@ def test_phases_follow_one_another(log):
     assert phases(FlightData.read(log)) == [("climb", 0.0, 3.0), ("hover", 3.0, pytest.approx(SECONDS))]
 
 
-def test_coefficients_are_those_of_the_propeller(log):
+def test_coefficients_are_those_of_propeller(log):
     flown = FlightData.read(log)
     speed = flown.truth.rotor_speed[:, 0]
     assert propulsion.coefficient(speed, flown.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
@@ -353,10 +444,10 @@ def test_estimate_errors_and_refusals(log):
     expected = np.zeros(9)
     expected[0] = ESTIMATE_ERROR
     assert error == pytest.approx(np.broadcast_to(expected, error.shape), abs=1e-9)
-    assert estimator.refusals(FlightData.read(log)) == "Measurements refused: gps 2, sonar 1."
+    assert estimator.refusals(FlightData.read(log)) == "Measurements rejected: gps 2, sonar 1."
 
 
-def test_attitude_error_is_in_the_body_frame(tmp_path):
+def test_attitude_error_is_in_body_frame(tmp_path):
     """Truth yawed by 90 degrees; an estimate rolled 0.1 rad further about the body's x axis errs by (0.1, 0, 0)."""
     c = math.cos(math.pi / 4)
     true, roll = Quaternion(x=0.0, y=0.0, z=c, w=c), (math.sin(0.05), math.cos(0.05))
@@ -371,7 +462,7 @@ def test_attitude_error_is_in_the_body_frame(tmp_path):
     assert error[:, 6:] == pytest.approx(np.array([[0.1, 0.0, 0.0]] * 2), abs=1e-12)
 
 
-def test_a_truncated_log_gives_a_report_too(log, tmp_path):
+def test_truncated_log_gives_report_too(log, tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     page = Page(report(cut))
@@ -382,16 +473,16 @@ def test_a_truncated_log_gives_a_report_too(log, tmp_path):
     assert "position" in page.plots
 
 
-def test_what_is_missing_is_said(tmp_path):
+def test_missing_data_is_reported(tmp_path):
     page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
-    assert set(page.plots) - {"motion"} == {"timeline", "position", "attitude", "path", "air"}
+    assert set(page.plots) == {"mission_map", "timeline", "position", "attitude", "path", "air"}
     assert "Left out: the vehicle has no motors." in text
     assert "Left out: the estimate states no uncertainty (it is the truth)." in text
     assert "No reference in this log" in text
 
 
-def test_a_single_sample_is_enough(tmp_path):
+def test_single_sample_is_enough(tmp_path):
     page = Page(report(record(tmp_path / "short.mcap", list(messages())[:5])))
     assert page.after("duration") == "0.00 s"
     assert "position" in page.plots
@@ -402,7 +493,7 @@ def test_a_single_sample_is_enough(tmp_path):
     [(None, "cannot read the log"), (b"no log", "not an MCAP file")],
     ids=["missing", "foreign"],
 )
-def test_a_file_that_is_no_log_is_refused(tmp_path, content, complaint):
+def test_non_log_file_is_rejected(tmp_path, content, complaint):
     path = tmp_path / "x.mcap"
     if content:
         path.write_bytes(content)
@@ -413,19 +504,19 @@ def test_a_file_that_is_no_log_is_refused(tmp_path, content, complaint):
     assert not path.with_suffix(".html").exists()
 
 
-def test_a_log_without_a_flight_is_refused(tmp_path):
+def test_log_without_flight_is_refused(tmp_path):
     path = record(tmp_path / "imu.mcap", [("imu", Imu(header(0, "drone1")))])
     with pytest.raises(ValueError, match="no flight in this log"):
         report(path)
 
 
-def test_a_damaged_scene_is_named(tmp_path):
+def test_damaged_scene_is_named(tmp_path):
     path = record(tmp_path / "scene.mcap", messages(), {"setup.json": b"[run"})
     with pytest.raises(ValueError, match=r"scene\.mcap: its attachment setup\.json cannot be read"):
         report(path)
 
 
-def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
+def test_unwritable_report_error_is_one_line(log, tmp_path):
     copy = tmp_path / "a.mcap"
     copy.write_bytes(log.read_bytes())
     copy.with_suffix(".html").mkdir()
@@ -434,7 +525,7 @@ def test_a_report_that_cannot_be_written_is_one_line(log, tmp_path):
 
 
 @pytest.mark.parametrize("count", [POINTS, POINTS + 1, 17051])
-def test_thinning_a_line_keeps_its_peaks_and_ends(count):
+def test_thinning_line_keeps_its_peaks_and_ends(count):
     t = np.linspace(0.0, 1.0, count)
     y = np.sin(50.0 * t)
     y[count // 3], y[-2] = 9.0, -9.0

@@ -23,7 +23,7 @@ def test_two_that_pass_one_another_are_nearest_side_by_side():
         "b": Truth((1.0, 3.0, 0.0), (0.0, 0.0, 0.0)),
         "far": Truth((0.0, 90.0, 0.0), (0.0, 0.0, 0.0), n=6),  # tells of itself for a shorter time
     }
-    found = nearest(truths)
-    assert (found.vehicles, found.distance, found.time) == (("a", "b"), pytest.approx(3.0), pytest.approx(0.5))
-    assert str(found) == "Nearest: a and b, 3.00 m apart at 0.50 s"
+    result = nearest(truths)
+    assert (result.vehicles, result.distance, result.time) == (("a", "b"), pytest.approx(3.0), pytest.approx(0.5))
+    assert str(result) == "Nearest: a and b, 3.00 m apart at 0.50 s"
     assert least_over_time(truths) == pytest.approx(np.hypot(3.0, 1.0 - 2.0 * np.arange(6) * 0.1))

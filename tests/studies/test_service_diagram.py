@@ -11,33 +11,33 @@ def mission():
     return resolve(load("delivery_mission"))
 
 
-def test_what_is_handed_over(mission):
-    found = service_diagram.handed(mission)
-    assert found["plant", "sensors"] == ["truth"]
-    assert found["autopilot", "plant"] == ["actuators*", "status*"]
-    assert "imu" in found["sensors", "autopilot"]
-    assert found["trajectory", "autopilot"] == ["trajectory"]
+def test_diagram_shows_ports(mission):
+    result = service_diagram.handed(mission)
+    assert result["plant", "sensors"] == ["truth"]
+    assert result["autopilot", "plant"] == ["actuators*", "status*"]
+    assert "imu" in result["sensors", "autopilot"]
+    assert result["trajectory", "autopilot"] == ["trajectory"]
 
 
-def test_who_listens(mission):
+def test_diagram_shows_listeners(mission):
     assert [p.name for p in service_diagram.listeners(mission)] == ["recorder", "router", "mavlink", "foxglove", "ros2"]
     load_only = resolve(load("cooperative_load"))  # nobody steers: nothing for a ground station
     assert [p.name for p in service_diagram.listeners(load_only)] == ["recorder", "router", "foxglove", "ros2"]
 
 
-def test_every_topic_has_an_arrow_of_its_own_and_the_link_leads_to_a_ground_station(mission):
-    found = service_diagram.arrows(mission)
-    told = [arrow.text for arrow in found]
+def test_every_topic_has_its_arrow(mission):
+    result = service_diagram.arrows(mission)
+    reported = [arrow.text for arrow in result]
     handed = [text for texts in service_diagram.handed(mission).values() for text in texts]
     beside = ["every recorded topic", *["every topic"] * 3, "telemetry", "commands", "MAVLink 2"]
-    assert sorted(told) == sorted([*handed, *beside])
-    assert len({(arrow.start, arrow.end) for arrow in found}) == len(found)  # none lies on another
-    link = found[told.index("MAVLink 2")]
+    assert sorted(reported) == sorted([*handed, *beside])
+    assert len({(arrow.start, arrow.end) for arrow in result}) == len(result)  # none lies on another
+    link = result[reported.index("MAVLink 2")]
     assert link.both_ways
     assert "MAVLink 2" not in [arrow.text for arrow in service_diagram.arrows(resolve(load("cooperative_load")))]
 
 
-def test_arrows_begin_and_end_at_the_edges_of_their_services(mission):
+def test_arrows_begin_and_end_at_edges_of_their_services(mission):
     at = service_diagram.places(mission)
     for arrow in service_diagram.arrows(mission):
         if arrow.colour == service_diagram.FLOWN:
@@ -50,7 +50,7 @@ def test_arrows_begin_and_end_at_the_edges_of_their_services(mission):
 
 
 @pytest.mark.parametrize("ending", ["png", "svg"])
-def test_the_picture_shows_everybody(mission, tmp_path, ending):
+def test_architecture_picture_shows_every_service(mission, tmp_path, ending):
     path = tmp_path / f"services.{ending}"
     service_diagram.draw(mission, path)
     content = path.read_bytes()

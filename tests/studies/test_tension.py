@@ -19,8 +19,8 @@ def multipliers(r, v, force):
     outside = np.vstack([np.zeros(3), force])
     outside[:, 2] -= MASS * LOAD["gravity"]
     saddle = np.block([[np.diag(np.repeat(MASS, 3)), jacobian.T], [jacobian, np.zeros((2, 2))]])
-    found = np.linalg.solve(saddle, np.concatenate([outside.ravel(), -(dv**2).sum(axis=1)]))
-    return found[9:] * np.linalg.norm(d, axis=1)
+    result = np.linalg.solve(saddle, np.concatenate([outside.ravel(), -(dv**2).sum(axis=1)]))
+    return result[9:] * np.linalg.norm(d, axis=1)
 
 
 def test_tension_is_that_of_lagrange_multipliers():
@@ -32,8 +32,8 @@ def test_tension_is_that_of_lagrange_multipliers():
         length = np.array(LOAD["link_length"])[:, None]
         r, v = np.vstack([np.zeros(3), -length * q]), rng.normal(size=3) + np.vstack([np.zeros(3), -length * swing])
         force = rng.normal(size=(2, 3)) * 8.0
-        found = tension(r[None], v[None], force[None], LOAD)[0]
-        assert found == pytest.approx(multipliers(r, v, force), abs=1e-11)
+        result = tension(r[None], v[None], force[None], LOAD)[0]
+        assert result == pytest.approx(multipliers(r, v, force), abs=1e-11)
 
 
 def flight(thrust):
@@ -55,14 +55,14 @@ def hover(t):
     return np.where(t[:, None] < 0.5, own + 0.2 * 9.81, own * [1.6, 0.0])
 
 
-def test_a_link_that_pushes_is_told_with_its_name_time_and_force():
-    found = flight(hover(np.arange(100) / 100)).events
-    assert [(event.kind, event.text[:6]) for event in found] == [("slack", "link 2")]
-    assert 0.49 < found[0].time < 0.5
+def test_pushing_link_event_has_name_time_and_force():
+    result = flight(hover(np.arange(100) / 100)).events
+    assert [(event.kind, event.text[:6]) for event in result] == [("slack", "link 2")]
+    assert 0.49 < result[0].time < 0.5
     assert flight(hover(np.zeros(100))).events == []
 
 
-def test_where_a_push_begins_and_ends():
+def test_where_push_begins_and_ends():
     t = np.arange(5.0)
     assert pushes(t, np.array([3.0, 1.0, -1.0, -2.0, 4.0])) == [(1.5, 3.0, 2.0)]
     assert pushes(t, np.ones(5)) == []

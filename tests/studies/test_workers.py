@@ -39,7 +39,7 @@ def running(pid):
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
-def test_workers_end_with_an_interrupted_or_killed_parent(tmp_path, number):
+def test_workers_end_with_interrupted_or_killed_parent(tmp_path, number):
     if not Path("/proc/self/stat").exists():
         pytest.skip("finds processes in /proc")
     (tmp_path / "flies.py").write_text(SCRIPT)
@@ -67,11 +67,11 @@ def test_workers_end_with_an_interrupted_or_killed_parent(tmp_path, number):
         parent.wait()
 
 
-def test_workers_that_cannot_be_had_are_refused_in_one_line(monkeypatch):
+def test_unavailable_workers_error_is_one_line(monkeypatch):
     def fails(*_):
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 
     monkeypatch.setattr("lapwing.studies.workers.ProcessPoolExecutor", fails)
-    said = "worker processes need semaphores: read-only file system; expected a /dev/shm to write to"
-    with pytest.raises(ValueError, match=said), workers(2):
+    output = "worker processes need semaphores: read-only file system; expected a /dev/shm to write to"
+    with pytest.raises(ValueError, match=output), workers(2):
         pass

@@ -19,7 +19,7 @@ from lapwing.studies.accuracy.work_precision import Point, cheapest, check_targe
 from lapwing.studies.effects.cost import costs
 
 WIDTH = 120  # letters of a table that goes to no terminal
-SLOW = 3.0  # [s] after which the user is told why
+SLOW = 3.0  # [s] after which the reason is printed
 
 
 class Study(NamedTuple):
@@ -34,7 +34,7 @@ class Study(NamedTuple):
 
 
 def console() -> Console:
-    """The terminal, or a page of fixed width where the output goes elsewhere."""
+    """Return the terminal, or a page of fixed width if the output is redirected."""
     return terminal.console(None if sys.stdout.isatty() else WIDTH)
 
 
@@ -42,13 +42,13 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     """Study one target.
 
     Args:
-        screen: where the user is told why it takes long.
-        target: name of a problem, or a scene's file.
+        screen: console for progress messages.
+        target: name of a problem, or path of a scene.
         overrides: "key=value" of the scene.
-        goal: error whose cheapest choice is named, None for no such choice.
+        goal: error for which the cheapest solver is selected; None: no selection.
 
     Raises:
-        ValueError: no such target, no sound goal, or a goal that no method meets.
+        ValueError: the target or goal is invalid, or no method meets the goal.
     """
     check_target(goal)
     scene = scene_of(target, overrides)

@@ -15,12 +15,12 @@ LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors whose cheapest points are
 
 
 def setting(point: Point, unit: str) -> str:
-    """The step or tolerance of a point as one reads it."""
+    """Format the step or tolerance of a point."""
     return f"tol {point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.3g} {unit}"
 
 
 def sentence(point: Point, unit: str) -> str:
-    """One line about a point."""
+    """Format a point as one line."""
     what = "tolerance" if point.unit == "tol" else "step"
     text = f"{point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.6g} {unit}"
     cost = "" if point.evaluations is None else f", {point.evaluations} evaluations"
@@ -28,7 +28,7 @@ def sentence(point: Point, unit: str) -> str:
 
 
 def show(console: Console, problem: Problem, points: list[Point], chosen: Point | None) -> None:
-    """Print, of each method, its cheapest points at a few errors."""
+    """Return print, of each method, its cheapest points at a few errors."""
     console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column("method (order)\n    step")

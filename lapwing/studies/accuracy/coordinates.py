@@ -10,7 +10,7 @@ from lapwing.kernels.state_tree import flatten, normalise, unflatten
 
 
 def matrices(q: np.ndarray) -> np.ndarray:
-    """R_world_body in row order, shape (k, 9), of quaternions wxyz, shape (k, 4)."""
+    """Return R_world_body in row order, shape (k, 9), of quaternions wxyz, shape (k, 4)."""
     w, x, y, z = q.T
     return np.column_stack(
         [
@@ -22,7 +22,7 @@ def matrices(q: np.ndarray) -> np.ndarray:
 
 
 def _parts(x: Any) -> Iterator[bool]:
-    """For each part of a state in order: whether it is a quaternion (four numbers) or a number."""
+    """Yield True for each quaternion (four numbers) and False for each number of a state, in order."""
     if isinstance(x, Quaternion):
         yield True
     elif isinstance(x, tuple):
@@ -33,7 +33,7 @@ def _parts(x: Any) -> Iterator[bool]:
 
 
 def coordinates(x: Any, rows: np.ndarray) -> np.ndarray:
-    """Rows of the stored numbers of states shaped like x, shape (k, m), with each quaternion as a matrix."""
+    """Return the rows of the stored numbers of states shaped like x, shape (k, m), with each quaternion as a matrix."""
     columns, at = [], 0
     for turned in _parts(x):
         columns.append(matrices(rows[:, at : at + 4]) if turned else rows[:, at : at + 1])
@@ -42,7 +42,7 @@ def coordinates(x: Any, rows: np.ndarray) -> np.ndarray:
 
 
 def of_state(x: Any) -> np.ndarray:
-    """Coordinates of one state, shape (n,)."""
+    """Return the coordinates of one state, shape (n,)."""
     return coordinates(x, np.array([flatten(x)], dtype=float))[0]
 
 
@@ -53,5 +53,5 @@ def defect(x: Any, row: np.ndarray) -> float:
 
 
 def error(end: np.ndarray, exact: np.ndarray) -> float:
-    """Largest difference of coordinates, relative to 1 + their size."""
+    """Return the largest difference of coordinates, relative to 1 + their size."""
     return float((np.abs(end - exact) / (1.0 + np.abs(exact))).max())

@@ -18,7 +18,7 @@ from lapwing.studies.accuracy.plant import longest_step
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 
-LONGEST = 20.0  # [s] of a motion that has no end of its own
+LONGEST = 20.0  # [s] of a motion without an end
 WHOLE = 200.0  # [s] of a mission, from take-off to rest
 MOST_TICKS = 5000  # of the former, at the scene's own rate
 SOURCES = ("plant step", "contact", "exchange interval", "coupling delay")
@@ -46,10 +46,10 @@ class Part(NamedTuple):
 
 
 def errors(scene: Scene) -> list[Part]:
-    """The errors of a scene whose integrator and step are given, each at a few settings.
+    """Return the errors of a scene with a given integrator and step, each at several settings.
 
     Raises:
-        ValueError: a flight comes to no end.
+        ValueError: a flight does not end.
     """
     base = [*scene.overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
     rate, interval = scene[Communication].rate, scene[Communication].interval
@@ -86,7 +86,7 @@ def errors(scene: Scene) -> list[Part]:
 
 
 def scene_integrator(scene: Scene) -> str:
-    """The name of the scene's integrator."""
+    """Return the name of the scene's integrator."""
     return str(scene.lookup("solver.integrator"))
 
 
@@ -103,15 +103,15 @@ def _duration(scene: Scene) -> float:
 
 
 def _clean(scene: Scene) -> list[str]:
-    """Overrides that take the noise out."""
-    found = ["autopilot.estimator=ground_truth"] if scene.has("autopilot") else []
+    """Return the overrides that remove noise."""
+    result = ["autopilot.estimator=ground_truth"] if scene.has("autopilot") else []
     if "random_wind_force" in scene.tables("effects"):
-        found.append("effects.random_wind_force.sigma=0.0")
-    return found
+        result.append("effects.random_wind_force.sigma=0.0")
+    return result
 
 
 def _exchange(scene: Scene, rate: int) -> list[str]:
-    """Overrides for another exchange rate; what is due at every tick stays so."""
+    """Return the overrides for another communication rate; what is due at every tick stays so."""
     bodies = [f"rates.body_states={rate}"] if scene[Rates].body_states == scene[Communication].rate else []
     return [f"communication.rate={rate}", *bodies]
 
@@ -121,9 +121,9 @@ def _part(source: str, setting: float, label: str, flight: FlightData, exact: Fl
 
 
 def difference(one: FlightData, other: FlightData) -> tuple[float, float, float]:
-    """Distance [m] and angle [rad] between two flights that nine ticks in ten stay below, and the largest distance.
+    """Return the 90th percentiles of distance [m] and angle [rad] between two flights, and the maximum distance.
 
-    Compared at the ticks of the one with fewer.
+    Compared at the ticks of the flight with fewer ticks.
     """
     coarse, fine = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
     every = round(coarse.setup.interval / fine.setup.interval)

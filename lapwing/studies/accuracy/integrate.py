@@ -20,7 +20,7 @@ TOLERANCES = tuple(10.0**-k for k in range(1, 14))
 
 
 def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, rows: np.ndarray) -> float:
-    """Mean evaluations in a step of h, counted in the step at each of these times and states (uncompiled)."""
+    """Return the mean evaluations in a step of h, counted at each of these times and states (uncompiled)."""
     calls = 0
 
     def counting(p: Any, t: float, state: Any) -> Any:
@@ -36,7 +36,7 @@ def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, row
 # kernels of this file, so that their cache names no class but those of systems that every user of the study can import
 @kernel
 def sampled(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
-    """March from time 0 in steps of h, each `every`-th state into a row of `out`; returns how many rows are finite."""
+    """Integrate from time 0 in steps of h; store each `every`-th state in a row of `out`. Return the finite rows."""
     return record(method, p, 0.0, x, h, every, out)
 
 
@@ -47,12 +47,12 @@ def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray
 
 
 def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
-    """A way for each integrator, the adaptive one by tolerances.
+    """Return a solver method per integrator, the adaptive one by tolerances.
 
     Args:
         p: parameters of the system (its class is in `RATES`).
         x: state at time 0.
-        duration: of the run.
+        duration: duration of the run.
         coarsest: steps of the coarsest run; a multiple of SAMPLES.
     """
     fixed = fixed_ways(p, x, duration, coarsest)
@@ -60,7 +60,7 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
 
 
 def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
-    """A way for each integrator, all by steps."""
+    """Return a solver method per integrator, all by steps."""
     return [_fixed(name, p, x, duration, coarsest) for name in integrators.compatible_methods(p, x)]
 
 

@@ -62,25 +62,25 @@ def flight(
 
 
 def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
-    """(parameters, start) of a scene with a multirotor of one or several bodies: in the air, moving and turning."""
+    """Return (parameters, initial state) of a scene with a multirotor of one or more bodies, airborne and rotating."""
     form, p = model(scene).described(scene)
     start = ((0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p), (3.0, 1.0, -0.5), (0.4, -0.6, 0.3))
     return p, form.initial_state(p, *start)
 
 
 def model(scene: Scene) -> Any:
-    """The module of the scene's plant model."""
+    """Return the module of the scene's plant model."""
     return models.get(scene[Vehicle].model)
 
 
 def longest_step(scene: Scene) -> float:
-    """The longest step [s] that the scene's model accepts."""
-    found = getattr(model(scene), "longest_step", None)
-    return found(scene) if found else math.inf
+    """Return the longest step [s] that the scene's model accepts."""
+    result = getattr(model(scene), "longest_step", None)
+    return result(scene) if result else math.inf
 
 
 def problem(scene: Scene) -> Problem:
-    """The plant of such a scene, and the ways to integrate it."""
+    """Return the plant of such a scene as a problem with its solver methods."""
     exchange = scene[Communication]
     (p, state), longest = physics(scene), longest_step(scene)
     motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
@@ -124,7 +124,7 @@ def problem(scene: Scene) -> Problem:
 
 
 def hover_speed(p: MultirotorParameters) -> float:
-    """Speed of all rotors [rad/s] that carries the weight."""
+    """Return the rotor speed [rad/s] that balances the weight."""
     low, high = 0.0, p.layout.speed_per_volt * p.layout.max_voltage
     for _ in range(50):
         middle = 0.5 * (low + high)

@@ -18,7 +18,7 @@ class SolverRun(NamedTuple):
 class SolverMethod(NamedTuple):
     """One method, for one problem.
 
-    A setting is its step or its tolerance. `prepare(setting)` gives what is timed, a call that does all the work and
+    A setting is its step or its tolerance. `prepare(setting)` returns the timed function, which does all the work and
     nothing else; `read(setting, result of that call)` its Outcome, or None where the run failed; `idle()` is the same
     call without a single step, whose time is taken off.
     """

@@ -31,10 +31,10 @@ def problem(scene: Scene) -> Problem:
 
 
 def physics(scene: Scene) -> tuple[Any, Any]:
-    """(parameters, start) of the scene's plant.
+    """Return (parameters, initial state) of the scene's plant.
 
     Raises:
-        ValueError: its model is none that this study knows how to integrate.
+        ValueError: this study does not support the plant's model.
     """
     model = plant.model(scene)
     if hasattr(model, "described"):
@@ -67,7 +67,7 @@ def _marched(scene: Scene, p: Any, x: Any) -> Problem:
 
 
 def lifted(p: Any) -> Any:
-    """The parameters; of a carried load with thrusts that carry the weight, and some turning."""
+    """Return the parameters; those of a shared load with thrusts that balance the weight, and some rotation."""
     if not isinstance(p, CooperativeLoadParameters):
         return p
     n = len(p.quad_mass)

@@ -46,7 +46,7 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
 
 
 def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
-    """The points of the scene's plant: from the user's cache, so that every later run flies the same."""
+    """Return the points of the scene's plant, from the user's cache so that later runs select the same."""
     path = _file(scene)
     if path and (known := _read(path)):
         return known
@@ -69,7 +69,7 @@ def _read(path: Path) -> list[Point]:
 
 
 def _file(scene: Scene) -> Path | None:
-    """Named by the sources and by all that the plant is made of, but for its solution; None without a cache."""
+    """Return the cache file, named by sources and plant without its solver. Return None without a cache."""
     folder = cache_folder()
     if folder is None:
         return None

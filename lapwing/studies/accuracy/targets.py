@@ -12,19 +12,19 @@ from lapwing.studies.accuracy.systems import problems
 
 
 def find(target: str) -> Problem:
-    """The problem of a name.
+    """Return the problem of a name.
 
     Raises:
-        ValueError: there is none; the text lists the choices.
+        ValueError: it does not exist; the message lists the choices.
     """
     return discovery.choose(problems(), target, "problem")
 
 
 def scene_of(target: str, overrides: Iterable[str]) -> Scene | None:
-    """The scene that a target names, by its path or, where no problem has its name, by that; None for a problem.
+    """Return the scene of a target, by its path or, unless a problem has it, by its name; None for a problem.
 
     Raises:
-        ValueError: no sound scene, or overrides without one.
+        ValueError: the scene is invalid, or there are overrides without a scene.
     """
     shipped = target not in problems() and (SHIPPED / f"{target}.toml").is_file()
     if target.endswith(".toml") or shipped:

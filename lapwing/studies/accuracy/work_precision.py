@@ -32,7 +32,7 @@ class Point(NamedTuple):
 
 
 def measure(problem: Problem, longest: float = LONGEST) -> list[Point]:
-    """All points of a problem, way by way, each from coarse to fine until a run takes `longest` [s] of wall time."""
+    """Return all points of a problem, method by method, each from coarse to fine until a run takes `longest` [s]."""
     exact = problem.reference()
     points = []
     for way in problem.ways:
@@ -66,17 +66,17 @@ def _exhausted(errors: list[float]) -> bool:
 
 
 def drift(problem: Problem, outcome: SolverRun) -> dict[str, float]:
-    """Largest change of each invariant over the samples, relative to its size at the start."""
-    found = {"manifold": outcome.defect}
+    """Return the largest change of each invariant over the samples, relative to its size at the start."""
+    result = {"manifold": outcome.defect}
     for name, invariant in problem.invariants.items():
         values = invariant(outcome.times, outcome.samples)
         size = np.abs(values[0]).max()
-        found[name] = float(np.abs(values - values[0]).max() / (size if size > 0.0 else 1.0))
-    return found
+        result[name] = float(np.abs(values - values[0]).max() / (size if size > 0.0 else 1.0))
+    return result
 
 
 def clock(work: Callable[[], Any]) -> tuple[float, Any]:
-    """(median wall time [s], result) of a call."""
+    """Return (median wall time [s], result) of a call."""
     taken: list[float] = []
     while len(taken) < REPEATS[0] or (sum(taken) < TIMED and len(taken) < REPEATS[1]):
         started = time.perf_counter()
@@ -88,10 +88,10 @@ def clock(work: Callable[[], Any]) -> tuple[float, Any]:
 
 
 def cheapest(points: list[Point], target: float) -> Point:
-    """The fastest point whose error is at most `target`.
+    """Return the fastest point whose error is at most `target`.
 
     Raises:
-        KeyedError: none is.
+        ConfigError: there is none.
     """
     met = [p for p in points if p.error <= target]
     if not met:
@@ -108,16 +108,16 @@ def pareto_points(points: list[Point], levels: list[float]) -> list[Point]:
         own = [p for p in points if p.way == way]
         for level in levels:
             met = [p for p in own if p.error <= level]
-            if met and (found := min(met, key=lambda p: p.time)) not in kept:
-                kept.append(found)
+            if met and (result := min(met, key=lambda p: p.time)) not in kept:
+                kept.append(result)
     return kept
 
 
 def check_target(target: float | None) -> None:
-    """Refuse what is no error to ask for.
+    """Check that a target is a valid error.
 
     Raises:
-        ValueError: zero, below, or no number.
+        ValueError: it is zero, negative or no number.
     """
     if target is not None and not (target > 0.0 and math.isfinite(target)):
         raise ValueError(f"--target {target:g}: expected an error above 0, for example 1e-6")

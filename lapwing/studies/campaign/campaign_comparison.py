@@ -45,10 +45,10 @@ class Comparison(NamedTuple):
 
 
 def compare(one: Path, other: Path) -> Comparison:
-    """Compare two campaigns over the runs that both have flown.
+    """Compare two campaigns over their common runs.
 
     Raises:
-        ValueError: one is none, or they have no runs in common.
+        ValueError: one folder is no campaign, or they have no runs in common.
     """
     a, b = Results(read(one)), Results(read(other))
     known = {pair: k for k, pair in enumerate(_pairs(a))}

@@ -2,20 +2,21 @@
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene
-from lapwing.messages.topics import ACTUATORS, ESTIMATE, SETPOINT, STATUS, TRUTH
+from lapwing.messages.topics import ACTUATORS, ESTIMATE, ESTIMATE_COVARIANCE, SETPOINT, STATUS, TRUTH
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.communication_schema import Communication, Rates
+from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.scene_resolver import resolve
 
-TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, STATUS)
+TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, ESTIMATE_COVARIANCE, STATUS)
 
 
 def campaign_setup(scene: Scene) -> RunConfig:
-    """The set-up of a flight of this scene, with an estimate at every tick.
+    """Return the run configuration of a flight, with an estimate at every tick.
 
     Raises:
-        ValueError: nobody flies along a trajectory in this scene.
+        ValueError: a vehicle has neither a trajectory nor a firmware with a mission.
     """
     if scene.vehicles:
         for vehicle in scene.vehicles:
@@ -26,5 +27,5 @@ def campaign_setup(scene: Scene) -> RunConfig:
 
 
 def _check(scene: Scene) -> None:
-    if not scene.has(Autopilot) or not follows_trajectory(scene):
+    if not scene.has(Autopilot) or not (follows_trajectory(scene) or flown_by_firmware(scene)):
         raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")

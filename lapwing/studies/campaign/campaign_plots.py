@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.studies.battery_use import WATT_HOUR
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import ellipse, has_sobol, interval, rank_correlation, sobol
 from lapwing.studies.metrics import METRICS
@@ -24,27 +25,29 @@ _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
 
 def shown(name: str) -> tuple[str, float]:
-    """Label of a figure and the factor to its unit there: angles in degrees, shares in per cent."""
+    """Return label and unit factor of a metric as shown: angles in degrees, energies in W h, fractions in per cent."""
     unit = METRICS[name]
+    if unit == "J":
+        return f"{name} [W h]", 1.0 / WATT_HOUR
     if unit == "rad":
         return f"{name} [°]", 1.0 / DEGREE
     return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
 
 
 def required(found: Results) -> dict[str, float]:
-    """The limits of figures that the scene's `[success]` sets."""
+    """Return the limits of metrics in the scene's `[success]`."""
     texts = found.folder.about["success"]
     return {match[1]: float(match[2]) for text in texts if (match := _LIMIT.fullmatch(text.strip()))}
 
 
 def errors(found: Results) -> Plot:
-    """Root-mean-square errors, beside what is published."""
+    """Plot root-mean-square errors with the published values."""
     caption = "Share of the runs with a smaller root-mean-square error of the reference against the truth."
     return _distributions(found, [name for name in found.figures if name.startswith("rmse.")], caption)
 
 
 def others(found: Results) -> Plot:
-    """All other figures that differ between runs."""
+    """Plot all other metrics that differ between runs."""
     names = [name for name in found.figures if not name.startswith("rmse")]
     return _distributions(found, names, "Share of the runs with a smaller value.")
 
@@ -69,8 +72,7 @@ def _distributions(found: Results, names: list[str], caption: str) -> Plot:
 
 
 def _each(found: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
-    """(legend, figure of the runs, colour) of each vehicle of a fleet; of the run where there is one vehicle, or more
-    than can be told apart."""
+    """Return (legend, metric of the runs, colour) of each vehicle of a fleet; of the run for one or many vehicles."""
     own = found.of_vehicles(name)
     if not 0 < len(own) <= len(COLOURS):
         return [("the worst vehicles" if own else "runs", found[name], FLOWN)]
@@ -95,8 +97,8 @@ def touchdown(found: Results) -> Plot:
     half = np.median(np.linalg.norm(points - points.mean(axis=0), axis=1))
     (x, y), (dx, dy) = points.mean(axis=0), points.std(axis=0, ddof=1)
     caption = (
-        f"Last touch-down of {len(points)} runs: mean ({x:.3f}, {y:.3f}) m, standard deviation "
-        f"{dx:.3f} m along x and {dy:.3f} m along y; half of them within {half:.3f} m of the mean."
+        f"Last touch-down of {len(points)} runs: mean ({x:.3g}, {y:.3g}) m, standard deviation "
+        f"{dx:.2g} m along x and {dy:.2g} m along y; half of them within {half:.2g} m of the mean."
     )
     drawn = tuple(mark for mark in marks if len(mark.x))
     return Plot((Panel(drawn, "y [m]", "x [m]", timed=False, equal=True),), caption, 5.0)
@@ -116,7 +118,7 @@ def _touchdowns(found: Results) -> Plot:
 
 
 def success(found: Results) -> Plot:
-    """Probability of success over each parameter."""
+    """Return the probability of success over each parameter."""
     panels, good = [], found["success"].astype(bool)
     keys, rest = _most(found)
     for k, key in enumerate(keys):
@@ -131,7 +133,7 @@ def success(found: Results) -> Plot:
         )
         label = "probability of success" if k % ACROSS == 0 else ""
         place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS, "y_range": (-0.02, 1.02)}
-        panels.append(Panel(marks, label, key, x_ticks=_texts(found, key), timed=False, **place))
+        panels.append(Panel(marks, label, _with_unit(found, key), x_ticks=_texts(found, key), timed=False, **place))
     caption = "Share of successes among the runs of each part of a parameter's range, of equal counts."
     return _grid(panels, caption + rest)
 
@@ -166,7 +168,7 @@ def matters(found: Results) -> Plot:
                 "x_range": (-1.05, 1.05) if column == 0 else (-0.05, 1.05),
             }
             panels.append(Panel(bars, "", kinds[column], title=aim, timed=False, **place))
-    caption = f"How each parameter goes with what {len(x)} runs came to: Spearman's rank correlation"
+    caption = f"Spearman's rank correlation of each parameter with the results of {len(x)} runs"
     caption += (
         "; beside it the share of the variance that the parameter explains alone (SALib, RBD-FAST)."
         if with_sobol
@@ -179,12 +181,12 @@ def matters(found: Results) -> Plot:
 
 
 def parallel(found: Results) -> Plot:
-    """Every run as a line over all parameters and what matters, each scaled to its range."""
+    """Return every run as a line over all parameters and what matters, each scaled to its range."""
     keys, rest = _most(found)
     names = [*keys, *(name for name in MATTERS if name in found.figures)]
     columns, ticks = [], []
     for name in names:
-        values, (label, scale) = found.number(name), shown(name) if name in METRICS else (name, 1.0)
+        values, (label, scale) = found.number(name), shown(name) if name in METRICS else (_with_unit(found, name), 1.0)
         low, high = np.nanmin(values), np.nanmax(values)
         columns.append((values - low) / (high - low if high > low else 1.0))
         texts = _texts(found, name)
@@ -198,18 +200,19 @@ def parallel(found: Results) -> Plot:
             broken = np.column_stack([lines, np.full(len(lines), np.nan)])
             x = np.tile(np.append(np.arange(len(names), dtype=float), np.nan), len(lines))
             marks.append(Line(x, broken.ravel(), name, colour, 0.7))
-    panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), y_range=(-0.03, 1.03))
+    limits: dict[str, Any] = {"x_range": (-0.5, len(names) - 0.5), "y_range": (-0.03, 1.03)}
+    panel = Panel(tuple(marks), "place in the range", timed=False, x_ticks=tuple(ticks), **limits)
     caption = f"A line for each run, at most {PARALLEL} successes and {PARALLEL} failures."
     return Plot((panel,), caption + rest, 4.2)
 
 
 def _some(n: int, most: int) -> np.ndarray:
-    """Indices of at most so many of n runs, at random: every k-th would fall in step with the runs of a grid."""
+    """Return the indices of at most so many of n runs, at random, since every k-th could match the steps of a grid."""
     return np.arange(n) if n <= most else np.sort(np.random.default_rng(1).choice(n, most, replace=False))
 
 
 def _parameters(found: Results) -> list[str]:
-    """The parameters that differ between the runs."""
+    """Return the parameters that differ between the runs."""
     keys = [key for key in found.folder.plan.keys if len(np.unique(found[key])) > 1]
     if not keys:
         raise NotRecordedError("no parameter varies; --vary KEY=DISTRIBUTION lets one")
@@ -217,7 +220,7 @@ def _parameters(found: Results) -> list[str]:
 
 
 def _most(found: Results) -> tuple[list[str], str]:
-    """The parameters that go most with what matters, as many as have a panel, and a sentence about the others."""
+    """Return the parameters with the strongest correlations, as many as panels, and a text on the others."""
     keys = _parameters(found)
     if len(keys) <= KEYS:
         return keys, ""
@@ -234,7 +237,7 @@ def _most(found: Results) -> tuple[list[str], str]:
 
 
 def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
-    """Runs of each part of a parameter's range, shape (n,) of bool: of each value, or parts of equal counts."""
+    """Yield a mask of the runs, shape (n,), for each value of a parameter or each part of its range of equal counts."""
     values = np.unique(x)
     if len(values) <= BINS:
         yield from (x == value for value in values)
@@ -244,15 +247,21 @@ def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
     yield from (place == k for k in np.unique(place))
 
 
+def _with_unit(found: Results, key: str) -> str:
+    """Return a parameter's key with its unit, if that is known."""
+    unit = found.units.get(key, "")
+    return f"{key} [{unit}]" if unit else key
+
+
 def _texts(found: Results, name: str) -> tuple[str, ...]:
-    """The values of a parameter of texts, in the order of their numbers."""
+    """Return the values of a parameter of texts, in the order of their numbers."""
     return tuple(np.unique(found[name])) if found[name].dtype == object else ()
 
 
 def _broken(key: str) -> str:
-    """A dotted key on several lines, so that it stands beside others."""
+    """Break a dotted key into several lines."""
     lines = [""]
-    for part in re.findall(r"[^.]+\.?", key):
+    for part in re.findall(r"\[[^\]]*\]|[^.\[]+\.?", key):
         if len(lines[-1] + part) > LETTERS and lines[-1]:
             lines.append("")
         lines[-1] += part

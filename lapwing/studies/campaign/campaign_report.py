@@ -6,10 +6,12 @@ from pathlib import Path
 
 from lapwing.studies.campaign import campaign_plots, console_output
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.report.matplotlib_figure import write_pdf, write_png
+from lapwing.studies.report.matplotlib_figure import write_png
 from lapwing.studies.report.page import render
+from lapwing.studies.report.paper import Cover, Titled, write_pdf
 from lapwing.studies.report.plot import NotRecordedError, Plot
 from lapwing.studies.report.sections import Section
+from lapwing.studies.tracking import AXES, shown
 
 WORST = 10  # runs that are listed
 PLOTS: dict[str, Callable[[Results], Plot]] = {
@@ -34,8 +36,11 @@ def write(path: Path, found: Results) -> None:
         if path.suffix == ".html":
             path.write_text(_page(found, sections), encoding="utf-8")
         else:
-            draw = write_pdf if path.suffix == ".pdf" else write_png
-            draw(path, [section.plot for section in sections if section.plot])
+            drawn = [Titled(section.title, section.plot) for section in sections if section.plot]
+            if path.suffix == ".pdf":
+                write_pdf(path, _cover(found), drawn)
+            else:
+                write_png(path, [titled.plot for titled in drawn])
     except OSError as fault:
         raise ValueError(f"{path}: cannot write the report: {fault.strerror or fault}") from None
 
@@ -48,7 +53,7 @@ def _section(title: str, draw: Callable[[Results], Plot], found: Results) -> Sec
         return Section(name, title, missing=str(reason))
 
 
-def _page(found: Results, sections: list[Section]) -> str:
+def _facts(found: Results) -> dict[str, object]:
     about, plan = found.folder.about, found.folder.plan
     facts = {
         "seed": plan.seed,
@@ -60,6 +65,31 @@ def _page(found: Results, sections: list[Section]) -> str:
         "success": " and ".join(about["success"]) or "always",
         "versions": ", ".join(f"{name} {text}" for name, text in about["versions"].items()),
     }
+    return {name: text for name, text in facts.items() if text}
+
+
+def _cover(found: Results) -> Cover:
+    p = found.failure
+    share = f"Failures: {p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
+    spreads = {axis: found.spread(f"rmse.{axis}") for axis in AXES}
+    rows = [
+        (
+            f"{axis} [{shown(axis)[0]}]",
+            *(console_output.digits(shown(axis)[1] * v) for v in (s.median, s.high, s.worst)),
+        )
+        for axis, s in spreads.items()
+        if s is not None
+    ]
+    facts = tuple((name, str(text)) for name, text in _facts(found).items())
+    return Cover(_title(found), found.outcome_text, (share,), ("RMSE", "median", "95 %", "worst"), tuple(rows), facts)
+
+
+def _title(found: Results) -> str:
+    return f"{found.scene}: {len(found) + len(found.refused['run'])} runs"
+
+
+def _page(found: Results, sections: list[Section]) -> str:
+    plan = found.folder.plan
     heads = [campaign_plots.shown(name) for name in LISTED]
     worst = [
         {
@@ -76,10 +106,10 @@ def _page(found: Results, sections: list[Section]) -> str:
     refused = zip(found.refused["run"].tolist(), found.refused["outcome_text"].tolist(), strict=True)
     return render(
         "campaign.html",
-        title=f"{found.scene}: {len(found) + len(found.refused['run'])} runs",
+        title=_title(found),
         outcome_text=found.outcome_text,
         failure=found.failure,
-        facts={name: text for name, text in facts.items() if text},
+        facts=_facts(found),
         heads=[label for label, _ in heads],
         worst=worst,
         vehicles=console_output.vehicle_cells(found),

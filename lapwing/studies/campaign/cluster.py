@@ -16,10 +16,10 @@ PATIENCE = 10.0  # [s] for the scheduler to answer
 def dask(
     address: str, say: Callable[[str], None] = lambda line: None
 ) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
-    """The workers of the scheduler at an address, tcp://host:8786; a line is said while there are none.
+    """Return a function that runs calls on the workers of a Dask scheduler, tcp://host:8786.
 
     Raises:
-        ValueError: Dask is not installed, or nobody answers at this address.
+        ValueError: Dask is not installed, or the scheduler does not answer.
     """
     try:
         from distributed import Client, as_completed

@@ -1,14 +1,17 @@
 """A campaign in the terminal, and as JSON."""
 
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from rich.console import Console
 from rich.table import Table
 
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.results import Results
+from lapwing.studies.consistency import JOINT, SOURCES, bounds
 from lapwing.studies.tracking import AXES, shown
 
 VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
@@ -31,6 +34,8 @@ def show(console: Console, found: Results) -> None:
         least = {axis: found.spread(f"within_3sigma.{axis}") for axis in "xyz"}
         text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
         console.print(f"Least of a flight: {text}", highlight=False)
+        for line in consistency_lines(found):
+            console.print(line, highlight=False)
     if found.vehicles:
         _vehicles(console, found)
     if len(found) > 1 and not found.figures:
@@ -47,6 +52,26 @@ def show(console: Console, found: Results) -> None:
         console.print(f"Distance from the mission's target at the end: {text}", highlight=False)
     _list(console, "run", found["run"][failed], found["outcome_text"][failed])
     _list(console, "rejected: run", found.refused["run"], found.refused["outcome_text"])
+
+
+def consistency_lines(found: Results) -> list[str]:
+    """Return the joint NEES and the NIS over all runs with their 95 % bounds; [] without a covariance."""
+    known = found["nees"][np.isfinite(found["nees"])]
+    if not len(known):
+        return []
+    low, high = bounds(JOINT, len(known))
+    share = np.nanmean(found["within_95.nees"])
+    samples = int(np.nansum(found["nis_samples"]))
+    innovations = []
+    for source, (_, dimension) in SOURCES.items():
+        if np.isfinite(found[f"nis.{source}"]).any():
+            least, most = (bound / dimension for bound in bounds(dimension, samples))
+            innovations.append(f"{source} {np.nanmean(found[f'nis.{source}']):.3f} ({least:.3f} to {most:.3f})")
+    return [
+        f"Joint NEES of attitude, velocity, position: {known.mean():.2f}, expected {JOINT}, 95 % bounds {low:.2f} to "
+        f"{high:.2f}; within its 95 % quantile {share:.1%} of the time",
+        f"NIS by dimension, expected 1 (95 % bounds): {', '.join(innovations)}",
+    ]
 
 
 def _vehicles(console: Console, found: Results) -> None:
@@ -89,7 +114,7 @@ def _list(console: Console, what: str, runs: Sequence[int], told: Sequence[str])
 def _table(console: Console, title: str, kind: str, found: Results) -> None:
     table = Table(title=title, title_justify="left")
     table.add_column("axis", no_wrap=True)
-    for column in ("5 %", "median", "95 %", "worst", "of run"):
+    for column in ("5 %", "median", "95 %", "worst", "in run"):
         table.add_column(column, justify="right", no_wrap=True)
     if found.published:
         table.add_column(found.source, justify="right")
@@ -98,11 +123,18 @@ def _table(console: Console, title: str, kind: str, found: Results) -> None:
         s, (unit, scale) = found.spread(f"{kind}.{axis}"), shown(axis)
         if s is None:
             continue
-        row = [f"{axis} [{unit}]", *(f"{scale * v:.4f}" for v in (s.low, s.median, s.high, s.worst)), str(s.run)]
+        row = [f"{axis} [{unit}]", *(digits(scale * v) for v in (s.low, s.median, s.high, s.worst)), str(s.run)]
         if published := found.published.get(f"rmse.{axis}"):
-            row += [f"{scale * published:.4f}", f"{s.worst / published:.3f}"]
+            row += [digits(scale * published), f"{s.worst / published:.3f}"]
         table.add_row(*row)
-    console.print(table)
+    if table.row_count:  # a flight plan is no reference
+        console.print(table)
+
+
+def digits(value: float) -> str:
+    """Return a number with three significant digits and at least four decimals: 1.2345, 0.000214."""
+    decimals = 4 if value == 0.0 or abs(value) >= 1e-2 else min(2 - math.floor(math.log10(abs(value))), 9)
+    return f"{value:.{decimals}f}"
 
 
 def write_json(path: Path, found: Results, digest: str) -> None:

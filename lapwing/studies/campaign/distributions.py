@@ -28,14 +28,14 @@ class Distribution(NamedTuple):
         return _VALUES[self.name](*self.arguments) if self.name in _VALUES else ()
 
     def at(self, u: float) -> Any:
-        """The value below which the share u of the distribution lies, 0 < u < 1."""
+        """Return the quantile of u, 0 < u < 1."""
         if values := self.values:
             return values[min(int(u * len(values)), len(values) - 1)]
         return float(_QUANTILES[self.name](u, *self.arguments))
 
 
 def normal(mean: float, deviation: float) -> Distribution:
-    """A normal distribution with this mean and standard deviation, in the unit of the key.
+    """Return a normal distribution with this mean and standard deviation, in the unit of the key.
 
     Raises:
         ValueError: the deviation is below 0.
@@ -44,7 +44,7 @@ def normal(mean: float, deviation: float) -> Distribution:
 
 
 def uniform(low: float, high: float) -> Distribution:
-    """A uniform distribution over [low, high], in the unit of the key.
+    """Return a uniform distribution over [low, high], in the unit of the key.
 
     Raises:
         ValueError: high is below low.
@@ -53,7 +53,7 @@ def uniform(low: float, high: float) -> Distribution:
 
 
 def loguniform(low: float, high: float) -> Distribution:
-    """A value whose logarithm is uniform: each decade between low and high is as likely.
+    """Return a log-uniform distribution: each decade between low and high is equally likely.
 
     Raises:
         ValueError: high is below low, or low is not above 0.
@@ -62,10 +62,10 @@ def loguniform(low: float, high: float) -> Distribution:
 
 
 def linspace(low: float, high: float, count: int) -> Distribution:
-    """One of `count` values from low to high, equally far apart, each as likely.
+    """Return a distribution over `count` equidistant values from low to high, equally likely.
 
     Raises:
-        ValueError: the count is no whole number from 1 to 1 000 000.
+        ValueError: the count is no integer from 1 to 1 000 000.
     """
     sound = isinstance(count, int) and 0 < count <= MOST
     expected = f"a whole number of values, up to {MOST}, as third argument"
@@ -73,7 +73,7 @@ def linspace(low: float, high: float, count: int) -> Distribution:
 
 
 def choice(*values: Any) -> Distribution:
-    """One of these values, each as likely.
+    """Return a distribution over these values, equally likely.
 
     Raises:
         ValueError: there are none.
@@ -99,10 +99,10 @@ _SPLIT = re.compile(r"""((?:"[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|[^,])+)(?:,|$)"
 
 
 def parse(text: str) -> Distribution:
-    """The distribution of a text: "normal(10.4, 0.2)", "choice(rtk, standard)".
+    """Return the distribution of a text: "normal(10.4, 0.2)", "choice(rtk, standard)".
 
     Raises:
-        ValueError: no such distribution, or wrong arguments.
+        ValueError: the distribution is unknown, or its arguments are invalid.
     """
     found = _FORM.fullmatch(text.strip())
     if not found or found[1] not in KINDS:
@@ -116,7 +116,7 @@ def parse(text: str) -> Distribution:
 
 
 def _arguments(text: str) -> list[Any]:
-    """Values of TOML between commas, bare words among them. ValueError for anything else."""
+    """Parse comma-separated TOML values, including bare words. Raise ValueError for anything else."""
     try:
         return tomllib.loads(f"values = [{text}]")["values"]
     except tomllib.TOMLDecodeError:

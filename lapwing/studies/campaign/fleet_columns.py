@@ -16,7 +16,7 @@ Row = dict[str, Any]
 
 
 def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
-    """The columns that the table of a fleet has besides those of a run: `left.rmse.x`, by name and type."""
+    """Return the name and type of a fleet's additional columns, such as `left.rmse.x`."""
     each = {f"{name}.success": bool for name in vehicles}
     figures = {
         f"{v}.{name}": str if name == "outcome" else float
@@ -28,12 +28,12 @@ def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
 
 
 def joined(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
-    """The columns of a run besides what it draws.
+    """Return the columns of a run without its drawn parameters.
 
     Args:
-        flights: by the vehicle's name.
-        of_each: its figures.
-        required: its `[success]`.
+        flights: flights by vehicle name.
+        of_each: metrics by vehicle name.
+        required: `[success]` by vehicle name.
     """
     found: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in METRICS}
     unmet = {name: required[name].unmet(row) for name, row in of_each.items()}
@@ -60,4 +60,4 @@ def _worst(name: str, values: list[Any]) -> Any:
         return math.nan
     if name == "energy":
         return math.fsum(known)
-    return min(known) if name.startswith("within_3sigma.") else max(known)
+    return min(known) if name.startswith("within_") else max(known)

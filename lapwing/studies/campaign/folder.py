@@ -53,7 +53,7 @@ class Folder:
         return [range(start, min(start + size, self.plan.runs)) for start in range(0, self.plan.runs, size)]
 
     def missing(self) -> list[int]:
-        """The shards that are still to be flown."""
+        """Return the shards that have not been flown."""
         return [k for k in range(len(self.shards)) if not self._shard(k).exists()]
 
     def write(self, shard: int, rows: list[Row]) -> None:
@@ -62,12 +62,11 @@ class Folder:
             run_table.write_csv(file, self.kinds, [rows])
 
     def rows(self, shard: int) -> list[Row]:
-        """The rows of a shard that is done."""
+        """Return the rows of a complete shard."""
         return run_table.read_csv(self._shard(shard), self.kinds)
 
     def pages(self) -> Iterator[list[Row]]:
-        """The rows of the runs in their order, a shard at a time, up to the first shard that is missing or the last of
-        the table."""
+        """Yield the rows of the runs in order, shard by shard, up to the first missing one or the table's end."""
         last = self._last()
         for shard in range(len(self.shards)):
             if not self._shard(shard).exists() or (last is not None and shard > last):
@@ -75,14 +74,14 @@ class Folder:
             yield self.rows(shard)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """The columns of the table, shape (n,) each."""
+        """Return the columns of the table, shape (n,) each."""
         return run_table.arrays(self.kinds, self.pages())
 
     def end_after(self, shard: int | None) -> None:
-        """The table ends with this shard, None: with the last; shards after it are kept, and left out.
+        """End the table with this shard; None: with the last. Later shards are kept but left out.
 
         Raises:
-            RunFailed: it cannot be written.
+            RunFailed: the folder cannot be written.
         """
         if shard is None:
             (self.path / LAST).unlink(missing_ok=True)
@@ -142,10 +141,10 @@ def default_path(about: dict[str, Any]) -> Path:
 
 
 def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
-    """The folder of a campaign, made or gone on with.
+    """Create or continue the folder of a campaign.
 
     Raises:
-        ValueError: it holds another campaign, or something else, or cannot be written.
+        ValueError: it contains another campaign or something else, or cannot be written.
     """
     if not (path / MANIFEST).exists():
         _make(path, about)
@@ -174,10 +173,10 @@ def _begun(file: Path) -> bool:
 
 
 def read(path: Path) -> Folder:
-    """The folder of a campaign that was begun.
+    """Return the folder of an existing campaign.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is no campaign.
     """
     try:
         about = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
@@ -191,7 +190,7 @@ def read(path: Path) -> Folder:
 
 @contextlib.contextmanager
 def _kept(path: Path) -> Iterator[Path]:
-    """`_whole` of what was flown; RunFailed where it cannot be written."""
+    """Yield a file as `_whole` does. Raise RunFailed if it cannot be written."""
     try:
         with _whole(path) as file:
             yield file
@@ -202,7 +201,7 @@ def _kept(path: Path) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def _whole(path: Path) -> Iterator[Path]:
-    """A file to write that takes this path's place when all of it is there."""
+    """Yield a temporary file that replaces the path when it is complete."""
     new = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}")  # several machines may share the folder
     try:
         yield new

@@ -11,7 +11,7 @@ from lapwing.studies.workers import workers
 
 
 def here(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
-    """Results of call(*task), one after the other in this process, each with its place among the tasks."""
+    """Yield the results of call(*task) in this process, each with the index of its task."""
     for place, task in enumerate(tasks):
         yield place, call(*task)
 
@@ -33,5 +33,5 @@ def processes(count: int) -> Callable[[Callable[..., Any], Iterable[tuple]], Ite
 
 
 def cores() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

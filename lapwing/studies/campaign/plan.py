@@ -41,13 +41,13 @@ class Plan(NamedTuple):
         return [*(key for key, _ in self.vary), *(self.sweep[0] if self.sweep else ())]
 
     def option(self, key: str) -> str:
-        """The option of the command line that lets a key vary; "" of one that does not."""
+        """Return the command-line option that varies a key; "" if there is none."""
         if any(key == varied for varied, _ in self.vary):
             return "--vary"
         return "--sweep: column" if key in self.keys else ""
 
     def seed_of(self, run: int) -> int:
-        """The seed of all randomness within a run: 1, 2, ... of campaign 1; no two campaigns share one."""
+        """Return the seed of a run: 1, 2, ... of campaign 1; no two campaigns share a seed."""
         return (self.seed - 1) * APART + run + 1
 
     def anywhere(self) -> "Plan":
@@ -62,7 +62,7 @@ class Plan(NamedTuple):
         return drawn | (self.sweep[run % len(self.sweep)] if self.sweep else {})
 
     def given(self, run: int) -> dict[str, Any]:
-        """All that a run overrides in the scene of the campaign, its seed included."""
+        """Return all overrides of a run, including its seed."""
         return {**self.values(run), SEED: self.seed_of(run)}
 
 
@@ -75,20 +75,20 @@ def plan(
     sweep: Path | None = None,
     design: str = "random",
 ) -> Plan:
-    """A plan.
+    """Return a plan.
 
     Args:
-        path: of the scene, or its name.
-        overrides: of every run, KEY=VALUE.
-        runs: how many; by default the entries of the sweep, the points of the grid, or 100.
-        seed: of the campaign.
-        vary: a distribution by key.
-        sweep: CSV file, a column for each key, a line for each run: for values that belong together.
-        design: how the runs fill the space of what varies: independently, as a Latin hypercube, as a scrambled Sobol
-            sequence, or as a grid of all combinations of the values that are finitely many.
+        path: path or name of the scene.
+        overrides: KEY=VALUE of every run.
+        runs: number of runs; by default the entries of the sweep, the points of the grid, or 100.
+        seed: seed of the campaign.
+        vary: distribution by key.
+        sweep: CSV file with a column per key and a line per run, for correlated values.
+        design: sampling of the varied keys: independent, Latin hypercube, scrambled Sobol sequence, or a grid of all
+            combinations of finitely many values.
 
     Raises:
-        ValueError: what is wrong with which argument.
+        ValueError: an argument is invalid.
     """
     varied, swept = tuple(sorted((vary or {}).items())), _read(sweep) if sweep else ()
     if both := sorted(set(vary or {}) & set(swept[0] if swept else ())):
@@ -114,13 +114,13 @@ def plan(
 
 
 def _word(seed: int, run: int, key: str) -> int:
-    """64 random bits, a pure function of its arguments."""
+    """Return 64 random bits, a pure function of the arguments."""
     text = "\0".join((str(seed), str(run), key))
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=8).digest(), "little")
 
 
 def _unit(seed: int, run: int, key: str) -> float:
-    """A number in (0, 1), as `_word`."""
+    """Return a number in (0, 1). See `_word`."""
     return ((_word(seed, run, key) >> 12) + 0.5) * 2.0**-52
 
 
@@ -129,7 +129,7 @@ def _independent(plan: Plan, run: int) -> list[float]:
 
 
 def _grid(plan: Plan, run: int) -> list[float]:
-    """All combinations of what has finitely many values, one after the other; the rest is independent."""
+    """Return the run's combination of the keys with finitely many values; other keys are independent."""
     places = _independent(plan, run)
     for k, (_, distribution) in reversed(list(enumerate(plan.vary))):
         if n := len(distribution.values):
@@ -140,7 +140,7 @@ def _grid(plan: Plan, run: int) -> list[float]:
 
 @cache
 def _latin(seed: int, runs: int, keys: tuple[str, ...]) -> np.ndarray:
-    """Latin hypercube of all runs, shape (keys, runs): of each key's range every n-th part is drawn once."""
+    """Return a Latin hypercube of all runs, shape (keys, runs): each n-th part of a key's range is drawn once."""
     ranked = [[_unit(seed, run, key) for run in range(runs)] for key in keys]
     inside = [[_unit(seed, run, f"{key} inside") for run in range(runs)] for key in keys]
     return (np.argsort(np.argsort(ranked, axis=1), axis=1) + np.array(inside)) / runs
@@ -148,7 +148,7 @@ def _latin(seed: int, runs: int, keys: tuple[str, ...]) -> np.ndarray:
 
 @cache
 def _sobol(seed: int, runs: int, keys: int) -> np.ndarray:
-    """Scrambled Sobol sequence of all runs, shape (keys, runs)."""
+    """Return a scrambled Sobol sequence of all runs, shape (keys, runs)."""
     from scipy.stats.qmc import Sobol  # half a second to import
 
     points = Sobol(keys, rng=np.random.default_rng(_word(seed, 0, "sobol")))
@@ -166,10 +166,10 @@ _PLACES: dict[str, Callable[[Plan, int], Iterable[float]]] = {
 
 
 def _read(path: Path) -> tuple[dict[str, Any], ...]:
-    """The lines of a CSV file as values by key.
+    """Return the lines of a CSV file as values by key.
 
     Raises:
-        ValueError: it cannot be read, has no lines, or one of another length.
+        ValueError: it cannot be read, has no lines, or lines of different length.
     """
     try:
         lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")), skipinitialspace=True))

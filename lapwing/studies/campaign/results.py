@@ -1,5 +1,6 @@
 """The results of a campaign: its table in memory, and what is asked of it."""
 
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +17,7 @@ from lapwing.studies.tracking import AXES
 LEAST_IS_WORST = (
     NEAREST,
     *(f"within_3sigma.{axis}" for axis in "xyz"),
+    "within_95.nees",
 )  # of all other figures the greatest is the worst
 
 
@@ -26,20 +28,21 @@ class Results:
         folder: of the campaign.
         columns: by name, those of refused runs left out.
         refused: of the refused runs.
+        units: of the parameters' keys, as far as they are known.
     """
 
-    def __init__(self, folder: Folder):
-        self.folder, everything = folder, folder.arrays()
+    def __init__(self, folder: Folder, units: Mapping[str, str] | None = None):
+        self.folder, self.units, everything = folder, units or {}, folder.arrays()
         taken = everything["outcome"] != REFUSED
         self.columns = {name: values[taken] for name, values in everything.items()}
         self.refused = {name: values[~taken] for name, values in everything.items()}
 
     def __len__(self) -> int:
-        """Number of runs that were flown."""
+        """Return the number of completed runs."""
         return len(self.columns["run"])
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """A column of the runs that were flown."""
+        """Return a column of the completed runs."""
         return self.columns[name]
 
     @property
@@ -89,16 +92,16 @@ class Results:
         return spread(self[name], self["run"], least=name in LEAST_IS_WORST)
 
     def of_vehicles(self, name: str) -> dict[str, np.ndarray]:
-        """A figure of each vehicle of a fleet, by the vehicle's name; {} of a scene of one."""
+        """Return a metric by vehicle name of a fleet; {} for a single vehicle."""
         return {vehicle: self[f"{vehicle}.{name}"] for vehicle in self.vehicles}
 
     def number(self, key: str) -> np.ndarray:
-        """A parameter as numbers: texts by their place in alphabetical order."""
+        """Return a parameter as numbers: texts by their alphabetical index."""
         values = self[key]
         return np.unique(values, return_inverse=True)[1].astype(float) if values.dtype == object else values
 
     def worst(self, count: int) -> list[dict[str, Any]]:
-        """The worst runs: failures first, then those farthest from their reference."""
+        """Return the worst runs: failures first, then the largest tracking errors."""
         away = np.nan_to_num(self["max_distance"], nan=np.inf)
         order = np.lexsort((self["run"], -away, self["success"].astype(bool)))[:count]
         return [{name: values[k] for name, values in self.columns.items()} for k in order]

@@ -34,10 +34,10 @@ def write_csv(path: Path, kinds: Mapping[str, type], pages: Iterable[Iterable[Ro
 
 
 def read_csv(path: Path, kinds: Mapping[str, type]) -> list[dict[str, Any]]:
-    """The rows of a file of `write_csv`.
+    """Return the rows of a file of `write_csv`.
 
     Raises:
-        ValueError: it is none, or has other columns.
+        ValueError: it is no such file, or has other columns.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -68,7 +68,7 @@ def write_parquet(
 
 
 def arrays(kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> dict[str, np.ndarray]:
-    """The columns of a table, shape (n,) each; texts as objects."""
+    """Return the columns of a table, shape (n,) each; texts as objects."""
     found: dict[str, list[np.ndarray]] = {name: [] for name in kinds}
     for page in pages:
         rows = list(page)
@@ -79,7 +79,7 @@ def arrays(kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> dict[st
 
 
 def _plain(value: Any, kind: type) -> Any:
-    """A value as its column has it: what is no text in a column of texts as JSON."""
+    """Convert a value to its column's type; other values in text columns become JSON."""
     if kind is str:
         return value if isinstance(value, str) else "" if value is None else json.dumps(value)
     return math.nan if value is None else kind(value)
@@ -99,6 +99,6 @@ def _value(cell: str, kind: type) -> Any:
 
 
 def bits(kinds: Mapping[str, type], rows: Iterable[Row]) -> Iterator[bytes]:
-    """The rows as bytes, for a digest over them."""
+    """Yield the rows as bytes for a digest."""
     for row in rows:
         yield "\x1f".join(_text(row.get(name), kind) for name, kind in kinds.items()).encode() + b"\n"

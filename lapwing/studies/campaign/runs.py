@@ -19,6 +19,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene, SceneError
 from lapwing.services.common.success_criteria import Success
 from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.process_table import foreign_firmware
 from lapwing.services.scene_resolver import load, reseed
 from lapwing.studies.campaign import fleet_columns
 from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
@@ -54,12 +55,12 @@ def versions() -> dict[str, str]:
 
 
 def vehicles(plan: Plan) -> tuple[str, ...]:
-    """The names of the vehicles of a fleet; () of a scene of one."""
+    """Return the vehicle names of a fleet; () for a single vehicle."""
     return tuple(vehicle[Vehicle].name for vehicle in scene_of(plan).vehicles)
 
 
 def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
-    """Name and type of every column of the table; `vehicles` of a fleet."""
+    """Return the name and type of every column of the table; `vehicles` of a fleet."""
     found: dict[str, type] = {"run": int, "seed": int}
     for key in plan.keys:
         drawn = next((d for k, d in plan.vary if k == key), None)
@@ -70,10 +71,10 @@ def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
 
 
 def first_setup(plan: Plan) -> tuple[int, RunConfig]:
-    """The first run that the scene takes, and its set-up.
+    """Return the number and run configuration of the first run that the scene accepts.
 
     Raises:
-        SceneError: the scene is not sound, or refuses what each of `TRIED` first runs draws and of as many others.
+        SceneError: the scene is invalid, or rejects the first `TRIED` runs and as many others.
     """
     refusal = None
     others = np.linspace(0, plan.runs - 1, TRIED, dtype=int).tolist()  # of a grid the first runs are much alike
@@ -87,15 +88,17 @@ def first_setup(plan: Plan) -> tuple[int, RunConfig]:
 
 
 def reference(run: int, setup: RunConfig) -> Reference:
-    """Fly a run and return its reference."""
+    """Fly a run and return its reference, without an end state for a foreign firmware, whose flights differ."""
+    if foreign_firmware(setup):
+        return Reference(versions(), run, "")
     return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
 
 
 def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Row]:
-    """The rows of the runs from `start` to before `stop`.
+    """Return the rows of the runs from `start` (inclusive) to `stop` (exclusive).
 
     Raises:
-        ValueError: this worker is of another version, or its numbers are others.
+        ValueError: this worker has another version or other numbers.
     """
     _check(plan, reference)
     rows: dict[str, np.ndarray] = {}
@@ -103,12 +106,12 @@ def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Ro
 
 
 def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> Row:
-    """The row of a run, flown; one that the scene refuses is told so.
+    """Fly a run. Return its row; a run that the scene rejects has that as its outcome.
 
     Args:
-        plan: of the campaign.
-        run: its number.
-        rows: memory for the flights of one run after the other.
+        plan: plan of the campaign.
+        run: number of the run.
+        rows: reusable memory for the flights of successive runs.
     """
     row: Row = {"run": run, "seed": plan.seed_of(run), **plan.values(run), "success": False}
     try:
@@ -146,10 +149,10 @@ def _of_refused(names: tuple[str, ...]) -> Row:
 
 
 def setup_of(plan: Plan, run: int) -> RunConfig:
-    """The set-up of a run.
+    """Return the run configuration of a run.
 
     Raises:
-        SceneError: what the run draws does not fit the scene.
+        SceneError: the drawn values do not fit the scene.
     """
     if not plan.keys:
         return reseed(_resolved(plan.path, plan.overrides), plan.seed_of(run))
@@ -171,12 +174,12 @@ def located(plan: Plan) -> Iterator[None]:
 
 
 def scene_of(plan: Plan) -> Scene:
-    """The scene of a campaign."""
+    """Return the scene of a campaign."""
     return _scene(plan.path, plan.overrides)
 
 
 def sources(plan: Plan) -> dict[str, str]:
-    """The texts that a campaign is made of: of the scene, of what it names, and of what runs may name instead."""
+    """Return the source texts of a campaign: the scene, its files, and files that runs may name instead."""
     found = {name: text.decode() for name, text in scene_of(plan).sources.items()}
     for key, distribution in plan.vary:
         for value in distribution.values:
@@ -204,7 +207,7 @@ _agreed: set[str] = set()  # end states of references that this process has flow
 
 
 def _check(plan: Plan, reference: Reference) -> None:
-    """Refuse to fly where the first run goes another way than where the campaign was begun."""
+    """Check that the first run gives the same result as at the start of the campaign."""
     where = f"worker on {platform.node()}"
     try:
         scene_of(plan)
@@ -213,6 +216,8 @@ def _check(plan: Plan, reference: Reference) -> None:
     for name, wanted in reference.versions.items():
         if (found := versions().get(name)) != wanted:
             raise ValueError(f"{where}: has {name} {found}; the campaign was begun with {wanted}")
+    if foreign_firmware(setup_of(plan, reference.run)):
+        return  # no two of its flights need be equal
     if reference.end_state not in _agreed:
         if (found := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
             raise ValueError(f"{where}: run {reference.run} goes another way there than where the campaign was begun")

@@ -109,7 +109,7 @@ class Ending:
     """
 
     def __init__(self, until: float | None):
-        """`until`: how well the probability of a failure is to be known; None for never well enough."""
+        """Create a stopping rule; `until`: half-width of the failure probability's confidence interval, or None."""
         self.shard, self.total = 0, Count()
         self._until, self._reached = until, False
 

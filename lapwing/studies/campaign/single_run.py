@@ -9,15 +9,15 @@ from lapwing.studies.campaign.runs import REFUSED, located, scene_of, sources
 
 
 def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
-    """The scene of a run, with all that it has drawn.
+    """Return the scene of a run with its drawn values.
 
     Args:
-        scene: that the campaign has flown.
-        run: its number.
-        folder: of the campaign.
+        scene: scene of the campaign.
+        run: number of the run.
+        folder: folder of the campaign.
 
     Raises:
-        ValueError: no such run, or the scene is not what was flown.
+        ValueError: there is no such run, or the scene differs from the campaign's.
     """
     found = read(folder)
     if not 0 <= run < found.plan.runs:
@@ -32,7 +32,7 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
 
 
 def end_state_of(run: int, folder: Path) -> str:
-    """The end state that a run came to in its campaign; "" where it has not been flown."""
+    """Return the final state of a run in its campaign; "" if it has not been flown."""
     found = read(folder)
     shard = next(k for k, runs in enumerate(found.shards) if run in runs)
     if shard in found.missing():

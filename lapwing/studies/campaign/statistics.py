@@ -33,7 +33,7 @@ class Spread(NamedTuple):
 
 
 def interval(k: int, n: int) -> Interval:
-    """Probability of what happened k times in n, by Clopper and Pearson: it holds at least as often as it says."""
+    """Return the Clopper-Pearson interval of a probability from k events in n trials; it is conservative."""
     if n == 0:
         return Interval(float("nan"), 0.0, 1.0)
     found = stats.binomtest(k, n).proportion_ci(SURE, method="exact")
@@ -41,7 +41,7 @@ def interval(k: int, n: int) -> Interval:
 
 
 def spread(values: np.ndarray, runs: np.ndarray, least: bool = False) -> Spread | None:
-    """Distribution of a figure, NaN left out; the worst is the greatest, or the `least`. None without a number."""
+    """Return the distribution of a metric without NaN; the worst is the greatest, or the `least`. None if empty."""
     there = np.isfinite(values)
     if not there.any():
         return None
@@ -52,7 +52,7 @@ def spread(values: np.ndarray, runs: np.ndarray, least: bool = False) -> Spread 
 
 
 def paired(a: np.ndarray, b: np.ndarray) -> Interval:
-    """Mean of b - a over pairs, with Student's interval; NaN without two pairs."""
+    """Return the mean of b - a over pairs, with Student's interval; NaN with fewer than two pairs."""
     difference = (b - a)[np.isfinite(a) & np.isfinite(b)]
     if len(difference) < 2:
         return Interval(float("nan"), float("nan"), float("nan"))
@@ -62,7 +62,7 @@ def paired(a: np.ndarray, b: np.ndarray) -> Interval:
 
 
 def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
-    """Spearman's correlation of two columns (n,), with the interval of Fisher's transformation."""
+    """Return Spearman's correlation of two columns (n,), with the interval of Fisher's transformation."""
     if len(x) < 4 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return Interval(float("nan"), float("nan"), float("nan"))
     rho = float(stats.spearmanr(x, y).statistic)
@@ -77,10 +77,10 @@ def has_sobol() -> bool:
 
 
 def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
-    """First-order Sobol indices of the columns of x (n, k) for y (n,), from any sample of independent columns; NaN of a
-    column that does not vary.
+    """Return first-order Sobol indices of the columns of x (n, k) for y (n,), from independent columns.
 
-    By SALib's RBD-FAST: Plischke, "An effective algorithm for computing global sensitivity indices (EASI)", 2010.
+    NaN for a constant column. By SALib's RBD-FAST: Plischke, "An effective algorithm for computing global sensitivity
+    indices (EASI)", 2010.
     """
     from SALib.analyze import rbd_fast
 
@@ -97,7 +97,7 @@ def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
 
 
 def ellipse(points: np.ndarray, share: float, n: int = 90) -> np.ndarray:
-    """The ellipse (n, 2) that holds this share of a normal distribution with mean and covariance of points (k, 2)."""
+    """Return the ellipse (n, 2) of this share of a normal distribution with mean and covariance of points (k, 2)."""
     values, axes = np.linalg.eigh(np.cov(points.T))
     radius = np.sqrt(stats.chi2.ppf(share, 2) * np.clip(values, 0.0, None))
     angle = np.linspace(0.0, 2.0 * np.pi, n)

@@ -53,7 +53,13 @@ def _table(console: Console, title: str, found: Study, active: bool) -> None:
 def _changes(i: Influence) -> tuple[str, str, str]:
     if i.failure:
         return "ends early", "", ""
-    return f"{i.trajectory:.2g}", f"{i.final:.2g}", f"{100.0 * i.energy:+.2g} %"
+    return f"{i.trajectory:.2g}", f"{i.final:.2g}", percent(i.energy)
+
+
+def percent(share: float) -> str:
+    """Return a relative change in per cent with two significant digits, without an exponent up to 1000 %."""
+    value = 100.0 * share
+    return f"{value:+.0f} %" if 9.95 <= abs(value) < 1e4 else f"{value:+.2g} %"
 
 
 def _of(found: Study, active: bool) -> list[Row]:
@@ -80,7 +86,7 @@ def _plain(value: object) -> object:
 
 
 def plot(path: Path, found: Study) -> None:
-    """Influence of every effect over the tolerance, and beside it what it costs."""
+    """Plot the influence of every effect over the tolerance, and its cost."""
     rows = [r for r in (*_of(found, False)[::-1], *_of(found, True)[::-1]) if r.influence]
     names = [row.name if row.active else f"({row.name})" for row in rows]
     with styled():
@@ -88,7 +94,7 @@ def plot(path: Path, found: Study) -> None:
         influence, cost = figure.subplots(1, 2, sharey=True)
         ends = [row.influence.trajectory for row in rows if row.influence]
         most = max([e for e in ends if math.isfinite(e)] + [10.0 * found.within])
-        lengths = [min(max(e, LEAST), 3.0 * most) for e in ends]
+        lengths = [min(max(e, LEAST), 3.0 * most) if e > 0.0 else 0.0 for e in ends]  # no bar: no change
         colours = [FLOWN if row.active else "#9CC3DD" for row in rows]
         influence.barh(names, lengths, color=colours)
         influence.axvline(found.within, color=BOUND, linewidth=1.2, label=f"tolerance {found.within:g} m")

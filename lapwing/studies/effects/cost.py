@@ -30,7 +30,7 @@ def exchanges(method: Any, p: Any, s: Any, key: Key, command: tuple[float, ...],
 
 
 def costs(scene: Scene, variants: list[Tables]) -> list[tuple[float, float]]:
-    """Nanoseconds of a plant step of each variant: (hovering at 10 m, standing with the motors off)."""
+    """Return the time [ns] of a plant step of each variant: (hovering at 10 m, on the ground with the motors off)."""
     calls = [_calls(variant(scene, tables)) for tables in variants]
     taken = np.empty((ROUNDS, len(variants), 2))
     for row in taken:

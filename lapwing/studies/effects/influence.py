@@ -17,7 +17,7 @@ class Influence(NamedTuple):
 
 
 def influence(flown: FlightData, other: FlightData) -> Influence:
-    """The difference of `other` from `flown`; a flight that ends earlier is taken to stay where it ended."""
+    """Return the difference of `other` from `flown`; a shorter flight is extended by its last state."""
     if other.failure:
         return Influence(np.inf, np.inf, np.inf, other.failure)
     count = max(len(flown.truth), len(other.truth))

@@ -60,11 +60,12 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
         raise ValueError(f"{scene.path}: the model {scene[Vehicle].model} knows no effects; expected a multirotor")
     tables = scene[Effects].tables
     fewer = {name: _without(tables, name) for name in tables}
-    alone = [name for name in effects.names() if effects.parameter_class(name) not in INTERACTION]  # nobody to meet
+    alone = [name for name in effects.names() if effects.parameter_class(name) not in INTERACTION]  # no other vehicle
     more = {name: {**tables, name: {}} for name in alone if name not in tables}
     refused = {name: why for name, v in (fewer | more).items() if (why := refusal(scene, v))}
+    among = [name for name in effects.names() if name not in alone and name not in tables]
     flying = {name: v for name, v in (fewer | more).items() if name not in refused}
-    found: dict[str, Influence] = {}
+    result: dict[str, Influence] = {}
     with hangar(scene) as crew:
         flights = crew.fly([tables, *flying.values()])
         count = len(flying) + 1
@@ -74,9 +75,9 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
             raise ValueError(f"{scene.path}: {flown.failure}")
         for i, (name, flight) in enumerate(zip(flying, flights, strict=True), 1):
             say(f"{'without' if name in tables else 'with'} {name}", i + 1, count)
-            found[name] = influence(flown, flight)
-        out = sorted((n for n in fewer if n in found), key=lambda n: found[n].trajectory)
-        out = [n for n in out if found[n].trajectory <= within]
+            result[name] = influence(flown, flight)
+        out = sorted((n for n in fewer if n in result), key=lambda n: result[n].trajectory)
+        out = [n for n in out if result[n].trajectory <= within]
         kept, apart = _smallest(crew, tables, flown, out, within, lambda text: say(text, count, count + 1))
     say("timing the plant's steps", count + 1, count + 1)
     names = list(flying)
@@ -86,7 +87,9 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
         sign = 1.0 if name in fewer else -1.0
         taken = each[names.index(name)] if name in flying else (math.nan, math.nan)
         airborne, standing = (sign * (a - b) for a, b in zip(full, taken, strict=True))
-        rows.append(Row(name, name in fewer, found.get(name), airborne, standing, refused.get(name, "")))
+        rows.append(Row(name, name in fewer, result.get(name), airborne, standing, refused.get(name, "")))
+    unknown = math.nan, math.nan
+    rows += [Row(name, False, None, *unknown, f"effects.{name}: needs other vehicles") for name in among]
     return Study(scene.name, within, *full, tuple(rows), tuple(kept), apart, *least)
 
 
@@ -97,9 +100,9 @@ def _without(tables: Tables, *names: str) -> dict[str, Any]:
 def _smallest(
     crew: VariantPool, tables: Tables, flown: FlightData, out: list[str], within: float, say: Callable[[str], None]
 ) -> tuple[dict[str, Any], float]:
-    """The effects left, and how far off that is, when all of `out` go that can go together.
+    """Return the effects that remain after the removal of as many of `out` as possible, and the resulting difference.
 
-    Each of `out` alone is within the tolerance; while all together are not, the one of most influence comes back.
+    Each of `out` alone is within the tolerance; while all together are not, the one of most influence is restored.
     """
     while out:
         kept = _without(tables, *out)

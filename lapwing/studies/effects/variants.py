@@ -19,7 +19,7 @@ Tables = Mapping[str, Any]  # the table of each effect that a variant has
 
 
 def variant(scene: Scene, tables: Tables) -> Scene:
-    """`scene` with these effects instead of its own."""
+    """Return the scene with these effects instead of its own."""
     return scene.replaced(Effects.model_validate(dict(tables)))
 
 
@@ -33,7 +33,7 @@ def refusal(scene: Scene, tables: Tables) -> str:
 
 
 def truth_of(scene: Scene) -> FlightData:
-    """The scene flown to its end, with the true state alone."""
+    """Fly the scene to its end. Return the true state alone."""
     return fly(scene, (TRUTH,))
 
 
@@ -44,12 +44,12 @@ class VariantPool:
         self._scene, self._pool = scene, pool
 
     def fly(self, variants: Iterable[Tables]) -> Iterator[FlightData]:
-        """The flight of each variant, in order, as they come."""
+        """Yield the flight of each variant, in order."""
         return self._pool.map(truth_of, [variant(self._scene, tables) for tables in variants])
 
 
 @contextmanager
 def hangar(scene: Scene) -> Iterator[VariantPool]:
-    """A hangar whose processes end with the block, at once where it ends with an error, and with this process."""
+    """Yield a pool whose processes end with the block, at once on an error, and with this process."""
     with workers(os.cpu_count() or 1) as pool:
         yield VariantPool(scene, pool)

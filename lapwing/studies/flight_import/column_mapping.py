@@ -1,6 +1,7 @@
 """Mapping files: which column holds which quantity, in which unit and frame."""
 
 import tomllib
+from collections.abc import Collection
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
@@ -40,6 +41,7 @@ class Vector(_Table):
 
     columns: tuple[str, ...]
     unit: str
+    scale: float = 1.0  # number of units of one count of the columns
     frame: Literal["enu", "ned", "flu", "frd", "enu_flu", "ned_frd"]
     sign: tuple[int, ...] = ()  # of each column, after the frame; all positive if left out
 
@@ -54,23 +56,42 @@ class Motors(_Table):
 
 
 class Mapping(_Table):
-    """Every quantity that an import knows."""
+    """Every quantity that an import knows.
 
+    With `partial`, quantities other than time, omega and motors are left out where a file has no columns of theirs.
+    Setpoints always may be left out.
+    """
+
+    partial: bool = False
     time: Scalar
-    position: Vector
-    attitude: Vector
+    position: Vector | None = None
+    attitude: Vector | None = None
     velocity: Vector | None = None
     omega: Vector
     specific_force: Vector | None = None
     motors: Motors
     battery: Scalar | None = None
     power: Scalar | None = None
+    setpoint: Vector | None = None
 
     @property
     def columns(self) -> list[str]:
         """Every column named."""
-        tables = [getattr(self, name) for name in type(self).model_fields]
-        return [c for t in tables if t is not None for c in ([t.column] if isinstance(t, Scalar) else t.columns)]
+        return [column for columns in self._named().values() for column in columns]
+
+    def within(self, names: Collection[str]) -> "Mapping":
+        """Return the mapping without quantities whose columns are missing and that it can do without."""
+        missing = [key for key, columns in self._named().items() if not set(columns) <= set(names)]
+        optional = set(missing) - {"time", "omega", "motors"} if self.partial else set(missing) & {"setpoint"}
+        return self.model_copy(update=dict.fromkeys(optional))
+
+    def _named(self) -> dict[str, tuple[str, ...]]:
+        tables = {name: getattr(self, name) for name in type(self).model_fields}
+        return {
+            name: (table.column,) if isinstance(table, Scalar) else table.columns
+            for name, table in tables.items()
+            if isinstance(table, Scalar | Vector | Motors)
+        }
 
 
 def shipped_mappings() -> list[str]:
@@ -108,7 +129,7 @@ def load_mapping(name: str) -> Mapping:
 def _check(name: str, mapping: Mapping) -> None:
     for key in type(mapping).model_fields:
         table: Any = getattr(mapping, key)
-        if table is None or isinstance(table, Motors):
+        if not isinstance(table, Scalar | Vector):
             continue
         counts = (3, 4) if key == "attitude" else (3,)
         if isinstance(table, Vector) and len(table.columns) not in counts:

@@ -5,11 +5,19 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import median_filter
 
+from lapwing.studies.flight_import.channels import check_density, check_rate_unit
 from lapwing.studies.flight_import.column_mapping import SCALES, Mapping, Motors, Scalar, Vector
 from lapwing.studies.flight_import.csv_table import read_columns
 from lapwing.studies.flight_import.recording import GYRO_LIMIT, LONGEST_GAP, Recording, widen
-from lapwing.studies.flight_import.rotation_arrays import body_rate, from_ned_frd, unit
-from lapwing.studies.flight_import.time_alignment import time_offset
+from lapwing.studies.flight_import.rotation_arrays import (
+    body_rate,
+    continuous,
+    from_euler,
+    from_ned_frd,
+    ned_to_enu,
+    unit,
+)
+from lapwing.studies.flight_import.time_alignment import describe
 
 FASTEST_TURN = 40.0  # [rad/s] between two measured attitudes above which tracking was lost
 FASTEST = 20.0  # [m/s] between two measured positions, as above
@@ -25,7 +33,21 @@ def read_csv_flight(path: Path, mapping: Mapping) -> Recording:
     Raises:
         ValueError: the file cannot be read, a column is missing, time runs backwards, or a unit is wrong.
     """
-    table = read_columns(path, mapping.columns)
+    return from_columns(path, read_columns(path, mapping.columns), mapping)
+
+
+def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> Recording:
+    """Return the recording of columns with one row for each instant.
+
+    Args:
+        path: of the file, for messages and the flight's name.
+        table: columns by name, each of shape (n,).
+        mapping: of the columns.
+
+    Raises:
+        ValueError: a column is missing, time runs backwards, or a unit is wrong.
+    """
+    mapping = mapping.within(table)
     if missing := [name for name in mapping.motors.columns if name not in table]:
         raise ValueError(f"{path}: no motor outputs ({', '.join(missing)}); log the motor commands and fly again")
     if missing := [name for name in mapping.columns if name not in table]:
@@ -38,59 +60,60 @@ def read_csv_flight(path: Path, mapping: Mapping) -> Recording:
     if (back := np.diff(raw_time) <= 0.0).any():
         raise ValueError(f"{path}: time runs backwards in row {_first(back) + 1}; sort the rows by time")
     time = raw_time - raw_time[0]
-    faults: dict[str, int] = {}
-    channels = {key: _vector(table, getattr(mapping, key)) for key in ("position", "velocity", "specific_force")}
-    channels["omega"] = _vector(table, mapping.omega)
-    channels["attitude"] = _attitude(table, mapping.attitude)
-    invalid = {"gap in time": np.r_[False, np.diff(time) > LONGEST_GAP]}
-    for key, values in channels.items():
-        if values is not None:
-            invalid[f"{key} not finite"] = ~np.isfinite(values).all(axis=1)
-    duty, invalid["motor out of range"] = _motors(table, mapping.motors)
-    battery, invalid["battery out of range"] = _battery(table, mapping.battery, time)
-    if mapping.battery is None and mapping.motors.unit == "duty":
-        raise ValueError(f"{path}: duty cycles without a battery voltage; map [battery], or motors in V")
-    position, attitude, omega = channels["position"], channels["attitude"], channels["omega"]
-    assert position is not None
-    assert attitude is not None
-    assert omega is not None
     step = np.diff(time, prepend=time[0] - (time[1] - time[0]))
+    channels = {
+        key: _vector(table, getattr(mapping, key)) for key in ("position", "velocity", "specific_force", "omega")
+    }
+    channels["attitude"] = _attitude(table, mapping.attitude)
+    measured = {key: values for key, values in channels.items() if values is not None}
+    nothing = np.full((len(time), 3), np.nan)
+    position, omega, force = (measured.get(key, nothing) for key in ("position", "omega", "specific_force"))
+    attitude = measured.get("attitude", np.full((len(time), 4), np.nan))
     turning = body_rate(attitude, step)
-    invalid["tracking lost"] = (np.abs(turning).max(axis=1) > FASTEST_TURN) | (
-        np.abs(np.diff(position, axis=0, prepend=position[:1])).max(axis=1) > FASTEST * step
-    )
+    duty, outside = _motors(table, mapping.motors)
+    battery, dips = _battery(table, mapping.battery, time)
     slow = median_filter(np.nan_to_num(omega), (5, 1), mode="nearest")
-    invalid["gyroscope out of range"] = (np.abs(np.nan_to_num(omega)).max(axis=1) > GYRO_LIMIT) | (
-        np.abs(np.nan_to_num(omega) - slow).max(axis=1) > SPIKE
-    )
-    if (force := channels["specific_force"]) is not None:
-        invalid["accelerometer out of range"] = np.abs(np.nan_to_num(force)).max(axis=1) > ACCELEROMETER_LIMIT
-    bad = np.zeros(len(time), bool)
-    for cause, mask in invalid.items():
-        if mask.any():
-            faults[cause] = int(mask.sum())
-            bad |= mask
-    valid = ~widen(bad, NEIGHBOURS)
-    _check_units(path, turning, omega, valid)
+    invalid = {
+        "gap in time": np.r_[False, np.diff(time) > LONGEST_GAP],
+        **{f"{key} not finite": ~np.isfinite(values).all(axis=1) for key, values in measured.items()},
+        "motor out of range": outside,
+        "battery out of range": dips,
+        "tracking lost": (np.abs(np.nan_to_num(turning)).max(axis=1) > FASTEST_TURN)
+        | (np.abs(np.nan_to_num(np.diff(position, axis=0, prepend=position[:1]))).max(axis=1) > FASTEST * step),
+        "gyroscope out of range": (np.abs(np.nan_to_num(omega)).max(axis=1) > GYRO_LIMIT)
+        | (np.abs(np.nan_to_num(omega) - slow).max(axis=1) > SPIKE),
+        "accelerometer out of range": np.abs(np.nan_to_num(force)).max(axis=1) > ACCELEROMETER_LIMIT,
+    }
+    faults = {cause: int(mask.sum()) for cause, mask in invalid.items() if mask.any()}
+    valid = ~widen(np.logical_or.reduce(list(invalid.values())), NEIGHBOURS)
     interval = float(np.round(np.median(np.diff(time)), 5))
-    voltage = duty * battery[:, None] if mapping.motors.unit == "duty" else duty
-    velocity = channels["velocity"]
-    if velocity is None:
-        velocity = np.gradient(position, time, axis=0)
-    lag, confidence = time_offset(turning, omega, valid, interval)
-    notes = (f"vehicle clock {1e3 * lag:+.0f} ms against attitude, correlation {confidence:.2f}",)
+    notes = [f"no {key}: the flight cannot be validated" for key in ("position", "attitude") if key not in measured]
+    if "attitude" in measured:
+        check_rate_unit(path, turning, omega, valid)
+        notes.append(describe(turning, omega, valid, interval))
+    voltage = duty
+    if mapping.motors.unit == "duty":
+        if np.isfinite(battery).all():
+            voltage = duty * battery[:, None]
+        else:
+            notes.append("no battery voltage: motor voltages are shares of the full voltage")
+    velocity = measured.get("velocity", np.gradient(position, time, axis=0))
     power = table[mapping.power.column] if mapping.power else np.full(len(time), np.nan)
-    if force is None:
-        force = np.full((len(time), 3), np.nan)
     name = path.name.removesuffix(".gz").removesuffix(".csv")
+    desired = _vector(table, mapping.setpoint)
+    setpoint = nothing[:0] if desired is None else desired
     plain: tuple[np.ndarray, ...] = position, attitude, velocity, omega, force, voltage, battery
     if np.abs(np.diff(time) - interval).max() > 0.1 * interval:
+        check_density(path, time[-1] / interval if interval > 0.0 else np.inf, len(time))
         grid = np.arange(0.0, time[-1] + 0.5 * interval, interval)
         plain, valid, power = _on_grid(grid, time, plain, valid, power)
+        if len(setpoint):
+            setpoint = np.column_stack([np.interp(grid, time, column) for column in setpoint.T])
     position, attitude, velocity, omega, force, voltage, battery = plain
     return Recording(
-        name, interval, position, attitude, velocity, omega, force, voltage, battery, valid, power, faults, notes
-    )
+        name, interval, position, attitude, velocity, omega, force, voltage, battery, valid, power, setpoint, faults,
+        tuple(notes),
+    )  # fmt: skip
 
 
 def _first(mask: np.ndarray) -> int:
@@ -100,33 +123,25 @@ def _first(mask: np.ndarray) -> int:
 def _vector(table: dict[str, np.ndarray], spec: Vector | None) -> np.ndarray | None:
     if spec is None:
         return None
-    values = np.column_stack([table[name] for name in spec.columns]) * SCALES[spec.unit]
+    values = np.column_stack([table[name] for name in spec.columns]) * (spec.scale * SCALES[spec.unit])
     if spec.sign:
         values = values * np.array(spec.sign)
     if spec.frame == "ned":
-        return values[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
+        return ned_to_enu(values)
     if spec.frame == "frd":
         return values * [1.0, -1.0, -1.0]
     return values
 
 
-def _attitude(table: dict[str, np.ndarray], spec: Vector) -> np.ndarray:
+def _attitude(table: dict[str, np.ndarray], spec: Vector | None) -> np.ndarray | None:
+    if spec is None:
+        return None
     values = np.column_stack([table[name] for name in spec.columns])
     if len(spec.columns) == 4:
         quaternion = values if spec.unit == "wxyz" else values[:, [3, 0, 1, 2]]
     else:
-        roll, pitch, yaw = (0.5 * values * SCALES[spec.unit]).T
-        cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
-        quaternion = np.column_stack(
-            [
-                cr * cp * cy + sr * sp * sy,
-                sr * cp * cy - cr * sp * sy,
-                cr * sp * cy + sr * cp * sy,
-                cr * cp * sy - sr * sp * cy,
-            ]
-        )
-    quaternion = unit(quaternion)
-    return from_ned_frd(quaternion) if spec.frame == "ned_frd" else quaternion
+        quaternion = from_euler(values * spec.scale * SCALES[spec.unit])
+    return from_ned_frd(unit(quaternion)) if spec.frame == "ned_frd" else unit(quaternion)
 
 
 def _motors(table: dict[str, np.ndarray], spec: Motors) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +154,7 @@ def _motors(table: dict[str, np.ndarray], spec: Motors) -> tuple[np.ndarray, np.
 
 
 def _battery(table: dict[str, np.ndarray], spec: Scalar | None, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Voltage [V] with readings out of range bridged, and where they were."""
+    """Return the voltage [V] with invalid readings interpolated, and a mask of them."""
     if spec is None:
         return np.full(len(time), np.nan), np.zeros(len(time), bool)
     volts = table[spec.column] * SCALES[spec.unit]
@@ -150,16 +165,6 @@ def _battery(table: dict[str, np.ndarray], spec: Scalar | None, time: np.ndarray
     volts = np.interp(time, time[~outside], volts[~outside])
     window = round(spec.smoothing / np.median(np.diff(time)))
     return (median_filter(volts, window | 1, mode="nearest") if window > 1 else volts), outside
-
-
-def _check_units(path: Path, turning: np.ndarray, omega: np.ndarray, valid: np.ndarray) -> None:
-    """Raise ValueError if the gyroscope is in degrees per second where the mapping says otherwise."""
-    if valid.sum() < FEWEST:
-        return
-    measured, expected = np.nanstd(omega[valid]), np.nanstd(turning[valid])
-    if expected > 0.05 and measured > 15.0 * expected:
-        message = f"gyroscope is {measured / expected:.0f} times the rate of the attitude"
-        raise ValueError(f"{path}: {message}, deg/s is suspected; set omega.unit in the mapping")
 
 
 def _on_grid(
@@ -175,5 +180,4 @@ def _on_grid(
     right = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
     sound = valid[right] & valid[right - 1] & (time[right] - time[right - 1] <= LONGEST_GAP)
     position, attitude, *rest = channels
-    flips = np.cumprod(np.where(np.r_[1.0, np.sum(attitude[1:] * attitude[:-1], axis=1)] < 0.0, -1.0, 1.0))
-    return (moved(position), unit(moved(attitude * flips[:, None])), *map(moved, rest)), sound, moved(power)
+    return (moved(position), unit(moved(continuous(attitude))), *map(moved, rest)), sound, moved(power)

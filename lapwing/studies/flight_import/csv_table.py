@@ -19,10 +19,10 @@ def read_columns(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
     try:
         with warnings.catch_warnings(), _opened(path) as file:
             names = [name.strip().strip('"') for name in file.readline().split(",")]
-            found = [name for name in dict.fromkeys(wanted) if name in names]
-            if not found:
+            result = [name for name in dict.fromkeys(wanted) if name in names]
+            if not result:
                 raise ValueError(f"{path}: no known column in its header; check the --mapping")
-            places = [names.index(name) for name in found]
+            places = [names.index(name) for name in result]
             try:
                 warnings.simplefilter("ignore", UserWarning)  # of a file without rows, which is an error below
                 table = np.loadtxt(file, delimiter=",", usecols=places, ndmin=2)
@@ -36,7 +36,7 @@ def read_columns(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
         raise ValueError(f"{path}: is not a text file of columns; expected CSV, or CSV compressed with gzip") from None
     if not len(table):
         raise ValueError(f"{path}: has no rows; expected a recorded flight")
-    return dict(zip(found, table.T, strict=True))
+    return dict(zip(result, table.T, strict=True))
 
 
 def _opened(path: Path) -> TextIO:

@@ -1,15 +1,22 @@
 """Recordings from Lapwing logs, simulated or imported."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from lapwing.messages.topics import ACTUATORS, IMU, TRUTH
+from lapwing.messages.topics import ACTUATORS, BARO, GPS, IMU, MAG, SETPOINT, TRUTH
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.rotation_arrays import unit
+from lapwing.studies.flight_import.recording import Recording, Series
+from lapwing.studies.flight_import.rotation_arrays import continuous, unit
 
 RATE = 100.0  # [Hz] of the recording
+READINGS = {  # name without the vehicle's, and fields, of each sensor's topic
+    "imu": ("imu", ("angular_velocity", "linear_acceleration")),
+    "gps": ("gps/fix", ("latitude", "longitude", "altitude")),
+    "baro": ("baro", ("fluid_pressure",)),
+    "mag": ("mag", ("magnetic_field",)),
+}
 
 
 def read_log_flight(path: Path) -> Recording:
@@ -18,7 +25,7 @@ def read_log_flight(path: Path) -> Recording:
     Raises:
         ValueError: no log, no motion, or no motor outputs in it.
     """
-    flight = FlightData.read(path, only=(TRUTH, ACTUATORS, IMU))
+    flight = FlightData.read(path, only=(TRUTH, ACTUATORS, IMU, GPS, BARO, MAG, SETPOINT))
     if not flight.has("actuators") or not len(flight.actuators):
         raise ValueError(f"{path}: no motor outputs (topic actuators); log the motor commands and fly again")
     truth = flight.truth
@@ -32,11 +39,40 @@ def read_log_flight(path: Path) -> Recording:
     if flight.has("imu") and len(flight.topic("imu")) > 1:
         imu, at = flight.topic("imu"), flight.times("imu")
         omega, force = _sampled(grid, at, imu.angular_velocity), _sampled(grid, at, imu.linear_acceleration)
-    quaternion = unit(_sampled(grid, times, _continuous(truth.orientation[:, [3, 0, 1, 2]])))
+    quaternion = unit(_sampled(grid, times, continuous(truth.orientation[:, [3, 0, 1, 2]])))
     battery = np.full(len(grid), np.nan)
     position, velocity = _sampled(grid, times, truth.position), _sampled(grid, times, truth.velocity)
     valid = np.isfinite(np.column_stack([position, velocity, quaternion, omega, volts])).all(axis=1)
-    return Recording(path.stem, interval, position, quaternion, velocity, omega, force, volts, battery, valid)
+    return Recording(
+        path.stem, interval, position, quaternion, velocity, omega, force, volts, battery, valid,
+        power=_power(grid, times, truth), setpoint=_setpoint(grid, flight), readings=_readings(flight, times[0]),
+    )  # fmt: skip
+
+
+def _power(grid: np.ndarray, times: np.ndarray, truth: Any) -> np.ndarray:
+    """Return the power of all motors [W], NaN if the log has none."""
+    power = np.asarray(truth.motor_power)
+    if power.ndim < 2 or not power.shape[1]:
+        return np.full(len(grid), np.nan)
+    return np.interp(grid, times, power.sum(axis=1))
+
+
+def _setpoint(grid: np.ndarray, flight: FlightData) -> np.ndarray:
+    if not flight.has("setpoint") or len(flight.setpoint) < 2:
+        return np.empty((0, 3))
+    return _sampled(grid, flight.times("setpoint"), flight.setpoint.position)
+
+
+def _readings(flight: FlightData, begin: float) -> dict[str, Series]:
+    """Return sensor readings at their own instants, without faulty ones."""
+    out = {}
+    for name, (topic, fields) in READINGS.items():
+        if not flight.has(topic) or len(flight.times(topic)) < 2:
+            continue
+        columns = np.column_stack([np.asarray(getattr(flight.topic(topic), field)) for field in fields])
+        finite = np.isfinite(columns).all(axis=1)
+        out[name] = Series.of(flight.times(topic)[finite] - begin, columns[finite])
+    return out
 
 
 def _sampled(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -50,9 +86,3 @@ def _latest(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarr
     at = grid[:, None] + step * (np.arange(fine) + 0.5) / fine
     index = np.clip(np.searchsorted(times, at, side="right") - 1, 0, len(times) - 1)
     return np.asarray(values)[index].mean(axis=1)
-
-
-def _continuous(q: np.ndarray) -> np.ndarray:
-    """Return the quaternions with signs that do not jump."""
-    flips = np.cumprod(np.where(np.r_[1.0, np.sum(q[1:] * q[:-1], axis=1)] < 0.0, -1.0, 1.0))
-    return q * flips[:, None]

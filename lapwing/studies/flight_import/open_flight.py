@@ -3,24 +3,51 @@
 from pathlib import Path
 
 from lapwing.studies.flight_import.column_mapping import load_mapping
-from lapwing.studies.flight_import.csv_flight import read_csv_flight
-from lapwing.studies.flight_import.log_flight import read_log_flight
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
+
+USD_MAPPING = "crazyflie_usd"
+FORMATS = ".ulg, .bin, .log, .tlog, .mcap, a rosbag2 folder, .csv and .csv.gz with --mapping, or a log of the Crazyflie"
 
 
 def open_flight(path: Path, mapping: str | None = None) -> Recording:
-    """Read a flight: a Lapwing log (.mcap), a ULog file (.ulg), or a CSV file (.csv, .csv.gz) with a mapping.
+    """Read a flight. See `FORMATS` for the formats, which the file's ending names.
+
+    Args:
+        path: of the file; of the folder for a rosbag2.
+        mapping: name or file of the columns' mapping, for CSV files and logs of the Crazyflie.
 
     Raises:
         ValueError: unknown format, no mapping for a CSV file, or an invalid file.
     """
-    if path.suffix == ".mcap":
-        return read_log_flight(path)
-    if path.suffix == ".ulg":
-        return read_ulog_flight(path)[0]
+    from lapwing.studies.flight_import import csv_flight, usd_log
+
+    if path.is_dir():
+        from lapwing.studies.flight_import.rosbag_flight import read_rosbag_flight
+
+        return read_rosbag_flight(path)
+    if not path.is_file():
+        raise ValueError(f"{path}: no such file; use the path of a recorded flight")
     if path.name.endswith((".csv", ".csv.gz")):
         if mapping is None:
             raise ValueError(f"{path}: a CSV file needs --mapping; use a name that ships, or a .toml file")
-        return read_csv_flight(path, load_mapping(mapping))
-    raise ValueError(f"{path}: unknown format; expected .ulg, .mcap, or .csv and .csv.gz with --mapping")
+        return csv_flight.read_csv_flight(path, load_mapping(mapping))
+    ending = path.suffix.lower()
+    if ending == ".mcap":
+        from lapwing.studies.flight_import.log_flight import read_log_flight
+
+        return read_log_flight(path)
+    if ending == ".ulg":
+        from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
+
+        return read_ulog_flight(path)
+    if ending in (".bin", ".log"):
+        from lapwing.studies.flight_import.dataflash_flight import read_dataflash_flight
+
+        return read_dataflash_flight(path)
+    if ending == ".tlog":
+        from lapwing.studies.flight_import.tlog_flight import read_tlog_flight
+
+        return read_tlog_flight(path)
+    if usd_log.is_usd_log(path):
+        return csv_flight.from_columns(path, usd_log.read_usd_log(path), load_mapping(mapping or USD_MAPPING))
+    raise ValueError(f"{path}: unknown format; expected {FORMATS}")

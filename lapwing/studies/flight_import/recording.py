@@ -1,12 +1,49 @@
 """A recorded flight on a uniform time grid, in SI units, world ENU and body FLU."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, Self
 
 import numpy as np
 
 LONGEST_GAP = 0.035  # [s] between two samples that interpolation bridges
+LONGEST_HOLD = 0.5  # [s] between two messages over which interpolation counts as valid
 GYRO_LIMIT = 35.0  # [rad/s] range of the usual gyroscopes, 2000 deg/s
 LARGEST_STEP = 12.0  # times the median absolute step of a channel above which a sample is an outlier
+
+
+@dataclass(frozen=True)
+class Series:
+    """Values at instants.
+
+    Attributes:
+        time: [s] of the log's clock, increasing, shape (n,).
+        values: shape (n, k).
+        dropped: number of samples left out because their time did not increase.
+    """
+
+    time: np.ndarray
+    values: np.ndarray
+    dropped: int = 0
+
+    @classmethod
+    def of(cls, time: Any, values: Any) -> Self:
+        """Return the samples whose time is finite and later than that of all samples before."""
+        time, values = np.asarray(time, float), np.asarray(values, float)
+        values = values.reshape(len(time), -1)
+        later = np.isfinite(time) & (
+            time > np.r_[-np.inf, np.maximum.accumulate(np.nan_to_num(time, nan=-np.inf))[:-1]]
+        )
+        return cls(time[later], values[later], int((~later).sum()))
+
+    def at(self, grid: np.ndarray) -> np.ndarray:
+        """Interpolate linearly, shape (len(grid), k)."""
+        return np.column_stack([np.interp(grid, self.time, column) for column in self.values.T])
+
+    def near(self, grid: np.ndarray) -> np.ndarray:
+        """Return where both neighbours of an instant are at most `LONGEST_HOLD` apart."""
+        right = np.clip(np.searchsorted(self.time, grid), 1, len(self.time) - 1)
+        return np.asarray(self.time[right] - self.time[right - 1] <= LONGEST_HOLD)
 
 
 @dataclass(frozen=True)
@@ -16,8 +53,8 @@ class Recording:
     Attributes:
         name: of the flight, the file's name without its endings.
         interval: [s] between two samples.
-        position: [m] world, shape (n, 3).
-        attitude: unit quaternions w, x, y, z, body to world, shape (n, 4).
+        position: [m] world, shape (n, 3); NaN where not measured.
+        attitude: unit quaternions w, x, y, z, body to world, shape (n, 4); NaN where not measured.
         velocity: [m/s] world, shape (n, 3).
         omega: [rad/s] body, shape (n, 3).
         specific_force: [m/s^2] body, shape (n, 3); NaN where not measured.
@@ -25,8 +62,11 @@ class Recording:
         battery_voltage: [V], shape (n,).
         valid: samples that every channel measured soundly, bool, shape (n,).
         power: [W] taken from the battery, shape (n,); NaN where not measured.
+        setpoint: [m] world, desired position, shape (n, 3); NaN where there is none, empty if not recorded.
         faults: number of samples marked invalid by cause.
         notes: time offset and other facts of the import, a line each.
+        readings: other sensors by name (see `write_log.SENSORS`), at their own rates, as far as the log has them.
+        unknown: names of the log's messages without a counterpart.
     """
 
     name: str
@@ -40,8 +80,11 @@ class Recording:
     battery_voltage: np.ndarray
     valid: np.ndarray
     power: np.ndarray = field(default_factory=lambda: np.empty(0))
+    setpoint: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
     faults: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    readings: Mapping[str, Series] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.valid)

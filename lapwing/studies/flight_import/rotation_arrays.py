@@ -61,3 +61,28 @@ def from_ned_frd(q: np.ndarray) -> np.ndarray:
     """Return attitudes of FRD body axes in NED as those of FLU body axes in ENU."""
     half = np.sqrt(0.5)
     return product(product(np.array([0.0, half, half, 0.0]), q), np.array([0.0, 1.0, 0.0, 0.0]))
+
+
+def from_euler(angles: np.ndarray) -> np.ndarray:
+    """Return the quaternions of roll, pitch and yaw [rad], shape (n, 3), that turn in the order yaw, pitch, roll."""
+    roll, pitch, yaw = (0.5 * angles).T
+    cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
+    return np.column_stack(
+        [
+            cr * cp * cy + sr * sp * sy,
+            sr * cp * cy - cr * sp * sy,
+            cr * sp * cy + sr * cp * sy,
+            cr * cp * sy - sr * sp * cy,
+        ]
+    )
+
+
+def ned_to_enu(v: np.ndarray) -> np.ndarray:
+    """Return vectors of NED in ENU, shape (n, 3)."""
+    return v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
+
+
+def continuous(q: np.ndarray) -> np.ndarray:
+    """Return the quaternions with signs that do not jump."""
+    flips = np.cumprod(np.where(np.r_[1.0, np.sum(q[1:] * q[:-1], axis=1)] < 0.0, -1.0, 1.0))
+    return q * flips[:, None]

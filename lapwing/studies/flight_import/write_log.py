@@ -1,21 +1,27 @@
 """Lapwing logs of recordings: the topics of a simulated flight, for the commands that read logs."""
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lapwing.cosim.log import LogWriter
-from lapwing.messages.topics import ACTUATORS, BATTERY, IMU, TRUTH
+from lapwing.messages.topics import ACTUATORS, AIRSPEED, BARO, BATTERY, GPS, IMU, MAG, RANGEFINDER, TRUTH, Topic
 from lapwing.messages.types import (
     Actuators,
     BatteryState,
+    FluidPressure,
     Header,
     Imu,
+    MagneticField,
+    NavSatFix,
+    NavSatStatus,
     Point,
     Pose,
     Quaternion,
+    Range,
     Time,
     Vector3,
     VehicleState,
@@ -24,17 +30,37 @@ from lapwing.studies.flight_import.recording import Recording
 
 VEHICLE = "drone1"
 FRAME = "world"
+BATTERY_INTERVAL = 0.1  # [s]
 SPINNING = 0.05  # share of the highest motor voltage above which motors count as armed
 
 
-def write_log(path: Path, flight: Recording, source: str, unknown: tuple[str, ...] = ()) -> None:
+SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
+    # topic and message of each sensor's readings: rad/s and m/s^2 in body axes, degrees and metres, pascals, teslas in
+    # body axes, metres, pascals
+    "imu": (
+        IMU,
+        lambda header, v: Imu(header=header, angular_velocity=Vector3(*v[:3]), linear_acceleration=Vector3(*v[3:])),
+    ),
+    "gps": (
+        GPS,
+        lambda header, v: NavSatFix(
+            header, NavSatStatus(NavSatStatus.STATUS_FIX, NavSatStatus.SERVICE_GPS), v[0], v[1], v[2]
+        ),
+    ),
+    "baro": (BARO, lambda header, v: FluidPressure(header, v[0])),
+    "mag": (MAG, lambda header, v: MagneticField(header, Vector3(*v))),
+    "rangefinder": (RANGEFINDER, lambda header, v: Range(header, Range.INFRARED, range=v[0])),
+    "airspeed": (AIRSPEED, lambda header, v: FluidPressure(header, v[0])),
+}
+
+
+def write_log(path: Path, flight: Recording, source: str) -> None:
     """Write a recording as a log. Invalid samples are left out of the motion's topics, and their number is recorded.
 
     Args:
         path: of the log.
         flight: what to write.
         source: name of the file that it was imported from.
-        unknown: topics of the source without a counterpart.
     """
     about = {
         "scene": flight.name,
@@ -44,33 +70,53 @@ def write_log(path: Path, flight: Recording, source: str, unknown: tuple[str, ..
         "invalid_samples": str(int((~flight.valid).sum())),
         "faults": ", ".join(f"{cause}: {count}" for cause, count in flight.faults.items()),
         "notes": "; ".join(flight.notes),
-        "unknown_topics": ", ".join(unknown),
+        "unknown_topics": ", ".join(flight.unknown),
     }
+    messages = sorted([*_motion(flight), *_readings(flight)], key=lambda entry: entry[0])
+    with LogWriter(path, about, {}) as log:
+        for time_ns, topic, message in messages:
+            log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
+
+
+def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
+    """Yield (time [ns], topic, message) of the quantities on the flight's grid."""
     acceleration = np.gradient(flight.velocity, flight.interval, axis=0)
     highest = max(float(np.nanmax(flight.motor_voltage, initial=0.0)), 1e-9)
-    with LogWriter(path, about, {}) as log:
-        for k in range(len(flight)):
-            time_ns = round(k * flight.interval * 1e9)
-            header = Header(Time(time_ns // 1_000_000_000, time_ns % 1_000_000_000), FRAME)
-            volts = tuple(flight.motor_voltage[k].tolist())
-            messages: list[tuple[Any, Any]] = []
-            if flight.valid[k]:
+    located = np.isfinite(np.column_stack([flight.position, flight.attitude])).all(axis=1)
+    battery_ticks = max(round(BATTERY_INTERVAL / flight.interval), 1)
+    for k in range(len(flight)):
+        time_ns = round(k * flight.interval * 1e9)
+        header = _header(time_ns)
+        volts = tuple(flight.motor_voltage[k].tolist())
+        if flight.valid[k]:
+            if located[k]:
                 pose = Pose(Point(*flight.position[k].tolist()), _quaternion(flight.attitude[k]))
                 motion = VehicleState(
                     header=header, pose=pose, velocity=_vector(flight.velocity[k]),
                     angular_velocity=_vector(flight.omega[k]), acceleration=_vector(acceleration[k]),
                     motor_voltage=volts,
                 )  # fmt: skip
-                messages.append((TRUTH, motion))
-                if np.isfinite(flight.specific_force[k]).all():
-                    rates, force = _vector(flight.omega[k]), _vector(flight.specific_force[k])
-                    messages.append((IMU, Imu(header=header, angular_velocity=rates, linear_acceleration=force)))
-                messages.append((ACTUATORS, Actuators(header, volts, max(volts) > SPINNING * highest)))
-            if k % 10 == 0 and math.isfinite(flight.battery_voltage[k]):
-                battery = BatteryState(header=header, voltage=float(flight.battery_voltage[k]), present=True)
-                messages.append((BATTERY, battery))
-            for topic, message in messages:
-                log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
+                yield time_ns, TRUTH, motion
+            if "imu" not in flight.readings and np.isfinite(flight.specific_force[k]).all():
+                rates, force = _vector(flight.omega[k]), _vector(flight.specific_force[k])
+                yield time_ns, IMU, Imu(header=header, angular_velocity=rates, linear_acceleration=force)
+            yield time_ns, ACTUATORS, Actuators(header, volts, max(volts) > SPINNING * highest)
+        if k % battery_ticks == 0 and math.isfinite(flight.battery_voltage[k]):
+            battery = BatteryState(header=header, voltage=float(flight.battery_voltage[k]), present=True)
+            yield time_ns, BATTERY, battery
+
+
+def _readings(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
+    """Yield (time [ns], topic, message) of the sensors at their own instants."""
+    for name, series in flight.readings.items():
+        topic, message = SENSORS[name]
+        for time, values in zip(series.time.tolist(), series.values.tolist(), strict=True):
+            if time >= 0.0 and all(map(math.isfinite, values)):
+                yield (time_ns := round(time * 1e9)), topic, message(_header(time_ns), values)
+
+
+def _header(time_ns: int) -> Header:
+    return Header(Time(time_ns // 1_000_000_000, time_ns % 1_000_000_000), FRAME)
 
 
 def _vector(values: np.ndarray) -> Vector3:

@@ -16,7 +16,7 @@ from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
-from lapwing.studies.validation.windows import Errors, compare, predict, window_starts
+from lapwing.studies.validation.windows import Errors, Span, compare, predict_all, window_starts
 
 STEP = 1e-4  # of a scaled parameter, for derivatives
 RANGE = 50.0  # times the start value, and its fraction, within which a positive parameter is sought
@@ -24,6 +24,7 @@ HORIZONS = (10, 25, 50)  # samples
 LOSS_SCALE = 0.5  # residual, in units of its scale, where the robust loss turns from square to linear
 CLUSTER = 1.0  # [s] of flight that counts as one independent observation for standard errors
 NO_INFLUENCE = 1e-12  # of the largest information, below which a parameter changes no prediction
+TOLERANCE = 1e-8  # of the relative change of loss and parameters; 1e-5 stops a standard error short of the minimum
 LARGEST = 1e3  # residual, in units of its scale
 FIELDS = ("position", "velocity", "attitude", "rate")
 
@@ -61,15 +62,15 @@ class OutputError:
         memory: TrimMemory = NO_TRIM,
         horizons: tuple[int, ...] = HORIZONS,
     ):
-        """Choose windows that do not overlap more than their number asks for.
+        """Choose windows with as little overlap as their number allows.
 
         Args:
-            plant: of the scene, at the interval of the recordings.
-            flights: to learn from.
+            plant: plant of the scene, at the interval of the recordings.
+            flights: training flights.
             keys: free parameters: keys of the scene, or of `flight_parameters`.
-            start: their values to begin with.
-            windows: about how many to use.
-            memory: of the trim.
+            start: initial values.
+            windows: approximate number of windows.
+            memory: memory of the trim.
             horizons: [samples] at which errors count.
         """
         self.plant, self.flights, self.keys = plant, list(flights), tuple(keys)
@@ -78,7 +79,7 @@ class OutputError:
         available = [window_starts(f, horizons[-1], 1) for f in self.flights]
         total = sum(map(len, available))
         if total == 0:
-            raise ValueError("no flight has a valid window in the air; give flights that leave the ground")
+            raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
         stride = max(1, total // windows)
         self.windows = [Window(k, a[stride // 2 :: stride]) for k, a in enumerate(available) if len(a)]
         self.weights = np.ones((len(horizons), len(FIELDS)))
@@ -87,7 +88,7 @@ class OutputError:
         self._count = sum(len(w.starts) for w in self.windows) * len(horizons) * len(FIELDS) * 3
 
     def _scales(self) -> np.ndarray:
-        """Spread of the errors at the start values, by horizon and field: the units of the residuals."""
+        """Return the spread of the errors at the initial values, by horizon and field: the units of the residuals."""
         residual = self._errors([self.start])[0]
         with np.errstate(invalid="ignore"):
             return np.maximum(np.nanmedian(np.abs(residual), axis=(0, 3)) * 1.4826, 1e-9)
@@ -107,13 +108,14 @@ class OutputError:
             flights = [apply_flight_parameters(f, dict(rest)) for f in self.flights]
             self.plant.set_parameters([{self.keys[k]: float(sets[i][k]) for k in own} for i in members])
             states = start_states(self.plant, flights, self.memory)
+            spans = [Span(w.flight, w.starts, j) for j in range(len(members)) for w in self.windows]
+            result = predict_all(self.plant, flights, spans, states, self.horizons)
+            parts = [
+                _stacked(compare(flights[s.flight], s.starts, self.horizons, f))
+                for s, f in zip(spans, result, strict=True)
+            ]
             for j, i in enumerate(members):
-                parts = []
-                for flight, starts in self.windows:
-                    r = flights[flight]
-                    found = predict(self.plant, r, starts, states[flight], self.horizons, j)
-                    parts.append(_stacked(compare(r, starts, self.horizons, found)))
-                out[i] = np.concatenate(parts)
+                out[i] = np.concatenate(parts[j * len(self.windows) : (j + 1) * len(self.windows)])
         return [values for values in out if values is not None]
 
     def clusters(self) -> np.ndarray:
@@ -131,8 +133,8 @@ class OutputError:
         """Minimise the robust loss.
 
         Args:
-            begin: values to continue from; the start values without.
-            most: evaluations of the derivatives at most.
+            begin: values to continue from; None: the initial values.
+            most: maximum evaluations of the derivatives.
             report: called after each step with its number, the values, and the cost.
         """
         bounds = np.array([(s / RANGE, s * RANGE) if s > 0.0 else (-np.inf, np.inf) for s in self.start]).T
@@ -147,28 +149,27 @@ class OutputError:
         def jacobian(x: np.ndarray) -> np.ndarray:
             steps = STEP * np.maximum(np.abs(x), 1e-2)
             sets = [x * self.scale, *((x + steps * row) * self.scale for row in np.eye(len(x)))]
-            base, *found = (_flat(r) for r in self.residuals(sets))
+            base, *result = (_flat(r) for r in self.residuals(sets))
             if report:
                 report(len(calls), x * self.scale, float(np.mean(_loss(base))))
             calls.append(1)
-            return np.column_stack([(f - base) / step for f, step in zip(found, steps, strict=True)])
+            return np.column_stack([(f - base) / step for f, step in zip(result, steps, strict=True)])
 
         calls: list[int] = []
         begin = self.start if begin is None else begin
         inner = np.clip(begin / self.scale, bounds[0] / self.scale * (1 + 1e-9), bounds[1] / self.scale * (1 - 1e-9))
         solution = least_squares(
             residual, inner, jac=jacobian, bounds=(bounds[0] / self.scale, bounds[1] / self.scale),
-            loss="soft_l1", f_scale=LOSS_SCALE, x_scale="jac", max_nfev=most, ftol=1e-5, xtol=1e-5,
+            loss="soft_l1", f_scale=LOSS_SCALE, x_scale="jac", max_nfev=most, ftol=TOLERANCE, xtol=TOLERANCE,
         )  # fmt: skip
         return self._fit(solution.x, jacobian(solution.x))
 
     def _fit(self, x: np.ndarray, jacobian: np.ndarray) -> Fit:
-        """Standard errors by the sandwich estimator over clusters of windows."""
+        """Return the fit with standard errors by the sandwich estimator over clusters of windows."""
         residual = _flat(self.residuals([x * self.scale])[0])
-        gain = 1.0 / np.sqrt(1.0 + (residual / LOSS_SCALE) ** 2)  # derivative of the loss
-        weighted = jacobian * gain[:, None]
-        information = jacobian.T @ weighted
-        score = (weighted * residual[:, None]).reshape(len(self.clusters()), -1, len(x)).sum(axis=1)
+        square = 1.0 + (residual / LOSS_SCALE) ** 2
+        information = jacobian.T @ (jacobian * (square**-1.5)[:, None])  # second derivative of the loss
+        score = (jacobian * (residual * square**-0.5)[:, None]).reshape(len(self.clusters()), -1, len(x)).sum(axis=1)
         names = self.clusters()
         count = int(names.max()) + 1
         total = np.zeros((count, len(x)))
@@ -194,7 +195,7 @@ class OutputError:
 
 
 def _stacked(e: Errors) -> np.ndarray:
-    """Errors of all fields, shape (n, h, 4, 3)."""
+    """Return the errors of all fields, shape (n, h, 4, 3)."""
     return np.stack([getattr(e, name) for name in FIELDS], axis=2)
 
 

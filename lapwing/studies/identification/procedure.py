@@ -15,7 +15,7 @@ from lapwing.services.common.vehicle_schema import VehicleAirframe
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
-from lapwing.studies.identification.output_error import Fit, OutputError
+from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import magnitudes
@@ -51,6 +51,7 @@ def identify(
     progress: Path | None = None,
     say: Callable[[str, int, int], None] = lambda text, done, total: None,
     most: int = 15,
+    horizons: tuple[int, ...] = HORIZONS,
 ) -> Identification:
     """Estimate the free parameters.
 
@@ -66,21 +67,22 @@ def identify(
         progress: file that keeps the values after each step; an interrupted estimation continues from it.
         say: called with what is done, steps done, and steps at most.
         most: steps at most.
+        horizons: [samples] at which errors count.
 
     Raises:
         ValueError: a flight or key is invalid, or no flight leaves the ground.
     """
     base = load_one(scene, overrides)
-    start = [_start(base, key) for key in keys]
+    start = [start_value(base, key) for key in keys]
     recordings = [r for r in read_flights(paths, mapping, say) if len(window_starts(r, HORIZON[-1], 1))]
     if not recordings:
-        raise ValueError("no flight has a valid window in the air; give flights that leave the ground")
+        raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
     chosen = _held_out(len(recordings), seed)
     used = [r for k, r in enumerate(recordings) if k not in chosen]
     held = [r for k, r in enumerate(recordings) if k in chosen]
     plant = PlantRows(base, recordings[0].interval)
-    problem = OutputError(plant, used, keys, start, windows, memory)
-    stamp = _stamp(base, keys, [r.name for r in used], windows, seed, memory)
+    problem = OutputError(plant, used, keys, start, windows, memory, horizons)
+    stamp = _stamp(base, keys, [r.name for r in used], windows, seed, (memory, horizons))
     begin = _resumed(progress, stamp)
 
     def kept(step: int, values: np.ndarray, cost: float) -> None:
@@ -126,7 +128,7 @@ def write_airframe(path: Path, scene: Scene | str | Path, found: Identification,
     path.write_text(text, encoding="utf-8")
 
 
-def _start(scene: Scene, key: str) -> float:
+def start_value(scene: Scene, key: str) -> float:
     """Return the value of a key in the scene.
 
     Raises:
@@ -158,8 +160,8 @@ def _held_out(count: int, seed: int) -> set[int]:
     return set(np.random.default_rng(seed).permutation(count)[:size].tolist())
 
 
-def _stamp(scene: Scene, keys: Sequence[str], flights: list[str], windows: int, seed: int, memory: TrimMemory) -> str:
-    parts = [*(f"{k}={_start(scene, k)!r}" for k in keys), *flights, str(windows), str(seed), repr(memory)]
+def _stamp(scene: Scene, keys: Sequence[str], flights: list[str], windows: int, seed: int, other: Any) -> str:
+    parts = [*(f"{k}={start_value(scene, k)!r}" for k in keys), *flights, str(windows), str(seed), repr(other)]
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
@@ -179,11 +181,12 @@ def _errors(
     own = {k: float(v) for k, v in zip(keys, values, strict=True)}
     plant.set_parameters([{k: v for k, v in own.items() if not is_flight_parameter(k)}])
     moved = [apply_flight_parameters(f, {k: v for k, v in own.items() if is_flight_parameter(k)}) for f in flights]
-    found = []
+    result = []
     for flight, state in zip(moved, start_states(plant, moved, memory), strict=True):
         starts = window_starts(flight, HORIZON[-1], 10)
-        found.append(magnitudes(compare(flight, starts, HORIZON, predict(plant, flight, starts, state, HORIZON)))[:, 0])
-    return np.nanmean(np.concatenate(found), axis=0)
+        predicted = predict(plant, flight, starts, state, HORIZON)
+        result.append(magnitudes(compare(flight, starts, HORIZON, predicted))[:, 0])
+    return np.nanmean(np.concatenate(result), axis=0)
 
 
 def _put(table: Any, keys: list[str], value: float) -> None:

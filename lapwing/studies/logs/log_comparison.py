@@ -11,7 +11,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.messages import TYPES
 from lapwing.messages.message_diff import first_difference
 
-AFTER = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)  # [s] at which growth is told, and at the end
+AFTER = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)  # [s] at which growth is reported, and at the end
 ABOUT = ("scene", "seed", "setup", "version", "commit")  # of the metadata: why logs may differ
 
 
@@ -50,7 +50,7 @@ def compare(one: str | Path, other: str | Path) -> Comparison:
     """Compare the deterministic messages of two logs.
 
     Raises:
-        ValueError: one of them cannot be read, or is of another version.
+        ValueError: one of them cannot be read, or has another version.
     """
     with LogReader(one) as a, LogReader(other) as b:
         keys = [key for key in ABOUT if a.metadata.get(key) != b.metadata.get(key)]
@@ -80,7 +80,7 @@ def _first(a: LogReader, b: LogReader, topics: set[str]) -> Difference | None:
 
 
 def _instants(log: LogReader, topics: set[str]) -> Iterator[tuple[int, dict[str, list[bytes]]]]:
-    """Time [ns] and the payloads of each topic, instant by instant."""
+    """Yield each time [ns] with the payloads of each topic."""
     for time_ns, group in groupby(log.messages(topics), key=lambda message: message[2]):
         said: dict[str, list[bytes]] = {}
         for topic, _, _, payload in group:
@@ -95,9 +95,10 @@ def _difference(
         told = (f"{len(one)} messages", f"{len(other)} messages") if len(one) != len(other) else ("", "")
         return Difference(topic, time_ns, "", told, ())
     pair = next((x, y) for x, y in zip(one, other, strict=True) if x != y)
-    found = first_difference(TYPES[kind], *pair)
-    assert found
-    return Difference(topic, time_ns, found.field, (found.one, found.other), _growth(a, b, topic, found.field, time_ns))
+    result = first_difference(TYPES[kind], *pair)
+    assert result
+    growth = _growth(a, b, topic, result.field, time_ns)
+    return Difference(topic, time_ns, result.field, (result.one, result.other), growth)
 
 
 def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -> tuple[Growth, ...]:
@@ -115,7 +116,7 @@ def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -
 
 
 def _apart(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Times [ns] and distances (n,) of the first of some fields that has numbers in both logs; empty where none has."""
+    """Return times [ns] and distances (n,) of the first of these fields with numbers in both logs; or empty."""
     (times_a, one), (times_b, other) = a.history(topic), b.history(topic)
     name = next((name for name in names if name in one and name in other), "")
     values = [np.asarray(columns[name]) if name else np.empty(0, object) for columns in (one, other)]

@@ -17,22 +17,22 @@ Table = dict[str, tuple[str, np.ndarray]]  # unit and values (n,) by the name of
 
 
 def tables(log: LogReader, topics: Collection[str] | None = None) -> dict[str, Table]:
-    """The topics of a log, all or those that are named, by name; the first column is the time [s].
+    """Return the topics of a log, or those of these names, as tables by name; the first column is the time [s].
 
     Raises:
-        ValueError: the log has no such topic, or a type that is not known here.
+        ValueError: the log has no such topic, or one of an unknown type.
     """
     known = log.topics()
-    found = {}
+    result = {}
     for topic, (times_ns, columns) in log.histories(topics).items():
         view, kind = TopicView(times_ns, columns), TYPES[known[topic]].type_name
         flat = {name: (unit(kind, name), values) for name, values in view.flat().items()}
-        found[topic] = {"time": ("s", view.times)} | flat
-    return found
+        result[topic] = {"time": ("s", view.times)} | flat
+    return result
 
 
 def write_csv(found: dict[str, Table], folder: Path) -> list[Path]:
-    """A file for each topic; the first line has names and units: "velocity.x [m/s]"."""
+    """Write a file per topic; the first line has names and units: "velocity.x [m/s]"."""
     paths = []
     for topic, table in found.items():
         path = folder / f"{_file_name(topic)}.csv"
@@ -45,7 +45,7 @@ def write_csv(found: dict[str, Table], folder: Path) -> list[Path]:
 
 
 def write_parquet(found: dict[str, Table], folder: Path) -> list[Path]:
-    """A file for each topic; each column's unit is in its field's metadata, key "unit".
+    """Write a file per topic; each column's unit is in its field's metadata, key "unit".
 
     Raises:
         ValueError: pyarrow is not installed.
@@ -67,7 +67,7 @@ def write_parquet(found: dict[str, Table], folder: Path) -> list[Path]:
 
 
 def write_mat(found: dict[str, Table], path: Path) -> list[Path]:
-    """One MATLAB file: for each topic a struct of columns, whose field `units` is a struct of the same names."""
+    """Write one MATLAB file: a struct of columns per topic, whose field `units` is a struct of the same names."""
     from scipy.io import savemat
 
     structs: dict[str, Any] = {}
@@ -79,7 +79,7 @@ def write_mat(found: dict[str, Table], path: Path) -> list[Path]:
 
 
 def _plain(values: np.ndarray) -> list[Any]:
-    """Python's own numbers and texts; of what is several texts or numbers one text."""
+    """Convert to Python's numbers and texts; several values become one text."""
     if values.dtype != object:
         return values.tolist()
     return [value if isinstance(value, str) else "; ".join(map(str, value)) for value in values]
@@ -94,6 +94,6 @@ def _file_name(topic: str) -> str:
 
 
 def _identifier(name: str) -> str:
-    """A name that MATLAB takes: letters, digits and underscores, a letter first."""
-    found = re.sub(r"\W", "_", name.strip("/"))
-    return found if found[:1].isalpha() else f"x{found}"
+    """Return a valid MATLAB identifier: letters, digits and underscores, a letter first."""
+    result = re.sub(r"\W", "_", name.strip("/"))
+    return result if result[:1].isalpha() else f"x{result}"

@@ -40,20 +40,20 @@ class Info(NamedTuple):
     @property
     def missing(self) -> dict[str, str]:
         """Commands that cannot use the log, with what it lacks for each."""
-        found = {}
+        result = {}
         if not any(topic.name.endswith("/ground_truth") for topic in self.topics):
-            found["report"] = "a topic /NAME/ground_truth"
+            result["report"] = "a topic /NAME/ground_truth"
         elif self.other_versions:
-            found["report"] = found["replay"] = f"messages of this version: {'; '.join(self.other_versions.values())}"
+            result["report"] = result["replay"] = f"messages of this version: {'; '.join(self.other_versions.values())}"
         if SETUP_FILE not in self.files:
-            found["resimulate"] = f"an attachment {SETUP_FILE}"
+            result["resimulate"] = f"an attachment {SETUP_FILE}"
         if "digest" not in self.metadata:
-            found["verify"] = "a digest in its metadata"
-        return found
+            result["verify"] = "a digest in its metadata"
+        return result
 
 
 def info(path: str | Path) -> Info:
-    """Look through a log.
+    """Scan a log.
 
     Raises:
         ValueError: it cannot be read.
@@ -69,7 +69,14 @@ def info(path: str | Path) -> Info:
         span = (min(instants) * 1e-9, max(instants) * 1e-9) if instants else (0.0, 0.0)
         size = Path(path).stat().st_size
         return Info(
-            Path(path), size, log.metadata, tuple(log.attachments), log.complete, *span, topics, log.of_other_versions()
+            Path(path),
+            size,
+            log.metadata,
+            tuple(log.attachments),
+            log.complete,
+            *span,
+            topics,
+            log.incompatible_types(),
         )
 
 

@@ -7,7 +7,7 @@ from lapwing.studies.report.style import POINTS
 
 
 def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
-    """At most `points` and a few of the samples of a line without gaps, shapes (n,); its ends and extremes are kept."""
+    """Return about `points` samples of a line without gaps, shapes (n,), including its ends and extremes."""
     if len(y) <= points:
         return x, y
     kept = extremes(y, points)
@@ -15,7 +15,7 @@ def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray
 
 
 def extremes(y: np.ndarray, points: int = POINTS) -> np.ndarray:
-    """Indices of the least and largest sample of each of points / 2 stretches, and of both ends, in order."""
+    """Return the sorted indices of minimum and maximum of each of points / 2 intervals, and of both ends."""
     length = -(-2 * len(y) // points)
     stretches = np.pad(y, (0, -len(y) % length), mode="edge").reshape(-1, length)
     starts = length * np.arange(len(stretches))
@@ -24,14 +24,14 @@ def extremes(y: np.ndarray, points: int = POINTS) -> np.ndarray:
 
 
 def every(values: np.ndarray, points: int = POINTS) -> np.ndarray:
-    """Every k-th sample and the last, shape (m, ...), of what is no function of time: a path, a cloud of points."""
+    """Return every k-th sample and the last, shape (m, ...), of data without a time axis: a path, a point cloud."""
     step = max(1, -(-len(values) // points))
     kept = values[::step]
     return kept if (len(values) - 1) % step == 0 else np.concatenate([kept, values[-1:]])
 
 
 def drawn(mark: Line, of_x: bool) -> Line:
-    """The line as it is drawn, of a function of x (else of a path); one with gaps stays whole."""
+    """Return the downsampled line, as a function of x or a path; one with gaps stays unchanged."""
     if len(mark.x) <= POINTS or np.isnan(mark.y).any():
         return mark
     if of_x:

@@ -25,7 +25,8 @@ def facts(flight: FlightData) -> dict[str, str]:
         "effects": "; ".join(_with_keys(name, keys) for name, keys in scene.get("effects", {}).items()),
         "sensors": "; ".join(_with_keys(name, keys) for name, keys in scene.get("sensors", {}).items()),
         "estimator": str(autopilot.get("estimator", "")) if steered else "",
-        "gains": _gains(scene) if steered else "",
+        "controller": str(autopilot.get("controller") or "cascaded PID") if steered else "",
+        "gains": _gains(scene) if steered and uses_gains(scene) else "",
         "duration": f"{t[-1] - t[0]:.2f} s",
         "landed": "yes" if flight.landed else "no" if flight.has("status") else "",
         "seed": said.get("seed", ""),
@@ -41,8 +42,8 @@ def facts(flight: FlightData) -> dict[str, str]:
 
 
 def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
-    """The keys of two scenes whose values differ, and both values; of many the first, and how many more."""
-    first, second = dict(_leaves(one)), dict(_leaves(other))
+    """Return the keys of two scenes with different values, and both values; the first ones and a count of the rest."""
+    first, second = (_leaves_in_use(scene, uses_gains(one) and uses_gains(other)) for scene in (one, other))
     keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
     found = {key: (_cut(first.get(key, "")), _cut(second.get(key, ""))) for key in keys[:MANY]}
     if len(keys) > MANY:
@@ -51,12 +52,23 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[s
 
 
 def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Dotted key and value of all that is no table; an empty table, such as an effect without keys, is "yes"."""
+    """Yield dotted key and value of all leaves; an empty table, such as an effect without keys, is "yes"."""
     for key, value in table.items():
         if isinstance(value, dict) and value:
             yield from _leaves(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", "yes" if isinstance(value, dict) else value
+
+
+def uses_gains(scene: dict[str, Any]) -> bool:
+    """Return True if the vehicle's controller is the cascade that the scene's gain set belongs to."""
+    return not scene.get("autopilot", {}).get("controller")
+
+
+def _leaves_in_use(scene: dict[str, Any], gains: bool) -> dict[str, Any]:
+    """Return the leaves of a scene, without those of the gain set unless `gains`."""
+    leaves = dict(_leaves(scene))
+    return leaves if gains else {k: v for k, v in leaves.items() if not k.startswith(("gains.", "autopilot.gains"))}
 
 
 def _gains(scene: dict[str, Any]) -> str:
@@ -70,7 +82,7 @@ def _with_keys(name: str, keys: dict[str, Any]) -> str:
 
 
 def _cut(value: Any) -> str:
-    """A value in at most so many letters: a module's text or a mesh has thousands."""
+    """Shorten a value: a module's text or a mesh has thousands of letters."""
     text = _short(value)
     return text if len(text) <= LONG else f"{text[:LONG]}…"
 

@@ -9,38 +9,38 @@ DEGREES = 180.0 / np.pi  # of 1 rad
 
 
 def over(flight: FlightData) -> dict:
-    """Span and phases of a flight, as arguments of a `Plot`."""
+    """Return time span and phases of a flight, as arguments of a `Plot`."""
     t = flight.truth.times
     return {"span": (float(t[0]), float(max(t[-1], t[0] + 1e-9))), "phases": tuple(phases(flight))}
 
 
 def phases(flight: FlightData) -> list[tuple[str, float, float]]:
-    """Name, start and end [s] of each phase of the mission, in order; empty without setpoints."""
+    """Return the name, start and end [s] of each phase of the mission, in order; empty without setpoints."""
     if not flight.has("setpoint"):
         return []
     return [run for run in runs(flight.setpoint.times, flight.setpoint.phase) if run[0]]
 
 
 def runs(t: np.ndarray, values: np.ndarray) -> list[tuple[str, float, float]]:
-    """Value as text, start and end [s] of each stretch in which it stays the same."""
+    """Return value as text, start and end [s] of each interval of constant value."""
     starts = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1)]
     ends = [*t[starts[1:]], t[-1]]
     return [(str(values[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True)]
 
 
 def three_axes(flight: FlightData, first: int, flown: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
-    """Three axes over time, a row each; where something was followed, beside each its error.
+    """Plot three axes over time, one per row, with the tracking error if there is a setpoint.
 
     Args:
-        flight: of the vehicle.
+        flight: flight of the vehicle.
         first: 0 for the position, 3 for the angles.
-        flown: in `unit`, shape (n, 3).
-        unit: of the plots.
-        scale: of 1 m or 1 rad in `unit`.
-        caption: of the plot.
+        flown: values in `unit`, shape (n, 3).
+        unit: unit of the plots.
+        scale: 1 m or 1 rad in `unit`.
+        caption: caption of the plot.
 
     Raises:
-        NotRecordedError: nothing to be seen, they stay as they are.
+        NotRecordedError: the values are constant.
     """
     if len(flown) > 1 and not np.ptp(flown, axis=0).any():
         raise NotRecordedError("it never changes")

@@ -1,7 +1,8 @@
 """Plots on paper: drawn by matplotlib, as PDF or PNG."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.backends.backend_pdf import PdfPages
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.image import imsave
 from matplotlib.ticker import MaxNLocator
 
@@ -37,10 +37,11 @@ _PARAMETERS: dict[Any, Any] = {
     "ytick.color": "#444444",
     "figure.facecolor": "white",
 }
+LEGEND = 130  # letters in the width of a legend, six of each entry for its symbol
 NUMBERS = 14  # along the width of a plot, of five digits each
 STEPS = (1, 2, 2.5, 5, 10)  # between them
 _DASHES: dict[str, Any] = {"solid": "-", "dash": (0, (4, 3)), "dot": (0, (1, 1.5)), "dashdot": (0, (6, 2, 1, 2))}
-_MARKERS = {"": "", "circle": "o", "open": "o", "square": "s"}
+_MARKERS = {"": "", "circle": "o", "open": "o", "square": "s", "cross": "X", "diamond": "D", "triangle": "^"}
 
 
 @contextmanager
@@ -50,15 +51,8 @@ def styled() -> Iterator[None]:
         yield
 
 
-def write_pdf(path: Path, plots: Sequence[Plot]) -> None:
-    """A page for each plot."""
-    with styled(), PdfPages(path, metadata={"CreationDate": None}) as pages:
-        for plot in plots:
-            pages.savefig(figure(plot))
-
-
 def write_png(path: Path, plots: Sequence[Plot]) -> None:
-    """All plots below each other in one picture."""
+    """Write all plots below each other in one image."""
     with styled():
         pictures = []
         for plot in plots:
@@ -68,9 +62,25 @@ def write_png(path: Path, plots: Sequence[Plot]) -> None:
         imsave(path, np.concatenate(pictures), format="png", metadata={"Software": ""})
 
 
+class ShownFigure(Figure):
+    """Figure that a notebook shows without pyplot, which would have to be imported before it."""
+
+    def _repr_png_(self) -> bytes:
+        with styled():
+            data = BytesIO()
+            self.savefig(data, format="png")
+        return data.getvalue()
+
+
 def figure(plot: Plot) -> Figure:
-    """The plot as a figure of `WIDTH`; to be called, and saved, within `styled`."""
-    made = Figure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
+    """Return the plot as a figure of `WIDTH`; call and save it within `styled`."""
+    made = ShownFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
+    draw_plot(plot, made)
+    return made
+
+
+def draw_plot(plot: Plot, made: Figure | SubFigure) -> None:
+    """Draw a plot into a figure or a part of one; call within `styled`."""
     grid = made.add_gridspec(len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths)
     named: dict[str, Any] = {}
     first: Axes | None = None
@@ -91,8 +101,12 @@ def figure(plot: Plot) -> Figure:
             axes.set_xlabel(f"time [{plot.unit}]" if bottom else "")
             _over_time(axes, plot, panel)
     if named:
-        made.legend(named.values(), named.keys(), loc="outside upper left", ncols=min(len(named), 6), fontsize=8.5)
-    return made
+        made.legend(named.values(), named.keys(), loc="outside upper left", ncols=_columns(named), fontsize="small")
+
+
+def _columns(names: Iterable[str]) -> int:
+    """Return the number of columns of a legend, of which a figure's width has room."""
+    return max(1, min(6, LEGEND // (max(map(len, names)) + 6)))
 
 
 def _flat(axes: Axes, plot: Plot, panel: Panel) -> None:
@@ -169,7 +183,7 @@ def _looks(line: Line) -> dict[str, Any]:
 
 
 def _over_time(axes: Axes, plot: Plot, panel: Panel) -> None:
-    """Shade every other phase, and name the phases over the panels of the first row where there is room."""
+    """Shade every other phase, and name the phases above the panels of the first row if there is room."""
     span = plot.span or axes.get_xlim()
     for index, (name, start, end) in enumerate(plot.phases):
         if index % 2:

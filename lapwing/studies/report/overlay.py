@@ -12,7 +12,7 @@ LANE = 0.32  # [inch] of a timeline
 
 
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
-    """Two plots in one; a panel of the first alone stays as it is, one of the second alone is named, not shown."""
+    """Return two plots in one; a panel of the first alone is kept, one of the second alone is named but not drawn."""
     others = {_key(panel): panel for panel in second.panels}
     panels = []
     for panel in first.panels:
@@ -61,7 +61,7 @@ def _same(one: Mark, other: Mark) -> bool:
 
 
 def _lanes(panel: Panel) -> dict[str, list[Stretch]]:
-    """The bars of each lane of a timeline."""
+    """Return the bars of each lane of a timeline."""
     found: dict[str, list[Stretch]] = {}
     for mark in panel.marks:
         if isinstance(mark, Stretch):
@@ -70,7 +70,7 @@ def _lanes(panel: Panel) -> dict[str, list[Stretch]]:
 
 
 def _of(mark: Mark, label: str, colours: dict[str, str], dash: str) -> Mark:
-    """The mark with its flight's name and looks; whose lines are dashed stay so."""
+    """Return the mark with its flight's name and style; dashed lines stay dashed."""
     if isinstance(mark, Stretch):
         return mark._replace(lane=f"{mark.lane}, {label}")
     mark = mark._replace(name=f"{mark.name}, {label}" if mark.name else label)

@@ -7,7 +7,7 @@ from lapwing.studies.report.plots.path import space
 
 
 def overview(flight: FlightData) -> Plot:
-    """The displacements beside their references, and the path."""
+    """Plot position with setpoint, and path."""
     t, followed = flight.truth.times, flight.reference
     panels = []
     for row, name in enumerate(AXES[:3]):

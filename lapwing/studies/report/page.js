@@ -1,6 +1,10 @@
 // Draws each plot when it comes near the window, and shows the same stretch of time in all of them.
 (() => {
   const config = { responsive: true, displaylogo: false, scrollZoom: false, toImageButtonOptions: { format: "svg" } };
+  Object.assign(config, { modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], displayModeBar: matchMedia("(hover: hover)").matches && "hover" });
+  const NARROW = 600; // [pixel] width below which a plot has one column
+  const dark = DARK_COLOURS;
+  const AROUND = [5, 10]; // [s] before and after an event that is chosen
   const linked = []; // plots over time that have been drawn: {box, axis}
   const unit = Number(document.body.dataset.seconds || 1); // in a unit of the plots' time
   let range = null; // of time, as somebody has chosen it
@@ -15,10 +19,39 @@
     }
   }
 
+  // Numbers in 16-bit steps of their range: see _array of plotly_traces.py. Typed arrays of plotly.js stay.
+  function numbers(given) {
+    if (given?.steps === undefined) return given;
+    const bytes = Uint8Array.from(atob(given.steps), (c) => c.charCodeAt(0));
+    return Float64Array.from(new Int16Array(bytes.buffer), (n) => (n === -32768 ? NaN : given.low + (n + 32767) * given.step));
+  }
+
+  const scheme = matchMedia("(prefers-color-scheme: dark)");
+  const light = matchMedia("print");
+  function coloured(text) {
+    if (!scheme.matches || light.matches) return text;
+    return text.replace(/#[0-9A-F]{6}\b/g, (colour) => dark[colour] ?? colour).replace(/rgba\((\d+),(\d+),(\d+),/g, (all, ...rgb) => {
+      const colour = dark[`#${rgb.slice(0, 3).map((n) => Number(n).toString(16).padStart(2, "0")).join("").toUpperCase()}`];
+      return colour ? `rgba(${[1, 3, 5].map((k) => parseInt(colour.slice(k, k + 2), 16))},` : all;
+    });
+  }
+  scheme.addEventListener("change", () => location.reload());
+
+  // On a phone the columns of a plot are below each other.
+  function stack(layout, { height, top, domains }) {
+    Object.assign(layout, { height, margin: { ...layout.margin, l: 56, r: 6, t: top } });
+    for (const [number, domain] of Object.entries(domains)) {
+      layout[`xaxis${number}`].domain = [0, 1];
+      layout[`yaxis${number}`].domain = domain;
+    }
+  }
+
   async function draw(figure) {
     if (figure.dataset.drawn) return;
     figure.dataset.drawn = "yes";
-    const { data, layout, timed } = JSON.parse(figure.querySelector("script").textContent);
+    const { data, layout, timed, narrow } = JSON.parse(coloured(figure.querySelector("script").textContent));
+    if (narrow && figure.clientWidth < NARROW) stack(layout, narrow);
+    for (const trace of data) for (const axis of ["x", "y"]) trace[axis] = numbers(trace[axis]);
     const box = figure.querySelector("div");
     if (range) for (const axis of timed) layout[axis].range = range.slice();
     await library;
@@ -27,22 +60,60 @@
     const plot = { box, timed, axis: timed[0], panels: timed.map((axis) => `${axis}${axis.replace("x", "y")}`.replaceAll("axis", "")) };
     linked.push(plot);
     box.on("plotly_relayout", (changed) => follow(plot, changed));
-    box.on("plotly_hover", ({ xvals }) => document.dispatchEvent(new CustomEvent("plot-time", { detail: xvals[0] * unit })));
+    box.on("plotly_hover", ({ xvals }) => seek(xvals[0] * unit));
   }
 
-  // The cursor of the plots that can be seen, at a time that somebody else has chosen.
-  document.addEventListener("motion-time", ({ detail }) => {
-    for (const { box, panels } of linked) {
-      const place = box.getBoundingClientRect();
-      if (place.bottom > 0 && place.top < innerHeight) Plotly.Fx.hover(box, { xval: detail / unit }, panels, true);
-    }
-  });
-
+  // A closed section is not near the window, and is drawn when it opens.
   const figures = [...document.querySelectorAll("figure.plot")];
   const near = new IntersectionObserver(
     (entries) => entries.filter((entry) => entry.isIntersecting).forEach((entry) => draw(entry.target)),
     { rootMargin: "600px" },
   );
   figures.forEach((figure) => near.observe(figure));
-  window.addEventListener("beforeprint", () => figures.forEach(draw));
+
+  // The 3D view is a page of its own in a frame; both sides tell each other the time.
+  const space = document.querySelector("#space .space");
+  let frame = null;
+  function seek(time) {
+    frame?.contentWindow.postMessage({ lapwing: "seek", time }, "*");
+  }
+  function visible({ box }) {
+    const place = box.getBoundingClientRect();
+    return box.offsetParent && place.bottom > 0 && place.top < innerHeight;
+  }
+  function hover(time) { // the cursor of the plots that can be seen
+    for (const plot of linked.filter(visible)) Plotly.Fx.hover(plot.box, { xval: time / unit }, plot.panels, true);
+  }
+  function show() {
+    if (frame) return;
+    frame = document.createElement("iframe");
+    frame.title = "3D view";
+    frame.srcdoc = JSON.parse(document.querySelector("#space script").textContent);
+    space.replaceChildren(frame);
+  }
+  if (space) {
+    addEventListener("message", ({ data, source }) => {
+      if (source !== frame?.contentWindow || data?.lapwing !== "time") return;
+      space.dataset.time = data.time;
+      hover(data.time);
+    });
+    const details = space.closest("details"); // it is heavy: without a GPU it would hold up the plots
+    details.addEventListener("toggle", () => details.open && show());
+  }
+
+  // A click on the time of an event shows its surroundings in all plots, and moves the 3D view there.
+  document.addEventListener("click", ({ target }) => {
+    const time = Number(target.closest?.("button[data-time]")?.dataset.time ?? NaN);
+    if (Number.isNaN(time)) return;
+    seek(time);
+    range = [(time - AROUND[0]) / unit, (time + AROUND[1]) / unit];
+    for (const plot of linked) Plotly.relayout(plot.box, { [`${plot.axis}.range`]: range.slice() });
+    const place = frame?.offsetParent ? space : linked.some(visible) ? null : document.querySelector("details[open] figure.plot");
+    place?.scrollIntoView({ block: "center", behavior: "smooth" });
+  });
+
+  window.addEventListener("beforeprint", () => {
+    for (const details of document.querySelectorAll("details")) details.open ||= !details.contains(space);
+    figures.forEach(draw);
+  });
 })();

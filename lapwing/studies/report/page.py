@@ -1,21 +1,21 @@
 """The report as a page for a browser: what the flight came to, and the plots; one file that needs no network."""
 
-import base64
-import gzip
+import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader
 
-from lapwing.cosim.config.run_config import RunConfig
 from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report.flight_header import differences, facts
-from lapwing.studies.report.motion_3d import to_json
-from lapwing.studies.report.plotly_figure import script
+from lapwing.studies.report.key_numbers import key_numbers, trouble
+from lapwing.studies.report.plotly_script import compressed, reduced, script
 from lapwing.studies.report.sections import Section, labels, long, sections
+from lapwing.studies.report.style import DARK
 from lapwing.studies.tracking import shown
 
+OPEN = ("timeline", "position")  # sections that are open at first
 LOOKS = {"landed": "good", "completed": "good"}  # by kind of outcome; "bad" for all others
 _HERE = Path(__file__).parent
 _TEMPLATES = Environment(loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True)
@@ -29,12 +29,13 @@ class Accuracy(NamedTuple):
     values: tuple[float | None, ...]
 
 
-def flight_page(flights: Sequence[FlightData]) -> str:
-    """The page of one flight, or of two laid over each other."""
+def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
+    """Return the page of one flight, or of two laid over each other, with the 3D view if `view3d`."""
     scenes = [flight.origin.scene for flight in flights]
     published = scenes[0].get("published", {})
     names = labels(flights)
     told = [facts(flight) for flight in flights]
+    drawn = sections(flights)  # one by one, each when the page comes to it
     heads = list(names) if len(flights) > 1 else ["this flight"]
     return render(
         "flight.html",
@@ -43,46 +44,49 @@ def flight_page(flights: Sequence[FlightData]) -> str:
         labels=names if len(flights) > 1 else (),
         outcomes=[(LOOKS.get(flight.outcome.kind, "bad"), flight.outcome) for flight in flights],
         events=[flight.events for flight in flights],
+        numbers=[key_numbers(flight) for flight in flights],
+        trouble=[trouble(flight) for flight in flights],
         facts={key: [one.get(key, "") for one in told] for key in dict.fromkeys(k for one in told for k in one)},
         differences=differences(*scenes) if len(scenes) == 2 else {},
         accuracy=accuracy(flights, published.get("rmse", {})),
         heads=heads + ([published.get("source", "published")] if published.get("rmse") else []),
-        sections=sections(flights),
+        map=next(drawn),
+        sections=drawn,
+        open=OPEN,
         seconds=3600 if long(flights) else 1,
-        motion=to_json(flights),
-        moving=_moving(),
+        space=_space(flights, names) if view3d else "",
+        no_space="" if view3d else _without_view(flights),
     )
 
 
-def live_page(setup: RunConfig, stream: str) -> str:
-    """The page of a flight that goes on; the address `stream` gives what is new of it."""
-    said = {"name": setup.scene, "title": setup.title, "several": len(setup.vehicles) > 1}
-    return render("live.html", [], stream=stream, moving=_moving(), **said)
+def _space(flights: Sequence[FlightData], names: Sequence[str]) -> str:
+    """Return the page of the 3D view as JSON text that is safe within an HTML element."""
+    from lapwing.studies.view3d.recording import page
+
+    return json.dumps(page(flights, names)).replace("<", "\\u003c")
 
 
-def _moving() -> str:
-    return (_HERE / "motion.js").read_text(encoding="utf-8")
+def _without_view(flights: Sequence[FlightData]) -> str:
+    """Return how to get the 3D view that this page lacks."""
+    from lapwing.studies.view3d import MISSING, available
+
+    source = flights[0].origin.source if flights[0].origin.recorded else "LOG"
+    return f"lapwing view {source}" if available() else MISSING
 
 
 def render(template: str, sections: Iterable[Section], **values: Any) -> str:
-    """The page of a template of this folder, with the script that draws its plots.
+    """Return the page of a template of this folder, with the script that draws its plots.
 
     Raises:
-        ValueError: that script is not installed.
+        ValueError: the script is not installed.
     """
-    code = (_HERE / "page.js").read_text(encoding="utf-8")
-    return _TEMPLATES.get_template(template).render(
-        library=_compressed(script()), code=code, sections=sections, **values
-    )
-
-
-def _compressed(text: str) -> str:
-    """Return a text compressed with gzip, in base64."""
-    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")
+    code = (_HERE / "page.js").read_text(encoding="utf-8").replace("DARK_COLOURS", json.dumps(DARK))
+    library = compressed(reduced(script()))
+    return _TEMPLATES.get_template(template).render(library=library, code=code, sections=sections, **values)
 
 
 def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list[Accuracy]:
-    """Root-mean-square error of each axis [m], [°] beside the published one; empty without a reference."""
+    """Return the root-mean-square error of each axis [m], [°] with the published one; empty without a reference."""
     if not any(flight.rmse for flight in flights):
         return []
     found = []

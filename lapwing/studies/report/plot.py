@@ -17,7 +17,7 @@ class Line(NamedTuple):
     colour: str = FLOWN
     width: float = 1.3  # [point]
     dash: str = "solid"  # or "dash", "dot", "dashdot"
-    marker: str = ""  # or "circle", "open", "square"
+    marker: str = ""  # or "circle", "open", "square", "cross", "diamond", "triangle"
     size: float = 5.0  # [point] of the marker
     joined: bool = True  # False: markers alone
     fill: str = ""  # colour inside of a closed line
@@ -98,18 +98,18 @@ class NotRecordedError(Exception):
 
 
 def column(panels: Iterable[Panel], height: float = 1.7, **looks: object) -> dict:
-    """Panels over time one below the other, `height` [inch] each, as arguments of a `Plot`."""
+    """Return panels over time one below the other, `height` [inch] each, as arguments of a `Plot`."""
     placed = tuple(panel._replace(row=row) for row, panel in enumerate(panels))
     return {"panels": placed, "height": 0.9 + height * len(placed), "heights": (1.0,) * len(placed), **looks}
 
 
 def reference(x: np.ndarray, y: np.ndarray, hidden: bool = False, name: str = "reference") -> Line:
-    """The dashed line by which a reference is drawn; x and y have shape (n,)."""
+    """Return the dashed line by which a reference is drawn; x and y have shape (n,)."""
     return Line(x, y, name, REFERENCE, 1.1, "dash", hidden=hidden)
 
 
 def in_hours(plot: Plot) -> Plot:
-    """The plot with its time in hours instead of seconds."""
+    """Return the plot with its time in hours instead of seconds."""
 
     def scaled(mark: Mark) -> Mark:
         if isinstance(mark, Stretch):
@@ -123,7 +123,7 @@ def in_hours(plot: Plot) -> Plot:
 
 
 def lowest(plot: Plot) -> set[int]:
-    """The indices of the panels with none below: they name what x is."""
+    """Return the indices of the lowest panels, which label x."""
     ends = [(p.row + p.rows, p.column, p.column + p.columns) for p in plot.panels]
     return {
         i
@@ -133,7 +133,7 @@ def lowest(plot: Plot) -> set[int]:
 
 
 def cube(panel: Panel) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corner of the cube, shape (3,) each, in which a panel in space is drawn to one scale."""
+    """Return the lower and upper corner, shape (3,) each, of the cube in which a panel in space is drawn to scale."""
     lines = [m for m in panel.marks if isinstance(m, Line) and m.z is not None]
     points = np.column_stack([np.concatenate([getattr(line, axis) for line in lines]) for axis in ("x", "y", "z")])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)

@@ -1,48 +1,34 @@
-"""Plots in a browser: the figures of plotly.js as JSON. The library's script is all that is taken of its package."""
+"""Plots in a browser: the figures of plotly.js as JSON."""
 
 import json
 import math
-from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lapwing.studies.report.plot import Panel, Plot, Stretch, cube, lowest
+from lapwing.studies.report.plot import Panel, Plot, Stretch, lowest
 from lapwing.studies.report.plotly_traces import in_legend, text_of, traces
-from lapwing.studies.report.style import SHADE
+from lapwing.studies.report.style import SHADE, TEXT
 
 PIXELS = 100  # an inch on the page
 _GAP_X, _GAP_Y = 78.0, 26.0  # [pixel] between panels, for the labels of the right one and the title of the lower one
 _GAP_X_LABEL = 30.0  # [pixel] more below a panel that names its own x
 _PAGE = 900.0  # [pixel] typical width of the panels together
+_NARROW = 300.0  # [pixel] of a phone
 _LETTER, _SYMBOL = 6.6, 48.0  # [pixel] wide in a legend
 _MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; above see _top
-_FONT = {"family": "system-ui, sans-serif", "size": 12, "color": "#333"}
-_GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
-
-
-def script() -> str:
-    """The text of plotly.js, as its Python package carries it; that package is not imported.
-
-    Raises:
-        ValueError: the package is not installed.
-    """
-    found = find_spec("plotly")
-    for folder in (found.submodule_search_locations or ()) if found else ():
-        path = Path(folder) / "package_data" / "plotly.min.js"
-        if path.exists():
-            return path.read_text(encoding="utf-8")
-    raise ValueError("the report needs plotly's script, which is not there: pip install plotly")
+_FONT = {"family": "system-ui, sans-serif", "size": 12, "color": TEXT}
+_GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
+_NUMBERS = {"exponentformat": "power", "minexponent": 4}  # 0.0002, where plotly would write 200 with a prefix
 
 
 def to_json(plot: Plot) -> str:
-    """Figure of a plot: `{"data", "layout", "timed"}`, safe within an HTML element."""
+    """Return the figure of a plot: `{"data", "layout", "timed"}`, safe within an HTML element."""
     return json.dumps(figure(plot), separators=(",", ":")).replace("<", "\\u003c")
 
 
 def figure(plot: Plot) -> dict[str, Any]:
-    """Data and layout of a plot; "timed" names its axes over time, which the page links."""
+    """Return data and layout of a plot; "timed" names its time axes, which the page links."""
     data: list[dict] = []
     layout: dict[str, Any] = {
         "height": round(plot.height * PIXELS),
@@ -50,10 +36,12 @@ def figure(plot: Plot) -> dict[str, Any]:
         "font": _FONT,
         "hovermode": "x unified" if all(p.timed for p in plot.panels) else "closest",
         "legend": {"orientation": "h", "x": 0, "y": 1, "yref": "container", "yanchor": "top"},
+        "modebar": {"bgcolor": "#FFFFFF", "color": "#888888", "activecolor": TEXT},
         "shapes": [],
         "annotations": [],
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#888888", "font": {"color": TEXT}},
         "barmode": "overlay",
         "uniformtext": {"mode": "hide", "minsize": 10},
     }
@@ -63,23 +51,40 @@ def figure(plot: Plot) -> dict[str, Any]:
     for index, panel in enumerate(plot.panels):
         number = "" if index == 0 else str(index + 1)
         domain_x, domain_y = _domains(plot, panel)
-        if panel.z_label:
-            layout[f"scene{number}"] = _scene(panel, domain_x, domain_y)
-            where = {"scene": f"scene{number}"}
-        else:
-            where = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
-            _axes(layout, plot, panel, number, (domain_x, domain_y), timed, index in ends)
+        where = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+        _axes(layout, plot, panel, number, (domain_x, domain_y), timed, index in ends)
         for mark in panel.marks:
             for trace in traces(mark, plot, panel):
                 trace.update(where)
                 in_legend(trace, named)
                 data.append(trace)
-    return {"data": data, "layout": layout, "timed": timed}
+    return {"data": data, "layout": layout, "timed": timed, "narrow": _narrow(plot)}
+
+
+def _narrow(plot: Plot) -> dict[str, Any]:
+    """Return height and top margin [pixel] and vertical domains by axis number for a page one column wide."""
+    inner = plot.height * PIXELS - _top(plot) - _MARGIN["b"]
+    order = sorted(range(len(plot.panels)), key=lambda i: (plot.panels[i].row, plot.panels[i].column))
+    heights = {}
+    for i in order:
+        panel = plot.panels[i]
+        share = sum(plot.heights[panel.row : panel.row + panel.rows]) / sum(plot.heights)
+        most = 320.0 if panel.equal or len(plot.panels) == 1 else 190.0
+        heights[i] = min(max(share * inner - _GAP_Y, 110.0), max(most, share * inner if len(plot.widths) == 1 else 0.0))
+    gaps = {i: _GAP_Y + _GAP_X_LABEL * (not plot.panels[i].timed or i in lowest(plot)) for i in order}
+    total = sum(heights.values()) + sum(gaps[i] for i in order[:-1])
+    domains, down = {}, 0.0
+    for i in order:
+        ends = 1.0 - (down + heights[i]) / total, 1.0 - down / total
+        domains["" if i == 0 else str(i + 1)] = [round(min(max(end, 0.0), 1.0), 5) for end in ends]
+        down += heights[i] + gaps[i]
+    top = _top(plot, _NARROW)
+    return {"height": round(total + top + _MARGIN["b"]), "top": top, "domains": domains}
 
 
 def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, timed: list[str], bottom: bool) -> None:
-    x: dict[str, Any] = {"domain": domains[0], "anchor": f"y{number}", "hoverformat": ".5~g", **_GRID}
-    y: dict[str, Any] = {"domain": domains[1], "anchor": f"x{number}", "hoverformat": ".5~g", **_GRID}
+    x: dict[str, Any] = {"domain": domains[0], "anchor": f"y{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
+    y: dict[str, Any] = {"domain": domains[1], "anchor": f"x{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
     y["title"] = {"text": panel.y_label, "standoff": 6}
     x["title"] = {"text": panel.x_label, "standoff": 4}
     if panel.log_x:
@@ -95,7 +100,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
         x["automargin"] = True  # a text may have several lines
     if panel.equal:
         y |= {"scaleanchor": f"x{number}", "scaleratio": 1}
-        x["constrain"] = y["constrain"] = "domain" if panel.x_range else "range"
+        x["constrain"] = y["constrain"] = "range"
     if any(isinstance(mark, Stretch) for mark in panel.marks):
         y |= {
             "autorange": "reversed",
@@ -121,7 +126,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
         "yref": f"y{number} domain",
         "xanchor": "left",
     }
-    small = {"size": 11, "color": "#555"}
+    small = {"size": 11, "color": "#555555"}
     if panel.title:
         layout["annotations"].append(
             {**corner, "text": text_of(panel.title), "x": 0, "y": 1, "yanchor": "bottom", "font": small}
@@ -134,7 +139,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
 
 
 def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
-    """Every other phase shaded, and their names over the panels of the first row where there is room."""
+    """Shade every other phase, and name the phases above the panels of the first row if there is room."""
     span = plot.span or (0.0, 1.0)
     room = 130 * panel.columns / len(plot.widths) / (span[1] - span[0])  # letters a second
     for index, (name, start, end) in enumerate(plot.phases):
@@ -144,35 +149,24 @@ def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
             layout["shapes"].append(shape)
         if panel.row == 0 and not panel.title and len(name) <= room * (end - start):
             middle: dict[str, Any] = {"xref": f"x{number}", "yref": f"y{number} domain", "x": (start + end) / 2, "y": 1}
-            looks: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#666"}}
+            looks: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#555555"}}
             layout["annotations"].append({**middle, **looks, "text": text_of(name)})
 
 
-def _scene(panel: Panel, domain_x: list[float], domain_y: list[float]) -> dict:
-    low, high = cube(panel)
-    looks = {"backgroundcolor": "white", "gridcolor": "#D9DDE1"}
-    axes = {
-        f"{axis}axis": {"title": {"text": text}, "range": [float(low[i]), float(high[i])], **looks}
-        for i, (axis, text) in enumerate(zip("xyz", (panel.x_label, panel.y_label, panel.z_label), strict=True))
-    }
-    camera = {"eye": {"x": -1.45, "y": -1.85, "z": 1.0}, "center": {"x": 0, "y": 0, "z": -0.12}}
-    return {**axes, "domain": {"x": domain_x, "y": domain_y}, "aspectmode": "cube", "camera": camera}
-
-
 def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:
-    """The part of the figure that a panel covers, from the left and from below."""
+    """Return the part of the figure that a panel covers, from the left and from below."""
     inner = plot.height * PIXELS - _top(plot) - _MARGIN["b"]
-    own = any(not p.timed and not p.z_label for p in plot.panels)
+    own = any(not p.timed for p in plot.panels)
     gap_y = _GAP_Y + (_GAP_X_LABEL if own and len(plot.heights) > 1 else 0.0)
     x = _share(plot.widths, _GAP_X / _PAGE, panel.column, panel.columns)
     top = _share(plot.heights, gap_y / inner, panel.row, panel.rows)
     return x, [1.0 - top[1], 1.0 - top[0]]
 
 
-def _top(plot: Plot) -> int:
-    """Room [pixel] above the panels: for a legend, and for titles and names of phases."""
+def _top(plot: Plot, width: float = _PAGE) -> int:
+    """Return the space [pixel] above the panels for legend, titles and names of phases."""
     names = {getattr(mark, "name", "") for panel in plot.panels for mark in panel.marks} - {""}
-    lines = math.ceil(sum(_LETTER * len(name) + _SYMBOL for name in names) / _PAGE)
+    lines = math.ceil(sum(_LETTER * len(name) + _SYMBOL for name in names) / width)
     return 6 + 22 * lines + (18 if plot.phases or any(panel.title for panel in plot.panels) else 0)
 
 

@@ -10,27 +10,31 @@ from lapwing.studies.report.downsampling import drawn, extremes
 from lapwing.studies.report.plot import Band, Level, Line, Mark, Panel, Plot, Stretch
 
 _POINT = 96.0 / 72.0  # [pixel]
-_SYMBOLS = {"circle": "circle", "open": "circle-open", "square": "square"}
+FEW = 8  # numbers that are written as text
+STEPS = 32767  # from the middle of a range to its ends
+_SYMBOLS = {"circle": "circle", "open": "circle-open", "square": "square", "cross": "x", "diamond": "diamond"}
+_SYMBOLS |= {"triangle": "triangle-up"}
 
 
 def traces(mark: Mark, plot: Plot, panel: Panel) -> list[dict[str, Any]]:
-    """A mark as one trace, a band as two; without the axes that they belong to."""
+    """Return a mark as one trace, a band as two, without their axes."""
     if isinstance(mark, Level):
         return [_level(mark, plot, panel)]
     if isinstance(mark, Stretch):
         return [_bar(mark)]
     if isinstance(mark, Band):
         kept = extremes(mark.high)
+        exact = (panel.log_x, panel.log_y)
         looks = {"type": "scatter", "mode": "lines", "line": {"width": 0, "color": mark.colour}, "hoverinfo": "skip"}
-        x = _array(mark.x[kept])
-        low = {**looks, "x": x, "y": _array(mark.low[kept]), "name": text_of(mark.name), "showlegend": False}
+        x = _array(mark.x[kept], exact[0])
+        low = {**looks, "x": x, "y": _array(mark.low[kept], exact[1]), "name": text_of(mark.name), "showlegend": False}
         filled = {"fill": "tonexty", "fillcolor": _pale(mark.colour), "name": text_of(mark.name)}
-        return [low, {**looks, "x": x, "y": _array(mark.high[kept]), **filled}]
+        return [low, {**looks, "x": x, "y": _array(mark.high[kept], exact[1]), **filled}]
     return [_line(mark, panel)]
 
 
 def in_legend(trace: dict, named: set[tuple]) -> None:
-    """One entry in the legend for all that has one name and looks; a click on it shows or hides them together."""
+    """Group traces of one name and style under one legend entry, which toggles them together."""
     if not trace.get("name"):
         trace.update(showlegend=False, name="")
         return
@@ -44,16 +48,13 @@ def _line(mark: Line, panel: Panel) -> dict:
     line = drawn(mark, panel.timed)
     modes = [mode for mode, wanted in (("lines", line.joined), ("markers", line.marker)) if wanted]
     trace: dict[str, Any] = {
-        "type": "scatter3d" if panel.z_label else "scatter",
-        "mode": "+".join(modes),
-        "x": _array(line.x),
-        "y": _array(line.y),
+        "type": "scatter",
+        "mode": "+".join(modes) or "none",
+        "x": _array(line.x, panel.log_x, panel.x_range),
+        "y": _array(line.y, panel.log_y, panel.y_range),
         "line": {"color": line.colour, "width": round(line.width * _POINT, 2), "dash": line.dash},
         "name": text_of(line.name),
     }
-    if panel.z_label:
-        trace["z"] = _array(np.zeros_like(line.x) if line.z is None else line.z)
-        trace["line"]["width"] *= 2.0  # WebGL draws thinner
     if line.marker:
         trace["marker"] = {"symbol": _SYMBOLS[line.marker], "size": line.size * _POINT, "color": line.colour}
     if line.fill:
@@ -67,7 +68,7 @@ def _line(mark: Line, panel: Panel) -> dict:
 
 
 def _level(mark: Level, plot: Plot, panel: Panel) -> dict:
-    """A trace and no shape, so that it is in the legend and says its value."""
+    """Return a level as a trace instead of a shape, so that it is in the legend and shows its value."""
     lines = [m for m in panel.marks if isinstance(m, Line) and len(m.x)]
     ends = [f(m.x) for m in lines for f in (np.nanmin, np.nanmax)] or [0.0, 1.0]
     low, high = plot.span if plot.span and panel.timed else panel.x_range or (min(ends), max(ends))
@@ -96,8 +97,8 @@ def _bar(mark: Stretch) -> dict:
         "textposition": "inside",
         "insidetextanchor": "middle",
         "textangle": 0,
-        "marker": {"color": _pale(mark.colour, 0.45), "line": {"color": "white", "width": 1}},
-        "textfont": {"color": "#222"},
+        "marker": {"color": _pale(mark.colour, 0.45), "line": {"color": "#FFFFFF", "width": 1}},
+        "textfont": {"color": "#222222"},
         "hovertemplate": f"{text_of(mark.lane)}: {text_of(mark.text)}<br>{lasted}<extra></extra>",
     }
 
@@ -107,10 +108,25 @@ def _pale(colour: str, opacity: float = 0.16) -> str:
     return f"rgba({red},{green},{blue},{opacity})"
 
 
-def _array(values: np.ndarray) -> dict[str, str]:
-    """A typed array as plotly.js reads it: single precision is finer than any screen."""
-    data = np.ascontiguousarray(values, dtype="<f4").tobytes()
-    return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
+def _array(values: np.ndarray, log: bool = False, shown: tuple[float, float] | None = None) -> Any:
+    """Return numbers for page.js: few as they are, many as 16-bit steps of their range, base64; NaN is the lowest.
+
+    Args:
+        values: numbers, shape (n,).
+        log: the axis is logarithmic, for which equal steps are too coarse: single precision instead.
+        shown: range that the axis shows, if narrower than that of the values, which then get single precision too.
+    """
+    finite = np.isfinite(values)
+    if len(values) <= FEW:
+        return [float(v) if ok else None for v, ok in zip(values, finite, strict=True)]
+    low, high = (float(f(values[finite])) if finite.any() else 0.0 for f in (np.min, np.max))
+    step = (high - low) / (2 * STEPS)
+    if log or (shown is not None and step > abs(shown[1] - shown[0]) / 4000):
+        data = np.ascontiguousarray(values, dtype="<f4").tobytes()
+        return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
+    counts = np.zeros(len(values)) if step == 0.0 else np.round((np.where(finite, values, low) - low) / step) - STEPS
+    data = np.where(finite, counts, -STEPS - 1).astype("<i2").tobytes()
+    return {"low": low, "step": step, "steps": base64.b64encode(data).decode("ascii")}
 
 
 def text_of(text: str) -> str:

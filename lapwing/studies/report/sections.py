@@ -29,9 +29,9 @@ class Section(NamedTuple):
 
 
 def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
-    """Every plot of the vehicles' models, of one flight or of two laid over each other.
+    """Yield all plots of the vehicles' models, of one flight or of two overlaid.
 
-    They are drawn one after the other, as they are asked for: each holds all rows of what it shows.
+    They are drawn on demand, since each holds all samples that it shows.
     """
     models = {flight.origin.scene.get("vehicle", {}).get("model", "rigid_body") for flight in flights}
     wanted = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
@@ -41,7 +41,10 @@ def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
 
 
 def labels(flights: Sequence[FlightData]) -> tuple[str, ...]:
-    """Names that tell the flights apart: those of their logs, with folders where these are the same."""
+    """Return names that distinguish the flights: their own, or those of their logs, with folders if these are equal."""
+    own = tuple(flight.name for flight in flights)
+    if all(own) and len(set(own)) == len(own):
+        return own
     sources = [Path(flight.origin.source) for flight in flights]
     stems = tuple(source.stem for source in sources)
     if len(set(stems)) == len(stems):

@@ -9,10 +9,13 @@ from lapwing.studies.flight_data import FlightData
 FORMATS = (".html", ".pdf", ".png")
 
 
-def write(flights: FlightData | Sequence[FlightData], target: Path) -> Path:
-    """Write the report of a flight, or of two laid over each other; its path.
+def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool = False) -> Path:
+    """Write the report of a flight, or of two laid over each other; return its path.
 
-    A name that ends in .html gives a page for a browser; .pdf a page a plot, .png all of them in one picture.
+    Args:
+        flights: one or two.
+        target: .html for a page in a browser, .pdf with a cover and numbered A4 pages, .png with all plots.
+        view3d: put the 3D view into the page, if viser is installed.
 
     Raises:
         ValueError: the report cannot be written, or the file's name has another ending.
@@ -22,14 +25,22 @@ def write(flights: FlightData | Sequence[FlightData], target: Path) -> Path:
     try:
         if target.suffix == ".html":
             from lapwing.studies.report.page import flight_page
+            from lapwing.studies.view3d import available
 
-            target.write_text(flight_page(flown), encoding="utf-8")
+            target.write_text(flight_page(flown, view3d and available()), encoding="utf-8")
         else:
-            from lapwing.studies.report.matplotlib_figure import write_pdf, write_png
             from lapwing.studies.report.sections import sections
 
-            draw = write_pdf if target.suffix == ".pdf" else write_png
-            draw(target, [section.plot for section in sections(flown) if section.plot])
+            drawn = (section for section in sections(flown) if section.plot)
+            if target.suffix == ".pdf":
+                from lapwing.studies.report.flight_cover import cover
+                from lapwing.studies.report.paper import Titled, write_pdf
+
+                write_pdf(target, cover(flown), [Titled(s.title, s.plot) for s in drawn if s.plot])
+            else:
+                from lapwing.studies.report.matplotlib_figure import write_png
+
+                write_png(target, [s.plot for s in drawn if s.plot])
     except OSError as fault:
         with suppress(OSError):
             target.unlink(missing_ok=True)  # no half of one
@@ -38,10 +49,10 @@ def write(flights: FlightData | Sequence[FlightData], target: Path) -> Path:
 
 
 def check_format(target: Path) -> None:
-    """Refuse a name with an ending that no report has.
+    """Check the ending of a report's name.
 
     Raises:
-        ValueError: it has another.
+        ValueError: the format is unknown.
     """
     if target.suffix not in FORMATS:
         raise ValueError(f"{target}: expected a name that ends in {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")

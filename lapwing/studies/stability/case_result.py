@@ -71,14 +71,14 @@ class Sweep(NamedTuple):
     falling: bool = False  # the case gets harder towards small values
 
     def breaks(self) -> dict[str, float | None]:
-        """The first difficulty at which each method is beyond the bound; None: nowhere in the sweep."""
-        found: dict[str, float | None] = {}
+        """Return the first difficulty at which each method exceeds the bound; None if it never does."""
+        result: dict[str, float | None] = {}
         for name, x, y in self.curves:
             order = np.argsort(x)[:: -1 if self.falling else 1]
             broken = order[~(np.asarray(y)[order] <= self.bound)]
-            found[name] = float(x[broken[0]]) if len(broken) else None
-        return found
+            result[name] = float(x[broken[0]]) if len(broken) else None
+        return result
 
     def plot(self) -> Plot:
-        """The sweep as a plot."""
+        """Return the sweep as a plot."""
         return Plot(self.difficulty, self.error, self.curves, self.bound, self.log_x)

@@ -29,10 +29,10 @@ class Result(NamedTuple):
 
 
 def chosen(case: str | None, long: bool, sweep: bool) -> list[str]:
-    """Names of the cases to run: one, or all; those that take minutes only where `long`.
+    """Return the names of the cases to run: one, or all; slow ones only with `long`.
 
     Raises:
-        ValueError: no such case, or one that cannot be swept.
+        ValueError: there is no such case, or it has no sweep.
     """
     if case is None:
         every = [name for name in cases.names() if long or not getattr(cases.get(name), "LONG", False)]
@@ -44,12 +44,12 @@ def chosen(case: str | None, long: bool, sweep: bool) -> list[str]:
 
 
 def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) -> list[Result]:
-    """The results of these cases, in their order.
+    """Return the results of these cases, in order.
 
     Args:
-        names: of cases.
-        sweep: walk their difficulty as well.
-        progress: told the name of each case that is done.
+        names: names of cases.
+        sweep: also run the sweep of the difficulty.
+        progress: called with the name of each finished case.
     """
     number = min(len(names), os.cpu_count() or 1)
     if number == 1:
@@ -61,17 +61,17 @@ def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) 
 
 
 def one(name: str, sweep: bool) -> Result:
-    """The result of one case; one that ends in an error falls short, and says with which."""
+    """Return the result of one case; an error makes it fail and is part of the result."""
     module, started = cases.get(name), time.perf_counter()
     try:
         with np.errstate(all="ignore"):  # methods that break run over; that is what is measured
-            found = module.run()
+            result = module.run()
     except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
         why = f"ended in an error: {error}"
-        found = CaseResult([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
+        result = CaseResult([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
     with np.errstate(all="ignore"):
         walked = module.sweep() if sweep else None
-    return Result(name, module.HARD, found, walked, time.perf_counter() - started)
+    return Result(name, module.HARD, result, walked, time.perf_counter() - started)
 
 
 def _told(result: Result, progress: Callable[[str], None]) -> Result:

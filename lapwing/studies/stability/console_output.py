@@ -14,7 +14,7 @@ from lapwing.studies.stability.case_runner import Result
 
 
 def figure(value: float) -> str:
-    """A number in few letters."""
+    """Format a number briefly."""
     return f"{value:.2g}" if math.isfinite(value) else str(value)
 
 
@@ -40,7 +40,7 @@ FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}
 
 
 def table(console: Console, results: Sequence[Result]) -> None:
-    """For each case a line that says what is hard about it, and its rows."""
+    """Print each case: a line on its difficulty, and its rows."""
     for k, result in enumerate(results):
         console.print(f"\n[bold]{result.case}[/bold]: {escape(result.hard)}", highlight=False)
         shown = Table(box=None, pad_edge=False, header_style="dim", show_header=k == 0, expand=True)

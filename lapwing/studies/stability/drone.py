@@ -23,6 +23,6 @@ PAPER: dict[str, Any] = {
 
 
 def thrown(drone: Any, omega: Vec3, speeds: tuple[float, ...]) -> tuple[Any, Any]:
-    """(machine, state): turning at omega [rad/s] with propellers at these speeds [rad/s], nothing acting."""
+    """Return (machine, state) rotating at omega [rad/s] with propellers at these speeds [rad/s], without loads."""
     p = machine(drone, ZERO, speeds=speeds)
     return p, assembled_state(p, BodyState(ZERO, NO_ROTATION, ZERO, omega), (0.1, 0.4, 0.7, 1.0), speeds)

@@ -12,13 +12,13 @@ from lapwing.studies.simulate import fly
 
 
 def flown(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> FlightData:
-    """A flight of a scene with overrides "KEY=VALUE", until its end or until its numbers end.
+    """Fly a scene with overrides "KEY=VALUE" to its end or to a non-finite state.
 
     Raises:
-        SceneError: what is set is refused.
+        SceneError: an override is invalid.
     """
-    found: FlightData = fly(load(scene, list(overrides)), topics)
-    return found
+    result: FlightData = fly(load(scene, list(overrides)), topics)
+    return result
 
 
 def finite(flight: FlightData) -> bool:

@@ -13,7 +13,7 @@ VICTIM = "autopilot"
 
 
 def wall(seconds: float) -> int:
-    """Error of the wall clock [s] at a time [s]: an hour too late, an hour too early, in turn."""
+    """Return the error of the wall clock [s] at a time [s]: alternately an hour late and an hour early."""
     return HOUR if int(seconds / OFTEN) % 2 else -HOUR
 
 
@@ -23,7 +23,7 @@ def forward(seconds: float) -> int:
 
 
 def jumping(clock: Callable[[], float], scale: int, jump: Callable[[float], int]) -> Callable[[], float]:
-    """The clock with these jumps; it counts `scale` a second."""
+    """Return the clock with these jumps; it counts `scale` per second."""
 
     def read() -> float:
         now = clock()

@@ -11,9 +11,9 @@ from lapwing.studies.accuracy.integrate import sampled
 
 
 def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
-    """Stored numbers of the states at `samples` equal parts of a run from time 0, shape (samples + 1, n).
+    """Return the states at `samples` equal parts of a run from time 0, shape (samples + 1, n).
 
-    `steps` is a multiple of `samples`. Rows from the first that is not finite on are NaN.
+    `steps` is a multiple of `samples`. Rows are NaN from the first non-finite one.
     """
     out = np.empty((samples + 1, len(flatten(x))))
     kept = sampled(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
@@ -22,12 +22,12 @@ def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int)
 
 
 def marched(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
-    """`rows` with attitudes as matrices, shape (samples + 1, m)."""
+    """Return `rows` with attitudes as matrices, shape (samples + 1, m)."""
     return coordinates(x, rows(method, p, x, duration, steps, samples))
 
 
 def worst(values: np.ndarray) -> float:
-    """The largest absolute value; NaN if any value is NaN, 0 of none."""
+    """Return the largest absolute value; NaN if any value is NaN, 0 for an empty array."""
     return float(np.abs(values).max()) if len(values) else 0.0
 
 

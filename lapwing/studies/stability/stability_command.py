@@ -13,17 +13,17 @@ WIDTH = 180  # letters of a table that goes to no terminal
 
 
 def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Path | None) -> bool:
-    """Study one case, or all; whether all of them stand.
+    """Run one case, or all. Return True if all pass.
 
     Args:
-        case: its name, None for all.
-        long: with those that take minutes.
-        sweep: walk the difficulty until each method breaks.
-        json: file for the figures.
+        case: name of a case; None: all.
+        long: include the slow cases.
+        sweep: increase the difficulty until each method fails.
+        json: file for the numbers.
         report: file for the page.
 
     Raises:
-        ValueError: no such case, or one that cannot be swept.
+        ValueError: there is no such case, or it has no sweep.
     """
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     names = chosen(case, long, sweep)

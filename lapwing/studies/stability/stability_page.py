@@ -24,7 +24,7 @@ def write(path: Path, results: Sequence[Result]) -> None:
         "stability.html",
         list(_sections(results)),
         results={result.case: result for result in results},
-        figure=figure,
+        number=figure,
         verdict=verdict,
         distance=distance,
     )

@@ -19,7 +19,7 @@ ATTEMPTS = 60
 
 
 def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
-    """The airframe with the mass, inertia and lag that the linear model shows."""
+    """Return the airframe with mass, inertia and lag of the linear model."""
     effects = model.roll, model.pitch, model.yaw
     x, y, z = (moment / k for moment, k in zip(moments(airframe), effects, strict=True))
     return airframe._replace(
@@ -31,7 +31,7 @@ def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
 
 
 def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
-    """Gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
+    """Return the gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
 
     def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
         d = w / effect
@@ -56,36 +56,36 @@ def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
 
 def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
     """Return the fault of each loop that is unstable, has too small a margin, or is unstable at a corner."""
-    found = {}
+    result = {}
     for name, response in loops.items():
         m = margins(response)
         # Only the single loops and the cuts at the motors scale with the vehicle's gain.
         scaled = CORNERS if name in ("altitude", "yaw", "x_plant_input", "y_plant_input") else ()
         if not stable(response):
-            found[name] = "unstable"
+            result[name] = "unstable"
         elif not 0.0 < m.crossover < math.inf:
-            found[name] = f"its gain is {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
+            result[name] = f"its gain is {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
         elif math.degrees(m.phase) < PHASE:
-            found[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE:g}"
+            result[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE:g}"
         elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN:
-            found[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN:g}"
+            result[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN:g}"
         elif not all(stable(k * response) for k in scaled):
-            found[name] = "unstable with mass, inertia or thrust 20 % wrong"
-    return found
+            result[name] = "unstable with mass, inertia or thrust 20 % wrong"
+    return result
 
 
 def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, say: Callable[[str], None]) -> Bandwidths:
-    """The fastest bandwidths at or below those `wanted` whose gain set keeps its margins.
+    """Return the fastest bandwidths at or below `wanted` whose gain set has the required margins.
 
     Args:
-        model: the plant about hover.
-        airframe: what the controller is told of the vehicle.
-        tick: the controller's period [s].
-        wanted: bandwidths to begin with.
-        say: told of every loop that had to be slowed down, and why.
+        model: plant about hover.
+        airframe: nominal vehicle parameters of the controller.
+        tick: period of the controller [s].
+        wanted: initial bandwidths.
+        say: called with each loop that had to be slowed down, and the reason.
 
     Raises:
-        ValueError: no bandwidth down to a twentieth of what was wanted holds the margins.
+        ValueError: no bandwidth down to a twentieth of `wanted` has the margins.
     """
     plant, now = assumed_airframe(airframe, model), wanted
     first: dict[str, str] = {}
@@ -107,7 +107,7 @@ def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, sa
 
 
 def _owner(name: str, wrong: dict[str, str]) -> str:
-    """The bandwidth that is to blame for a loop: of a cascade the inner one first."""
+    """Return the bandwidth responsible for a loop: the inner one of a cascade first."""
     if name in ("altitude", "yaw"):
         return name
     return "attitude" if {"roll", "pitch"} & wrong.keys() else "position"

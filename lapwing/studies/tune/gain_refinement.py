@@ -51,10 +51,10 @@ def polish(
     start: Bandwidths,
     progress: Callable[[], None] = lambda: None,
 ) -> Polished:
-    """Nelder and Mead's search over the bandwidths that the scene's path says something about, from `start`.
+    """Refine the bandwidths that the scene's path excites by Nelder and Mead's search, from `start`.
 
-    Its aim is the mean over the axes of the RMSE, each over that of `start`. What does not land or lacks a margin
-    counts as worse than anything that flies. Deterministic: the same scene gives the same gains.
+    The objective is the mean over the axes of the RMSE over that of `start`. A gain set that does not land or lacks a
+    margin is worse than any that flies. Deterministic: equal scenes return equal gains.
     """
     plant, setup = assumed_airframe(airframe, model), campaign_setup(scene)
     seen: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
@@ -75,11 +75,11 @@ def polish(
         lacking = shortfalls(open_loops(build(gains.plain(), airframe), plant, tick, DELAY))
         if lacking:
             return 10.0 + len(lacking)
-        found = fly(gains)
-        if any(f["outcome"] != "landed" for f in found):
+        result = fly(gains)
+        if any(f["outcome"] != "landed" for f in result):
             return 10.0
-        ratio = float(np.mean([rmse(found, axis) / rmse(before, axis) for axis in judged]))
-        seen[ratio] = bandwidths, gains, found
+        ratio = float(np.mean([rmse(result, axis) / rmse(before, axis) for axis in judged]))
+        seen[ratio] = bandwidths, gains, result
         return ratio
 
     if not free:
@@ -99,5 +99,5 @@ def polish(
 
 
 def rmse(flights: list[Figures], axis: str) -> float:
-    """Root-mean-square error of an axis over several flights [m] or [rad]."""
+    """Return the root-mean-square error of an axis over several flights [m] or [rad]."""
     return float(np.sqrt(np.mean([f[f"rmse.{axis}"] ** 2 for f in flights])))

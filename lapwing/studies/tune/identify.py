@@ -42,7 +42,7 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
     Args:
         flight: the flight; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
         p: a controller of the vehicle, for the rotors' shares and the hovering thrust.
-        guess: the linear model, for what the log cannot tell.
+        guess: linear model, for values that the log does not determine.
 
     Raises:
         ValueError: the log has no such topics, too little of it is in the air, or a loop was not moved or does not fit.
@@ -60,12 +60,12 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
         moved = float(signals.demand[signals.used, k].std())
         if moved < QUIET * hovering:
             raise ValueError(f"{log}: {name} was not moved ({moved:.2g} N); fly the scene excitation and use its log")
-    found = minimize_scalar(
+    result = minimize_scalar(
         lambda log_lag: sum(_fitted(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
         bounds=np.log(LAGS),
         method="bounded",
     )
-    lag = float(np.exp(found.x))
+    lag = float(np.exp(result.x))
     gains, fit = {}, {}
     for k, name in enumerate(LOOPS):
         (gains[name], *lead), left = _fitted(signals, k, lag, tick)
@@ -81,7 +81,7 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
 
 
 def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
-    """Demands and filtered responses tick by tick."""
+    """Return virtual controls and filtered responses tick by tick."""
     thrust = flight.actuators.thrust
     sensed = flight.has("imu") and len(flight.topic("imu")) >= len(thrust)
     if sensed:
@@ -104,17 +104,17 @@ def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
 
 
 def _filters(tick: float) -> tuple[tuple, tuple]:
-    """Digital 1 / (s/CUT + 1)^2 and s / (s/CUT + 1)^2."""
+    """Return the digital 1 / (s/CUT + 1)^2 and s / (s/CUT + 1)^2."""
     below = [1.0 / CUT**2, 2.0 / CUT, 1.0]
     return bilinear([1.0], below, 1.0 / tick), bilinear([1.0, 0.0], below, 1.0 / tick)
 
 
 def _fitted(signals: _Signals, k: int, lag: float, tick: float) -> tuple[list[float], float]:
-    """Gains of a loop's thrust, for yaw also of its rate, for a lag [s]; and the share of variance that is left."""
+    """Return a loop's gains of thrust, for yaw also of its rate, for a lag [s], and the unexplained variance share."""
     keep, used = np.exp(-tick / lag), signals.used
     thrust = lfilter([1.0 - keep], [1.0, -keep], signals.demand[:, k])
     regressors = [lfilter(*way, thrust)[used] for way in _filters(tick)[: 2 if LOOPS[k] == "yaw" else 1]]
     response = signals.response[used, k]
-    found, *_ = np.linalg.lstsq(np.column_stack([*regressors, np.ones(used.sum())]), response)
-    left = response - np.column_stack(regressors) @ found[:-1] - found[-1]
-    return [float(g) for g in found[:-1]], float(left.var() / response.var())
+    result, *_ = np.linalg.lstsq(np.column_stack([*regressors, np.ones(used.sum())]), response)
+    left = response - np.column_stack(regressors) @ result[:-1] - result[-1]
+    return [float(g) for g in result[:-1]], float(left.var() / response.var())

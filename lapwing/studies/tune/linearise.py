@@ -26,7 +26,7 @@ class Hover(NamedTuple):
     rotor_speed: float  # [rad/s] at which the weight is carried
     voltage: float  # [V] that holds it
     lag: float  # [s] of the rotors' speed behind the voltage
-    thrust_slope: float  # [N s/rad] of one rotor by itself over its speed
+    thrust_slope: float  # [N s/rad] of one rotor without interference, over its speed
     altitude: float  # [m/s^2 / N] acceleration upwards over the force demand of every rotor
     roll: float  # [rad/s^2 / N]
     pitch: float  # [rad/s^2 / N]
@@ -46,7 +46,7 @@ def hover(scene: Scene) -> Hover:
     p = parameters(frame, effects.from_scene(still, frame, environment(scene)))
     known = known_airframe(scene)
     lift, *turns = np.array(shares(known)[0]).T  # shares of the rotors
-    free = next((k for k, row in enumerate(known.wakes.thrust) if row[k] == 1.0), 0)  # a rotor in nobody's wake
+    free = next((k for k, row in enumerate(known.wakes.thrust) if row[k] == 1.0), 0)  # a rotor outside all wakes
     count, evenly = len(lift), np.sqrt(lift)  # speeds in hover, over the speed of a rotor that carries the mean
 
     def seen(speeds: np.ndarray, voltage: np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:

@@ -25,19 +25,19 @@ class Stepped(NamedTuple):
 
 
 def systems(p: Parameters, airframe: Airframe, tick: float, delay: int) -> dict[str, Any]:
-    """Open loops as transfer functions; arguments as of `lapwing.services.autopilot.margins.open_loops`."""
+    """Return open loops as transfer functions; see `lapwing.services.autopilot.margins.open_loops` for arguments."""
     s = control.tf("s")
     late = control.tf(*control.pade((delay + 0.5) * tick, PADE))
     return {name: control.minreal(loop, CANCEL, verbose=False) for name, loop in loops(p, airframe, s, late).items()}
 
 
 def closed(loop: Any) -> Any:
-    """The loop closed by unit feedback."""
+    """Return the loop closed by unit feedback."""
     return control.minreal(loop / (1.0 + loop), CANCEL, verbose=False)
 
 
 def step(loop: Any, seconds: float = 5.0) -> Stepped:
     """Step response of the closed loop."""
     time, value = control.step_response(closed(loop), np.linspace(0.0, seconds, 1001))
-    found = control.step_info(value, time, yfinal=1.0)
-    return Stepped(time, value, found["RiseTime"], found["Overshoot"] / 100.0, found["SettlingTime"])
+    result = control.step_info(value, time, yfinal=1.0)
+    return Stepped(time, value, result["RiseTime"], result["Overshoot"] / 100.0, result["SettlingTime"])

@@ -83,9 +83,9 @@ def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
             if "unstable" in (judged.shortfalls.get(loop), judged.shortfalls.get(inner)):
                 said.append(f"{judged.name}: unstable")
                 continue
-            found = step(systems_of[loop], seconds)
-            said.append(f"{judged.name}: {found.rise:.2g} s, {100.0 * found.overshoot:.0f} % over")
-            marks.append(Line(np.asarray(found.time), np.asarray(found.value), judged.name, colour, dash=dash))
+            result = step(systems_of[loop], seconds)
+            said.append(f"{judged.name}: {result.rise:.2g} s, {100.0 * result.overshoot:.0f} % over")
+            marks.append(Line(np.asarray(result.time), np.asarray(result.value), judged.name, colour, dash=dash))
         label = "response to a unit step" if column == 0 else ""
         top = 1.35 * max([1.0, *(float(mark.y.max()) for mark in marks if isinstance(mark, Line))])  # room for the note
         place: dict[str, Any] = {"column": column, "timed": False, "y_range": (-0.05, top)}

@@ -5,10 +5,11 @@ import math
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.studies.validation.closed_loop import ClosedLoop
 from lapwing.studies.validation.prediction_metrics import FIELDS, Metric
 from lapwing.studies.validation.procedure import Validation
 
-UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2"), strict=True))
+UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True))
 
 
 def show(console: Console, found: Validation) -> None:
@@ -18,15 +19,18 @@ def show(console: Console, found: Validation) -> None:
     )
     table.add_column("after", justify="right")
     table.add_column("predicted by")
-    for name in FIELDS:
+    shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(found.plant[0][k].mean)]
+    for name in (FIELDS[k] for k in shown):
         table.add_column(f"{name.replace('_', ' ')} [{UNITS[name]}]", justify="right")
     for k, steps in enumerate(found.horizons):
         after = f"{steps * found.interval:g} s"
-        table.add_row(after, "plant", *(_with_interval(m) for m in found.plant[k]))
+        table.add_row(after, "plant", *(_with_interval(found.plant[k][f]) for f in shown))
         for name, rows in found.baselines.items():
             last = name == list(found.baselines)[-1]
-            table.add_row("", name.replace("_", " "), *(_plain(m.mean) for m in rows[k]), end_section=last)
+            table.add_row("", name.replace("_", " "), *(_plain(rows[k][f].mean) for f in shown), end_section=last)
     console.print(table)
+    for flight in found.closed_loop:
+        console.print(closed_loop_line(flight), highlight=False, soft_wrap=True)
     memory = found.memory
     console.print(
         f"start: measured state; rotor speeds from past commands; trim from the past {memory.force:g} s (force) and "
@@ -39,6 +43,15 @@ def show(console: Console, found: Validation) -> None:
     for name, faults in faulty:
         text = ", ".join(f"{cause}: {count}" for cause, count in faults.items())
         console.print(f"marked samples: {name}: {text}", highlight=False)
+
+
+def closed_loop_line(flight: ClosedLoop) -> str:
+    """Return one line on a flight of recorded setpoints."""
+    return (
+        f"closed loop: {flight.name}: {flight.difference:.3g} m from the recorded flight over {flight.time[-1]:.1f} s; "
+        f"tracking error {flight.tracking_error(flight.simulated):.3g} m, "
+        f"recorded {flight.tracking_error(flight.recorded):.3g} m"
+    )
 
 
 def _with_interval(metric: Metric) -> str:

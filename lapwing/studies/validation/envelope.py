@@ -69,7 +69,7 @@ def residual_spectra(found: Validation) -> tuple[np.ndarray, np.ndarray]:
 
 
 def explanations(found: Validation) -> list[Explanation]:
-    """Return how much of the residual accelerations each candidate explains by itself, the best first."""
+    """Return the fraction of the residual accelerations that each candidate alone explains, the best first."""
     candidates = {
         "body velocity (drag, rotor drag)": lambda f, v: v,
         "velocity squared (fuselage drag)": lambda f, v: v * np.linalg.norm(v, axis=1, keepdims=True),

@@ -10,10 +10,11 @@ import numpy as np
 
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
-from lapwing.studies.validation.windows import Errors, compare
+from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
 SLICE = 5  # samples of commands that one regressor averages
 RIDGE = 1e-3  # of the number of windows, on standardised regressors
+SMALLEST = 1e-6  # spread of a regressor, SI, below which it counts as constant
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -21,7 +22,8 @@ def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tup
     """Return the errors of the linear prediction of each flight, fitted to the other flights (to itself if alone)."""
     regressors = [_regressors(f, s, horizons[-1]) for f, s in zip(flights, starts, strict=True)]
     targets = [_targets(f, s, horizons) for f, s in zip(flights, starts, strict=True)]
-    scale = np.concatenate(regressors).std(axis=0) + 1e-9
+    spread = np.concatenate(regressors).std(axis=0)
+    scale = np.where(spread > SMALLEST, spread, 1.0)
     regressors = [r / scale for r in regressors]
     moments = np.array([r.T @ r for r in regressors])
     products = [r.T @ t for r, t in zip(regressors, targets, strict=True)]
@@ -47,7 +49,7 @@ def _regressors(flight: Recording, starts: np.ndarray, longest: int) -> np.ndarr
 
 
 def _targets(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...]) -> np.ndarray:
-    """Changes in body axes of the start: position beyond constant velocity, velocity, attitude, rate."""
+    """Return changes in initial body axes: position beyond constant velocity, velocity, attitude, rate."""
     out = []
     start = flight.attitude[starts]
     for h in horizons:
@@ -62,7 +64,8 @@ def _targets(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...]) -
 
 
 def _applied(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], change: np.ndarray) -> np.ndarray:
-    predicted = np.zeros((*change.shape[:2], 16))
+    predicted = np.zeros((*change.shape[:2], WIDTH))
+    predicted[..., POWER] = np.nan
     start, velocity = flight.attitude[starts][:, None], flight.velocity[starts][:, None]
     time = (np.array(horizons) * flight.interval)[:, None]
     turn = np.broadcast_to(start, (*change.shape[:2], 4))

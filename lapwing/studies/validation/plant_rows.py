@@ -19,6 +19,7 @@ from lapwing.services.scene_resolver import load_one, resolve
 LONGEST_STEP = 0.01  # [s] of the integrator
 FORCE, TORQUE = "effects.body_wrench.force", "effects.body_wrench.torque"
 LANES = simd_batch.WIDTH
+MOTION = 13  # columns of position, attitude, velocity and omega
 
 
 class PlantRows:
@@ -113,25 +114,46 @@ class PlantRows:
 
     def advance(self, blocks: np.ndarray, voltage: np.ndarray) -> None:
         """Advance all vehicles by one tick under motor voltages [V], shape (n, rotors)."""
+        self.advance_along(blocks, voltage[None])
+
+    def advance_along(self, blocks: np.ndarray, voltage: np.ndarray, motions: np.ndarray | None = None) -> np.ndarray:
+        """Advance all vehicles by several ticks; return motion and rotor speeds after each, shape (ticks, n, columns).
+
+        Args:
+            blocks: of `start`; changed.
+            voltage: [V] of the motors, shape (ticks, n, rotors).
+            motions: position, attitude, velocity and omega to set before each tick, shape (ticks, n, 13).
+        """
+        ticks, n, _ = voltage.shape
         count = len(blocks) * LANES
-        commands = np.zeros((count, self.rotors))
-        commands[: len(voltage)] = voltage
+        commands = _padded(voltage, count)
+        reset = np.zeros((0, 0, 0)) if motions is None else _padded(motions, count)
+        trace = np.empty((ticks, count, MOTION + self.rotors))
         flat, columns = blocks.reshape(-1), blocks.shape[1]
-        keys, ticks = np.zeros((count, 2), np.int64), np.zeros(count, np.int64)
+        keys, exchanges = np.zeros((count, 2), np.int64), np.zeros(count, np.int64)
         core = self._core
         parts = min(cpu_count() or 1, len(blocks))
         edges = [len(blocks) * k // parts for k in range(parts + 1)]
 
         def work(k: int) -> None:
-            simd_batch.advance(
-                core.method, self.like, flat, columns, keys, ticks, commands, core.step, core.steps,
-                edges[k], edges[k + 1], 1,
+            simd_batch.advance_along(
+                core.method, self.like, flat, columns, keys, exchanges, commands, reset, trace, core.step, core.steps,
+                edges[k], edges[k + 1],
             )  # fmt: skip
 
         if parts == 1:
             work(0)
         else:
             list(self._pool.map(work, range(parts)))
+        return trace[:, :n]
+
+    def power(self, blocks: np.ndarray, n: int) -> np.ndarray:
+        """Return the electrical power [W] of the first n vehicles after their last tick, shape (n,)."""
+        from lapwing.studies.validation.plant_power import electrical_power
+
+        out = np.empty(len(blocks) * LANES)
+        electrical_power(self.like, blocks.reshape(-1), blocks.shape[1], out, 0, len(blocks))
+        return out[:n]
 
     def _resolved(self, values: Mapping[str, Any]) -> Any:
         return _plant(self._scene(values))
@@ -152,6 +174,13 @@ class PlantRows:
         return pack_row(member), mass.total, mass.matrix
 
 
+def _padded(values: np.ndarray, count: int) -> np.ndarray:
+    """Return values of shape (ticks, n, columns) with the last vehicle repeated up to `count` vehicles."""
+    if values.shape[1] == count:
+        return np.ascontiguousarray(values)
+    return np.concatenate([values, np.repeat(values[:, -1:], count - values.shape[1], axis=1)], axis=1)
+
+
 def _with_wrench(scene: Scene) -> Scene:
     """Return the scene with an effect `body_wrench`, for the trim."""
     if "body_wrench" in scene[Effects].tables:
@@ -169,9 +198,9 @@ def _whole_lists(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
             continue
         if prefix not in out:
             out[prefix] = scene.lookup(prefix)
-        found = list(out[prefix])
-        found[int(element)] = value
-        out[prefix] = found
+        result = list(out[prefix])
+        result[int(element)] = value
+        out[prefix] = result
     return out
 
 

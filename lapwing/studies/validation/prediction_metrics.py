@@ -6,9 +6,9 @@ import numpy as np
 
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import from_vector, product
-from lapwing.studies.validation.windows import Errors, compare
+from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
-FIELDS = ("position", "velocity", "attitude", "rate", "specific_force")
+FIELDS = ("position", "velocity", "attitude", "rate", "specific_force", "power")
 RESAMPLES = 2000  # of the bootstrap over flights
 CONFIDENCE = 95.0  # [%]
 
@@ -24,11 +24,11 @@ class Metric(NamedTuple):
 def magnitudes(errors: Errors) -> np.ndarray:
     """Return the absolute errors of each window: the angle of attitude, of vectors the mean over axes.
 
-    Shape (n, h, 5), in the order of FIELDS; the specific force is NaN where it was not measured.
+    Shape (n, h, 6), in the order of FIELDS; specific force and power are NaN where they were not measured.
     """
     means = [np.abs(getattr(errors, name)).mean(axis=-1) for name in ("position", "velocity")]
     angle = np.linalg.norm(errors.attitude, axis=-1)
-    rest = [np.abs(getattr(errors, name)).mean(axis=-1) for name in ("rate", "specific_force")]
+    rest = [np.abs(getattr(errors, name)).mean(axis=-1) for name in FIELDS[3:]]
     return np.stack([*means, angle, *rest], axis=-1)
 
 
@@ -60,13 +60,14 @@ def pooled(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]:
 
 
 def constant_velocity(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...]) -> Errors:
-    """Return the errors of a prediction with the measured velocity and body rate held."""
+    """Return the errors of a prediction with the measured velocity, body rate and power held."""
     time = np.array(horizons) * flight.interval
     shape = (len(starts), len(horizons))
-    predicted = np.zeros((*shape, 16))
+    predicted = np.zeros((*shape, WIDTH))
     velocity, omega = flight.velocity[starts][:, None], flight.omega[starts][:, None]
     predicted[..., :3] = flight.position[starts][:, None] + velocity * time[:, None]
     predicted[..., 3:7] = product(flight.attitude[starts][:, None], from_vector(omega * time[:, None]))
     predicted[..., 7:10] = velocity
     predicted[..., 10:13] = omega
+    predicted[..., POWER] = flight.power[starts][:, None] if len(flight.power) else np.nan
     return compare(flight, starts, horizons, predicted)

@@ -11,6 +11,7 @@ import numpy as np
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.validation.closed_loop import ClosedLoop, fly_setpoints
 from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pooled
@@ -42,6 +43,7 @@ class Validation:
     skipped: tuple[str, ...]  # a line for each flight without a window
     plant: list[list[Metric]]  # by horizon and field
     baselines: dict[str, list[list[Metric]]]
+    closed_loop: tuple[ClosedLoop, ...] = ()
 
     @property
     def windows(self) -> int:
@@ -57,6 +59,7 @@ def validate(
     overrides: Overrides = (),
     memory: TrimMemory = USUAL_TRIM,
     stride: int = STRIDE,
+    closed_loop: bool = False,
     say: Callable[[str, int, int], None] = lambda text, done, total: None,
 ) -> Validation:
     """Predict every window of every flight, and compare.
@@ -69,6 +72,7 @@ def validate(
         overrides: of the scene.
         memory: of the trim.
         stride: samples between the starts of two windows.
+        closed_loop: fly the recorded setpoints with the scene's autopilot, too.
         say: called with what is done, the number of flights done, and their number.
 
     Raises:
@@ -78,14 +82,14 @@ def validate(
     interval = recordings[0].interval
     used, starts, skipped = [], [], []
     for recording in recordings:
-        found = window_starts(recording, horizons[-1], stride)
-        if len(found):
+        result = window_starts(recording, horizons[-1], stride)
+        if len(result):
             used.append(recording)
-            starts.append(found)
+            starts.append(result)
         else:
             skipped.append(f"{recording.name}: no valid window in the air")
     if not used:
-        raise ValueError(f"{skipped[0]}; give flights that leave the ground")
+        raise ValueError(f"{skipped[0]}; use flights that leave the ground")
     plant = PlantRows(scene, interval, overrides)
     for recording in used:
         if recording.rotors != plant.rotors:
@@ -102,10 +106,18 @@ def validate(
     say("baselines", len(used), len(used))
     held = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
     baselines = {"constant_velocity": held, "linear_fit": linear_fit(used, starts, horizons)}
+    loops = []
+    for k, recording in enumerate(used if closed_loop else []):
+        say(f"closed loop: {recording.name}", k, len(used))
+        flown = fly_setpoints(scene, recording, overrides)
+        if flown is None:
+            skipped.append(f"{recording.name}: no setpoints in the air to fly in closed loop")
+        else:
+            loops.append(flown)
     return Validation(
         str(Path(str(getattr(scene, "name", scene))).stem), interval, horizons, memory, tuple(flights), tuple(skipped),
         pooled([magnitudes(f.plant) for f in flights]),
-        {name: pooled([magnitudes(e) for e in errors]) for name, errors in baselines.items()},
+        {name: pooled([magnitudes(e) for e in errors]) for name, errors in baselines.items()}, tuple(loops),
     )  # fmt: skip
 
 
@@ -144,11 +156,21 @@ def write_json(path: Path, found: Validation) -> None:
         "flights": flights,
         "skipped": list(found.skipped),
     }
+    if found.closed_loop:
+        content["closed_loop"] = [
+            {
+                "flight": c.name,
+                "seconds": float(c.time[-1]),
+                "difference": c.difference,
+                "tracking_error": {name: c.tracking_error(getattr(c, name)) for name in ("simulated", "recorded")},
+            }
+            for c in found.closed_loop
+        ]
     path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
 
 
 def _flight(found: Validation, flight: FlightErrors) -> dict:
-    means = np.nanmean(magnitudes(flight.plant)[:, -1], axis=0) if len(flight.starts) else np.full(len(FIELDS), np.nan)
+    means = np.array([m.mean for m in pooled([magnitudes(flight.plant)[:, -1:]])[0]])
     row: dict = {"windows": len(flight.starts)}
     row |= {name: _number(v) for name, v in zip(FIELDS, means.tolist(), strict=True)}
     return row | {"faults": flight.recording.faults, "notes": list(flight.recording.notes)}

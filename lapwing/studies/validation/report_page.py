@@ -14,6 +14,7 @@ from lapwing.studies.validation.prediction_metrics import FIELDS
 from lapwing.studies.validation.procedure import Validation
 
 SHOWN = ("position", "velocity", "attitude", "rate")
+OVERLAID = 3  # flights in the closed-loop plot
 COLOURS = ("#1b6ca8", "#c44536", "#4a8f3c")
 
 
@@ -24,6 +25,8 @@ def write(path: Path, found: Validation) -> None:
         Section("envelope", "Errors over the envelope", _envelope(found, after)),
         Section("spectra", "Spectra of the residuals", _spectra(found)),
     ]
+    if found.closed_loop:
+        sections.append(Section("closed-loop", "Closed loop: the recorded setpoints, flown", _closed_loop(found)))
     lead = (
         f"{found.windows} windows of {len(found.flights)} flights. Each starts from the measured state and is fed the "
         f"measured motor commands. Trim from the past {found.memory.force:g} s (force) and "
@@ -31,7 +34,7 @@ def write(path: Path, found: Validation) -> None:
     )
     page = render(
         "validation.html", title=f"{found.scene}: prediction of recorded flights", lead=lead,
-        tables=[_errors(found), _explained(found), _flights(found)], sections=sections,
+        tables=[_errors(found), _explained(found), *_loops(found), _flights(found)], sections=sections,
     )  # fmt: skip
     path.write_text(page, encoding="utf-8")
 
@@ -52,6 +55,19 @@ def _explained(found: Validation) -> Rows:
     for cause, force, torque in explanations(found):
         table.add(cause, f"{force:.1f}", f"{torque:.1f}")
     return table
+
+
+def _loops(found: Validation) -> list[Rows]:
+    if not found.closed_loop:
+        return []
+    table = Rows(
+        "Closed loop", "flight", "duration [s]", "simulated less recorded [m]", "tracking error, simulated [m]",
+        "tracking error, recorded [m]",
+    )  # fmt: skip
+    for c in found.closed_loop:
+        errors = (c.difference, c.tracking_error(c.simulated), c.tracking_error(c.recorded))
+        table.add(c.name, f"{c.time[-1]:.1f}", *(f"{e:.3g}" for e in errors))
+    return [table]
 
 
 def _flights(found: Validation) -> Rows:
@@ -76,6 +92,23 @@ def _envelope(found: Validation, after: float) -> Plot:
             panels.append(Panel((line,), label, low, row=row, column=column, timed=False))
     caption = f"Mean absolute error after {after:g} s by the state at the start of the window."
     return Plot(tuple(panels), caption, 8.0, (1.0,) * len(SHOWN), (1.0,) * max(len(every), 1))
+
+
+def _closed_loop(found: Validation) -> Plot:
+    panels = []
+    flights = found.closed_loop[:OVERLAID]
+    for column, c in enumerate(flights):
+        for row, axis in enumerate(CHANNELS):
+            lines = (
+                Line(c.time, c.setpoint[:, row], "setpoint", COLOURS[2], dash="dot"),
+                Line(c.time, c.recorded[:, row], "recorded", COLOURS[0]),
+                Line(c.time, c.simulated[:, row], "simulated", COLOURS[1]),
+            )
+            label = f"{axis} [m]" if column == 0 else ""
+            low = f"{c.name}: time [s]" if row == len(CHANNELS) - 1 else ""
+            panels.append(Panel(lines, label, low, row=row, column=column, timed=False))
+    caption = f"Setpoints of a recording, flown by the scene's vehicle and autopilot; {len(flights)} flights."
+    return Plot(tuple(panels), caption, 7.0, (1.0,) * len(CHANNELS), (1.0,) * len(flights))
 
 
 def _spectra(found: Validation) -> Plot:

@@ -7,20 +7,20 @@ from scipy.signal import lfilter
 
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, rotate
-from lapwing.studies.validation.plant_rows import PlantRows
+from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 
 PIECE = 400  # samples of a piece of a flight; pieces are stepped side by side
 WARM_UP = 100  # samples before a piece in which the rotor speeds settle
 GROUNDED = 0.1  # [m] height below which a sample is lifted, so that contact is not computed for nothing
 LIFT = 10.0  # [m]
-MOTION = 13  # columns of position, attitude, velocity and omega
+CHUNK = 50  # samples stepped at once
 
 
 class TrimMemory(NamedTuple):
-    """How far back the trim looks."""
+    """Memory length of the trim."""
 
     force: float = 0.15  # [s] time constant of the mean of past residual forces; 0: no trim
-    torque: float = 3.0  # [s] the same of residual torques
+    torque: float = 10.0  # [s] the same of residual torques
 
 
 NO_TRIM = TrimMemory(0.0, 0.0)
@@ -28,7 +28,7 @@ USUAL_TRIM = TrimMemory()
 
 
 class StartStates(NamedTuple):
-    """What a window needs besides the measured motion, for every sample of a flight and every parameter set."""
+    """Initial data of a window besides the measured motion, for every sample of a flight and every parameter set."""
 
     rotor_speed: np.ndarray  # [rad/s], shape (sets, n, rotors)
     force: np.ndarray  # [N] body, trim by the samples up to this one, shape (sets, n, 3)
@@ -62,22 +62,21 @@ def start_states(plant: PlantRows, flights: list[Recording], memory: TrimMemory)
     speed = np.zeros((sets, sum(map(len, flights)), plant.rotors))
     after = np.zeros((sets, speed.shape[1], 6))
     begin = np.maximum(first - WARM_UP, 0)
-    volts = padded[1][offset + begin] * plant.speed_per_volt
-    rotors = slice(MOTION, MOTION + plant.rotors)
-    plant.write(blocks, rotors, np.tile(volts, (sets, 1)))
-    body, wrench = slice(0, MOTION), slice(7, MOTION)
-    for k in range(-WARM_UP, PIECE):
-        place = first + k
-        live = (place >= 0) & (place < length)
-        if not live.any():
-            continue
+    rotors = np.tile(padded[1][offset + begin] * plant.speed_per_volt, (sets, 1))
+    plant.write(blocks, slice(MOTION, MOTION + plant.rotors), rotors)
+    longest = min(PIECE, int(length.max()))
+    for low in range(-WARM_UP, longest, CHUNK):
+        place = first + np.arange(low, min(low + CHUNK, longest))[:, None]
         at = offset + np.clip(place, 0, length - 1)
-        plant.write(blocks, body, np.tile(padded[0][at], (sets, 1)))
-        own = live & (k >= 0)
-        now = plant.read(blocks, rotors, sets * lanes).reshape(sets, lanes, -1)
-        speed[:, at[own]] = now[:, own]
-        plant.advance(blocks, np.tile(padded[1][at], (sets, 1)))
-        after[:, at[own]] = plant.read(blocks, wrench, sets * lanes).reshape(sets, lanes, -1)[:, own]
+        every = np.tile(at, (1, sets))
+        trace = plant.advance_along(blocks, padded[1][every], padded[0][every])
+        before = np.concatenate([rotors[None], trace[:-1, :, MOTION:]])
+        rotors = trace[-1, :, MOTION:]
+        tick, lane = np.nonzero((place >= first) & (place < length))
+        row = at[tick, lane]
+        for k in range(sets):
+            speed[k, row] = before[tick, k * lanes + lane]
+            after[k, row] = trace[tick, k * lanes + lane, 7:MOTION]
     out, start = [], 0
     for flight, moved in zip(flights, motion, strict=True):
         span = slice(start, start := start + len(flight))

@@ -1,16 +1,19 @@
 """Prediction windows: where they begin, and what the plant predicts over them."""
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotate, rotation_vector
-from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.start_states import MOTION, StartStates
+from lapwing.studies.validation.plant_rows import MOTION, PlantRows
+from lapwing.studies.validation.start_states import StartStates
 
 LOWEST = 0.3  # [m] above the ground, below which a window is left out
 PAST = 20  # samples before a window that must be valid, for the rotor speeds and the trim
+POWER, WIDTH = MOTION + 3, MOTION + 4  # column of the power, and number of columns, of a prediction
 BATCH = 16_384  # windows stepped at once
 
 
@@ -22,6 +25,7 @@ class Errors(NamedTuple):
     attitude: np.ndarray  # [rad] rotation vector from the measured to the predicted body, shape (n, h, 3)
     rate: np.ndarray  # [rad/s] body, shape (n, h, 3)
     specific_force: np.ndarray  # [m/s^2] body, mean over the last tick, shape (n, h, 3); NaN where not measured
+    power: np.ndarray  # [W] taken by the motors, shape (n, h, 1); NaN where not measured
 
 
 def window_starts(flight: Recording, longest: int, stride: int, lowest: float = LOWEST) -> np.ndarray:
@@ -44,28 +48,67 @@ def predict(
     """Step the plant from the measured states under the measured commands.
 
     Returns:
-        Position, attitude, velocity and omega at each horizon, and the acceleration of the last tick [m/s^2] world;
-        shape (n, h, 16).
+        Position, attitude, velocity and omega at each horizon, the acceleration of the last tick [m/s^2] world, and the
+        power [W], NaN unless a flight has measured it; shape (n, h, 17).
     """
-    out = np.empty((len(starts), len(horizons), MOTION + 3))
-    measured = np.column_stack([flight.position, flight.attitude, flight.velocity, flight.omega])
-    for low in range(0, len(starts), BATCH):
-        s = starts[low : low + BATCH]
-        blocks = plant.start(np.full(len(s), parameter_set))
-        plant.write(blocks, slice(0, MOTION), measured[s])
-        plant.write(blocks, slice(MOTION, MOTION + plant.rotors), states.rotor_speed[parameter_set, s])
-        plant.add_wrench(blocks, states.force[parameter_set, s], states.torque[parameter_set, s])
-        row = 0
-        for k in range(horizons[-1]):
-            last = k + 1 == horizons[row]
-            before = plant.read(blocks, slice(7, 10), len(s)).copy() if last else None
-            plant.advance(blocks, flight.motor_voltage[s + k])
-            if last:
-                now = plant.read(blocks, slice(0, MOTION), len(s))
-                out[low : low + len(s), row, :MOTION] = now
-                out[low : low + len(s), row, MOTION:] = (now[:, 7:10] - before) / plant.interval
-                row += 1
-    return out
+    return predict_all(plant, [flight], [Span(0, starts, parameter_set)], [states], horizons)[0]
+
+
+class Span(NamedTuple):
+    """Windows of one flight to predict with one parameter set."""
+
+    flight: int
+    starts: np.ndarray
+    parameter_set: int
+
+
+def predict_all(
+    plant: PlantRows,
+    flights: Sequence[Recording],
+    spans: Sequence[Span],
+    states: Sequence[StartStates],
+    horizons: tuple[int, ...],
+) -> list[np.ndarray]:
+    """Predict windows of many flights and parameter sets side by side. See `predict` for what each span returns.
+
+    Args:
+        plant: with its parameter sets.
+        flights: recordings.
+        spans: which windows of which flight with which parameter set.
+        states: of each flight.
+        horizons: [samples] ascending.
+    """
+    flight = np.concatenate([np.full(len(s.starts), s.flight) for s in spans])
+    chosen = np.concatenate([np.full(len(s.starts), s.parameter_set) for s in spans])
+    start = np.concatenate([s.starts for s in spans])
+    first = np.concatenate([[0], np.cumsum([len(r) for r in flights])])
+    measured = np.concatenate([np.column_stack([r.position, r.attitude, r.velocity, r.omega]) for r in flights])
+    volts = np.concatenate([r.motor_voltage for r in flights])
+    at = first[flight] + start
+    speed, force, torque = (
+        np.concatenate([getattr(s, name) for s in states], axis=1) for name in ("rotor_speed", "force", "torque")
+    )
+    out = np.full((len(start), len(horizons), WIDTH), np.nan)
+    ends = np.array(horizons)
+    powered = any(np.isfinite(r.power).any() for r in flights)
+    for low in range(0, len(start), BATCH):
+        part = slice(low, low + BATCH)
+        rows, sets = at[part], chosen[part]
+        blocks = plant.start(sets)
+        plant.write(blocks, slice(0, MOTION), measured[rows])
+        plant.write(blocks, slice(MOTION, MOTION + plant.rotors), speed[sets, rows])
+        plant.add_wrench(blocks, force[sets, rows], torque[sets, rows])
+        traces = []
+        for k, (begin, end) in enumerate(pairwise([0, *horizons])):
+            traces.append(plant.advance_along(blocks, volts[rows + np.arange(begin, end)[:, None]]))
+            if powered:
+                out[part, k, POWER] = plant.power(blocks, len(rows))
+        trace = np.concatenate(traces)
+        velocity = np.concatenate([measured[None, rows, 7:10], trace[..., 7:10]])
+        out[part, :, :MOTION] = trace[ends - 1, :, :MOTION].swapaxes(0, 1)
+        out[part, :, MOTION:POWER] = ((velocity[ends] - velocity[ends - 1]) / plant.interval).swapaxes(0, 1)
+    edges = np.cumsum([len(s.starts) for s in spans])[:-1]
+    return np.split(out, edges)
 
 
 def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], predicted: np.ndarray) -> Errors:
@@ -81,7 +124,12 @@ def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], pr
         rotation_vector(attitude),
         predicted[..., 10:13] - flight.omega[at],
         middle - force,
+        predicted[..., POWER:WIDTH] - _power(flight)[at][..., None],
     )
+
+
+def _power(flight: Recording) -> np.ndarray:
+    return flight.power if len(flight.power) == len(flight) else np.full(len(flight), np.nan)
 
 
 def _in_body(attitude: np.ndarray, vector: np.ndarray) -> np.ndarray:

@@ -34,7 +34,7 @@ def decay():
     return Problem("decay", "s", 1.0, ways, lambda: np.array([np.exp(-1.0)]), "closed form", value)
 
 
-def test_measured_errors_are_those_of_the_method():
+def test_measured_errors_are_those_of_method():
     points = measure(decay())
     assert [p.way for p in points] == ["euler"] * 5
     for p in points:
@@ -55,7 +55,7 @@ def points():
     ]
 
 
-def test_the_cheapest_that_meets_a_target_is_named():
+def test_cheapest_that_meets_target_is_named():
     assert cheapest(points(), 1e-3).setting == 0.1
     assert cheapest(points(), 2e-4).setting == 0.05
     assert cheapest(points(), 1e-6).way == "two"
@@ -65,19 +65,19 @@ def test_the_cheapest_that_meets_a_target_is_named():
 
 
 @pytest.mark.parametrize("goal", [0.0, -1e-3, float("nan"), float("inf")])
-def test_a_goal_that_is_no_error_is_refused(goal):
+def test_invalid_error_goal_is_rejected(goal):
     with pytest.raises(ValueError, match=r"--target .*: expected an error above 0"):
         check_target(goal)
 
 
-def test_a_misspelt_target_lists_the_choices():
+def test_misspelt_target_lists_choices():
     with pytest.raises(
         ValueError, match=r"unknown problem 'gyrostat_bloked'; did you mean gyrostat_blocked\? \(problems: .*free"
     ):
         find("gyrostat_bloked")
 
 
-def test_a_scene_goes_by_its_name_where_no_problem_has_it():
+def test_problem_name_precedes_scene_name():
     assert scene_of("delivery_paper", ["solver.step=0.002"]).lookup("solver.step") == 0.002
     assert scene_of("gyrostat_blocked", []) is None
     assert scene_of("lapwing/scenes/gyrostat_blocked.toml", []).name == "gyrostat_blocked"
@@ -95,27 +95,27 @@ def test_json_and_picture(tmp_path):
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
-def test_the_command_prints_the_choice(capsys, tmp_path, monkeypatch):
+def test_command_prints_choice(capsys, tmp_path, monkeypatch):
     problem = find("os4_experiment_1")
     few = [way for way in problem.ways if way.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled
     monkeypatch.setattr(accuracy_command, "find", lambda target: problem._replace(ways=few))
-    found = accuracy_command.study(accuracy_command.console(), "os4_experiment_1", [], 1e-3)
-    accuracy_command.show(accuracy_command.console(), found)
-    accuracy_command.write_json(tmp_path / "a.json", found)
+    result = accuracy_command.study(accuracy_command.console(), "os4_experiment_1", [], 1e-3)
+    accuracy_command.show(accuracy_command.console(), result)
+    accuracy_command.write_json(tmp_path / "a.json", result)
     printed = capsys.readouterr().out
     assert "OS4 quadrotor: experiment 1" in printed
     assert "cheapest: " in printed
-    found = json.loads((tmp_path / "a.json").read_text())
-    assert found["cheapest"]["error"] <= 1e-3
-    assert {"rkmk54", "lie_euler", "erk4m"} == {p["way"] for p in found["points"]}
+    result = json.loads((tmp_path / "a.json").read_text())
+    assert result["cheapest"]["error"] <= 1e-3
+    assert {"rkmk54", "lie_euler", "erk4m"} == {p["way"] for p in result["points"]}
 
 
-def test_the_table_fits_80_columns_and_cuts_no_digit(capsys):
+def test_table_fits_80_columns_and_cuts_no_digit(capsys):
     drift = dict.fromkeys(("manifold", "energy", "vertical momentum"), 1.23e-123)
     wide = Point("implicit_lie_midpoint", 2, "s", 5.7220458984375e-05, 3.2e-13, 0.15, 12_345_678, drift)
     console_output.show(console(80), decay(), [wide], wide)
-    said = capsys.readouterr().out
-    assert max(map(len, said.splitlines())) <= 80
-    assert "…" not in said
-    assert "5.72e-05 s" in said
-    assert "12345678" in said
+    output = capsys.readouterr().out
+    assert max(map(len, output.splitlines())) <= 80
+    assert "…" not in output
+    assert "5.72e-05 s" in output
+    assert "12345678" in output

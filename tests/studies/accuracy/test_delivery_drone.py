@@ -25,7 +25,7 @@ def test_five_bodies_converge_in_every_description(found):
             assert coarse > 6.0 * fine, name
 
 
-def test_both_coordinates_tell_the_same(found):
+def test_both_coordinates_agree(found):
     for held in ("partitioning", "projection"):
         for coordinates in ("SE(3)", "Euler"):
             assert found[f"{coordinates}, {held}"][1][1] < 1e-10
@@ -35,7 +35,7 @@ def test_without_stabilisation_hinges_come_apart(found):
     assert found["SE(3), none"][1][1] > 1e2 * found["SE(3), projection"][1][1]
 
 
-def test_the_reduced_model_stays_wrong_by_what_it_leaves_out(found):
+def test_reduced_model_keeps_its_model_error(found):
     """By about the 0.6 % that the blades, all along x at the start, add to the mean (theory.md, eq. (8.51))."""
     for name in ("reduced, frame only", "reduced, mean"):
         (coarse, _), (fine, _) = found[name]

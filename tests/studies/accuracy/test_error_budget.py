@@ -33,7 +33,7 @@ def test_difference_at_common_ticks():
     assert difference(fine, opposite) == (0.0, 0.0, 0.0)
 
 
-def test_a_flight_in_memory_is_the_plants_own():
+def test_flight_in_memory_is_plants_own():
     flown = fly(load(ROOT / "lapwing/scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
     assert len(flown.truth) == 101
     assert flown.setup.interval == 0.004
@@ -42,7 +42,7 @@ def test_a_flight_in_memory_is_the_plants_own():
     assert abs(flown.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t
 
 
-def test_errors_fall_with_what_causes_them():
+def test_errors_decrease_with_their_causes():
     scene = load(ROOT / "lapwing/scenes/cooperative_load.toml", ["run.duration=1.0", "solver.integrator=rkmk2"])
     parts = errors(scene)
     by = {source: [p for p in parts if p.source == source] for source in SOURCES}
@@ -54,7 +54,7 @@ def test_errors_fall_with_what_causes_them():
     assert delay[0] / delay[1] == pytest.approx(2.0, rel=0.3)  # one interval of delay, first order
 
 
-def test_an_accuracy_is_kept_from_take_off_to_rest():
+def test_accuracy_is_kept_from_take_off_to_rest():
     """Steps of 4 ms and the contact at the accuracy, against steps of an eighth and a contact 1000 times finer."""
     coarse, fine = (
         fly(load("hover", [f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]))

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.long
 HOVER = Path(__file__).parents[3] / "lapwing/scenes/hover.toml"
 
 
-def test_five_bodies_are_integrated_in_steps_that_their_scene_accepts(monkeypatch):
+def test_five_bodies_use_steps_accepted_by_scene(monkeypatch):
     monkeypatch.setattr(plant.integrators, "compatible_methods", lambda p, x: ["rk4_renormalised"])
     scene = load(HOVER, ["vehicle.model=multibody", "solver.accuracy=1e-4"])
     problem = scenes.problem(scene)

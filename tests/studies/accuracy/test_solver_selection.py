@@ -49,26 +49,26 @@ def measured(monkeypatch, tmp_path):
         ("step = 0.001", []),
     ],
 )
-def test_the_cheapest_that_meets_the_accuracy_is_set(solver, chosen, measured, tmp_path):
+def test_cheapest_that_meets_accuracy_is_set(solver, chosen, measured, tmp_path):
     path = scene(tmp_path, solver)
-    found = solver_selection.overrides(load(path), lambda text: None)
-    assert found == chosen
-    decided = load(path, found)
+    result = solver_selection.overrides(load(path), lambda text: None)
+    assert result == chosen
+    decided = load(path, result)
     assert not decided[Solver].undecided
     method(decided)
 
 
-def test_it_is_measured_once_for_the_same_physics(measured, tmp_path):
-    path, said = scene(tmp_path, "accuracy = 1e-4"), []
-    first = solver_selection.overrides(load(path), said.append)
-    assert solver_selection.overrides(load(path), said.append) == first
-    solver_selection.overrides(load(path, ["solver.accuracy=1e-3"]), said.append)
-    assert len(measured) == len(said) == 1
-    solver_selection.overrides(load(path, ["os4.mass=0.7"]), said.append)
+def test_selection_is_measured_once_per_physics(measured, tmp_path):
+    path, output = scene(tmp_path, "accuracy = 1e-4"), []
+    first = solver_selection.overrides(load(path), output.append)
+    assert solver_selection.overrides(load(path), output.append) == first
+    solver_selection.overrides(load(path, ["solver.accuracy=1e-3"]), output.append)
+    assert len(measured) == len(output) == 1
+    solver_selection.overrides(load(path, ["os4.mass=0.7"]), output.append)
     assert len(measured) == 2
 
 
-def test_a_damaged_cache_and_one_that_cannot_be_written_are_no_obstacle(measured, monkeypatch, tmp_path):
+def test_damaged_or_read_only_cache_is_ignored(measured, monkeypatch, tmp_path):
     path = scene(tmp_path, "accuracy = 1e-4")
     first = solver_selection.overrides(load(path), lambda text: None)
     (kept,) = (tmp_path / "cache" / "accuracy").glob("*.json")
@@ -80,29 +80,29 @@ def test_a_damaged_cache_and_one_that_cannot_be_written_are_no_obstacle(measured
     assert solver_selection.overrides(load(path), lambda text: None) == first
 
 
-def test_what_cannot_be_met_and_what_nobody_chose_is_said(measured, tmp_path):
+def test_unreachable_accuracy_and_default_are_reported(measured, tmp_path):
     path = scene(tmp_path, "accuracy = 1e-12")
     with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: 1e-12: no method meets .* 1e-07, by rkmk4"):
         solver_selection.overrides(load(path), lambda text: None)
     with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: what `lapwing run` chooses .* --set"):
         method(load(path))
-    with pytest.raises(SceneError, match=r"solver.accuracy: expected a number above 0, got 0"):
+    with pytest.raises(SceneError, match=r"solver.accuracy: expected a number at least 1e-12, got 0"):
         load(path, ["solver.accuracy=0"])
 
 
-def test_measured_in_earnest_on_a_scene(monkeypatch, tmp_path):
+def test_measured_in_earnest_on_scene(monkeypatch, tmp_path):
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path)
     few = ["lie_euler", "erk4m", "rkmk4"]  # each is compiled
     monkeypatch.setattr(integrate.integrators, "compatible_methods", lambda p, x: few)
     path = scene(tmp_path, "accuracy = 1e-6")
-    found = solver_selection.overrides(load(path), lambda text: None)
+    result = solver_selection.overrides(load(path), lambda text: None)
     points = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())
-    (chosen,) = [p for p in points if found == [f'solver.integrator="{p["way"]}"', f"solver.step={p['setting']!r}"]]
+    (chosen,) = [p for p in points if result == [f'solver.integrator="{p["way"]}"', f"solver.step={p['setting']!r}"]]
     assert chosen["error"] <= 1e-6
     assert chosen["time"] == min(p["time"] for p in points if p["error"] <= 1e-6)
 
 
-def test_a_model_that_cannot_be_measured_is_named(monkeypatch):
+def test_model_that_cannot_be_measured_is_named(monkeypatch):
     other = load(OS4)
     monkeypatch.delattr("lapwing.services.plant.models.os4.system")
     with pytest.raises(ValueError, match=r"os4_motors.toml: vehicle.model: the integrators of os4 cannot be compared"):

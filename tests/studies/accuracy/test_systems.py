@@ -13,7 +13,7 @@ pytestmark = pytest.mark.long
 
 
 @pytest.mark.parametrize("name", [n for n, p in problems().items() if any(w.name == "rkmk54" for w in p.ways)])
-def test_the_reference_is_met(name):
+def test_reference_is_met(name):
     problem = problems()[name]
     way = next(w for w in problem.ways if w.name == "rkmk54")
     coarse, fine = (way.read(t, way.prepare(t)()) for t in (1e-5, 1e-12))
@@ -23,18 +23,18 @@ def test_the_reference_is_met(name):
     assert max(drift(problem, fine).values()) < 1e-9
 
 
-def test_an_invariant_of_a_wrong_motion_drifts():
+def test_invariant_of_wrong_motion_drifts():
     problem = problems()["free_rigid_body"]
     way = next(w for w in problem.ways if w.name == "rkmk54")
     outcome = way.read(1e-8, way.prepare(1e-8)())
     outcome.samples[-1, 9:12] *= 1.01
-    found = drift(problem, outcome)
-    assert found["energy"] == pytest.approx(0.0201, rel=1e-3)
-    assert found["momentum"] > 5e-3
+    result = drift(problem, outcome)
+    assert result["energy"] == pytest.approx(0.0201, rel=1e-3)
+    assert result["momentum"] > 5e-3
 
 
 @pytest.mark.parametrize("t", [0.3, 7.0, 25.0])
-def test_the_closed_form_solves_eulers_equations(t):
+def test_closed_form_solves_eulers_equations(t):
     inertia, start = free_rigid_body.INERTIA, free_rigid_body.START
 
     def rate(_, y):
@@ -45,7 +45,7 @@ def test_the_closed_form_solves_eulers_equations(t):
     assert free_rigid_body.closed_form(inertia, start, t) == pytest.approx(other, abs=1e-10)
 
 
-def test_matrices_are_those_of_the_library():
+def test_matrices_are_those_of_library():
     q = np.array([[0.5, -0.5, 0.5, 0.5], [0.8, 0.0, 0.6, 0.0]])
     assert matrices(q)[0] == pytest.approx([0, -1, 0, 0, 0, 1, -1, 0, 0], abs=1e-15)
     assert matrices(q)[1] == pytest.approx([0.28, 0, 0.96, 0, 1, 0, -0.96, 0, 0.28], abs=1e-15)

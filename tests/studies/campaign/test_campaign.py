@@ -54,7 +54,7 @@ def options(folder, **vary):
     return ["campaign", SCENE, *sets, *varied, "--runs", RUNS, "--out", folder, "--workers", 1]
 
 
-def test_a_run_draws_flies_and_is_a_row(flown):
+def test_run_draws_flies_and_is_row(flown):
     folder, _ = flown
     rows = [row for page in folder.pages() for row in page]
     assert [row["run"] for row in rows] == list(range(RUNS))
@@ -63,7 +63,7 @@ def test_a_run_draws_flies_and_is_a_row(flown):
     assert {row["outcome"] for row in rows} == {"completed"}
 
 
-def test_a_stop_loses_no_shard_that_is_done_and_workers_change_nothing(flown, tmp_path):
+def test_stop_keeps_complete_shards_for_any_workers(flown, tmp_path):
     folder, first = started(tmp_path / "c")
     campaign(folder, first, local.here, part=range(0, len(folder.shards), 2))
     (tmp_path / "c" / "shards" / ".00001.csv.77").write_text("half written")
@@ -75,17 +75,17 @@ def test_a_stop_loses_no_shard_that_is_done_and_workers_change_nothing(flown, tm
 
 
 @pytest.mark.skipif(not run_table.has_parquet(), reason="pyarrow is not installed: pip install lapwing[campaign]")
-def test_the_table_is_parquet_with_its_making_in_the_metadata(flown):
+def test_table_is_parquet_with_its_making_in_metadata(flown):
     from pyarrow import parquet
 
     folder, digest = flown
-    found = parquet.read_table(folder.path / "runs.parquet")
-    assert found.num_rows == RUNS
+    result = parquet.read_table(folder.path / "runs.parquet")
+    assert result.num_rows == RUNS
     assert (
-        found["effects.random_wind_force.mean.0"].to_pylist()
+        result["effects.random_wind_force.mean.0"].to_pylist()
         == folder.arrays()["effects.random_wind_force.mean.0"].tolist()
     )
-    about = {name.decode(): text.decode() for name, text in found.schema.metadata.items()}
+    about = {name.decode(): text.decode() for name, text in result.schema.metadata.items()}
     assert (about["scene"], about["digest"]) == (SCENE, digest)
     assert json.loads(about["vary"])["vehicle.mass"] == "normal(10.4, 0.3)"
     assert json.loads(about["versions"])["numpy"]
@@ -97,7 +97,7 @@ def test_csv_gives_every_bit_back(flown):
     assert list(run_table.bits(folder.kinds, rows)) == list(run_table.bits(folder.kinds, folder.rows(0) + rows[2:]))
 
 
-def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_path):
+def test_folder_of_other_campaign_is_rejected_unchanged(flown, tmp_path):
     folder, _ = flown
     before = (folder.path / "campaign.json").read_text()
     for changes, differing in (({"seed": 2}, "seed"), ({"runs": 41}, "runs"), ({"vary": {}}, "vary")):
@@ -111,7 +111,7 @@ def test_another_campaigns_folder_is_refused_and_nothing_overwritten(flown, tmp_
     assert started(tmp_path / "c")[0].missing()
 
 
-def test_two_machines_may_begin_at_the_same_moment(tmp_path, monkeypatch):
+def test_two_machines_may_begin_at_same_moment(tmp_path, monkeypatch):
     make = folder_module._make
 
     def twice(path, about):
@@ -126,19 +126,19 @@ def test_two_machines_may_begin_at_the_same_moment(tmp_path, monkeypatch):
         started(tmp_path / "two")
 
 
-def test_a_part_counts_its_own_runs(flown, tmp_path):
+def test_part_counts_its_own_runs(flown, tmp_path):
     words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
-    code, said = lapwing(*words, "--shard", "2/2")
-    assert (code, "2 of 2 flights" in said, "3 shards missing" in said) == (0, True, True)
+    code, output = lapwing(*words, "--shard", "2/2")
+    assert (code, "2 of 2 flights" in output, "3 shards missing" in output) == (0, True, True)
     again = ["run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process"]
-    told = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
-    assert f"run 0 of {tmp_path / 'c'}: not flown there yet" in told[0]
-    assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in told[1]
-    code, said = lapwing(*words)
-    assert (code, "3 of 3 flights" in said) == (0, True)
+    reported = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
+    assert f"run 0 of {tmp_path / 'c'}: not flown there yet" in reported[0]
+    assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in reported[1]
+    code, output = lapwing(*words)
+    assert (code, "3 of 3 flights" in output) == (0, True)
 
 
-def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
+def test_worker_with_other_numerics_is_rejected(flown):
     folder, _ = flown
     _, first = started(folder.path)
     with pytest.raises(ValueError, match=r"has numpy .*; the campaign was begun with 0.1"):
@@ -147,7 +147,7 @@ def test_a_worker_whose_numbers_are_others_does_not_fly(flown):
         fly_runs(folder.plan, first._replace(end_state="00"), 0, 1)
 
 
-def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkeypatch):
+def test_full_disk_is_one_line_and_keeps_runs(tmp_path, monkeypatch):
     write = run_table.write_csv
 
     def full(path, *arguments):
@@ -157,15 +157,15 @@ def test_a_full_disk_is_told_in_a_line_and_what_was_flown_stays(tmp_path, monkey
 
     words = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
     monkeypatch.setattr("lapwing.studies.campaign.run_table.write_csv", full)
-    code, said = lapwing(*words)
+    code, output = lapwing(*words)
     expected = "00002.csv: cannot be written: no space left on device; the same command goes on where it stopped"
-    assert (code, expected in said, len(read(tmp_path / "c").missing())) == (1, True, 3)
+    assert (code, expected in output, len(read(tmp_path / "c").missing())) == (1, True, 3)
     monkeypatch.undo()
-    code, said = lapwing(*words)
-    assert (code, "3 of 3 flights" in said) == (0, True)
+    code, output = lapwing(*words)
+    assert (code, "3 of 3 flights" in output) == (0, True)
 
 
-def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
+def test_campaign_ends_at_interval_width_with_any_worker(tmp_path):
     counts = []
 
     def backwards(call, tasks):
@@ -179,7 +179,7 @@ def test_it_ends_when_enough_is_known_whoever_flies(tmp_path):
     assert 0 < counts[0].runs < RUNS
 
 
-def test_what_was_flown_beyond_what_is_enough_is_kept(tmp_path):
+def test_runs_beyond_interval_width_are_kept(tmp_path):
     def nobody(call, tasks):
         assert not list(tasks)
         yield from ()
@@ -196,79 +196,81 @@ def test_what_was_flown_beyond_what_is_enough_is_kept(tmp_path):
     assert folder.finish() == digest
 
 
-def test_how_well_it_is_known_is_asked_once_a_shard(monkeypatch):
-    asked = []
-    monkeypatch.setattr("lapwing.studies.campaign.shard_loop.interval", lambda k, n: asked.append(n) or interval(k, n))
+def test_how_well_it_is_known_is_asked_once_shard(monkeypatch):
+    requested = []
+    monkeypatch.setattr(
+        "lapwing.studies.campaign.shard_loop.interval", lambda k, n: requested.append(n) or interval(k, n)
+    )
     ending, done = Ending(1e-9), {}
     for shard in range(300):
         done[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, the second first
         assert not ending.reached(done)
-    assert asked == list(range(10, 3010, 10))
+    assert requested == list(range(10, 3010, 10))
 
 
-def test_what_a_scene_refuses_is_counted_and_listed(tmp_path):
-    code, said = lapwing(*options(tmp_path / "c d", **{"vehicle.mass": choice(10.4, -1.0)}))
+def test_rejected_parameters_are_counted_and_listed(tmp_path):
+    code, output = lapwing(*options(tmp_path / "c d", **{"vehicle.mass": choice(10.4, -1.0)}))
     assert code == 0
-    found = Results(read(tmp_path / "c d"))
-    assert 0 < len(found.refused["run"]) == RUNS - len(found) < RUNS
-    assert f"{len(found)} completed, {len(found.refused['run'])} rejected" in said
-    assert found.refused["outcome_text"][0] == "--vary vehicle.mass: expected a number above 0 [kg], got -1.0"
-    run = found.refused["run"][0]
+    result = Results(read(tmp_path / "c d"))
+    assert 0 < len(result.refused["run"]) == RUNS - len(result) < RUNS
+    assert f"{len(result)} completed, {len(result.refused['run'])} rejected" in output
+    assert result.refused["outcome_text"][0] == "--vary vehicle.mass: expected a number above 0 [kg], got -1.0"
+    run = result.refused["run"][0]
     assert lapwing("run", SCENE, "--run", run, "--campaign", tmp_path / "c d") == (
         2,
-        f"lapwing: {found.refused['outcome_text'][0]}\n",
+        f"lapwing: {result.refused['outcome_text'][0]}\n",
     )
-    assert "the scene does not take" in (tmp_path / "c d" / "report.html").read_text()
+    assert "The scene rejected the parameters of" in (tmp_path / "c d" / "report.html").read_text()
     assert (
         f"--campaign &#39;{tmp_path}/c d&#39;" in (tmp_path / "c d" / "report.html").read_text()
     )  # as a shell reads it
 
 
-def test_what_is_refused_is_told_alike_wherever_lapwing_is_installed(tmp_path):
+def test_rejection_text_does_not_depend_on_install_path(tmp_path):
     made = plan(SCENE, SHORT, runs=1, vary={"vehicle.mass": choice(0.1)})
     assert row_of(made, 0)["outcome_text"].startswith(
         "delivery_drone.toml:6: airframe.mass.payload: expected less than total"
     )
 
 
-def test_report_json_and_a_run_flown_again_to_the_bit(flown, tmp_path, monkeypatch):
+def test_report_json_and_run_flown_again_to_bit(flown, tmp_path, monkeypatch):
     folder, digest = flown
-    code, said = lapwing(*options(folder.path), "--json", tmp_path / "c.json")
-    assert (code, digest in said) == (0, True)
+    code, output = lapwing(*options(folder.path), "--json", tmp_path / "c.json")
+    assert (code, digest in output) == (0, True)
     good = int(Results(folder)["success"].sum())
     assert 0 < good < RUNS
-    told = json.loads((tmp_path / "c.json").read_text())
-    assert (told["runs"], len(told["failed"]), told["digest"]) == (RUNS, RUNS - good, digest)
+    reported = json.loads((tmp_path / "c.json").read_text())
+    assert (reported["runs"], len(reported["failed"]), reported["digest"]) == (RUNS, RUNS - good, digest)
     page = (folder.path / "report.html").read_text()
     assert all(text in page for text in ("Probability of success", "Which parameter matters", "normal(10.4, 0.3)"))
     worst = Results(folder).worst(1)[0]["run"]
     command = f"lapwing run {SCENE} --run {worst} --campaign {folder.path}"
     assert command in page
     monkeypatch.chdir(tmp_path)
-    code, said = lapwing(*command.split()[1:], "--mode", "single-process", "--log", "again.mcap")
-    assert (code, f"run {worst} of {folder.path}: final state bit-for-bit identical" in said) == (
+    code, output = lapwing(*command.split()[1:], "--mode", "single-process", "--log", "again.mcap")
+    assert (code, f"run {worst} of {folder.path}: final state bit-for-bit identical" in output) == (
         4,
         True,
     )  # one that fails
-    code, said = lapwing("run", SCENE, "--run", RUNS, "--campaign", folder.path)
-    assert (code, f"--run {RUNS}: expected a run of {folder.path}, 0 to 39" in said) == (2, True)
-    code, said = lapwing("run", "hover", "--run", 1, "--campaign", folder.path)
-    assert (code, "is not what" in said) == (2, True)
+    code, output = lapwing("run", SCENE, "--run", RUNS, "--campaign", folder.path)
+    assert (code, f"--run {RUNS}: expected a run of {folder.path}, 0 to 39" in output) == (2, True)
+    code, output = lapwing("run", "hover", "--run", 1, "--campaign", folder.path)
+    assert (code, "is not what" in output) == (2, True)
 
 
 def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     folder, _ = flown
     other, first = started(tmp_path / "heavier", overrides=(*SHORT, "autopilot.gains=paper"))
     campaign(other, first, local.here)
-    code, said = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
-    assert (code, f"{RUNS} pairs of runs" in said) == (0, True)
-    assert "the campaigns differ in: overrides\n" in said
-    assert "…" not in said  # 80 columns are enough for all numbers
-    (row,) = [line.split() for line in said.splitlines() if line.split()[:1] == ["energy"]]
-    assert row[:3] == ["energy", "[J]", "*"]
-    found = {d["figure"]: d for d in json.loads((tmp_path / "d.json").read_text())["differences"]}
-    energy = found["energy"]
-    assert [float(text) for text in row[3:]] == pytest.approx(
+    code, output = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
+    assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
+    assert "the campaigns differ in: overrides\n" in output
+    assert "…" not in output  # 80 columns are enough for all numbers
+    (row,) = [line.split() for line in output.splitlines() if line.split()[:1] == ["energy"]]
+    assert row[:4] == ["energy", "[W", "h]", "*"]
+    result = {d["figure"]: d for d in json.loads((tmp_path / "d.json").read_text())["differences"]}
+    energy = result["energy"]
+    assert [3600.0 * float(text) for text in row[4:]] == pytest.approx(
         [energy["one"], energy["other"], *energy["difference"].values()], rel=0.005
     )
     assert energy["difference"]["value"] == pytest.approx(energy["other"] - energy["one"])
@@ -316,7 +318,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
 )
 def test_bad_input_is_one_line(arguments, message, tmp_path):
     (tmp_path / "c.csv").write_text("vehicle.mas,solver.step\n10,0.001\n")
-    code, said = lapwing("campaign", *(a.replace("{}", str(tmp_path / "c")) for a in arguments))
+    code, output = lapwing("campaign", *(a.replace("{}", str(tmp_path / "c")) for a in arguments))
     assert code == 2
-    assert message in " ".join(said.split())
+    assert message in " ".join(output.split())
     assert not Path("campaigns").exists()

@@ -26,20 +26,20 @@ def table(runs, sweep=None, keys=KEYS, **values):
     drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in keys}
     kinds = {"run": int, "seed": int, **dict.fromkeys(keys, float), "success": bool}
     kinds |= {name: str if name in ("outcome", "outcome_text") else float for name in METRICS}
-    found = {name: np.full(runs, np.nan) for name in kinds}
-    found |= {"run": np.arange(runs), "success": np.ones(runs, bool), "outcome": np.full(runs, "landed", object)}
+    result = {name: np.full(runs, np.nan) for name in kinds}
+    result |= {"run": np.arange(runs), "success": np.ones(runs, bool), "outcome": np.full(runs, "landed", object)}
     about = {"vehicles": [], "published": {}, "success": [], "scene": "hover"}
-    arrays = found | drawn | {name: of(drawn) for name, of in values.items()}
+    arrays = result | drawn | {name: of(drawn) for name, of in values.items()}
     return Results(SimpleNamespace(arrays=lambda: arrays, plan=made, about=about, kinds=kinds))
 
 
 def bars(plot, panel, aim):
     """Length of the bars of a panel of `matters`, by parameter."""
-    (found,) = [p for p in plot.panels if p.title == aim and p.x_label.startswith(panel)]
-    return {bar.lane: bar.end - bar.start for bar in found.marks}
+    (result,) = [p for p in plot.panels if p.title == aim and p.x_label.startswith(panel)]
+    return {bar.lane: bar.end - bar.start for bar in result.marks}
 
 
-def test_what_some_runs_do_not_tell_matters_for_the_others():
+def test_missing_values_of_runs_keep_other_columns():
     def speed(drawn):
         return np.where(drawn["b"] < 0.5, drawn["a"], np.nan)  # half of the runs never touch down
 
@@ -51,17 +51,17 @@ def test_what_some_runs_do_not_tell_matters_for_the_others():
 
 
 @pytest.mark.skipif(not has_sobol(), reason="SALib is not installed: pip install lapwing[campaign]")
-def test_a_parameter_that_all_who_tell_have_in_common_has_no_index():
+def test_constant_parameter_has_no_index():
     def speed(drawn):
         drawn["b"][:] = np.where(drawn["b"] < 0.5, 0.25, drawn["b"])
         return np.where(drawn["b"] == 0.25, drawn["a"], np.nan)
 
-    found = bars(matters(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
-    assert set(found) == {"a"}
-    assert found["a"] == pytest.approx(1.0, abs=0.1)
+    result = bars(matters(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
+    assert set(result) == {"a"}
+    assert result["a"] == pytest.approx(1.0, abs=0.1)
 
 
-def test_sobol_indices_are_not_told_of_what_goes_together(tmp_path):
+def test_sobol_indices_are_omitted_for_correlated_parameters(tmp_path):
     lines = [f"{k / 100},{k / 50}" for k in range(100)]
     (tmp_path / "s.csv").write_text("\n".join(["a,b", *lines]))
     plot = matters(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
@@ -69,7 +69,7 @@ def test_sobol_indices_are_not_told_of_what_goes_together(tmp_path):
     assert "which those of a sweep are not" in plot.caption
 
 
-def test_what_is_left_out_of_many_runs_is_no_value_of_a_grid():
+def test_omitted_grid_runs_are_no_values():
     lots = table(3000, energy=lambda drawn: drawn["b"])
     lots.columns["b"][:] = np.arange(3000) % 10  # of which every tenth run has the same
     (good,) = parallel(lots).panels[0].marks
@@ -79,17 +79,17 @@ def test_what_is_left_out_of_many_runs_is_no_value_of_a_grid():
 
 
 def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
-    asked = []
+    requested = []
     monkeypatch.setattr(campaign_plots, "has_sobol", lambda: True)
     monkeypatch.setattr(
-        campaign_plots, "sobol", lambda x, y, names: asked.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names)
+        campaign_plots, "sobol", lambda x, y, names: requested.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names)
     )
     monkeypatch.setattr(campaign_plots, "MOST", 100)
     lots = table(2000, energy=lambda drawn: drawn["b"])
     lots.columns["b"][:] = np.arange(2000) % 10
     matters(lots)
-    assert asked[0].shape == (100, 2)
-    assert len(np.unique(asked[0][:, 1])) == 10
+    assert requested[0].shape == (100, 2)
+    assert len(np.unique(requested[0][:, 1])) == 10
 
 
 def test_long_keys_stand_beside_each_other():
@@ -98,27 +98,29 @@ def test_long_keys_stand_beside_each_other():
     assert campaign_plots._broken("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
 
 
-def test_errors_stand_as_shares_beside_what_is_required():
-    found = table(11, **{"rmse.x": lambda drawn: np.arange(11.0), "rmse.roll": lambda drawn: np.arange(11.0)})
-    found.folder.about["success"] = ["rmse.roll < 0.1"]
-    roll, x = sorted(errors(found).panels, key=lambda panel: panel.x_label)
+def test_errors_are_shares_of_requirements():
+    result = table(11, **{"rmse.x": lambda drawn: np.arange(11.0), "rmse.roll": lambda drawn: np.arange(11.0)})
+    result.folder.about["success"] = ["rmse.roll < 0.1"]
+    roll, x = sorted(errors(result).panels, key=lambda panel: panel.x_label)
     assert (x.x_label, x.marks[0].x.tolist()) == ("rmse.x [m]", list(range(11)))
     assert x.marks[0].y[-1] == 1.0
     assert roll.marks[1].x == pytest.approx(np.degrees([0.1, 0.1]))
 
 
-def test_of_many_parameters_those_that_matter_are_drawn_and_the_others_named():
-    found = table(200, keys=MANY, energy=lambda drawn: drawn["l"] + 0.5 * drawn["k"])
-    assert len(bars(matters(found), "rank", "energy")) == len(MANY)
+def test_influential_parameters_are_drawn_others_listed():
+    result = table(200, keys=MANY, energy=lambda drawn: drawn["l"] + 0.5 * drawn["k"])
+    assert len(bars(matters(result), "rank", "energy")) == len(MANY)
     for draw in (campaign_plots.success, parallel):
-        plot = draw(found)
-        told = plot.caption.partition("Left out, as they go least with it: ")[2].rstrip(".").split(", ")
-        assert len(told) == len(MANY) - campaign_plots.KEYS
-        assert not {"k", "l"} & set(told)
-    assert [panel.x_label for panel in campaign_plots.success(found).panels] == [key for key in MANY if key not in told]
+        plot = draw(result)
+        reported = plot.caption.partition("Left out, as they go least with it: ")[2].rstrip(".").split(", ")
+        assert len(reported) == len(MANY) - campaign_plots.KEYS
+        assert not {"k", "l"} & set(reported)
+    assert [panel.x_label for panel in campaign_plots.success(result).panels] == [
+        key for key in MANY if key not in reported
+    ]
 
 
-def test_on_paper_numbers_below_panels_beside_each_other_do_not_touch():
+def test_printed_axis_labels_do_not_overlap():
     rmse = {f"rmse.{axis}": lambda drawn: 0.01 + 0.16 * drawn["a"] for axis in ("x", "y", "z")}
     with matplotlib_figure.styled():
         canvas = FigureCanvasAgg(matplotlib_figure.figure(errors(table(50, **rmse))))

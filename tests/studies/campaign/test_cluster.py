@@ -21,7 +21,7 @@ pytestmark = pytest.mark.long
 distributed = pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
 
 
-def test_a_killed_worker_and_a_late_one_change_nothing(tmp_path):
+def test_killed_and_late_workers_do_not_change_results(tmp_path):
     made = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
     first = reference(*first_setup(made))
     alone, folder = (begin(tmp_path / name, made, manifest(made, first)) for name in ("alone", "cluster"))
@@ -45,7 +45,7 @@ def test_a_killed_worker_and_a_late_one_change_nothing(tmp_path):
     assert folder.finish() == alone.finish()
 
 
-def test_a_lost_scheduler_is_told_in_a_line_and_what_was_flown_stays(tmp_path, capfd):
+def test_lost_scheduler_is_one_line_and_keeps_runs(tmp_path, capfd):
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{free.getsockname()[1]}"
@@ -55,9 +55,9 @@ def test_a_lost_scheduler_is_told_in_a_line_and_what_was_flown_stays(tmp_path, c
     made = plan("delivery_mission", ("run.duration=3.5",), runs=400, seed=7)
     first = reference(*first_setup(made))
     folder = begin(tmp_path / "folder", made, manifest(made, first))
-    with (tmp_path / "said").open("w") as said:
+    with (tmp_path / "said").open("w") as output:
         helpers = [
-            subprocess.Popen([sys.executable, "-m", f"distributed.cli.{name}", *words], stdout=said, stderr=said)
+            subprocess.Popen([sys.executable, "-m", f"distributed.cli.{name}", *words], stdout=output, stderr=output)
             for name, *words in (scheduler, worker)
         ]
         try:
@@ -71,7 +71,7 @@ def test_a_lost_scheduler_is_told_in_a_line_and_what_was_flown_stays(tmp_path, c
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_nobody_answers(monkeypatch):
+def test_missing_worker_is_reported(monkeypatch):
     monkeypatch.setattr("lapwing.studies.campaign.cluster.PATIENCE", 0.5)
     with pytest.raises(ValueError, match=r"--cluster tcp://127.0.0.1:9: no Dask scheduler answers there"):
         dask("tcp://127.0.0.1:9")

@@ -38,12 +38,12 @@ def lapwing(*arguments):
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("campaign") / "fleet"
     sets = [part for text in SHORT for part in ("--set", text)]
-    code, said = lapwing("campaign", "fleet", *sets, *VARIED, "--runs", 3, "--workers", 1, "--out", path)
-    assert code == 0, said
-    return path, said
+    code, output = lapwing("campaign", "fleet", *sets, *VARIED, "--runs", 3, "--workers", 1, "--out", path)
+    assert code == 0, output
+    return path, output
 
 
-def test_flights_of_a_fleet_are_those_of_its_vehicles():
+def test_flights_of_fleet_are_those_of_its_vehicles():
     setup = resolve(load("fleet", ["run.duration=1.0"]))
     flights, log = fly_each(setup, TOPICS), fly(setup)
     assert [flight.vehicle for flight in flights] == ["left", "right", "scout"]
@@ -54,57 +54,57 @@ def test_flights_of_a_fleet_are_those_of_its_vehicles():
         assert set(flight.fleet) == {"left", "right", "scout"}
 
 
-def test_a_row_has_the_worst_of_the_vehicles_and_each_of_them(folder):
-    path, said = folder
-    found = Results(read(path))
-    assert found.vehicles == ["left", "right", "scout"]
+def test_row_has_worst_of_vehicles_and_each_of_them(folder):
+    path, output = folder
+    result = Results(read(path))
+    assert result.vehicles == ["left", "right", "scout"]
     for name in ("rmse.x", "max_tilt", "max_distance"):
-        each = [found[f"{vehicle}.{name}"] for vehicle in found.vehicles]
-        assert (found[name] == np.max(each, axis=0)).all()
-    assert found["energy"] == pytest.approx(sum(found[f"{vehicle}.energy"] for vehicle in found.vehicles))
-    assert not found["success"].any()
-    assert found["left.success"].all()
-    assert not found["scout.success"].any()
-    assert all(text.startswith("scout: Completed") for text in found["outcome_text"])
-    assert 4.0 < found["nearest"].min() < 4.3  # they stand 4.24 m apart
-    assert "Nearest of any two vehicles" in said
+        each = [result[f"{vehicle}.{name}"] for vehicle in result.vehicles]
+        assert (result[name] == np.max(each, axis=0)).all()
+    assert result["energy"] == pytest.approx(sum(result[f"{vehicle}.energy"] for vehicle in result.vehicles))
+    assert not result["success"].any()
+    assert result["left.success"].all()
+    assert not result["scout.success"].any()
+    assert all(text.startswith("scout: Completed") for text in result["outcome_text"])
+    assert 4.0 < result["nearest"].min() < 4.3  # they stand 4.24 m apart
+    assert "Nearest of any two vehicles" in output
 
 
-def test_the_report_shows_every_vehicle(folder):
+def test_report_shows_every_vehicle(folder):
     path, _ = folder
-    page, found = (path / "report.html").read_text(), Results(read(path))
-    for vehicle in found.vehicles:
+    page, result = (path / "report.html").read_text(), Results(read(path))
+    for vehicle in result.vehicles:
         assert f'<th scope="row">{vehicle}</th>' in page
-    lines = {mark.name: mark for mark in errors(found).panels[0].marks}
+    lines = {mark.name: mark for mark in errors(result).panels[0].marks}
     assert set(lines) == {"left", "right", "scout"}
     for vehicle, line in lines.items():
-        assert np.array_equal(line.x, np.sort(found[f"{vehicle}.rmse.x"]))
+        assert np.array_equal(line.x, np.sort(result[f"{vehicle}.rmse.x"]))
     with pytest.raises(NotRecordedError, match="no vehicle touches down"):
-        touchdown(found)
+        touchdown(result)
 
 
-def test_what_varies_reaches_the_vehicle_that_it_names(folder):
-    found = Results(read(folder[0]))
-    masses = found["vehicle.0.airframe.mass.total"]
+def test_varied_key_reaches_named_vehicle(folder):
+    result = Results(read(folder[0]))
+    masses = result["vehicle.0.airframe.mass.total"]
     assert len(set(masses)) == 3
     # who climbs with more mass takes more energy
-    assert (np.argsort(masses) == np.argsort(found["left.energy"])).all()
-    assert json.loads((folder[0] / "campaign.json").read_text())["vehicles"] == found.vehicles
+    assert (np.argsort(masses) == np.argsort(result["left.energy"])).all()
+    assert json.loads((folder[0] / "campaign.json").read_text())["vehicles"] == result.vehicles
 
 
-def test_a_run_is_its_figures_and_the_same_each_time():
-    given = plan("fleet", SHORT, runs=2)
+def test_run_is_its_figures_and_same_each_time():
+    values = plan("fleet", SHORT, runs=2)
     rows = {}
-    first = [row_of(given, run, rows) for run in (0, 1, 0)]
+    first = [row_of(values, run, rows) for run in (0, 1, 0)]
     assert repr(first[0]) == repr(first[2])
     assert first[0]["end_state"] != first[1]["end_state"]
     flights = fly_each(resolve(load("fleet", [*SHORT, "run.seed=1", "rates.estimate=250"])), TOPICS)
     assert metrics(flights[1])["rmse.z"] == first[0]["right.rmse.z"]
 
 
-def test_a_run_is_flown_again_to_the_bit(folder, tmp_path):
-    code, said = lapwing(
+def test_run_is_flown_again_to_bit(folder, tmp_path):
+    code, output = lapwing(
         "run", "fleet", "--run", 1, "--campaign", folder[0], "--mode", "single-process", "--log", tmp_path / "a.mcap"
     )
-    assert "final state bit-for-bit identical" in said
+    assert "final state bit-for-bit identical" in output
     assert code == 4  # as it had failed

@@ -42,10 +42,10 @@ def test_quantiles_are_those_of_scipy(distribution, reference):
     ],
 )
 def test_values_that_are_finitely_many(text, values):
-    found = parse(text)
-    assert found.values == values
-    assert [found.at(u) for u in (np.arange(len(values)) + 0.5) / len(values)] == list(values)
-    assert parse(str(found)) == found
+    result = parse(text)
+    assert result.values == values
+    assert [result.at(u) for u in (np.arange(len(values)) + 0.5) / len(values)] == list(values)
+    assert parse(str(result)) == result
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_draws_are_distributed_as_they_ought_to_be():
 
 
 @pytest.mark.parametrize("design", ["lhs", "sobol"])
-def test_designs_draw_every_part_of_a_range(design):
+def test_designs_draw_every_part_of_range(design):
     made = plan("hover", runs=16, vary={"a": uniform(0, 16), "b": uniform(0, 16)}, design=design)
     for key in "ab":
         assert sorted(map(int, drawn(made, key))) == list(range(16))  # one in each sixteenth
@@ -98,14 +98,14 @@ def test_designs_draw_every_part_of_a_range(design):
     assert made.values(7) == plan("hover", runs=16, vary=dict(made.vary), design=design).values(7)
 
 
-def test_a_grid_has_all_combinations():
+def test_grid_has_all_combinations():
     made = plan("hover", vary={"a": choice(1, 2), "b": linspace(0, 1, 3), "c": uniform(0, 1)}, design="grid")
     assert made.runs == 6
     assert sorted(zip(drawn(made, "a"), drawn(made, "b"), strict=True)) == [(a, b) for a in (1, 2) for b in (0, 0.5, 1)]
     assert len(set(drawn(made, "c"))) == 6
 
 
-def test_a_sweep_keeps_together_what_belongs_together(tmp_path):
+def test_sweep_keeps_rows_together(tmp_path):
     (tmp_path / "s.csv").write_text('vehicle.mass, "sensors.gps.preset"\n9.5, rtk\n10.5, standard\n')
     made = plan("hover", runs=3, sweep=tmp_path / "s.csv")
     assert [made.values(k) for k in range(3)] == [
@@ -131,21 +131,21 @@ def test_no_sweep(tmp_path, text, said):
         plan("hover", sweep=tmp_path / "s.csv")
 
 
-def test_a_sweep_may_begin_with_the_mark_that_spreadsheets_put_there(tmp_path):
+def test_sweep_may_begin_with_mark_that_spreadsheets_put_there(tmp_path):
     (tmp_path / "s.csv").write_text("\ufeffa,b\n1,2\n", encoding="utf-8")
     assert plan("hover", sweep=tmp_path / "s.csv").sweep == ({"a": 1, "b": 2},)
 
 
-def test_a_grid_is_flown_though_its_first_runs_are_all_refused():
+def test_grid_is_flown_though_its_first_runs_are_all_refused():
     vary = {"effects.random_wind_force.sigma": choice(-1, 1), "vehicle.mass": linspace(10, 11, 20)}
     made = plan("delivery_mission", vary=vary, design="grid")
     assert made.runs == 40
     assert first_setup(made)[0] >= 20
 
 
-def test_what_is_refused_is_told_alike_wherever_files_lie():
-    told = [_refusal(SceneError("autopilot.gains", f"no file {folder}/nix.toml")) for folder in ("/a/b", "/c")]
-    assert told == ["autopilot.gains: no file nix.toml"] * 2
+def test_rejection_text_is_independent_of_file_place():
+    reported = [_refusal(SceneError("autopilot.gains", f"no file {folder}/nix.toml")) for folder in ("/a/b", "/c")]
+    assert reported == ["autopilot.gains: no file nix.toml"] * 2
 
 
 @pytest.mark.parametrize(

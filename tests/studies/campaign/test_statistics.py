@@ -13,21 +13,21 @@ def test_clopper_and_pearson():
     assert interval(0, 0)[1:] == (0.0, 1.0)
 
 
-def test_spread_names_the_worst():
+def test_spread_names_worst():
     values, runs = np.append(np.arange(101.0), np.nan), np.arange(102) + 100
     assert spread(values, runs) == (50.0, 5.0, 95.0, 100.0, 200)
     assert spread(values, runs, least=True).run == 100
     assert spread(np.array([np.nan]), runs[:1]) is None
 
 
-def test_a_difference_of_pairs_is_sharper_than_of_means():
+def test_difference_of_pairs_is_sharper_than_of_means():
     noise = np.random.default_rng(1).normal(0.0, 10.0, 400)
-    found = paired(noise, noise + np.tile([0.9, 1.1], 200))
-    assert found.value == pytest.approx(1.0)
-    assert found.high - found.low == pytest.approx(2.0 * 1.966 * 0.1 / 20.0, rel=0.01)
+    result = paired(noise, noise + np.tile([0.9, 1.1], 200))
+    assert result.value == pytest.approx(1.0)
+    assert result.high - result.low == pytest.approx(2.0 * 1.966 * 0.1 / 20.0, rel=0.01)
 
 
-def test_rank_correlation_of_a_monotone_and_of_no_relation():
+def test_rank_correlation_of_monotone_and_of_no_relation():
     x = np.random.default_rng(2).uniform(size=500)
     assert rank_correlation(x, np.exp(5.0 * x)).value == pytest.approx(1.0)
     none = rank_correlation(x, np.random.default_rng(3).uniform(size=500))
@@ -39,11 +39,11 @@ def test_rank_correlation_of_a_monotone_and_of_no_relation():
 def test_sobol_indices_of_ishigamis_function():
     x = np.random.default_rng(4).uniform(-np.pi, np.pi, (4000, 3))
     y = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-    found = sobol(x, y, ["a", "b", "c"])
-    assert [s.value for s in found] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.04)  # Saltelli et al. 2008
+    result = sobol(x, y, ["a", "b", "c"])
+    assert [s.value for s in result] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.04)  # Saltelli et al. 2008
 
 
-def test_an_ellipse_holds_its_share():
+def test_ellipse_holds_its_share():
     points = np.random.default_rng(5).multivariate_normal([1.0, 2.0], [[4.0, 1.5], [1.5, 1.0]], 20000)
     outline = ellipse(points, 0.95) - points.mean(axis=0)
     inverse = np.linalg.inv(np.cov(points.T))

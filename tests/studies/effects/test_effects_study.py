@@ -1,5 +1,6 @@
 """The study of effects: differences in closed form, the smallest set on flights made up, and a real one."""
 
+import contextlib
 import json
 import math
 from pathlib import Path
@@ -7,9 +8,10 @@ from pathlib import Path
 import pytest
 from synthetic_flights import moved
 
+from lapwing.dynamics import effects
 from lapwing.services.common.vehicle_schema import Effects
 from lapwing.services.scene_resolver import load
-from lapwing.studies.effects import console_output
+from lapwing.studies.effects import console_output, procedure
 from lapwing.studies.effects.influence import Influence, influence
 from lapwing.studies.effects.procedure import Row, Study, _smallest
 from lapwing.studies.effects.procedure import study as run_study
@@ -21,21 +23,21 @@ HOVER = Path(__file__).parents[3] / "lapwing/scenes/hover.toml"
 
 
 def test_difference_of_two_flights():
-    found = influence(moved([0, 1, 2, 3]), moved([0, 1, 4, 2], power=110.0))
-    assert found.trajectory == 2.0
-    assert found.final == 1.0
-    assert found.energy == pytest.approx(0.1)
+    result = influence(moved([0, 1, 2, 3]), moved([0, 1, 4, 2], power=110.0))
+    assert result.trajectory == 2.0
+    assert result.final == 1.0
+    assert result.energy == pytest.approx(0.1)
 
 
-def test_who_has_landed_earlier_stays_there():
+def test_landed_vehicle_stays_landed():
     assert influence(moved([0, 1, 2]), moved([0, 1, 2, 5])).final == 3.0
     assert influence(moved([0, 1, 2, 5]), moved([0, 1])).trajectory == 4.0
 
 
-def test_a_flight_without_end_is_infinitely_far():
-    found = influence(moved([0, 1]), moved([0], failure="not finite at t = 1 s"))
-    assert found.trajectory == math.inf
-    assert found.failure == "not finite at t = 1 s"
+def test_flight_without_end_is_infinitely_far():
+    result = influence(moved([0, 1]), moved([0], failure="not finite at t = 1 s"))
+    assert result.trajectory == math.inf
+    assert result.failure == "not finite at t = 1 s"
 
 
 class Crew:
@@ -48,19 +50,19 @@ class Crew:
         return iter([moved([0, sum(w for n, w in self.worth.items() if n not in tables)]) for tables in variants])
 
 
-def test_the_smallest_set_leaves_out_all_that_may_go_together():
+def test_smallest_set_leaves_out_all_that_may_go_together():
     worth = {"a": 0.001, "b": 0.004, "c": 0.008, "d": 5.0}
-    said = []
+    output = []
     kept, apart = _smallest(
-        Crew(worth), {name: {} for name in worth}, moved([0, 0]), ["a", "b", "c"], 0.01, said.append
+        Crew(worth), {name: {} for name in worth}, moved([0, 0]), ["a", "b", "c"], 0.01, output.append
     )
     assert list(kept) == ["c", "d"]
     assert apart == pytest.approx(0.005)
-    assert said == ["without a, b, c together", "without a, b together"]
-    assert _smallest(Crew(worth), {name: {} for name in worth}, moved([0, 0]), [], 0.01, said.append)[1] == 0.0
+    assert output == ["without a, b, c together", "without a, b together"]
+    assert _smallest(Crew(worth), {name: {} for name in worth}, moved([0, 0]), [], 0.01, output.append)[1] == 0.0
 
 
-def test_density_changes_a_real_flight_a_little():
+def test_density_changes_real_flight_little():
     scene = load(HOVER, ["run.duration=2.0"])
     tables = dict(scene[Effects].tables)
     one, again, thinner = (fly(variant(scene, t)) for t in (tables, tables, tables | {"air_density": {}}))
@@ -70,11 +72,30 @@ def test_density_changes_a_real_flight_a_little():
     assert 100.0 < one.energy < 4000.0
 
 
-def test_effects_that_cannot_be_say_why():
+def test_impossible_effects_name_reason():
     scene = load(HOVER)
     assert refusal(scene, {"gravity": {}, "gravity_altitude": {}}).startswith("effects.gravity_altitude: excludes")
     assert refusal(scene, {"wind_gust": {}}).startswith("effects.wind_gust.peak: ")
     assert refusal(scene, scene[Effects].tables) == ""
+
+
+def test_every_effect_of_catalogue_is_listed(monkeypatch):
+    """Flights and costs are replaced; what cannot be flown has its reason."""
+
+    class Same:
+        def fly(self, variants):
+            return (moved([0.0, 1.0]) for _ in variants)
+
+    monkeypatch.setattr(procedure, "hangar", lambda scene: contextlib.nullcontext(Same()))
+    monkeypatch.setattr(procedure, "costs", lambda scene, variants: [(1.0, 1.0)] * len(variants))
+    result = run_study(load(HOVER), 0.01, lambda *_: None)
+    rows = {row.name: row for row in result.rows}
+    assert sorted(rows) == effects.names()
+    for name in ("multirotor_ground_effect", "vortex_ring", "dc_motor", "battery_thevenin"):
+        assert rows[name].influence is not None
+    assert rows["ceiling_effect"].remark.startswith("effects.ceiling_effect.height: missing")
+    assert rows["collision"].remark == "effects.collision: needs other vehicles"
+    assert rows["downwash"].remark == "effects.downwash: needs other vehicles"
 
 
 def study():
@@ -88,9 +109,9 @@ def study():
 
 
 def test_table_json_and_plot(tmp_path, capsys):
-    found = study()
-    assert [row.name for row in found.missing] == ["wind"]
-    console_output.show(console(80), found)
+    result = study()
+    assert [row.name for row in result.missing] == ["wind"]
+    console_output.show(console(80), result)
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text  # no digit is cut
@@ -98,14 +119,14 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert "ends early" in text
     assert "not flown: gust.peak: field required" in text
     assert "Left out, and worth more than 0.01 m: wind" in text
-    console_output.write_json(tmp_path / "study.json", found)
+    console_output.write_json(tmp_path / "study.json", result)
     data = json.loads((tmp_path / "study.json").read_text())
     assert data["missing"] == ["wind"]
     assert data["rows"][0]["influence"]["trajectory"] is None
-    console_output.plot(tmp_path / "study.png", found)
+    console_output.plot(tmp_path / "study.png", result)
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_system_without_effects_is_refused():
+def test_system_without_effects_is_refused():
     with pytest.raises(ValueError, match=r"os4_motors.toml: the model os4 knows no effects"):
         run_study(load(HOVER.parent / "os4_motors.toml"), 0.01, print)

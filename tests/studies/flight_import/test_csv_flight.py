@@ -3,12 +3,13 @@ import gzip
 import numpy as np
 import pytest
 from flight_recordings import INTERVAL, real_flights, simulated, write_csv
+from scipy.interpolate import CubicSpline
 
 from lapwing.studies.flight_import.column_mapping import load_mapping
 from lapwing.studies.flight_import.csv_flight import read_csv_flight
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, from_vector, product, rotate, rotation_vector
-from lapwing.studies.flight_import.time_alignment import time_offset
+from lapwing.studies.flight_import.time_alignment import clock_drift, time_offset
 from lapwing.studies.validation.plant_rows import PlantRows
 
 
@@ -37,13 +38,13 @@ def read(path):
 
 
 def test_columns_become_si_quantities(flight, path):
-    found = read(path)
-    assert found.position == pytest.approx(flight.position, abs=1e-8)
-    assert found.attitude == pytest.approx(flight.attitude, abs=1e-8)
-    assert found.omega == pytest.approx(flight.omega, abs=1e-8)
-    assert found.specific_force == pytest.approx(flight.specific_force, abs=1e-6)
-    assert found.motor_voltage == pytest.approx(np.minimum(flight.motor_voltage, 4.3), abs=1e-6)
-    assert found.valid.all()
+    result = read(path)
+    assert result.position == pytest.approx(flight.position, abs=1e-8)
+    assert result.attitude == pytest.approx(flight.attitude, abs=1e-8)
+    assert result.omega == pytest.approx(flight.omega, abs=1e-8)
+    assert result.specific_force == pytest.approx(flight.specific_force, abs=1e-6)
+    assert result.motor_voltage == pytest.approx(np.minimum(flight.motor_voltage, 4.3), abs=1e-6)
+    assert result.valid.all()
 
 
 def test_gzip_gives_equal_recording(path, tmp_path):
@@ -56,12 +57,12 @@ def test_faulty_samples_are_marked_and_counted(path):
     edited(path, "motor_motor_m2", lambda k, v: "1938326" if k == 100 else v)
     edited(path, "pwr_pm_vbat", lambda k, v: "2.04" if 200 <= k < 203 else v)
     edited(path, "px", lambda k, v: "nan" if k == 300 else v)
-    found = read(path)
-    assert found.faults["motor out of range"] == 1
-    assert found.faults["battery out of range"] == 3
-    assert found.faults["position not finite"] == 1
-    assert not found.valid[[100, 200, 300]].any()
-    assert found.valid.mean() > 0.95
+    result = read(path)
+    assert result.faults["motor out of range"] == 1
+    assert result.faults["battery out of range"] == 3
+    assert result.faults["position not finite"] == 1
+    assert not result.valid[[100, 200, 300]].any()
+    assert result.valid.mean() > 0.95
 
 
 @pytest.mark.parametrize(
@@ -111,6 +112,23 @@ def test_time_offset_of_shifted_stream():
     assert score > 0.98
 
 
+def test_clock_drift_of_stretched_stream():
+    rng = np.random.default_rng(5)
+    time = 0.01 * np.arange(12_000)
+    knots = np.arange(-1.0, time[-1] + 2.0, 0.15)
+    smooth = [CubicSpline(knots, rng.standard_normal(len(knots))) for _ in range(3)]
+    turning = np.column_stack([f(time) for f in smooth])
+    late = np.column_stack([f(time - 0.02 - 500e-6 * time) for f in smooth]) + 0.1 * rng.standard_normal((12_000, 3))
+    drift = clock_drift(turning, late, np.ones(12_000, bool), 0.01)
+    assert drift.rate == pytest.approx(500e-6, abs=max(3.0 * drift.standard_error, 5e-6))
+    assert drift.standard_error < 20e-6
+
+
+def test_clock_drift_of_short_stream_is_unknown():
+    turning = np.random.default_rng(5).standard_normal((1_000, 3))
+    assert clock_drift(turning, turning, np.ones(1_000, bool), 0.01) is None
+
+
 def test_unknown_unit_is_named(tmp_path):
     text = '[time]\ncolumn = "t"\nunit = "fortnight"\n'
     mapping = tmp_path / "mine.toml"
@@ -122,7 +140,7 @@ def test_unknown_unit_is_named(tmp_path):
 def test_real_flights_import_with_their_faults():
     folder = real_flights("nanobench")
     mapping = load_mapping("nanobench")
-    found = read_csv_flight(folder / "B2_circle_medium_rep3.csv.gz", mapping)
-    assert found.faults["motor out of range"] > 500
-    assert found.faults["battery out of range"] > 100
-    assert 0.6 < found.valid.mean() < 0.9
+    result = read_csv_flight(folder / "B2_circle_medium_rep3.csv.gz", mapping)
+    assert result.faults["motor out of range"] > 500
+    assert result.faults["battery out of range"] > 100
+    assert 0.6 < result.valid.mean() < 0.9

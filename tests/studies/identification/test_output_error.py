@@ -7,19 +7,21 @@ import numpy as np
 import pytest
 from flight_recordings import INTERVAL, simulated, write_csv
 
+from lapwing.services.scene_resolver import load_one
 from lapwing.studies.identification.output_error import OutputError
-from lapwing.studies.identification.procedure import identify
+from lapwing.studies.identification.procedure import identify, start_value
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
 
 SCENE = "crazyflie_21"
-TRUE = {
-    "effects.rotor_quadratic.thrust_constant": 1.75e-8,
-    "airframe.motor.time_constant": 0.0557,
-    "effects.h_force.coefficient": 1.89e-6,
-    "airframe.mass.inertia.0": 1.89e-4,
-}
+KEYS = (
+    "effects.rotor_quadratic.thrust_constant",
+    "airframe.motor.time_constant",
+    "effects.h_force.coefficient",
+    "airframe.mass.inertia.0",
+)
+TRUE = {key: start_value(load_one(SCENE, ()), key) for key in KEYS}
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +84,12 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     done = run(
         "identify", SCENE, *paths, "--mapping", "nanobench", "--free",
         "airframe.motor.time_constant,effects.h_force.coefficient", "--out", out, "--json", figures,
-        "--windows", "60", "--trim-force", "0", "--trim-torque", "0", "--set", "airframe.motor.time_constant=0.08",
+        "--windows", "60", "--trim-force", "0", "--trim-torque", "0", "--seed", "3", "--horizons", "10,50",
+        "--set", "airframe.motor.time_constant=0.08",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(0.0557, rel=0.1)
+    true = TRUE["airframe.motor.time_constant"]
+    assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(true, rel=0.1)
     assert "Identified by output error from 2 flights" in out.read_text()
     assert len(json.loads(figures.read_text())["held_out"]) == 1
     assert not out.with_name("mine.toml.progress").exists()

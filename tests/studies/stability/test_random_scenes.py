@@ -9,11 +9,11 @@ from lapwing.studies.stability.flights import finite
 
 @given(st.integers(0, 2**31))
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-def test_what_validates_flies_and_flies_alike_twice(seed):
-    found = flights(seed)
-    if found is None:
+def test_valid_random_scene_flies_repeatably(seed):
+    result = flights(seed)
+    if result is None:
         return
-    first, second = found
+    first, second = result
     assert not first.failure
     assert finite(first)
     assert first.digest == second.digest

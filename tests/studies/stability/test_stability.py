@@ -27,7 +27,7 @@ CHEAP = (
 
 
 @pytest.mark.parametrize("name", CHEAP)
-def test_a_case_stands_and_its_baseline_method_does_not(name, monkeypatch):
+def test_case_passes_and_baseline_fails(name, monkeypatch):
     result = one(name, False)
     assert result.found.rows
     for row in result.found.rows:
@@ -36,7 +36,7 @@ def test_a_case_stands_and_its_baseline_method_does_not(name, monkeypatch):
     assert result.found.plot.curves
 
 
-def test_every_case_says_what_is_hard():
+def test_every_case_describes_its_difficulty():
     for name in cases.names():
         assert cases.get(name).HARD
         assert cases.get(name).__doc__.startswith("Case ")
@@ -62,11 +62,11 @@ def made_up(monkeypatch):
 def test_json_and_page(made_up, tmp_path, capsys):
     made_up(row(0.5, 2.0), row(0.0, math.nan, 0.0))
     stability("made_up", json=tmp_path / "s.json", report=tmp_path / "s.html")
-    given = {"name": "made_up.row", "bound": 1.0, "measured": 0.5, "verdict": "pass"}
+    values = {"name": "made_up.row", "bound": 1.0, "measured": 0.5, "verdict": "pass"}
     assert json.loads((tmp_path / "s.json").read_text()) == {
         "cases": [
-            {**given, "baseline_measured": 2.0, "baseline_verdict": "fail"},
-            {**given, "bound": 0.0, "measured": 0.0, "baseline_measured": None, "baseline_verdict": "fail"},
+            {**values, "baseline_measured": 2.0, "baseline_verdict": "fail"},
+            {**values, "bound": 0.0, "measured": 0.0, "baseline_measured": None, "baseline_verdict": "fail"},
         ]
     }
     page = (tmp_path / "s.html").read_text()
@@ -78,14 +78,14 @@ def test_json_and_page(made_up, tmp_path, capsys):
 @pytest.mark.parametrize(
     "rows", [[row(2.0, 3.0)], [row(math.nan, 3.0)], [row(0.1, 0.2)]], ids=["over", "nan", "no teeth"]
 )
-def test_exit_code_1_where_a_case_falls_short(made_up, rows):
+def test_exit_code_1_where_case_falls_short(made_up, rows):
     made_up(*rows)
     with pytest.raises(SystemExit) as ended:
         stability("made_up")
     assert ended.value.code == 1
 
 
-def test_a_case_that_ends_in_an_error_falls_short(monkeypatch):
+def test_case_that_ends_in_error_falls_short(monkeypatch):
     def broken():
         raise ValueError("out of reach")
 
@@ -103,7 +103,7 @@ def test_a_case_that_ends_in_an_error_falls_short(monkeypatch):
         ({"report": "page.txt"}, "expected a name that ends in .html"),
     ],
 )
-def test_what_cannot_be_asked_for_is_one_line_and_exit_code_2(arguments, message, capsys, tmp_path):
+def test_invalid_case_exits_with_code_2(arguments, message, capsys, tmp_path):
     if "report" in arguments:
         arguments = {"report": tmp_path / arguments["report"]}
     with pytest.raises(SystemExit) as ended:
@@ -112,13 +112,13 @@ def test_what_cannot_be_asked_for_is_one_line_and_exit_code_2(arguments, message
     assert message in capsys.readouterr().err
 
 
-def test_long_cases_are_left_out_unless_they_are_asked_for():
+def test_slow_cases_need_option():
     assert "day_of_flight" not in chosen(None, False, False)
     assert "day_of_flight" in chosen(None, True, False)
     assert "lie_limits" not in chosen(None, False, True)
 
 
-def test_where_a_method_breaks():
+def test_where_method_breaks():
     x = np.array([1.0, 2.0, 3.0, 4.0])
     curves = [Curve("soon", x, np.array([0.1, 5.0, 0.1, 9.0])), Curve("never", x, x * 0.0)]
     assert Sweep("d", "e", 1.0, curves).breaks() == {"soon": 2.0, "never": None}
@@ -126,7 +126,7 @@ def test_where_a_method_breaks():
     assert Sweep("d", "e", 1.0, [Curve("nan", x, x * np.nan)]).breaks() == {"nan": 1.0}
 
 
-def test_how_far_from_the_bound():
+def test_margin_to_bound():
     assert console_output.distance(1.0, 0.5) == "2 x"
     assert console_output.distance(1.0, 0.0) == "exact"
     assert console_output.distance(0.0, 0.0) == ""

@@ -26,7 +26,7 @@ def airframe():
     return known_airframe(SCENE)
 
 
-def test_the_linear_model_is_the_one_derived_by_hand(model, airframe):
+def test_linear_model_is_one_derived_by_hand(model, airframe):
     """Theory, eqs. (1.13) and (4.30): 4/m, 4 l/J, 4 b/J_z, the motors' lag, and g over the tilt."""
     arm = sum(abs(x) for x in airframe.rotor_x)
     i_x, i_y, i_z = airframe.inertia_body
@@ -41,7 +41,7 @@ def test_the_linear_model_is_the_one_derived_by_hand(model, airframe):
     assert model.thrust_slope == pytest.approx(2.0 * weight / model.rotor_speed, rel=1e-6)
 
 
-def test_the_reaction_to_speeding_rotors_up_leads_the_yaw():
+def test_reaction_to_speeding_rotors_up_leads_yaw():
     """Theory, after eq. (4.31): the effect of a steady speed is the same, its rate adds I_r / (b_T dF/dOmega)."""
     scene = load_scene(SCENE.path.parent / "delivery_mission.toml")
     with_inertia, without, known = hover(scene), hover(SCENE), known_airframe(scene)
@@ -62,7 +62,7 @@ def test_the_reaction_to_speeding_rotors_up_leads_the_yaw():
     )
 
 
-def test_a_loop_is_stable_up_to_its_margins_and_no_further(airframe):
+def test_loop_is_stable_up_to_its_margins_and_no_further(airframe):
     for name in ("paper", "tuned"):
         loops = open_loops(build(load(name).plain(), airframe), airframe, TICK)
         for loop in ("altitude", "yaw", "x_plant_input", "y_plant_input"):
@@ -75,10 +75,10 @@ def test_a_loop_is_stable_up_to_its_margins_and_no_further(airframe):
 
 
 @pytest.mark.parametrize("factor", [1.0, 3.0])
-def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airframe, factor):
-    said = []
-    wanted = Bandwidths(*(factor * w for w in Bandwidths()))
-    gains = gain_set(model, design(model, airframe, TICK, wanted, said.append))
+def test_design_keeps_margins_and_reports_slower_loops(model, airframe, factor):
+    output = []
+    expected = Bandwidths(*(factor * w for w in Bandwidths()))
+    gains = gain_set(model, design(model, airframe, TICK, expected, output.append))
     loops = open_loops(build(gains.plain(), airframe), assumed_airframe(airframe, model), TICK)
     for m in map(margins, loops.values()):
         assert math.degrees(m.phase) >= PHASE
@@ -86,7 +86,7 @@ def test_the_design_keeps_its_margins_and_says_where_it_backs_off(model, airfram
         assert m.reduction <= 10.0 ** (-GAIN / 20.0)
     assert not shortfalls(loops)
     if factor > 1.0:
-        assert any("backed off" in line for line in said)
+        assert any("backed off" in line for line in output)
 
 
 def test_unstable_and_weak_gains_are_named(airframe):
@@ -99,20 +99,20 @@ def test_unstable_and_weak_gains_are_named(airframe):
 RACER = {"vehicle.airframe": str(Path(__file__).parent / "racer.toml"), "effects.gyroscopic_torque": {}}
 
 
-def test_a_racer_is_designed_for_although_the_scenes_gains_are_another_vehicles():
+def test_design_ignores_gains_of_other_vehicle():
     """Its yaw under the delivery drone's gains has a gain above 1 throughout, which once was an IndexError."""
-    scene, said = load_scene("hover", RACER), []
+    scene, output = load_scene("hover", RACER), []
     model, airframe = hover(scene), known_airframe(scene)
     plant = assumed_airframe(airframe, model)
     own = open_loops(build(load("tuned").plain(), airframe), plant, TICK)
     assert margins(own["yaw"]).crossover == math.inf
     assert shortfalls(own)["yaw"]
-    found = gain_set(model, design(model, airframe, TICK, Bandwidths(), said.append))
-    assert not shortfalls(open_loops(build(found.plain(), airframe), plant, TICK))
-    assert [line.partition(":")[0] for line in said] == ["yaw"]
+    result = gain_set(model, design(model, airframe, TICK, Bandwidths(), output.append))
+    assert not shortfalls(open_loops(build(result.plain(), airframe), plant, TICK))
+    assert [line.partition(":")[0] for line in output] == ["yaw"]
 
 
-def test_a_loop_that_cannot_be_had_is_named():
+def test_loop_that_cannot_be_had_is_named():
     scene = load_scene("hover", {"airframe.motor.time_constant": 20.0})
     with pytest.raises(ValueError, match=r"no gains with 45 deg and 6 dB found: \w+: .*; ask for lower bandwidths"):
         design(hover(scene), known_airframe(scene), TICK, Bandwidths(), lambda _: None)

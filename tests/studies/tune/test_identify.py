@@ -47,7 +47,7 @@ def test_gains_and_lag_are_found_again(kind):
     assert min(it.fit.values()) > 75.0
 
 
-def test_a_vehicle_that_is_heavier_than_assumed_shows(tmp_path):
+def test_heavier_vehicle_is_identified(tmp_path):
     airframe = (SCENES / "vehicles" / "delivery_drone.toml").read_text()
     heavy_file = tmp_path / "heavy.toml"
     heavy_file.write_text(re.sub(r"^total = .*$", "total = 12.0", airframe, count=1, flags=re.MULTILINE))

@@ -38,9 +38,9 @@ def test_written_gains_can_be_read_and_flown(found, tmp_path):
 def test_refinement_keeps_margins_and_reduces_errors(found):
     assert found.after.shortfalls == {}
     assert rmse(found.polished.after, "z") < 0.9 * rmse(found.polished.before, "z")
-    moved, asked = found.polished.bandwidths, Bandwidths()
-    assert moved.altitude != asked.altitude
-    assert moved.position == asked.position  # nothing of this flight goes along x or y
+    moved, requested = found.polished.bandwidths, Bandwidths()
+    assert moved.altitude != requested.altitude
+    assert moved.position == requested.position  # nothing of this flight goes along x or y
 
 
 def test_tuning_is_deterministic(found):
@@ -81,10 +81,10 @@ def test_failing_gains_are_named_and_need_force(found, tmp_path, monkeypatch):
     assert (result.exit_code, out.exists()) == (0, True)
 
 
-def test_weak_present_gains_give_a_warning():
-    said = []
-    tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), said.append)
-    assert any(line.startswith("warning: present gains paper of the scene: roll: phase margin 2") for line in said)
+def test_weak_present_gains_give_warning():
+    output = []
+    tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), output.append)
+    assert any(line.startswith("warning: present gains paper of the scene: roll: phase margin 2") for line in output)
 
 
 def gains_with(tmp_path, **changes):

@@ -24,7 +24,7 @@ def airframe(request):
 
 
 @pytest.mark.parametrize("name", ["tuned", "paper"])
-def test_the_same_responses_margins_and_stability(name, airframe):
+def test_same_responses_margins_and_stability(name, airframe):
     p = build(load(name).plain(), airframe)
     own = open_loops(p, airframe, TICK, DELAY)
     for loop, system in systems(p, airframe, TICK, DELAY).items():
@@ -38,16 +38,16 @@ def test_the_same_responses_margins_and_stability(name, airframe):
         assert stable(own[loop]) == (closed(system).poles().real.max() < 0.0), loop
 
 
-def test_step_of_a_first_order_loop_is_the_closed_form():
+def test_step_of_first_order_loop_is_closed_form():
     w = 4.0
-    found = step(control.tf([w], [1.0, 0.0]), 3.0)
-    assert np.allclose(found.value, 1.0 - np.exp(-w * found.time), atol=1e-6)
-    assert found.rise == pytest.approx(math.log(9.0) / w, rel=0.02)
-    assert found.overshoot == pytest.approx(0.0, abs=1e-4)
-    assert found.settling == pytest.approx(math.log(50.0) / w, rel=0.02)
+    result = step(control.tf([w], [1.0, 0.0]), 3.0)
+    assert np.allclose(result.value, 1.0 - np.exp(-w * result.time), atol=1e-6)
+    assert result.rise == pytest.approx(math.log(9.0) / w, rel=0.02)
+    assert result.overshoot == pytest.approx(0.0, abs=1e-4)
+    assert result.settling == pytest.approx(math.log(50.0) / w, rel=0.02)
 
 
-def test_steps_settle_at_the_setpoint(airframe):
+def test_steps_settle_at_setpoint(airframe):
     loops = systems(build(load("tuned").plain(), airframe), airframe, TICK, DELAY)
     for loop in ("altitude", "yaw", "x", "y"):
         assert step(loops[loop], 6.0).value[-1] == pytest.approx(1.0, abs=0.01)

@@ -36,10 +36,10 @@ def test_own_flight_is_predicted_to_rounding(plant, flights):
     flight = flights[0]
     (states,) = start_states(plant, [flight], NO_TRIM)
     starts = np.arange(200, 400, 7)  # the rotors have forgotten what they began with
-    found = compare(flight, starts, (1, 10, 50), predict(plant, flight, starts, states, (1, 10, 50)))
-    assert np.abs(found.position).max() < 1e-8
-    assert np.abs(found.attitude).max() < 1e-6
-    assert np.abs(found.rate).max() < 1e-6
+    result = compare(flight, starts, (1, 10, 50), predict(plant, flight, starts, states, (1, 10, 50)))
+    assert np.abs(result.position).max() < 1e-8
+    assert np.abs(result.attitude).max() < 1e-6
+    assert np.abs(result.rate).max() < 1e-6
 
 
 def test_trim_recovers_constant_force(plant, flights):
@@ -72,9 +72,9 @@ def test_windows_stay_clear_of_invalid_samples(flights):
 
 def test_constant_velocity_matches_closed_form(flights):
     flight, starts = flights[0], np.array([100, 200])
-    found = constant_velocity(flight, starts, (50,))
+    result = constant_velocity(flight, starts, (50,))
     expected = flight.position[starts] + 0.5 * flight.velocity[starts] - flight.position[starts + 50]
-    assert found.position[:, 0] == pytest.approx(expected, abs=1e-12)
+    assert result.position[:, 0] == pytest.approx(expected, abs=1e-12)
 
 
 def test_linear_fit_beats_constant_velocity(flights):
@@ -95,8 +95,8 @@ def test_interval_resamples_flights_not_windows():
 
 
 def test_magnitudes_are_means_over_axes(plant, flights):
-    found = errors(plant, flights[0], (10,))
-    assert magnitudes(found)[:, 0, 1] == pytest.approx(np.abs(found.velocity[:, 0]).mean(axis=1))
+    result = errors(plant, flights[0], (10,))
+    assert magnitudes(result)[:, 0, 1] == pytest.approx(np.abs(result.velocity[:, 0]).mean(axis=1))
 
 
 def run(*arguments):
@@ -107,8 +107,9 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 4.0, [1, 2, 3])]
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
     done = run(
-        "validate", SCENE, *paths, "--mapping", "nanobench", "--horizons", "1,50", "--json", out, "--report", page
-    )
+        "validate", SCENE, *paths, "--mapping", "nanobench", "--horizons", "1,50", "--json", out, "--report", page,
+        "--stride", "7", "--trim-force", "2", "--trim-torque", "0", "--set", "run.seed=2",
+    )  # fmt: skip
     assert done.returncode == 0, done.stderr
     first, last = json.loads(out.read_text())["horizons"]
     assert (first["steps"], last["steps"]) == (1, 50)
@@ -139,6 +140,6 @@ def test_real_flights_are_predicted_better_than_baseline():
     from lapwing.studies.validation.procedure import validate
 
     paths = sorted(real_flights("nanobench").glob("B9_trefoil_slow_rep*.csv.gz"))[:4]
-    found = validate(SCENE, paths, "nanobench", (10, 50))
+    result = validate(SCENE, paths, "nanobench", (10, 50))
     for field in range(4):
-        assert found.plant[-1][field].mean < found.baselines["constant_velocity"][-1][field].mean
+        assert result.plant[-1][field].mean < result.baselines["constant_velocity"][-1][field].mean

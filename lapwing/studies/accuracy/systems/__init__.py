@@ -1,6 +1,6 @@
 """The systems of the accuracy study: one file each, found by scanning this folder.
 
-A file has `problems()`, which gives its problems by the name that `lapwing accuracy` takes.
+A file has `problems()`, which returns its problems by their names in `lapwing accuracy`.
 """
 
 from functools import cache
@@ -11,8 +11,8 @@ from lapwing.studies.accuracy.problem import Problem
 
 @cache
 def problems() -> dict[str, Problem]:
-    """Every problem by its name."""
-    found: dict[str, Problem] = {}
+    """Return all problems by name."""
+    result: dict[str, Problem] = {}
     for module in discovery.modules(__name__).values():
-        found |= module.problems()
-    return found
+        result |= module.problems()
+    return result

@@ -28,7 +28,7 @@ def _parameters(drive: LiftCommand) -> CooperativeLoadParameters:
 
 
 def problems() -> dict[str, Problem]:
-    """The problems of this file: a carried load under steady thrusts and moments, and falling with the rotors off."""
+    """Return this file's problems: a shared load under steady thrusts and moments, and falling with rotors off."""
     return {
         "cooperative_load": _problem("steady thrusts and moments", _parameters(PUSHED), {}),
         "cooperative_load_falling": _problem("rotors off", _parameters(OFF), {"energy": energy}),
@@ -48,7 +48,7 @@ def _problem(title: str, p: CooperativeLoadParameters, invariants: dict) -> Prob
 
 
 def swing(p: CooperativeLoadParameters, x: CooperativeLoadState, duration: float) -> np.ndarray:
-    """Coordinates at the end, from free particles under constraint forces, with no sphere in their equations."""
+    """Return the final coordinates of free particles under constraint forces, without spheres in their equations."""
     y, n = of_state(x), len(x.link)
     length = np.array(p.link_length)[:, None]
     # of the state's coordinates: load 0:6, attitudes, angular velocities, then q and omega of each link
@@ -65,7 +65,7 @@ def swing(p: CooperativeLoadParameters, x: CooperativeLoadState, duration: float
 
 
 def right_hand_side(p: CooperativeLoadParameters, z: np.ndarray) -> np.ndarray:
-    """Newton for load and quadrotors with |r_i - r_0| = L_i by multipliers; attitudes and angular velocities beside."""
+    """Return Newton's equations of load and quadrotors with |r_i - r_0| = L_i by multipliers, and attitudes."""
     n = len(p.link_length)
     k = 3 * n + 3
     r, v = z[:k].reshape(-1, 3), z[k : 2 * k].reshape(-1, 3)
@@ -87,7 +87,7 @@ def right_hand_side(p: CooperativeLoadParameters, z: np.ndarray) -> np.ndarray:
 
 
 def energy(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Kinetic and potential energy [J], shape (k,), from positions and velocities of the three masses."""
+    """Return the kinetic and potential energy [J], shape (k,), from positions and velocities of the three masses."""
     p = _parameters(OFF)
     at, n = 30, 2
     total = p.load_mass * (0.5 * (y[:, 3:6] ** 2).sum(axis=1) + p.gravity * y[:, 2])

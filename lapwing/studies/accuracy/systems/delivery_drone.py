@@ -63,8 +63,8 @@ def _of_euler(p: Any, x: Any) -> float:
 
 @overload_for(gap)
 def _gap(p, x):  # type: ignore[no-untyped-def] # numba compares its signature with that of what it gives
-    found = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
-    return lambda p, x: found(p, x)
+    result = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
+    return lambda p, x: result(p, x)
 
 
 @kernel
@@ -80,7 +80,7 @@ def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, 
 
 
 def problems() -> dict[str, Problem]:
-    """The problem of this file: the delivery drone, in the air and tumbling, as one rigid body and as five."""
+    """Return the problem of this file: the delivery drone, in the air and tumbling, as one rigid body and as five."""
     frame = load_airframe(AIRFRAME)
     gyro = effects.from_scene({"gyroscopic_torque": {}}, frame)
     volts = (SPEED * frame.motor.rotor_constant,) * 4
@@ -108,7 +108,7 @@ def problems() -> dict[str, Problem]:
 
 
 def thrown(p: Any, frame: Any) -> FiveBodies:
-    """The five bodies at the start, blades along x."""
+    """Return the initial state of the five bodies, blades along x."""
     speeds = tuple(-sign * SPEED for sign in frame.rotors.reaction_sign)
     machine = five_bodies_machine(p.layout.bodies.drone, STILL, speeds=speeds)
     return five_body_stabilisation.assembled_state(
@@ -136,7 +136,7 @@ def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
 
 
 def inertia(frame: Any, angles: Any) -> np.ndarray:
-    """Inertia of frame and propellers at these angles [rad] in the body, shape (3, 3); None: averaged over a turn."""
+    """Return the body inertia of frame and propellers at angles [rad], shape (3, 3); None: mean over a turn."""
     rotors, total = frame.rotors, np.diag(frame.mass.inertia).astype(float)
     along, across = rotors.blade_inertia
     for k, hub in enumerate(np.array(rotors.position)):
@@ -149,8 +149,11 @@ def inertia(frame: Any, angles: Any) -> np.ndarray:
 
 
 def reference(frame: Any) -> np.ndarray:
-    """(position, R, velocity, omega) at the end: without torque from outside the angular momentum keeps its direction
-    in the world, R' = R hat(omega) with J(angles) omega + h = R^T L (theory.md, eq. (8.50)); shape (18,)."""
+    """Return the final (position, R, velocity, omega), shape (18,).
+
+    Without external torque the angular momentum keeps its world direction: R' = R hat(omega) with
+    J(angles) omega + h = R^T L (theory.md, eq. (8.50)).
+    """
     spin = -np.array(frame.rotors.reaction_sign) * SPEED
     own = np.array([0.0, 0.0, frame.rotors.inertia * spin.sum()])
     start = np.array(rotation_matrix(ATTITUDE)).reshape(3, 3)
@@ -159,10 +162,10 @@ def reference(frame: Any) -> np.ndarray:
     def omega(t: float, y: np.ndarray) -> np.ndarray:
         return np.linalg.solve(inertia(frame, spin * t), y.reshape(3, 3).T @ momentum - own)
 
-    found = solve_ivp(
+    result = solve_ivp(
         lambda t, y: turning(y, omega(t, y)), (0.0, DURATION), start.ravel(), method="DOP853",
         rtol=TOLERANCE, atol=0.1 * TOLERANCE,
     )  # fmt: skip
-    end = found.y[:, -1]
+    end = result.y[:, -1]
     # the hubs surround the centre of mass: it stays where it is
     return np.concatenate([STILL, end, STILL, omega(DURATION, end)])

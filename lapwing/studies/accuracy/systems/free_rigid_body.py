@@ -17,7 +17,7 @@ DURATION = 60.0  # [s]
 
 
 def problems() -> dict[str, Problem]:
-    """The problem of this file: a body of three different moments of inertia, tumbling."""
+    """Return the problem of this file: a body of three different moments of inertia, tumbling."""
     problem = Problem(
         "free rigid body, three different moments of inertia",
         "s",
@@ -31,17 +31,17 @@ def problems() -> dict[str, Problem]:
 
 
 def energy(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Kinetic energy [J], shape (k,)."""
+    """Return the kinetic energy [J], shape (k,)."""
     return 0.5 * (y[:, 9:12] ** 2 * INERTIA).sum(axis=1)
 
 
 def momentum(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Angular momentum in the world [N m s], shape (k, 3)."""
+    """Return the angular momentum in the world [N m s], shape (k, 3)."""
     return to_world(y[:, :9], y[:, 9:12] * INERTIA)
 
 
 def closed_form(inertia: tuple[float, float, float], start: RigidBody, t: float) -> np.ndarray:
-    """Coordinates at time t (theory.md, eqs. (7.2) to (7.5) and (7.5a)).
+    """Return the coordinates at time t (theory.md, eqs. (7.2) to (7.5) and (7.5a)).
 
     For rotation about the axis of the largest moment, omega_1 and omega_3 positive at the start.
     """
@@ -73,7 +73,7 @@ def closed_form(inertia: tuple[float, float, float], start: RigidBody, t: float)
 
 
 def _upright(momentum_body: np.ndarray) -> np.ndarray:
-    """The rotation, without a turn about z, that takes a momentum in the body to the z axis; shape (3, 3)."""
+    """Return the rotation without a turn about z that takes a body momentum to the z axis; shape (3, 3)."""
     x, y, z = momentum_body / np.linalg.norm(momentum_body)
     across = np.hypot(x, y)
     # rows: the line of nodes, the direction normal to it, the momentum

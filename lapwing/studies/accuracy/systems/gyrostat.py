@@ -34,7 +34,7 @@ BLOCKED = SPINNING._replace(rotor_momentum=NONE)
 
 
 def problems() -> dict[str, Problem]:
-    """The problems of this file: a satellite with rotors blocked, spinning, under friction, and under feedback."""
+    """Return this file's problems: a satellite with rotors blocked, spinning, under friction, and under feedback."""
     momentum = {"momentum": lambda t, y: total_momentum(SPINNING, t, y)}
     steady = {"energy": lambda t, y: energy(STEADY, t, y), "momentum": lambda t, y: total_momentum(STEADY, t, y)}
     free = {"energy": lambda t, y: energy(BLOCKED, t, y), "momentum": lambda t, y: total_momentum(BLOCKED, t, y)}
@@ -61,7 +61,7 @@ def _problem(p: GyrostatParameters, title: str, invariants: dict) -> Problem:
 
 
 def right_hand_side(p: GyrostatParameters, t: float, y: np.ndarray) -> np.ndarray:
-    """The three scalar equations of Ge and Lin for (x, y, z), and R' = R hat(omega); y is R in row order and omega."""
+    """Return Ge and Lin's scalar equations for (x, y, z), and R' = R hat(omega); y is R in row order and omega."""
     a, b, c = p.inertia
     h1, h2, h3 = p.rotor_momentum
     u, v, w = y[9:]
@@ -76,12 +76,12 @@ def right_hand_side(p: GyrostatParameters, t: float, y: np.ndarray) -> np.ndarra
 
 
 def energy(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Kinetic energy of the platform, shape (k,)."""
+    """Return the kinetic energy of the platform, shape (k,)."""
     return 0.5 * (y[:, 9:] ** 2 * p.inertia).sum(axis=1)
 
 
 def total_momentum(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Momentum of platform and rotors in the world, shape (k, 3) (theory.md, eq. (7.8))."""
+    """Return the momentum of platform and rotors in the world, shape (k, 3) (theory.md, eq. (7.8))."""
     h = np.tile(p.rotor_momentum, (len(t), 1)).astype(float)
     h[:, 2] *= 1.0 + p.forcing_amplitude * np.cos(p.forcing_frequency * t)
     return to_world(y[:, :9], y[:, 9:] * p.inertia + h)

@@ -38,7 +38,7 @@ class HeavyTopParameters(NamedTuple):
 
 @always_inline
 def rate(p: HeavyTopParameters, t: float, x: RigidBody) -> RigidBody:
-    """I omega' = I omega x omega + r x R^T weight."""
+    """Return the tangent: I omega' = I omega x omega + r x R^T weight."""
     o = x.omega_body
     torque = cross(p.arm_body, rotate_back(x.attitude, p.weight_world))
     return RigidBody(o, divide(add(cross(multiply(p.inertia, o), o), torque), p.inertia))  # type: ignore[arg-type]
@@ -48,7 +48,7 @@ RATES[HeavyTopParameters] = rate
 
 
 def problems() -> dict[str, Problem]:
-    """The problem of this file: a heavy top that spins about its arm and nutates."""
+    """Return the problem of this file: a heavy top that spins about its arm and nutates."""
     p = HeavyTopParameters(INERTIA, (ARM, 0.0, 0.0), (0.0, 0.0, -MASS * GRAVITY))
     problem = Problem(
         "heavy top, spinning and nutating",
@@ -63,7 +63,7 @@ def problems() -> dict[str, Problem]:
 
 
 def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
-    """Momentum balance about the pivot in the world, for R in row order and omega in the body."""
+    """Return the momentum balance about the pivot in the world, for R in row order and omega in the body."""
     R, o = y[:9].reshape(3, 3), y[9:]
     torque_world = np.cross(ARM * R[:, 0], [0.0, 0.0, -MASS * GRAVITY])
     omega_rate = (R.T @ torque_world - np.cross(o, np.multiply(INERTIA, o))) / INERTIA
@@ -71,10 +71,10 @@ def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
 
 
 def energy(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Kinetic and potential energy [J], shape (k,)."""
+    """Return the kinetic and potential energy [J], shape (k,)."""
     return 0.5 * (y[:, 9:] ** 2 * INERTIA).sum(axis=1) + MASS * GRAVITY * ARM * y[:, 6]
 
 
 def vertical_momentum(t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Angular momentum about the vertical through the pivot [N m s], shape (k,)."""
+    """Return the angular momentum about the vertical through the pivot [N m s], shape (k,)."""
     return to_world(y[:, :9], y[:, 9:] * INERTIA)[:, 2]

@@ -27,7 +27,7 @@ RATES[MultirotorDrive] = rate
 
 
 def problems() -> dict[str, Problem]:
-    """The problem of this file: the bare delivery drone, tumbling."""
+    """Return the problem of this file: the bare delivery drone, tumbling."""
     drive = bare_drive()
     problem = Problem(
         "delivery drone, bare and tumbling",
@@ -42,14 +42,14 @@ def problems() -> dict[str, Problem]:
 
 
 def bare_drive() -> MultirotorDrive:
-    """The drone under gravity and thrust, with its voltages."""
+    """Return the drone under gravity and thrust, with its voltages."""
     frame = load_airframe(AIRFRAME)
     p = multirotor.parameters(frame, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, frame))
     return MultirotorDrive(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
 
 
 def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
-    """Newton, Euler and a first-order lag for (position, R in row order, velocity, omega, rotor speeds)."""
+    """Return Newton, Euler and a first-order lag for (position, R in row order, velocity, omega, rotor speeds)."""
     layout, body = drive.parameters.layout, drive.parameters.body
     gravity, rotor = drive.parameters.effects
     R, o, speed = y[3:12].reshape(3, 3), y[15:18], y[18:22]

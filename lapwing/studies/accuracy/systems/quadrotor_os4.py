@@ -32,7 +32,7 @@ EXPERIMENTS_RPM = {
 
 
 def problems() -> dict[str, Problem]:
-    """The problems of this file, one for each experiment of the source."""
+    """Return the problems of this file, one for each experiment of the source."""
     return {f"os4_experiment_{number}": _problem(number, rpm) for number, rpm in EXPERIMENTS_RPM.items()}
 
 
@@ -51,7 +51,7 @@ def _problem(number: int, rpm: tuple[int, ...]) -> Problem:
 
 
 def right_hand_side(p: Os4Parameters, y: np.ndarray) -> np.ndarray:
-    """Newton and Euler for (position, R in row order, velocity, omega, rotor speeds), forces summed rotor by rotor."""
+    """Return Newton and Euler for (position, R in row order, velocity, omega, rotor speeds), summed rotor by rotor."""
     R, v, o, speed = y[3:12].reshape(3, 3), y[12:15], y[15:18], y[18:22]
     place = p.arm * np.array([[1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0], [0, -1.0, 0]])
     clockwise = np.array([1.0, -1.0, 1.0, -1.0])  # from above; drag turns the body the other way

@@ -13,5 +13,5 @@ from lapwing.dynamics import discovery
 
 
 def modules() -> list[ModuleType]:
-    """Every plot's module, in order of the page."""
+    """Return all plot modules, in the order of the page."""
     return sorted(discovery.modules(__name__).values(), key=lambda module: module.ORDER)

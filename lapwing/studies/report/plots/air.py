@@ -1,29 +1,44 @@
 """Wind and density of the air over time."""
 
+import numpy as np
+
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
-from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, column
+from lapwing.studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, column
 from lapwing.studies.report.style import AXIS_COLOURS, STEERED
 
 ORDER = 80
 TITLE = "Air: wind and density"
 NEEDS = ("ground_truth",)
 MODELS = STEERED
+SECOND = 1.0  # [s] over which the wind is averaged: turbulence of each tick would hide all else
 
 
 def draw(flight: FlightData) -> Plot:
-    """Wind in the world frame and density; of the two only what the log has."""
+    """Plot world-frame wind and density, as far as recorded."""
     t, wind, density = flight.truth.times, flight.truth.wind, flight.truth.air_density
     if not (wind.any() or density.any()):
         raise NotRecordedError("neither wind nor air density")
     panels = []
     if wind.any():
-        parts = zip("xyz", wind.T, AXIS_COLOURS, strict=True)
-        panels.append(Panel(tuple(Line(t, part, name, colour) for name, part, colour in parts), "wind [m/s]"))
+        panels.append(Panel(_wind(t, wind), "wind [m/s]"))
     if density.any():
         panels.append(Panel((Line(t, density),), "density [kg/m³]"))
-    said = "" if wind.any() else " The log has no velocity of the wind."
+    said = f" Wind: mean over {SECOND:g} s, and its range within that time (shaded)." if wind.any() else ""
+    said = said or " The log has no velocity of the wind."
     return Plot(
         caption=f"Velocity of the air in the world frame (ENU) and its density where the vehicle is.{said}",
         **column(panels, 1.9, **over(flight)),
     )
+
+
+def _wind(times: np.ndarray, wind: np.ndarray) -> tuple[Mark, ...]:
+    """Return mean and range of the wind [m/s], shape (n, 3), over each SECOND."""
+    place = np.floor((times - times[0]) / SECOND).astype(int)
+    starts = np.flatnonzero(np.diff(place, prepend=-1))
+    counts = np.diff(np.append(starts, len(times)))
+    middle = np.add.reduceat(times, starts) / counts
+    low, high = np.minimum.reduceat(wind, starts), np.maximum.reduceat(wind, starts)
+    mean = np.add.reduceat(wind, starts) / counts[:, None]
+    bands = [Band(middle, low[:, k], high[:, k], "", AXIS_COLOURS[k]) for k in range(3)]
+    return (*bands, *(Line(middle, mean[:, k], name, AXIS_COLOURS[k]) for k, name in enumerate("xyz")))

@@ -10,7 +10,7 @@ NEEDS = ("ground_truth",)
 
 
 def draw(flight: FlightData) -> Plot:
-    """One row for each angle."""
+    """Plot each angle in a row."""
     said = "Attitude as roll, pitch and yaw."
     if len(flight.reference):
         said += " The reference of roll and pitch is what the inner loops follow; that of yaw is the setpoint."

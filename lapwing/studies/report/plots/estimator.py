@@ -18,7 +18,7 @@ _COLUMNS = (("position", "m", 1.0), ("velocity", "m/s", 1.0), ("attitude", "°",
 
 
 def draw(flight: FlightData) -> Plot:
-    """Errors of position, velocity (world frame) and attitude (rotation vector, body frame), a row for each axis."""
+    """Plot errors of position, velocity (world frame) and attitude (rotation vector, body frame), a row per axis."""
     error, sigma = errors(flight), deviations(flight.estimate)
     if not sigma.any():
         raise NotRecordedError("the estimate states no uncertainty (it is the truth)")
@@ -31,11 +31,11 @@ def draw(flight: FlightData) -> Plot:
             half = 1.3 * max(np.quantile(np.abs(off), 0.97), np.quantile(bound, 0.95), 1e-12)
             largest = np.abs(off).max()
             cut += int(np.sum(np.abs(off) > half))
-            beyond = f"largest {largest:.2g} {unit}" + (", beyond this scale" if largest > half else "")
+            beyond = f"max {largest:.2g}" + (" ▲" if largest > half else "")
             marks = Band(t, -bound, bound, "3 sigma"), Line(t, off, "estimate minus truth", width=1.0)
             label = f"{quantity} {name} [{unit}]"
-            panels.append(Panel(marks, label, note=beyond, row=row, column=column, y_range=(-half, half)))
-    said = f"{cut} samples lie beyond the scales of their panels" if cut else "Nothing lies beyond the scales"
+            panels.append(Panel(marks, label, title=beyond, row=row, column=column, y_range=(-half, half)))
+    said = f"{cut} samples lie beyond the scales of their panels (▲)" if cut else "Nothing lies beyond the scales"
     caption = (
         "Estimate minus truth at the estimate's own time, within three standard deviations as the estimator says "
         f"(shaded); {100 * inside:.1f} % of the errors lie inside. {said}. "
@@ -45,7 +45,7 @@ def draw(flight: FlightData) -> Plot:
 
 
 def deviations(estimate: TopicView) -> np.ndarray:
-    """The standard deviations of position [m], velocity [m/s], attitude [rad], shape (n, 9)."""
+    """Return the standard deviations of position [m], velocity [m/s], attitude [rad], shape (n, 9)."""
     return np.hstack([estimate.position_std, estimate.velocity_std, estimate.attitude_std])
 
 
@@ -67,4 +67,4 @@ def refusals(flight: FlightData) -> str:
     """Return the share of rejected measurements of each source as a sentence."""
     count = Counter(source for sources in flight.estimate.rejected_sources for source in sources)
     said = ", ".join(f"{source} {times}" for source, times in count.most_common())
-    return f"Measurements refused: {said or 'none'}."
+    return f"Measurements rejected: {said or 'none'}."

@@ -12,7 +12,7 @@ FLEET = True
 
 
 def draw(flight: FlightData) -> Plot:
-    """The plan view on the left, the least distance of any two over time on the right."""
+    """Plot the plan view on the left, the minimum separation over time on the right."""
     marks = []
     for i, (name, truth) in enumerate(flight.fleet.items()):
         x, y, _ = truth.position.T

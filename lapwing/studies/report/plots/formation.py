@@ -17,7 +17,7 @@ INSTANTS = 11  # pictures of the links
 
 
 def draw(flight: FlightData) -> Plot:
-    """Three panels over time on the left, the view from the side on the right."""
+    """Plot three panels over time on the left, the side view on the right."""
     t = flight.times("body_states")
     places = flight.topic("body_states").position
     wanted = _wanted(flight, t)
@@ -39,7 +39,7 @@ def draw(flight: FlightData) -> Plot:
 
 
 def side(places: np.ndarray, wanted: np.ndarray) -> Panel:
-    """The load's path and the links seen along y."""
+    """Return the panel of the load's path and the links in the xz plane."""
     marks = [
         Line(places[:, 0, 0], places[:, 0, 2], "load", BOUND),
         reference(wanted[:, 0], wanted[:, 2], name="wanted path"),
@@ -57,11 +57,11 @@ def side(places: np.ndarray, wanted: np.ndarray) -> Panel:
 
 
 def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
-    """A line for each quadrotor of values of shape (n, quadrotors)."""
+    """Return a line for each quadrotor of values of shape (n, quadrotors)."""
     return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
 
 
 def _wanted(flight: FlightData, t: np.ndarray) -> np.ndarray:
-    """The load's wanted path [m] at times t, shape (n, 3)."""
+    """Return the load's desired path [m] at times t, shape (n, 3)."""
     path = np.array(flight.origin.scene["formation"]["path"])
     return path[0] + t[:, None] * path[1] + t[:, None] ** 2 * path[2]

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lapwing.studies.battery_use import WATT_HOUR
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
@@ -16,7 +17,7 @@ RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
 
 
 def draw(flight: FlightData) -> Plot:
-    """One panel for each quantity, one line for each motor."""
+    """Plot each quantity in a panel, each motor as a line."""
     truth, t = flight.truth, flight.truth.times
     if truth.rotor_speed.shape[-1] == 0:
         raise NotRecordedError("the vehicle has no motors")
@@ -28,20 +29,20 @@ def draw(flight: FlightData) -> Plot:
     panels = [Panel(motors(t, values), label) for label, values in quantities]
     marks, said = limits(flight)
     panels[1] = panels[1]._replace(marks=panels[1].marks + marks)
-    energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / 3600.0
-    caption = f"Speed of each propeller, voltage and electrical power of its motor. Energy drawn: {energy:.1f} W h. "
+    energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / WATT_HOUR
+    caption = f"Speed of each propeller, voltage and power of its motor. All motors take {energy:.1f} W h. "
     return Plot(caption=caption + said, **column(panels, 2.2, **over(flight)))
 
 
 def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
-    """A line for each motor of values of shape (n, motors)."""
+    """Return a line for each motor of values of shape (n, motors)."""
     return tuple(
         Line(t, of_motor, f"motor {k + 1}", COLOURS[k % len(COLOURS)], 1.0) for k, of_motor in enumerate(values.T)
     )
 
 
 def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
-    """The limits of the voltage, the stretches in which a motor is at one, and a sentence on them."""
+    """Return the voltage limits, the intervals at a limit, and a sentence on them."""
     highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
     if highest is None:
         return (), "The log does not say what limits the voltage."
@@ -59,7 +60,7 @@ def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
 
 
 def _stretches(t: np.ndarray, at_limit: np.ndarray, limit: float) -> tuple[Line, ...]:
-    """One line along the limit, at most: start, end and a gap for each stretch in which any motor is there."""
+    """Return at most one line along the limit: start, end and a gap for each interval with a motor there."""
     any_motor = np.concatenate([[False], at_limit.any(axis=1), [False]])
     edges = np.flatnonzero(any_motor[1:] != any_motor[:-1])
     if not len(edges):

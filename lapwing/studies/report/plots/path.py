@@ -1,4 +1,4 @@
-"""The path in space, and seen from above."""
+"""The path seen from two sides; the mission map shows it from above."""
 
 import numpy as np
 
@@ -6,21 +6,21 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
 
 ORDER = 40
-TITLE = "Path"
+TITLE = "Path from the side"
 NEEDS = ("ground_truth",)
 
 
 def draw(flight: FlightData) -> Plot:
-    """The path in 3D on the left, its plan view on the right."""
+    """Plot the views from the south and from the east."""
     if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
         raise NotRecordedError("it never leaves its place")
     beside = " beside the reference" if len(flight.reference) else ""
-    said = f"The flown path{beside}, in space (left) and from above, north up (right)."
-    return Plot((space(flight), plan(flight)), said, 4.9, (1.0,), (1.0, 1.0))
+    caption = f"The flown path{beside} from the south (left) and from the east (right)."
+    return Plot(tuple(side(flight, axis)._replace(column=axis) for axis in (0, 1)), caption, 3.6, (1.0,), (1.0, 1.0))
 
 
 def space(flight: FlightData) -> Panel:
-    """The path in space; the three axes have one scale."""
+    """Return the panel of the path in space; the three axes have one scale."""
     x, y, z = flight.truth.position.T
     marks = [Line(x, y, "flown", width=2.0, z=z)]
     if len(flight.reference):
@@ -29,12 +29,9 @@ def space(flight: FlightData) -> Panel:
     return Panel(tuple(marks), "y north [m]", "x east [m]", z_label="z up [m]", timed=False)
 
 
-def plan(flight: FlightData) -> Panel:
-    """Return the path from above."""
-    x, y, _ = flight.truth.position.T
-    marks = [Line(x, y, "flown", width=2.0)]
+def side(flight: FlightData, axis: int) -> Panel:
+    """Return the height over x east (axis 0) or y north (axis 1)."""
+    marks = [Line(flight.truth.position[:, axis], flight.truth.position[:, 2], "flown", width=2.0)]
     if len(flight.reference):
-        marks.append(reference(*flight.reference.T[:2]))
-    marks.append(Line(x[:1], y[:1], "start", marker="open", size=8.0, joined=False))
-    marks.append(Line(x[-1:], y[-1:], "end", marker="square", size=7.0, joined=False))
-    return Panel(tuple(marks), "y north [m]", "x east [m]", column=1, timed=False, equal=True)
+        marks.append(reference(flight.reference[:, axis], flight.reference[:, 2]))
+    return Panel(tuple(marks), "z up [m]", ("x east [m]", "y north [m]")[axis], timed=False)

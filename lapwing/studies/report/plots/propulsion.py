@@ -15,7 +15,7 @@ MODELS = STEERED
 
 
 def draw(flight: FlightData) -> Plot:
-    """Samples of the first propeller, and the curves k n^2 and k n^3 through them by least squares."""
+    """Plot samples of the first propeller, and least-squares curves k n^2 and k n^3."""
     speed = _first(flight, "rotor_speed")
     if not (speed.size and np.ptp(speed) > 0.0):
         raise NotRecordedError("the first propeller never changes its speed")
@@ -42,11 +42,11 @@ def draw(flight: FlightData) -> Plot:
 
 
 def coefficient(speed: np.ndarray, value: np.ndarray, power: int) -> float:
-    """k of value = k speed^power by least squares."""
+    """Return k of value = k speed^power by least squares."""
     law = speed**power
     return float(np.sum(law * value) / np.sum(law * law))  # BLAS would wake its threads for this
 
 
 def _first(flight: FlightData, field: str) -> np.ndarray:
-    """The first rotor's values of a field of VehicleState, shape (n,); empty without rotors."""
+    """Return the first rotor's values of a field of VehicleState, shape (n,); empty without rotors."""
     return flight.truth[field][:, :1].reshape(-1)

@@ -16,7 +16,7 @@ WIDTH = 0.004  # of the whole time, of an instant
 
 
 def draw(flight: FlightData) -> Plot:
-    """A lane for each thing that can change; lanes of what never happened are left out, and named."""
+    """Plot a lane for each state or event; lanes without content are named only."""
     status, t = flight.status, flight.status.times
     warning = np.array(BATTERY)[status.battery_warning.clip(max=len(BATTERY) - 1)]
     failed = np.where(status.failed_motor > 0, np.char.add("motor ", status.failed_motor.astype(str)), "")
@@ -28,17 +28,17 @@ def draw(flight: FlightData) -> Plot:
         "failsafe": (runs(t, _where(status.failsafe, "failsafe")), BOUND),
         "motor failed": (runs(t, failed), BOUND),
         "battery": (runs(t, warning), BOUND),
-        "said": (runs(t, status.text), COLOURS[3]),
+        "status text": (runs(t, status.text), COLOURS[3]),
         **{kind: (_instants(flight, kind), colour) for kind, colour in MARKED.items()},
     }
     found = {lane: ([run for run in stretches if run[0]], colour) for lane, (stretches, colour) in lanes.items()}
     bars = tuple(Stretch(lane, s, e, text, colour) for lane, (some, colour) in found.items() for text, s, e in some)
     never = [lane for lane, (some, _) in found.items() if not some]
-    said = f" Never in this flight: {', '.join(never)}." if never else ""
+    said = f" None in this flight: {', '.join(never)}." if never else ""
     shown = max(len(found) - len(never), 1)
     return Plot(
         (Panel(bars),),
-        f"What the autopilot says of itself, {len(t)} times.{said}",
+        f"State of the autopilot ({len(t)} messages) and events.{said}",
         1.1 + 0.32 * shown,
         span=over(flight)["span"],
     )
@@ -49,6 +49,6 @@ def _where(flags: np.ndarray, text: str) -> np.ndarray:
 
 
 def _instants(flight: FlightData, kind: str) -> list[tuple[str, float, float]]:
-    """Events of a kind as stretches that are just wide enough to be seen."""
+    """Return events of a kind as intervals just wide enough to be visible."""
     first, last = over(flight)["span"]
     return [(e.text, e.time, min(last, e.time + WIDTH * (last - first))) for e in flight.events if e.kind == kind]

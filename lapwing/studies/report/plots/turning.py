@@ -14,7 +14,7 @@ MODELS = ("gyrostat",)
 
 
 def draw(flight: FlightData) -> Plot:
-    """Three rates over time on the left, each pair of them on the right."""
+    """Plot three rates over time on the left, each pair of them on the right."""
     t, omega = flight.truth.times, flight.truth.angular_velocity
     panels = []
     for row, colour in enumerate(AXIS_COLOURS):

@@ -17,7 +17,7 @@ INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time u
 
 
 def draw(flight: FlightData) -> Plot:
-    """The three displacements, door and forces over time, and six instants from the side."""
+    """Plot displacements, door and forces over time, and the side view at six times."""
     crate = flight.origin.scene["unloading"]
     bodies = flight.topic("body_states")
     t, place = bodies.times, bodies.position
@@ -49,7 +49,7 @@ def draw(flight: FlightData) -> Plot:
 
 
 def picture(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:
-    """Crate, rollers, door and pack from the side."""
+    """Return the panel of crate, rollers, door and pack from the side."""
     length, _, height = crate["pack_size"]
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]) * (length / 2, height / 2)
     pack = place[0, [0, 2]] + corners @ _matrix(turn[0]).T
@@ -76,18 +76,18 @@ def picture(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:
 
 
 def _outline(points: np.ndarray, **looks: Any) -> Line:
-    """A line through points (x, z), shape (n, 2)."""
+    """Return a line through points (x, z), shape (n, 2)."""
     return Line(points[:, 0], points[:, 1], **looks)
 
 
 def _matrix(degrees: float) -> np.ndarray:
-    """Turns (x, z) about y."""
+    """Return the rotation of (x, z) about y."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([(c, s), (-s, c)])
 
 
 def _pitch(xyzw: np.ndarray) -> np.ndarray:
-    """Angle about y [degrees] of attitudes that only turn about y, nearly."""
+    """Return the angle about y [degrees] of attitudes that rotate about y only."""
     from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
 
     return np.degrees(Rotation.from_quat(xyzw).as_rotvec()[:, 1])

@@ -14,7 +14,7 @@ DASHES = ("solid", "dash", "dot", "dashdot")  # rotors of one speed lie on each 
 
 
 def draw(flight: FlightData) -> Plot:
-    """Mass times vertical acceleration, and the speed of each rotor."""
+    """Plot mass times vertical acceleration, and the speed of each rotor."""
     t = flight.truth.times
     force = flight.origin.scene["os4"]["mass"] * flight.truth.acceleration[:, 2]
     speeds = enumerate(zip((flight.truth.rotor_speed * RPM).T, COLOURS, DASHES, strict=False), 1)

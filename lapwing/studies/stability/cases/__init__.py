@@ -1,6 +1,6 @@
 """The cases: one file each, found by scanning this folder.
 
-A file has `HARD`, what is hard about it, `run()`, which gives what was found, and where it takes minutes `LONG = True`.
+A file has `HARD` (the difficulty), `run()` (returns the result) and `LONG = True` if it takes minutes.
 A case whose difficulty can be walked has `sweep()` as well.
 """
 
@@ -10,14 +10,14 @@ from lapwing.dynamics import discovery
 
 
 def names() -> list[str]:
-    """Every case's name: its file name."""
+    """Return the names of all cases: their file names."""
     return discovery.names(__name__)
 
 
 def get(name: str) -> ModuleType:
-    """The module of a case.
+    """Return the module of a case.
 
     Raises:
-        ValueError: there is none; the text lists the choices.
+        ValueError: there is none; the message lists the choices.
     """
     return discovery.get(__name__, name, "case")

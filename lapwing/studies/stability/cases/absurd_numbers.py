@@ -19,7 +19,7 @@ from lapwing.studies.accuracy.systems import cooperative_load, gyrostat
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.flights import finite, flown
 
-HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: refused with time, place and value, never passed on"
+HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: rejected with time, place and value, never used"
 
 NOT = (math.nan, math.inf, -math.inf)
 ABSURD = (*NOT, 1e300, -1e300, 1e-300, 5e-324, 0.0)
@@ -40,10 +40,10 @@ class Steady:
         self.outputs = outputs
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Nothing to be known."""
+        """Do nothing."""
 
-    def act(self, tick: int) -> int:
-        """Nothing to be done."""
+    def on_tick(self, tick: int) -> int:
+        """Do nothing."""
         return NEVER
 
 
@@ -54,7 +54,7 @@ def of_parameters(value: float, key: str) -> str:
     except ValueError:
         return "refused"
     except ArithmeticError:
-        return "silent"  # as to where and which: a trace of the code, for nobody to mend
+        return "silent"  # names neither place nor value: a traceback that a user cannot act on
     if flight.failure:
         return "reported" if "t = " in flight.failure or "tick" in flight.failure else "silent"
     return "flown" if finite(flight) else "silent"
@@ -62,7 +62,7 @@ def of_parameters(value: float, key: str) -> str:
 
 def of_states() -> dict[str, int]:
     """Replace every number of states and parameters of three systems by NaN; return the reactions."""
-    found = {"refused": 0, "silent": 0}
+    result = {"refused": 0, "silent": 0}
     systems: list[tuple[Any, Any]] = [
         (FreeBodyParameters((1.0, 1.6, 2.1)), RigidBody((1.0, 0.0, 0.0, 0.0), (0.1, 0.2, 0.3))),  # type: ignore[arg-type]
         (gyrostat.SPINNING, gyrostat.START),
@@ -77,14 +77,14 @@ def of_states() -> dict[str, int]:
                     try:
                         check_start(*check(tree))
                     except ValueError as error:
-                        found["refused" if str(value) in str(error) else "silent"] += 1
+                        result["refused" if str(value) in str(error) else "silent"] += 1
                     else:
-                        found["silent"] += 1
-    return found
+                        result["silent"] += 1
+    return result
 
 
 def of_commands(value: float) -> tuple[str, float]:
-    """(what becomes of a plant under such a voltage at its 10th tick, the largest number that it told before)."""
+    """Return (reaction of a plant to such a voltage at its 10th tick, largest number in its output before)."""
     setup = resolve(load("hover", SHORT))
     outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
     graph = BlockDiagram(setup, [create(setup, "plant"), Service("case", [Steady(*outputs)], [])], 2 * TICKS)
@@ -105,7 +105,7 @@ def of_commands(value: float) -> tuple[str, float]:
 
 
 def baseline_step(mass: float, volts: float) -> float:
-    """The baseline way: a falling point under a thrust, stepped with whatever comes; its height after a second."""
+    """Return the height after a second of a falling point under thrust, stepped with any value: the baseline."""
     with np.errstate(all="ignore"):
         m, v, z = np.float64(mass), np.float64(0.0), np.float64(0.0)
         for _ in range(10):
@@ -123,7 +123,7 @@ def _no_numbers(values: list[float]) -> float:
 
 
 def run() -> CaseResult:
-    """Counts of what was passed on in silence."""
+    """Count the values that were passed on without an error."""
     parameters = [of_parameters(value, key) for key in KEYS for value in ABSURD]
     states = of_states()
     commands = [of_commands(value) for value in ABSURD]
@@ -176,5 +176,5 @@ def run() -> CaseResult:
     kinds = ("refused", "reported", "flown", "silent")
     x = np.arange(len(kinds), dtype=float)
     every = [("parameters", parameters), ("commands", [c for c, _ in commands])]
-    curves = [Curve(name, x, np.array([_count(found, k) for k in kinds])) for name, found in every]
+    curves = [Curve(name, x, np.array([_count(result, k) for k in kinds])) for name, result in every]
     return CaseResult(rows, Plot("0 refused, 1 reported, 2 flown, 3 silent", "how many", curves, log_y=False))

@@ -35,14 +35,14 @@ WHY = "round-off of coordinates of a metre, a thousand steps of it: what a stabi
 
 
 def defects(way: int) -> np.ndarray:
-    """Largest defect on either level [m, -, m/s, rad/s] after each minute, shape (MINUTES,); NaN once it is none."""
+    """Return the maximum defect on either level [m, -, m/s, rad/s] per minute, shape (MINUTES,); NaN if invalid."""
     p: Any
     p, x = thrown(delivery_drone(**PAPER), OMEGA, SPEEDS)
-    found = []
+    result = []
     for minute in range(MINUTES):
         x = advance(METHOD.Method(), p, 60.0 * minute, x, STEP, EACH, way)
-        found.append(max(constraint_violation(p, x)))
-    return np.array(found)
+        result.append(max(constraint_violation(p, x)))
+    return np.array(result)
 
 
 def of_plant(stabilisation: str, seconds: float) -> float:
@@ -56,7 +56,7 @@ def of_plant(stabilisation: str, seconds: float) -> float:
 
 
 def run() -> CaseResult:
-    """The hinges after every minute of an hour."""
+    """Measure the hinge defects after every minute of an hour."""
     drift = {name: defects(way) for name, way in WAYS.items()}
     rows = [
         Row(

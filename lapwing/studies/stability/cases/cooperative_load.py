@@ -38,7 +38,7 @@ SPRING = 1e5  # [N/m] of the baseline way
 
 
 def start(name: str) -> tuple[Any, CooperativeLoadState]:
-    """(parameters, state at the start) of one of `CASES`: thrown without thrust."""
+    """Return (parameters, state at the start) of one of `CASES`: thrown without thrust."""
     load, angles, rates = CASES[name]
     p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), LENGTH, load, G, OFF)
     swings = tuple(
@@ -48,14 +48,14 @@ def start(name: str) -> tuple[Any, CooperativeLoadState]:
 
 
 def adaptive(p: Any, x: Any) -> np.ndarray:
-    """Stored numbers of the states, shape (SAMPLES + 1, n): steps that shorten where a light load snaps through."""
+    """Return the states, shape (SAMPLES + 1, n), with shorter steps where a light load snaps through."""
     out = np.full((SAMPLES + 1, len(flatten(x))), np.nan)
     adapted(p, x, np.linspace(0.0, DURATION, SAMPLES + 1), TOLERANCE, out)
     return out
 
 
 def ours(name: str, method: str = "rkmk4", steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """(how far the links are off their length, relative; drift of the energy, relative), shape (k,) each."""
+    """Return (relative error of the links' lengths; relative drift of the energy), shape (k,) each."""
     p, x = start(name)
     y = adaptive(p, x) if method == ADAPTIVE else rows(method, p, x, DURATION, steps, SAMPLES)
     off = np.max([np.abs(np.linalg.norm(y[:, at : at + 3], axis=1) - 1.0) for at in LINK], axis=0)
@@ -76,13 +76,13 @@ def energy_drift(load: float, velocity: np.ndarray, height: np.ndarray) -> np.nd
 
 
 def baseline(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """The baseline way: each link a stiff spring, RK4 at the same step; as `ours`."""
+    """Return the errors of `ours` for links as stiff springs, RK4 at the same step: the baseline."""
     p, x = start(name)
     q, omega = (np.array([getattr(s, field) for s in x.link]) for field in ("direction", "omega"))
     length, mass = np.array(LENGTH)[:, None], np.array([[p.load_mass], [QUAD], [QUAD]])
     r = np.vstack([x.load_position, x.load_position - length * q])
     v = np.vstack([x.load_velocity, x.load_velocity - length * np.cross(omega, q)])
-    z, h, found = np.stack([r, v]), DURATION / steps, []
+    z, h, result = np.stack([r, v]), DURATION / steps, []
 
     def rate(z: np.ndarray) -> np.ndarray:
         d = z[0, 1:] - z[0, 0]
@@ -93,25 +93,25 @@ def baseline(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
     with np.errstate(all="ignore"):
         for i in range(steps + 1):
             if i % (steps // SAMPLES) == 0:
-                found.append(z)
+                result.append(z)
             if i > 0 and not np.isfinite(z).all():
-                found += [z * np.nan] * (SAMPLES + 1 - len(found))
+                result += [z * np.nan] * (SAMPLES + 1 - len(result))
                 break
             k1 = rate(z)
             k2 = rate(z + 0.5 * h * k1)
             k3 = rate(z + 0.5 * h * k2)
             z = z + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rate(z + h * k3))
-        y = np.array(found)
+        y = np.array(result)
         size = np.linalg.norm(y[:, 0, 1:] - y[:, 0, :1], axis=2)
         off = np.abs(size / length.T - 1.0).max(axis=1)
         return off, energy_drift(p.load_mass, y[:, 1].transpose(1, 0, 2), y[:, 0, :, 2].T)
 
 
 def run() -> CaseResult:
-    """Length of the links and energy of each."""
+    """Measure link length and energy of each load."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     spring = f"links as springs of {SPRING:g} N/m, RK4 at 5 ms"
-    found, curves = [], []
+    result, curves = [], []
     for name in CASES:
         light = name == "light_load"
         method = f"{ADAPTIVE} on TS^2, tolerance {TOLERANCE:g}" if light else "rkmk4 on TS^2, 0.5 ms"
@@ -121,21 +121,21 @@ def run() -> CaseResult:
             baseline(name, STEPS // 10),
         )
         links, change = "length of the links, relative", "change of the energy, over the kinetic energy at first"
-        found += [
+        result += [
             Row(f"{name}.links", method, links, HELD, HELD_WHY, float(off.max()), spring, lost(baseline_off)),
             Row(f"{name}.energy", method, change, bound, why, float(energy.max()), spring, lost(baseline_energy)),
         ]
         curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, baseline_energy)]
-    return CaseResult(found, Plot("time [s]", "change of the energy", curves, ENERGY))
+    return CaseResult(result, Plot("time [s]", "change of the energy", curves, ENERGY))
 
 
 def lost(values: np.ndarray) -> float:
-    """The largest of the values that are finite."""
+    """Return the largest of the values that are finite."""
     return float(np.nanmax(np.where(np.isfinite(values), values, np.nan)))
 
 
 def sweep() -> Sweep:
-    """Lighter and lighter loads, at a step of 2 ms."""
+    """Decrease the load's mass at a step of 2 ms."""
     loads, steps = np.geomspace(1.0, 1e-9, 10), 5000
     curves: dict[str, list[float]] = {"rkmk4 on TS^2": [], "links as springs": []}
     whole = CASES["light_load"]
@@ -144,5 +144,5 @@ def sweep() -> Sweep:
         curves["rkmk4 on TS^2"].append(float(ours("light_load", steps=steps)[1].max()))
         curves["links as springs"].append(lost(baseline("light_load", steps)[1]))
     CASES["light_load"] = whole
-    found = [Curve(name, loads, np.array(values)) for name, values in curves.items()]
-    return Sweep("mass of the load [kg]", "change of the energy", 1e-3, found, falling=True)
+    result = [Curve(name, loads, np.array(values)) for name, values in curves.items()]
+    return Sweep("mass of the load [kg]", "change of the energy", 1e-3, result, falling=True)

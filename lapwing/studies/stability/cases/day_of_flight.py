@@ -17,13 +17,13 @@ HOURS = 24
 
 
 def resident() -> float:
-    """Memory of this process [MB]."""
+    """Return the memory use of this process [MB]."""
     with open("/proc/self/statm", encoding="ascii") as file:
         return int(file.read().split()[1]) * 4096 / 1e6
 
 
 def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
-    """(memory [MB], processor time [s]) after and of each hour; `whole`: every row of the truth is kept."""
+    """Return (memory [MB] after, processor time [s] of) each hour; `whole`: keep the full history of the truth."""
     setup = resolve(load("hover", ["run.duration=86400.0", "trajectory.phase.1.duration=86390.0"]))
     graph = BlockDiagram(setup, create_all(setup), 64, {ports.TRUTH} if whole else ())
     memory, seconds = [], []
@@ -36,7 +36,7 @@ def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
 
 
 def appending() -> float:
-    """The baseline way to keep a history: time of the last thousand rows over that of the first, less one."""
+    """Return the time of the last 1000 appended rows over that of the first, minus one: the baseline."""
     history, seconds = np.zeros(0), []
     for _ in range(20):
         started = time.process_time()
@@ -47,7 +47,7 @@ def appending() -> float:
 
 
 def run() -> CaseResult:
-    """Memory and speed, hour by hour."""
+    """Measure memory and speed, hour by hour."""
     memory, seconds = growth(False, HOURS)
     kept, _ = growth(True, 2)
     rows = [

@@ -23,7 +23,7 @@ DENSITY = STANDARD_DENSITY
 
 
 def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
-    """(parameters, state at rest, voltages) of a drone whose rotors give that share of its weight."""
+    """Return (parameters, state at rest, voltages) of a drone whose thrust is this fraction of its weight."""
     tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE, Environment(terrain=terrain)))
     state = static_equilibrium(multirotor, p, resting_pose(DRONE.contact.feet if DRONE.contact else (), terrain), G)
@@ -33,12 +33,12 @@ def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
 
 
 def run_on(p: Any, state: Any, voltage: tuple[float, ...], seconds: float, step: float = STEP) -> Any:
-    """The state so much later."""
+    """Return the state after a time."""
     return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
 
 
 def gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
-    """Highest energy [J] over that at first, over the kinetic, of a slide at a speed over a step so far ahead."""
+    """Return the maximum energy gain over the kinetic energy of a slide into a step at that distance."""
     p, state, off = on(relief(steps=[(distance, rise)]))
     state = state._replace(motion=state.motion._replace(velocity_world=(speed, 0.0, 0.0)))
     first = energy(p, state.motion)
@@ -64,7 +64,7 @@ def baseline_gained(distance: float, rise: float, speed: float = SPEED, step: fl
 
 
 def lifted(share: float) -> float:
-    """Acceleration [m/s^2] along the slope, down, of a drone whose rotors carry a share of its weight."""
+    """Return the downhill acceleration [m/s^2] of a drone whose rotors carry a share of its weight."""
     p, state, voltage = on(relief(slope=(0.0, math.tan(ANGLE))), share)
     down = np.array([0.0, -math.cos(ANGLE), -math.sin(ANGLE)])
     pushed = tuple(float(v) for v in 0.2 * down)
@@ -75,14 +75,14 @@ def lifted(share: float) -> float:
 
 
 def exact(share: float) -> float:
-    """Acceleration [m/s^2] as of `lifted`, by Newton's law: friction goes with what the rotors leave of the weight."""
+    """Return the acceleration [m/s^2] of `lifted` by Newton's law, with friction of the remaining weight."""
     return G * (math.sin(ANGLE) - DYNAMIC * max(math.cos(ANGLE) - share, 0.0))
 
 
 def run() -> CaseResult:
-    """Into a step, over an edge, up from a slope."""
+    """Measure contact with a step, an edge and a slope."""
     faces, field = "each face with its own normal, RK4 at 1 ms", "a height field, as deep as the step is high"
-    none = "none but round-off: the ground gives nothing"
+    none = "none but round-off: the ground adds no energy"
     newton = "acceleration down 20 degrees, half the weight lifted, relative to Newton's law"
     slid = "what the feet's springs still swing after 0.3 s"
     unloaded = G * (math.sin(ANGLE) - DYNAMIC * math.cos(ANGLE))
@@ -91,7 +91,7 @@ def run() -> CaseResult:
             gained(0.4, RISER), field, baseline_gained(0.4, RISER)),
         Row("edge", faces, "energy gained over an edge of 40 cm, over the kinetic", 1e-9, none,
             gained(0.4, -DROP), "forward Euler on spring and damper, upright", baseline_fall()),
-        Row("take_off", "anchored feet, RK4 at 1 ms", newton, 1e-3, slid,
+        Row("take_off", "friction elements, RK4 at 1 ms", newton, 1e-3, slid,
             abs(lifted(LIGHT) / exact(LIGHT) - 1.0),
             "friction by the whole weight", abs(unloaded / exact(LIGHT) - 1.0)),
     ]  # fmt: skip
@@ -99,7 +99,7 @@ def run() -> CaseResult:
 
 
 def baseline_fall() -> float:
-    """Energy gained [over the kinetic of the slide] by a fall of the drop, forward Euler at the plant's step."""
+    """Return the energy gain (over the kinetic energy of the slide) of a fall, forward Euler at the plant's step."""
     mass, z, v = DRONE.mass.total, DROP, 0.0
     highest = 0.0
     for _ in range(2000):
@@ -110,7 +110,7 @@ def baseline_fall() -> float:
 
 
 def sweep() -> Sweep:
-    """Faster and faster into a step."""
+    """Increase the speed into a step."""
     speeds = np.array([1.0, 2.0, 4.0, 8.0])
     ways = {"faces": gained, "height field": baseline_gained}
     curves = [

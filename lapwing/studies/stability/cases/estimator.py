@@ -49,7 +49,7 @@ class Outcome(NamedTuple):
 
 
 def flown(faults: dict[str, str], more: Sequence[str] = (), *, as_if_on_time: bool = False) -> Outcome:
-    """The mission with these faults, and more overrides; `as_if_on_time`: fixes count as measured when they arrive."""
+    """Fly the mission with faults and overrides; `as_if_on_time`: fixes count as measured on arrival."""
     overrides = [f"run.duration={END}", *more, *(f"sensors.{s}.faults=[{faults.get(s, NEVER)}]" for s in SENSORS)]
     setup = resolve(load("delivery_mission", overrides))
     services = create_all(setup)
@@ -93,13 +93,13 @@ def _matrices(xyzw: np.ndarray) -> np.ndarray:
 
 
 def definite(covariance: np.ndarray) -> float:
-    """The least eigenvalue of the correlations."""
+    """Return the least eigenvalue of the correlations."""
     size = np.sqrt(np.abs(np.diag(covariance)))
     return float(np.linalg.eigvalsh(0.5 * (covariance + covariance.T) / np.outer(size, size)).min())
 
 
 def textbook() -> float:
-    """The baseline update P = (1 - K H) P, of sharp measurements of nearly the same thing; its least eigenvalue."""
+    """Return the minimum eigenvalue after the update P = (1 - K H) P with precise, correlated readings (baseline)."""
     P, rng = np.diag([1e6] * 3), np.random.default_rng(1)
     least = 1.0
     for _ in range(30):
@@ -111,7 +111,7 @@ def textbook() -> float:
 
 
 def run() -> CaseResult:
-    """Errors against what is claimed, and the covariance."""
+    """Compare errors with the estimated covariance."""
     outcomes = {name: flown(faults) for name, faults in FAULTS.items()}
     rows, curves = [], []
     for name, o in outcomes.items():

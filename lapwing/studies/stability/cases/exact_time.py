@@ -13,7 +13,7 @@ HOURS = 24
 
 
 def run() -> CaseResult:
-    """Ticks as integers against a sum of intervals."""
+    """Compare integer ticks with a sum of intervals."""
     setup = resolve(load("hover", []))
     per_hour = 3600 * 1_000_000_000 // setup.interval_ns
     ticks = per_hour * np.arange(1, HOURS + 1)

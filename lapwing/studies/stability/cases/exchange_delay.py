@@ -31,13 +31,13 @@ WHY = "a step of the grid of intervals, of 1.25 to 1.28 where it matters: the lo
 
 
 def scene(rate: int) -> Scene:
-    """The hover with a push, at a rate of exchange."""
+    """Return the hover with a push, at a communication rate."""
     slow = [f"rates.{name}=1" for name in ("pose", "estimate", "status", "battery", "body_states", "commands")]
     return load("hover", [f"communication.rate={rate}", f"solver.step={1.0 / rate / -(-1000 // rate)!r}", *slow, *PUSH])
 
 
 def late(found: RunConfig, delay: int) -> RunConfig:
-    """The set-up with commands that act so many exchanges after the measurement that they are for."""
+    """Return the run configuration with a command delay of so many ticks."""
     plant = found.services["plant"]
     inputs = tuple(InputPort(i.port, 1 + delay) for i in plant.inputs)  # 1: from the next tick on is at once
     return found._replace(services={**found.services, "plant": plant._replace(inputs=inputs)})
@@ -55,18 +55,18 @@ def predicted(rate: int, delay: int) -> bool:
     """Return True if Nyquist's criterion calls every loop stable."""
     of = scene(rate)
     frame = known_airframe(of)
-    found = open_loops(build(of[GainSet].plain(), frame), frame, of[Communication].interval, delay)
-    return all(stable(loop) for loop in found.values())
+    result = open_loops(build(of[GainSet].plain(), frame), frame, of[Communication].interval, delay)
+    return all(stable(loop) for loop in result.values())
 
 
 def longest(works: list[bool]) -> float:
-    """The longest interval [s] up to which all work."""
+    """Return the longest interval [s] up to which all intervals are stable."""
     broken = next((i for i, good in enumerate(works) if not good), len(works))
     return 1.0 / RATES[max(broken - 1, 0)]
 
 
 def run() -> CaseResult:
-    """The longest interval of each delay, in flight and by analysis."""
+    """Compare the longest interval of each delay, in flight and by analysis."""
     flown = np.array([longest([flies(rate, d) for rate in RATES]) for d in DELAYS])
     linear = np.array([longest([predicted(rate, d) for rate in RATES]) for d in DELAYS])
     baseline = np.full(len(DELAYS), 1.0 / RATES[-1])

@@ -19,7 +19,7 @@ DIGITS = 1e-12
 
 
 def defect(R: np.ndarray) -> np.ndarray:
-    """Largest entry of R^T R - 1, shape (k,), of matrices in row order, shape (k, 9)."""
+    """Return the largest entry of R^T R - 1, shape (k,), of matrices in row order, shape (k, 9)."""
     m = R.reshape(-1, 3, 3)
     return np.abs(np.einsum("kji,kjl->kil", m, m) - np.eye(3)).max(axis=(1, 2))
 
@@ -27,22 +27,22 @@ def defect(R: np.ndarray) -> np.ndarray:
 def on_entries() -> np.ndarray:
     """Integrate the matrix entries by forward Euler (baseline), under the true rates, shape (SAMPLES + 1, 9)."""
     omega = marched("rkmk4", SPINNING, START, DURATION, STEPS, STEPS)[:, 9:]
-    R, h, found = np.eye(3).ravel(), DURATION / STEPS, []
+    R, h, result = np.eye(3).ravel(), DURATION / STEPS, []
     for i in range(STEPS + 1):
         if i % (STEPS // SAMPLES) == 0:
-            found.append(R)
+            result.append(R)
         R = R + h * turning(R, omega[i])
-    return np.array(found)
+    return np.array(result)
 
 
 def order(method: str) -> float:
-    """Observed order: from three halvings of the step."""
+    """Return the observed order from three halvings of the step."""
     ends = [marched(method, SPINNING, START, SHORT, COARSE * 2**k, 1)[-1] for k in range(3)]
     return math.log2(worst(ends[1] - ends[0]) / worst(ends[2] - ends[1]))
 
 
 def accumulated() -> np.ndarray:
-    """The end where each of ten parts takes over the clock that the one before has added up from its steps."""
+    """Return the final state if each of ten parts starts at the accumulated clock of the previous one."""
     x, t, h = START, 0.0, DURATION / STEPS
     for _ in range(10):
         x = integrate_fixed(get("rkmk4").Method(), SPINNING, t, x, h, STEPS // 10)
@@ -52,7 +52,7 @@ def accumulated() -> np.ndarray:
 
 
 def run() -> CaseResult:
-    """Orthogonality, order, and the same bits however the run is recorded."""
+    """Check orthogonality, order, and bit-for-bit identical results for any recording interval."""
     ours = marched("rkmk4", SPINNING, START, DURATION, STEPS, SAMPLES)
     baseline = on_entries()
     t = np.linspace(0.0, DURATION, SAMPLES + 1)

@@ -20,12 +20,12 @@ SMALL = 1e-11
 
 
 def start(epsilon: float) -> RigidBody:
-    """Turning about the intermediate axis, but for a little about the largest one."""
+    """Return a rotation about the intermediate axis with a small component about the largest one."""
     return RigidBody(exp((0.3, -0.5, 0.2)), (0.0, 1.0, epsilon))
 
 
 def closed_form(epsilon: float, t: np.ndarray) -> np.ndarray:
-    """omega_body at times t [s] (theory.md, eqs. (7.2) to (7.5)), shape (k, 3); omega_2 is at its largest at t = 0."""
+    """Return omega_body at times t [s], shape (k, 3), with omega_2 maximum at t = 0 (eqs. (7.2) to (7.5))."""
     A, B, C = INERTIA
     square, twice = B * B + (C * epsilon) ** 2, B + C * epsilon**2  # of the momentum, and twice the energy
     # this side of the separatrix, twice the energy times B below the square: about the axis of the largest moment
@@ -41,12 +41,12 @@ def closed_form(epsilon: float, t: np.ndarray) -> np.ndarray:
 
 
 def figures(method: str, epsilon: float, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(largest difference to the closed form up to each sample, drift of the energy, of the momentum), (k,) each."""
+    """Return (maximum difference from the closed form so far, drift of energy, of momentum), (k,) each."""
     return compared(marched(method, FreeBodyParameters(INERTIA), start(epsilon), DURATION, steps, SAMPLES), epsilon)
 
 
 def compared(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`figures` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
+    """Return the `figures` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     off = np.abs(y[:, 9:12] - closed_form(epsilon, t)).max(axis=1)
     energy = drift(0.5 * (y[:, 9:12] ** 2 * INERTIA).sum(axis=1))
@@ -54,7 +54,7 @@ def compared(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def run() -> CaseResult:
-    """The rates against the closed form, and both invariants."""
+    """Compare the rates with the closed form, and measure both invariants."""
     off, energy, momentum = figures("rigid_splitting", EPSILON, STEPS)
     baseline_off, baseline_energy, baseline_momentum = figures("lie_euler", EPSILON, STEPS)
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
@@ -86,7 +86,7 @@ def run() -> CaseResult:
             method,
             "change of the angular momentum in the world, relative",
             SMALL,
-            "as of the energy",
+            "as for the energy",
             float(momentum.max()),
             baseline,
             float(baseline_momentum.max()),
@@ -97,7 +97,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Longer and longer steps."""
+    """Increase the step."""
     counts = [200_000, 100_000, 40_000, 20_000, 8000, 4000, 2000, 1000, 500]
     steps = DURATION / np.array(counts)
     curves = [

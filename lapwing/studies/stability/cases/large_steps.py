@@ -19,17 +19,17 @@ LONG, GROWN = 2000, 20_000  # steps: until a spin must be gone, until what grows
 
 
 def methods() -> list[str]:
-    """The integrators that this system can be given to."""
+    """Return the integrators that support this system."""
     return [name for name in integrators.names() if name != KICKED]
 
 
 def spin(method: str, step: float, steps: int) -> float:
-    """Size of the spin after so many steps; NaN once it is none."""
+    """Return the size of the spin after so many steps; NaN if it is not finite."""
     return abs(float(rows(method, SPIN, START, steps * step, steps, 1)[-1, 6]))
 
 
 def edge(method: str) -> float:
-    """The step up to which one step makes the spin smaller, by bisection."""
+    """Return the maximum step that reduces the spin, by bisection."""
     low, high = 0.5, 16.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -38,7 +38,7 @@ def edge(method: str) -> float:
 
 
 def silent(method: str, step: float) -> float:
-    """1 where a run beyond all numbers says nothing, 0 where it is refused with time, system and value."""
+    """Return 1 if a diverged run raises no error, 0 if the error names time, system and value."""
     try:
         integrators.simulate(integrators.get(method), SPIN, START, step, GROWN, GROWN)
     except ValueError as error:
@@ -47,7 +47,7 @@ def silent(method: str, step: float) -> float:
 
 
 def run() -> CaseResult:
-    """Just inside the edge, and beyond it."""
+    """Measure steps just below and above the stability limit."""
     names = methods()
     edges = np.array([edge(name) for name in names])
     inside = np.array([spin(name, INSIDE * h, LONG) for name, h in zip(names, edges, strict=True)])
@@ -56,7 +56,7 @@ def run() -> CaseResult:
     with np.errstate(over="ignore"):
         baseline = np.abs(1.0 - INSIDE * widest) ** 100.0
         unchecked = sum(np.isinf(np.float64(BEYOND * h) ** GROWN) for h in edges)
-    found = [
+    result = [
         Row(
             "edge",
             f"all {len(names)} integrators at 0.95 of their own edge",
@@ -79,11 +79,11 @@ def run() -> CaseResult:
         ),
     ]
     walked = sweep()
-    return CaseResult(found, walked.plot())
+    return CaseResult(result, walked.plot())
 
 
 def sweep() -> Sweep:
-    """Longer and longer steps."""
+    """Increase the step."""
     steps = np.geomspace(0.25, 8.0, 41)
     curves = [Curve(name, steps, np.array([spin(name, float(h), 200) for h in steps])) for name in methods()]
     return Sweep("step times rate", "spin left after 200 steps, of 1", 1.0, curves)

@@ -36,7 +36,7 @@ def refused(override: str) -> bool:
 
 
 def by_remainder(period: int, ticks: int) -> int:
-    """The baseline schedule, float time modulo the period below an interval: messages missed or sent twice."""
+    """Return the missed or repeated messages of a float-time modulo schedule: the baseline."""
     interval = 0.004
     time = np.add.accumulate(np.full(ticks, interval)) - interval
     sent = np.mod(time, period * interval) < interval
@@ -45,7 +45,7 @@ def by_remainder(period: int, ticks: int) -> int:
 
 
 def with_jumping_clock() -> int:
-    """Commands that differ from those of a flight in one process, where the clocks of the autopilot's process jump."""
+    """Return the number of commands that differ from a single-process flight if the autopilot's clocks jump."""
     steady = flights.flown("hover", [SHORT], None)  # first: it compiles what the processes then find
     with tempfile.TemporaryDirectory() as folder:
         shutil.copy(jumping_clock.__file__, Path(folder) / "sitecustomize.py")
@@ -69,18 +69,18 @@ def with_jumping_clock() -> int:
 
 
 def by_own_clock(ticks: int, interval: float) -> int:
-    """The baseline controller, which takes its interval from its clock: intervals that are others than a tick."""
+    """Return the intervals other than a tick of a controller that uses its clock: the baseline."""
     read = [t + jumping_clock.wall(t) for t in interval * np.arange(ticks + 1)]
     return int((np.abs(np.diff(read) - interval) > 1e-3 * interval).sum())
 
 
 def worst(found: Outcome) -> float:
-    """The largest error over what is claimed, while it says that it is well."""
+    """Return the maximum error over its standard deviation while the estimate reports good health."""
     return float(found.ratio[found.well].max(initial=0.0))
 
 
 def run() -> CaseResult:
-    """Errors against what is claimed, and what is refused."""
+    """Compare errors with the estimated covariance, and count rejected readings."""
     what = "largest error over the claimed deviation, while it says that it is well"
     ours, baseline = "corrected at the time of the fix", "a fix counts as measured when it arrives; the whole flight"
     outcomes = {name: flown({}, more) for name, more in CASES}
@@ -100,7 +100,7 @@ def run() -> CaseResult:
     rows.append(
         Row(
             "odd_rates",
-            "refused with the key and the rates that would do",
+            "rejected with the key and the possible rates",
             f"of {len(ODD)} rates that divide nothing, flown",
             0.0,
             "none: a message is due at whole ticks",
@@ -126,7 +126,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Later and later fixes, with the IMU at 50 Hz."""
+    """Increase the latency of fixes, with the IMU at 50 Hz."""
     late = np.arange(1, 8)
     more = [[RARE, f"sensors.gps.latency_samples={n}"] for n in late.tolist()]
     ours = np.array([worst(flown({}, m)) for m in more])

@@ -18,7 +18,7 @@ DIGITS = 60
 
 
 def series(x: Decimal, first: Decimal, k: int) -> Decimal:
-    """Sine (first = x, k = 1) or cosine (first = 1, k = 0) by its power series."""
+    """Return the sine (first = x, k = 1) or cosine (first = 1, k = 0) by its power series."""
     total, term = first, first
     while abs(term) > Decimal(10) ** -DIGITS:
         term *= -x * x / ((k + 1) * (k + 2))
@@ -28,7 +28,7 @@ def series(x: Decimal, first: Decimal, k: int) -> Decimal:
 
 
 def exact(v: tuple[float, ...]) -> float:
-    """(1 - (a/2) cot(a/2)) / a^2 of a = |v|, of exactly these floats."""
+    """Return (1 - (a/2) cot(a/2)) / a^2 of a = |v|, of exactly these floats."""
     with localcontext() as context:
         context.prec = DIGITS
         square = sum((Decimal(c) * Decimal(c) for c in v), Decimal(0))
@@ -37,14 +37,14 @@ def exact(v: tuple[float, ...]) -> float:
 
 
 def baseline_ratio(v: tuple[float, ...]) -> float:
-    """The formula as it stands in books."""
+    """Return the textbook formula."""
     a = np.float64(np.linalg.norm(v))
     with np.errstate(all="ignore"):
         return float((1.0 - 0.5 * a / np.tan(0.5 * a)) / (a * a))
 
 
 def baseline_log(m: np.ndarray) -> np.ndarray:
-    """The formula as it stands in books: angle by the arc cosine, axis by the skew part."""
+    """Return the textbook formula: angle by the arc cosine, axis by the skew part."""
     R = m.reshape(3, 3)
     with np.errstate(all="ignore"):
         angle = np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))
@@ -53,7 +53,7 @@ def baseline_log(m: np.ndarray) -> np.ndarray:
 
 
 def ratio_errors(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Relative errors of ours and of the baseline ratio at these angles [rad], (k,) each."""
+    """Return the relative errors of ours and of the baseline ratio at these angles [rad], (k,) each."""
     vectors = [tuple(float(c) for c in a * AXIS) for a in angles]
     true = np.array([exact(v) for v in vectors])
     ours, baseline = (
@@ -63,7 +63,7 @@ def ratio_errors(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def log_errors(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Errors [rad] of ours and of the baseline logarithm of rotations by pi less these gaps, (k,) each."""
+    """Return the errors [rad] of ours and of the baseline logarithm of rotations by pi less these gaps, (k,) each."""
     vectors = [(math.pi - gap) * AXIS for gap in gaps]
     matrices = [np.array(so3.exp(tuple(float(c) for c in v))) for v in vectors]
     ours = [np.abs(np.array(so3.log(tuple(m.tolist()))) - v).max() for m, v in zip(matrices, vectors, strict=True)]
@@ -72,7 +72,7 @@ def log_errors(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def run() -> CaseResult:
-    """The three limits."""
+    """Measure the three limits."""
     gaps = np.geomspace(1e-1, 1e-9, 33)
     small, at_pole, at_pi = ratio_errors(gaps), ratio_errors(2.0 * math.pi - gaps), log_errors(gaps)
     what = "third coefficient of dexp inverse, relative"

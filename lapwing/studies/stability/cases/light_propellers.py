@@ -26,19 +26,19 @@ WAYS = {"projection": PROJECTION, "partitioning": PARTITION, "none": NONE}
 
 
 def defects(way: int, scale: float, speed: float, step: float, looks: int) -> np.ndarray:
-    """Largest defect on either level after every EACH steps, shape (looks,)."""
+    """Return the largest defect on either level after every EACH steps, shape (looks,)."""
     inertia = tuple(scale * i for i in PAPER["propeller_inertia"])
     p: Any
     p, x = thrown(delivery_drone(**{**PAPER, "propeller_inertia": inertia}, driven="speed"), OMEGA, (speed, -speed) * 2)
-    found = []
+    result = []
     for look in range(looks):
         x = advance(METHOD, p, look * EACH * step, x, step, EACH, way)
-        found.append(max(constraint_violation(p, x)))
-    return np.array(found)
+        result.append(max(constraint_violation(p, x)))
+    return np.array(result)
 
 
 def run() -> CaseResult:
-    """The hinges in two seconds."""
+    """Measure the hinge defects over two seconds."""
     drift = {name: defects(way, SCALE, SPEED, STEP, LOOKS) for name, way in WAYS.items()}
     rows = [
         Row(
@@ -59,7 +59,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Faster and faster propellers at the same step."""
+    """Increase the propeller speed at the same step."""
     speeds = np.geomspace(100.0, 2e4, 12)
     curves = [
         Curve(name, speeds, np.array([defects(way, SCALE, float(s), STEP, 10)[-1] for s in speeds]))

@@ -29,7 +29,7 @@ KEPT, FALLEN, WHEN, FORCE = 1e-13, 1e-11, 1e-5, 1e-10
 
 
 def formation(lengths: tuple[float, float], angles: tuple[float, float], rates: tuple[float, float]) -> tuple[Any, Any]:
-    """(parameters, state) of two level quadrotors under constant thrust; angles of the links from straight down."""
+    """Return (parameters, state) of two level quadrotors at constant thrust; link angles from straight down."""
     drive = LiftCommand((THRUST, THRUST), (ZERO, ZERO))
     p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), lengths, LOAD, G, drive)
     swings = tuple(
@@ -39,7 +39,7 @@ def formation(lengths: tuple[float, float], angles: tuple[float, float], rates: 
 
 
 def bodies(lengths: tuple[float, float], y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions [m] and velocities [m/s] of load and quadrotors, shape (k, 3, 3) each, of rows of a formation."""
+    """Return positions [m] and velocities [m/s] of load and quadrotors, shape (k, 3, 3) each, of state rows."""
     position, velocity = [y[:, :3]], [y[:, 3:6]]
     for at, length in zip((20, 26), lengths, strict=True):
         q, omega = y[:, at : at + 3], y[:, at + 3 : at + 6]
@@ -49,7 +49,7 @@ def bodies(lengths: tuple[float, float], y: np.ndarray) -> tuple[np.ndarray, np.
 
 
 def accounts(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    """Momentum [kg m/s], angular momentum about the load's first place [kg m^2/s] and energy [J], shape (7,)."""
+    """Return momentum [kg m/s], angular momentum about the load's first place [kg m^2/s], energy [J], shape (7,)."""
     mass, r = np.array([LOAD, QUAD, QUAD])[:, None], position - [0.0, 0.0, 50.0]
     energy = float(np.sum(mass * (0.5 * velocity**2 + [0.0, 0.0, G] * r)))
     return np.array([*(mass * velocity).sum(axis=0), *np.cross(r, mass * velocity).sum(axis=0), energy])
@@ -78,7 +78,7 @@ def let_go() -> tuple[float, float, float, float]:
 
 
 def over_the_top() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(times [s], tension of both links [N], that of the closed form [N], angle [rad]), (k,) each."""
+    """Return (times [s], tension of both links [N], that of the closed form [N], angle [rad]), (k,) each."""
     rate = math.sqrt(KAPPA * THRUST / (QUAD * SAME))
     p, x = formation((SAME, SAME), (0.0, 0.0), (rate, rate))
     duration = 0.5
@@ -86,16 +86,16 @@ def over_the_top() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     y = rows("rkmk4", p, x, duration, 5 * samples, samples)
     position, velocity = bodies((SAME, SAME), y)
     force = np.broadcast_to([0.0, 0.0, THRUST], (len(y), 2, 3))
-    found = tension(position, velocity, force, p._asdict()).sum(axis=1)
+    result = tension(position, velocity, force, p._asdict()).sum(axis=1)
     angle = np.unwrap(np.arctan2(y[:, 20], -y[:, 22]))
     mass = 2.0 * QUAD
     reduced, pull = mass * LOAD / (mass + LOAD), 2.0 * THRUST / mass
     exact = reduced * pull * (KAPPA - 2.0 + 3.0 * np.cos(angle))
-    return np.linspace(0.0, duration, samples + 1), found, exact, angle
+    return np.linspace(0.0, duration, samples + 1), result, exact, angle
 
 
 def slack_at() -> float:
-    """The time [s] at which the tension vanishes in closed form."""
+    """Return the time [s] at which the tension vanishes in closed form."""
     pull = THRUST / (QUAD * SAME)  # [1/s^2]
     end = math.acos((2.0 - KAPPA) / 3.0)
     return float(quad(lambda a: 1.0 / math.sqrt(pull * (KAPPA - 2.0 + 2.0 * math.cos(a))), 0.0, end, epsabs=1e-13)[0])
@@ -114,9 +114,9 @@ def silent() -> tuple[float, float]:
 
 
 def run() -> CaseResult:
-    """At the release and after it, at the top and beyond it."""
+    """Measure the release and afterwards, the top and beyond."""
     kept, lost, fallen, held = let_go()
-    t, found, exact, angle = over_the_top()
+    t, result, exact, angle = over_the_top()
     when = slack_at()
     sharing = np.abs(exact - LOAD * G * np.cos(angle)) / exact[0]
     horizontal = float(np.interp(0.5 * math.pi, angle, t))
@@ -131,12 +131,12 @@ def run() -> CaseResult:
             fallen, "the load weighs a gram, the links stay", held),
         Row("slack", f"{watched}, at every 2.5 ms", "time [s] at which it vanishes, against the closed form", WHEN,
             "a line between two readings: a share of its bend, 10 /s^2 times the square of 2.5 ms",
-            abs(pushes(t, found)[0].start - when), "when the link is level", abs(horizontal - when)),
+            abs(pushes(t, result)[0].start - when), "when the link is level", abs(horizontal - when)),
         Row("tension", watched, "tension against the closed form, over that at first", FORCE,
             "the error of RK4 in the rates: 1e-2 rad a step, fourth power, for 1000 steps",
-            float(np.abs(found - exact).max() / exact[0]), "the load's weight along the link", float(sharing.max())),
+            float(np.abs(result - exact).max() / exact[0]), "the load's weight along the link", float(sharing.max())),
         Row("told", "an event with link, time and force", "flights in which a link pushes without a word", 0.0,
             "none: a flight on cables would have gone another way", quiet, "the length of links is watched", unseen),
     ]  # fmt: skip
-    curves = [Curve("tension of both links", t, found), Curve("closed form", t, exact), Curve("slack", t, 0.0 * t)]
+    curves = [Curve("tension of both links", t, result), Curve("closed form", t, exact), Curve("slack", t, 0.0 * t)]
     return CaseResult(figures, Plot("time [s]", "tension [N]", curves, log_y=False))

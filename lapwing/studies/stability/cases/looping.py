@@ -21,17 +21,17 @@ WHY = "round-off: 2e-16 for each of 60 000 steps, were every one of one sign"
 
 
 def start(aside: float) -> RigidBody:
-    """Looping, with a little roll and yaw."""
+    """Return a looping with a little roll and yaw."""
     return RigidBody(from_roll_pitch_yaw(0.0, 0.0, 0.0), (aside, RATE, aside))
 
 
 def momentum(y: np.ndarray) -> np.ndarray:
-    """Angular momentum in the world [N m s], shape (k, 3): it stands still."""
+    """Return the angular momentum in the world [N m s], shape (k, 3), a constant."""
     return to_world(y[:, :9], y[:, 9:12] * INERTIA)
 
 
 def euler_angles(aside: float, steps: int, samples: int) -> np.ndarray:
-    """The baseline way: RK4 on roll, pitch and yaw with 1/cos of the pitch; coordinates, shape (samples + 1, 12)."""
+    """Return the coordinates, shape (samples + 1, 12), of RK4 on Euler angles with 1/cos(pitch): the baseline."""
     A, B, C = INERTIA
 
     def rate(y: tuple[float, ...]) -> tuple[float, ...]:
@@ -44,16 +44,16 @@ def euler_angles(aside: float, steps: int, samples: int) -> np.ndarray:
         )  # fmt: skip
 
     y: tuple[float, ...] = (0.0, 0.0, 0.0, aside, RATE, aside)
-    h, found = DURATION / steps, []
+    h, result = DURATION / steps, []
     for i in range(steps + 1):
         if i % (steps // samples) == 0:
-            found.append(_coordinates(y))
+            result.append(_coordinates(y))
         k1 = rate(y)
         k2 = rate(tuple(a + 0.5 * h * b for a, b in zip(y, k1, strict=True)))
         k3 = rate(tuple(a + 0.5 * h * b for a, b in zip(y, k2, strict=True)))
         k4 = rate(tuple(a + h * b for a, b in zip(y, k3, strict=True)))
         y = tuple(a + h / 6.0 * (b + 2.0 * c + 2.0 * d + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=True))
-    return np.array(found)
+    return np.array(result)
 
 
 def _coordinates(y: tuple[float, ...]) -> list[float]:
@@ -66,7 +66,7 @@ def _coordinates(y: tuple[float, ...]) -> list[float]:
 
 
 def run() -> CaseResult:
-    """Angular momentum in the world, which no torque changes."""
+    """Measure the angular momentum in the world, which no torque changes."""
     ours = drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(ASIDE), DURATION, STEPS, SAMPLES)))
     baseline = drift(momentum(euler_angles(ASIDE, STEPS // 4, SAMPLES)))
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
@@ -87,7 +87,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Nearer and nearer past the pole."""
+    """Pass the pole ever closer."""
     asides = np.geomspace(10.0, 1e-6, 15)
     ours = [
         drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(a), DURATION, STEPS, 60))).max()

@@ -15,14 +15,14 @@ LAGS = np.geomspace(1e-2, 1e-6, 9)
 
 
 def lagging(lag: float) -> tuple[np.ndarray, np.ndarray]:
-    """(times [s], largest distance of a rotor's speed from its voltage's, relative to the highest) of a flight."""
+    """Return (times [s], maximum relative deviation of a rotor's speed from that of its voltage) of a flight."""
     truth = flown("hover", [f"airframe.motor.time_constant={lag!r}"]).truth
     speed, voltage = truth.rotor_speed, truth.motor_voltage
     return truth.times, np.abs(speed * CONSTANT - voltage).max(axis=1) / voltage.max()
 
 
 def unsplit(lag: float, steps: int) -> np.ndarray:
-    """The baseline way: RK4 at the plant's step on w' = (1 - w) / lag; distance from 1 after each step."""
+    """Return the distance from 1 after each RK4 step at the plant's step on w' = (1 - w) / lag: the baseline."""
     z = -STEP / lag
     factor = 1.0 + z + z * z / 2.0 + z**3 / 6.0 + z**4 / 24.0
     with np.errstate(over="ignore"):
@@ -30,7 +30,7 @@ def unsplit(lag: float, steps: int) -> np.ndarray:
 
 
 def accepted(lag: float) -> float:
-    """1 where a scene with this lag is taken, 0 where it is refused."""
+    """Return 1 if a scene with this lag is accepted, 0 if it is rejected."""
     try:
         load("hover", [f"airframe.motor.time_constant={lag!r}"])
     except ValueError:
@@ -39,7 +39,7 @@ def accepted(lag: float) -> float:
 
 
 def run() -> CaseResult:
-    """A flight with stiff motors, and motors without any lag."""
+    """Fly with stiff motors, and with motors without lag."""
     t, off = lagging(STIFF)
     baseline = unsplit(STIFF, round(INTERVAL / STEP))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -57,7 +57,7 @@ def run() -> CaseResult:
         ),
         Row(
             "zero",
-            "a lag below 1 us is refused with its key, value and limit",
+            "a lag below 1 us is rejected with its key, value and limit",
             "scenes without lag that are flown",
             0.0,
             "none: a lag rate of infinity times a difference of nothing is no number",
@@ -71,7 +71,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Faster and faster motors: the distance at the end of a flight."""
+    """Decrease the lag of the motors: distance at the end of a flight."""
     ours = np.array([lagging(float(lag))[1][-1] for lag in LAGS])
     baseline = np.array([unsplit(float(lag), 1000)[-1] for lag in LAGS])
     curves = [Curve("split", LAGS, ours), Curve("RK4 at 1 ms", LAGS, baseline)]

@@ -24,27 +24,27 @@ WHY = "2e-16 for each of 100 000 steps, were every rounding of one sign"
 
 
 def drifts(method: str, body: str, steps: int) -> np.ndarray:
-    """The larger of the drifts of energy and momentum, shape (k,)."""
+    """Return the larger of the drifts of energy and momentum, shape (k,)."""
     inertia, omega = BODIES[body]
     y = marched(method, FreeBodyParameters(inertia), RigidBody(ASKEW, omega), DURATION, steps, SAMPLES)
     return drifted(y, inertia)
 
 
 def drifted(y: np.ndarray, inertia: tuple[float, float, float]) -> np.ndarray:
-    """`drifts` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
+    """Return the `drifts` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
     energy = (y[:, 9:12] ** 2 * inertia).sum(axis=1)
     return np.maximum(drift(energy), drift(to_world(y[:, :9], y[:, 9:12] * inertia)))
 
 
 def bend(inertia: tuple, omega: np.ndarray) -> np.ndarray:
-    """omega' of Euler's equations [rad/s^2]."""
+    """Return omega' of Euler's equations [rad/s^2]."""
     return np.cross(np.multiply(inertia, omega), omega) / inertia
 
 
 def nearly_spherical() -> tuple[float, float]:
-    """Errors of the rates at the end [rad/s], ours and of the closed form in floats.
+    """Return the errors of the final rates [rad/s], ours and of the closed form in floats.
 
-    They hardly turn in the body: the second order of their Taylor series is exact to 1e-17.
+    The body axes hardly rotate: the second order of their Taylor series is exact to 1e-17.
     """
     o = np.array(ALMOST)
     first = bend(SPHERICAL, o)
@@ -57,7 +57,7 @@ def nearly_spherical() -> tuple[float, float]:
 
 
 def run() -> CaseResult:
-    """Energy and momentum of the first two, the rates of the third."""
+    """Measure energy and momentum of the first two bodies, the rates of the third."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     rows, curves = [], []
     for body in BODIES:
@@ -92,7 +92,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """The needle with longer and longer steps."""
+    """Increase the step for the needle."""
     counts = [1_000_000, 400_000, 200_000, 100_000, 50_000, 20_000, 10_000, 4000]
     curves = [
         Curve(name, DURATION / np.array(counts), np.array([drifts(name, "needle", n).max() for n in counts]))

@@ -15,14 +15,14 @@ WHY = "none: what validates flies"
 
 
 def drawn(seed: int) -> list[str]:
-    """Overrides of the delivery mission."""
+    """Return random overrides of the delivery mission."""
     rng = np.random.default_rng(seed)
 
     def decades(low: float, high: float) -> float:
         return float(10.0 ** rng.uniform(np.log10(low), np.log10(high)))
 
     mass, size, rate = decades(2.5, 25.0), decades(0.2, 1.5), int(rng.choice([50, 100, 200, 250, 500]))
-    found = {
+    result = {
         "run.seed": seed,
         "run.duration": 1.0,
         "communication.rate": rate,
@@ -41,11 +41,11 @@ def drawn(seed: int) -> list[str]:
         "effects.random_wind_force.sigma": decades(0.01, 10.0),
     }
     slow = {f"rates.{name}": 10 for name in ("pose", "estimate", "status", "battery", "body_states", "commands")}
-    return [f"{key}={value}" for key, value in {**found, **slow}.items()]
+    return [f"{key}={value}" for key, value in {**result, **slow}.items()]
 
 
 def flights(seed: int) -> tuple[FlightData, FlightData] | None:
-    """A scene flown twice; None where it does not validate."""
+    """Fly a scene twice. Return None if it is invalid."""
     try:
         first: FlightData = fly(load("delivery_mission", drawn(seed)))
     except ValueError:  # also: too heavy for its rotors
@@ -55,7 +55,7 @@ def flights(seed: int) -> tuple[FlightData, FlightData] | None:
 
 
 def run() -> CaseResult:
-    """Flights that end in no number, and those that differ when they are flown again."""
+    """Count flights that diverge, and those that differ when repeated."""
     pairs = [pair for seed in range(COUNT) if (pair := flights(seed))]
     broken = [bool(first.failure) or not finite(first) for first, _ in pairs]
     unlike = [first.digest != second.digest for first, second in pairs]
@@ -92,5 +92,5 @@ def run() -> CaseResult:
 
 
 def _lag_and_step(seed: int) -> tuple[str, str]:
-    found = dict(item.split("=", 1) for item in drawn(seed))
-    return found["airframe.motor.time_constant"], found["solver.step"]
+    result = dict(item.split("=", 1) for item in drawn(seed))
+    return result["airframe.motor.time_constant"], result["solver.step"]

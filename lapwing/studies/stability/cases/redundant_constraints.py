@@ -33,7 +33,7 @@ GUESSES = np.geomspace(1e-9, 1e-2, 8)
 
 
 def saddle(system, q, v, drive) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """The baseline way: one LU of the assembled matrix of masses and constraints, the accelerations (6 n,)."""
+    """Return the accelerations (6 n,) by one LU of the assembled matrix of masses and constraints: the baseline."""
     p, e = rows(system.arrays, q, v, drive)
     root, rotational = mass_roots(system.arrays, p)
     J = e.jacobian_t.T
@@ -52,13 +52,13 @@ def saddle(system, q, v, drive) -> np.ndarray:  # type: ignore[no-untyped-def]
 
 
 def violated(system, q, v, drive, a) -> float:  # type: ignore[no-untyped-def]
-    """Largest J a - gamma, relative to the largest gamma."""
+    """Return the largest J a - gamma, relative to the largest gamma."""
     _, e = rows(system.arrays, q, v, drive)
     return float(np.abs(e.jacobian_t.T @ a - e.gamma).max() / max(np.abs(e.gamma).max(), 1.0))
 
 
 def redundant() -> tuple[float, float]:
-    """The drone with its propellers at imposed speeds, ours and the baseline way, the worst of 20 random states."""
+    """Return the errors of the drone with imposed propeller speeds, ours and the baseline's, of 20 random states."""
     rng, worst = np.random.default_rng(5), np.zeros(2)
     drone = delivery_drone(**PAPER, driven="speed")
     system = drone_system(drone)
@@ -77,17 +77,19 @@ def redundant() -> tuple[float, float]:
 
 
 def off_by(size: float) -> tuple[float, float]:
-    """Error of the Bricard loop's accelerations, relative, where its joints are apart by `size` [m]: with the rank of
-    the start as a bound, and with the rank found afresh."""
+    """Return the relative errors of the Bricard loop's accelerations with joints apart by `size` [m].
+
+    With the initial rank as a bound, and with a newly determined rank.
+    """
     system, q, v = bricard()
     off = displaced(q, size * np.random.default_rng(1).normal(size=v.shape))
     no_load, no_drive = np.zeros((5, 6)), np.zeros((0, 2))
     true = accelerations(system, q, v).acceleration
-    found = []
+    result = []
     for most in (29, ANY):
         a, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, most)
-        found.append(float(np.abs(a.acceleration - true).max() / np.abs(true).max()))
-    return found[0], found[1]
+        result.append(float(np.abs(a.acceleration - true).max() / np.abs(true).max()))
+    return result[0], result[1]
 
 
 def tips(t: np.ndarray, n: int) -> np.ndarray:
@@ -101,7 +103,7 @@ def tips(t: np.ndarray, n: int) -> np.ndarray:
 
 
 def singular_position() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(times, error of the first crank's tip [m], the same by the baseline way) of two four-bars that turn over."""
+    """Return (times, error of the first crank's tip [m], the baseline's) of two four-bars that turn over."""
     n = 2
     system, q, v = four_bars(n)
     motion = simulate(system, q, v, END / STEPS, STEPS, record_every=LOOKS)
@@ -112,7 +114,7 @@ def singular_position() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def inconsistent() -> tuple[float, float]:
-    """Largest constraint defect of a four-bar put together by hand, after it was made consistent, and as it was put."""
+    """Return the maximum constraint defect of a hand-assembled four-bar, after correction and before."""
     system, q, v = four_bars()
     rng, none = np.random.default_rng(1), np.zeros((0, 2))
     q, v = displaced(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape)
@@ -121,7 +123,7 @@ def inconsistent() -> tuple[float, float]:
 
 
 def run() -> CaseResult:
-    """Rank, redundancy off the constraints, a singular position and an inconsistent start."""
+    """Measure rank, redundancy off the constraints, a singular position and an inconsistent start."""
     t, off, baseline_off = singular_position()
     ours_off, fresh = off_by(1e-6)
     figures = [
@@ -171,8 +173,8 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """The Bricard loop further and further apart."""
-    found = np.array([off_by(size) for size in GUESSES])
+    """Increase the joint defect of the Bricard loop."""
+    result = np.array([off_by(size) for size in GUESSES])
     names = ("rank of the start as a bound", "rank found afresh")
-    curves = [Curve(name, GUESSES, found[:, k]) for k, name in enumerate(names)]
+    curves = [Curve(name, GUESSES, result[:, k]) for k, name in enumerate(names)]
     return Sweep("joints apart by [m]", "error of the accelerations, relative", 0.5, curves)

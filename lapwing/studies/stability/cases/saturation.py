@@ -37,14 +37,14 @@ OVERSHOOT, BACK, AWAY, UNIT = 1.0, 0.1, 0.5, 1e-12
 
 
 def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
-    """(times, height [m] over the setpoint) of the drone's height loop, without thrust for `loss` [s]."""
+    """Return (times, height [m] over the setpoint) of the drone's height loop, without thrust for `loss` [s]."""
     of = load("hover", [])
     frame, gains = known_airframe(of), pid.Pid(*of[GainSet].altitude)
     most = thrust_at(frame.motor, frame.voltage_max)
     weight = 0.25 * frame.mass * frame.gravity
     integrate, output = python_function(pid.integrate), python_function(pid.output)
     z = v = integral = cut = 0.0
-    thrust, found = weight, []
+    thrust, result = weight, []
     times = np.arange(0.0, 30.0, STEP)
     for t in times:
         integral = integrate(gains, integral, -z, cut if unwound else 0.0, STEP)
@@ -56,19 +56,19 @@ def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
         thrust += STEP / frame.motor.time_constant * (given - thrust)
         v += STEP * (4.0 * thrust / frame.mass - frame.gravity)
         z += STEP * v
-        found.append(z)
-    return times, np.array(found)
+        result.append(z)
+    return times, np.array(result)
 
 
 def away(gains: str) -> float:
-    """Largest distance [m] from the path: the pack falls off in flight, in a wind of 25 m/s."""
+    """Return the maximum distance [m] from the path when the pack is dropped in a wind of 25 m/s."""
     flight = flown("delivery_full", [*DROP, "run.duration=60.0", f"autopilot.gains={gains}"], TOPICS)
     n = min(len(flight.reference), len(flight.truth))
     return float(np.linalg.norm(flight.truth.position[:n] - flight.reference[:n, :3], axis=1).max())
 
 
 def rebound(gains: str) -> float:
-    """Largest height [m] over the path after a gust that has pushed the vehicle down."""
+    """Return the maximum height [m] above the path after a downward gust."""
     flight = flown("hover", [*GUST, f"autopilot.gains={gains}"], TOPICS)
     n = min(len(flight.reference), len(flight.truth))
     over = flight.truth.position[:n, 2] - flight.reference[:n, 2]
@@ -86,7 +86,7 @@ def tumbling() -> tuple[float, float]:
 
 
 def run() -> CaseResult:
-    """Overshoot after a loss of thrust, the path of a drop in wind, the attitude of a vehicle that turns over."""
+    """Measure the overshoot after a loss of thrust, a drop in wind, and the attitude of a vehicle that turns over."""
     t, ours = height(True, LOSS)
     _, baseline = height(False, LOSS)
     unit, stepped = tumbling()
@@ -137,11 +137,11 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Longer and longer losses of thrust: what is left after a quarter of a minute."""
+    """Increase the duration of the thrust loss: remaining error after 15 s."""
     losses = np.geomspace(0.1, 4.0, 25)
-    found = {True: "integral held", False: "integral goes on"}
+    result = {True: "integral held", False: "integral goes on"}
     curves = [
         Curve(name, losses, np.array([np.abs(height(held, float(s))[1][-250:]).max() for s in losses]))
-        for held, name in found.items()
+        for held, name in result.items()
     ]
     return Sweep("seconds without thrust", "height error at the end [m]", 0.1, curves)

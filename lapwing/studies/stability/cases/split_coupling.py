@@ -1,4 +1,4 @@
-"""Case 21: a stiffly held load, its control in a process of its own."""
+"""Case 21: a load with stiff control in a separate process."""
 
 from functools import cache
 from typing import Any
@@ -10,7 +10,7 @@ from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, 
 from lapwing.studies.stability.flights import flown
 from lapwing.studies.stability.sampled_runs import rows
 
-HARD = "a carried load whose control is another process: between two exchanges each sees the other stand still"
+HARD = "a carried load whose control is another process: each is constant for the other during a step"
 
 DURATION, LOOKS = 5.0, 50  # [s], times at which runs are compared: a multiple of every interval
 RATES = (400, 200, 100, 50, 40, 20, 10)  # [Hz]
@@ -21,7 +21,7 @@ SLOW = 20  # [Hz]
 
 @cache
 def together(steps: int) -> np.ndarray:
-    """The load's positions [m] with the control inside of the plant's equations, shape (LOOKS + 1, 3)."""
+    """Return the load's positions [m] with the control inside the plant's equations, shape (LOOKS + 1, 3)."""
     services = resolve(load("cooperative_load", [])).services
     law: Any = services["formation"].parameters
     start: Any = services["plant"].parameters.start
@@ -44,20 +44,20 @@ def apart(rate: int, coupling: str) -> np.ndarray:
             *slow,
         ],
     ).truth
-    found = np.full((LOOKS + 1, 3), np.nan)
+    result = np.full((LOOKS + 1, 3), np.nan)
     at = truth.position[:: round(DURATION / LOOKS * rate)]
-    found[: len(at)] = at
-    return found
+    result[: len(at)] = at
+    return result
 
 
 def off(positions: np.ndarray) -> float:
-    """Largest distance [m] from the run in one process, over those looks at which it is a number."""
+    """Return the maximum distance [m] from the single-process run, over the finite samples."""
     distance = np.linalg.norm(positions - together(2000), axis=1)
     return float(np.nanmax(distance))
 
 
 def run() -> CaseResult:
-    """In one and in two."""
+    """Compare one process with two."""
     one = float(np.linalg.norm(together(1000) - together(2000), axis=1).max())
     why = "the formation flies at 5 m/s: in an exchange of 2.5 ms it moves by 12 mm"
     broken, drowned = off(apart(SLOW, "jacobi")), "two processes in parallel (Jacobi) at 20 Hz"
@@ -80,7 +80,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Rarer and rarer exchanges."""
+    """Decrease the communication rate."""
     intervals = 1.0 / np.array(RATES)
     curves = [
         Curve(f"two processes, {coupling}", intervals, np.array([off(apart(rate, coupling)) for rate in RATES]))

@@ -26,20 +26,20 @@ EXACT, PUSHED, GAINED = 1e-9, 1e-3, 1e-9
 
 
 def base(axis: int) -> float:
-    """Half the distance [m] between the feet that the vehicle leans over."""
+    """Return half the distance [m] between the feet of the tilt axis."""
     return float(max(foot[1 - axis] for foot in FEET))
 
 
 def edge(axis: int) -> float:
-    """The angle [rad] at which the centre of mass is over the feet.
+    """Return the angle [rad] at which the centre of mass is above the feet.
 
-    The force of the ground then passes through it, however deep the feet are in: their springs do not move the edge.
+    The ground force then passes through it at any foot depth: the springs do not move the edge.
     """
     return math.atan(base(axis) / HEIGHT)
 
 
 def unit(axis: int) -> tuple[float, float, float]:
-    """Unit vector of the body's axis x (0) or y (1)."""
+    """Return the unit vector of the body's axis x (0) or y (1)."""
     return (1.0, 0.0, 0.0) if axis == 0 else (0.0, 1.0, 0.0)
 
 
@@ -49,7 +49,7 @@ def toppled(state: Any, axis: int) -> bool:
 
 
 def leaning(axis: int, angle: float) -> tuple[Any, Any]:
-    """(parameters, state at rest) on two feet, which just touch, leaning by an angle [rad]."""
+    """Return (parameters, state at rest) on two feet, which just touch, leaning by an angle [rad]."""
     p, state = standing(base(axis) * math.sin(angle) + HEIGHT * (math.cos(angle) - 1.0), 0.0)
     return p, state._replace(motion=state.motion._replace(attitude=exp(scale(angle, unit(axis)))))
 
@@ -61,17 +61,17 @@ def falls(axis: int, angle: float, step: float = STEP) -> bool:
 
 
 def inertia(axis: int) -> float:
-    """Moment [kg m^2] about the edge of the feet."""
+    """Return the moment [kg m^2] about the edge of the feet."""
     return DRONE.mass.inertia[axis] + MASS * (base(axis) ** 2 + HEIGHT**2)
 
 
 def enough(axis: int) -> float:
-    """The rate [rad/s] about the edge whose energy lifts the centre of mass over it."""
+    """Return the rate [rad/s] about the edge whose energy lifts the centre of mass over it."""
     return math.sqrt(2.0 * MASS * G * (math.hypot(base(axis), HEIGHT) - HEIGHT) / inertia(axis))
 
 
 def settled() -> tuple[Any, Any]:
-    """(parameters, state) of the vehicle standing still on all feet, which do not slide."""
+    """Return (parameters, state) of the vehicle at rest on all feet, which do not slide."""
     p, state = standing(0.0, 0.0, friction_static=GRIP, friction_dynamic=GRIP)
     return p, run_on(p, state, 3.0)
 
@@ -95,14 +95,14 @@ def threshold(topples: Callable[[float], bool], low: float, high: float, parts: 
 
 
 def baseline(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> np.ndarray:
-    """The baseline way: forward Euler on spring, damper and friction against the slip, in the plane of the fall.
+    """Return rows of (angle [rad], energy [J]), shape (n, 2), of the baseline; `rate` [rad/s] about the edge.
 
-    Rows of (angle [rad], energy [J]), shape (n, 2); `rate` [rad/s] is that about the edge.
+    Forward Euler on spring, damper and sign friction, in the plane of the fall.
     """
     b, about = base(axis), DRONE.mass.inertia[axis]
     z = b * math.sin(angle) + HEIGHT * math.cos(angle)
     y, vy, vz, omega = 0.0, -rate * HEIGHT, rate * b, rate
-    found = []
+    result = []
     for _ in range(round(SECONDS / step)):
         c, s = math.cos(angle), math.sin(angle)
         fy = fz = torque = 0.0
@@ -114,10 +114,10 @@ def baseline(axis: int, angle: float, rate: float = 0.0, step: float = STEP, fri
             fy, fz, torque = fy + drag, fz + press, torque + py * press - pz * drag
         y, z, angle = y + step * vy, z + step * vz, angle + step * omega
         vy, vz, omega = vy + step * fy / MASS, vz + step * (fz / MASS - G), omega + step * torque / about
-        found.append((angle, MASS * (G * z + 0.5 * (vy * vy + vz * vz)) + 0.5 * about * omega * omega))
+        result.append((angle, MASS * (G * z + 0.5 * (vy * vy + vz * vz)) + 0.5 * about * omega * omega))
         if abs(angle) > 0.5 * math.pi:
             break
-    return np.array(found)
+    return np.array(result)
 
 
 def baseline_falls(axis: int, angle: float, rate: float = 0.0, step: float = STEP, friction: float = FRICTION) -> bool:
@@ -126,7 +126,7 @@ def baseline_falls(axis: int, angle: float, rate: float = 0.0, step: float = STE
 
 
 def gained(axis: int, angle: float) -> float:
-    """Highest energy over that at first, relative to what the edge is over the standing vehicle."""
+    """Return the maximum energy over the initial one, relative to the energy of the edge over rest."""
     p, state = leaning(axis, angle)
     energies = [energy(p, state.motion)]
     for _ in range(1000):
@@ -136,25 +136,25 @@ def gained(axis: int, angle: float) -> float:
 
 
 def lift(axis: int) -> float:
-    """Energy [J] of the centre of mass over the edge, over that of the standing vehicle."""
+    """Return the energy [J] of the centre of mass above the edge, relative to rest."""
     return MASS * G * (math.hypot(base(axis), HEIGHT) - HEIGHT)
 
 
 def error(axis: int, step: float, topples: Any, parts: int) -> float:
-    """Distance [rad] of the angle at which it topples, set down at rest, from the edge."""
+    """Return the difference [rad] between toppling angle and edge for a vehicle released at rest."""
     exact = edge(axis)
     return abs(threshold(lambda a: topples(axis, a, step=step), exact - 0.1, exact + 0.1, parts) - exact)
 
 
 def push_error(axis: int, topples: Callable[[float], bool], parts: int) -> float:
-    """Difference of the rate at which it topples from that of the energy, relative."""
+    """Return the relative difference of the toppling rate from that of the energy."""
     exact = enough(axis)
     return abs(threshold(topples, 0.5 * exact, 1.5 * exact, parts) / exact - 1.0)
 
 
 def run() -> CaseResult:
     """Set down leaning, pushed, and what becomes of the energy."""
-    ours, euler = "anchored feet, RK4 at 1 ms", "forward Euler on spring, damper and friction, 1 ms"
+    ours, euler = "friction elements, RK4 at 1 ms", "forward Euler on spring, damper and friction, 1 ms"
     rest = settled()
     rate = max(push_error(i, partial(pushed, i, rest), 20) for i in AXES)
     baseline_rate = max(push_error(i, partial(baseline_falls, i, 0.0, friction=GRIP), 16) for i in AXES)
@@ -166,17 +166,17 @@ def run() -> CaseResult:
             "through the centre of mass",
             max(error(i, STEP, falls, 34) for i in AXES), euler, max(error(i, STEP, baseline_falls, 16) for i in AXES)),
         Row("pushed", ours, "rate at which it topples, standing, relative to that of equal energies", PUSHED,
-            "the energy of the feet's springs and of the depth to which it stands, 5 of 8000 mJ",
+            "the energy of the feet's springs and of their depth, 5 of 8000 mJ",
             rate, euler, baseline_rate),
         Row("energy", ours, f"energy gained, set down {NEAR:g} rad to either side, over that of the edge", GAINED,
-            "none but round-off: the ground gives nothing",
+            "none but round-off: the ground adds no energy",
             max(gained(i, a) for i, a in beside), euler, kicked),
     ]  # fmt: skip
     return CaseResult(rows, course())
 
 
 def course() -> Plot:
-    """The roll of vehicles that are set down a little to either side of the edge."""
+    """Plot the roll of vehicles released slightly to either side of the edge."""
     t = np.arange(251) * 0.02
     curves = []
     for name, off in (("before the edge", -NEAR), ("beyond it", NEAR)):
@@ -191,7 +191,7 @@ def course() -> Plot:
 
 
 def sweep() -> Sweep:
-    """Longer and longer steps: the error of the angle at which it topples."""
+    """Increase the step: error of the toppling angle."""
     steps = STEP * np.array([0.125, 0.25, 0.5, 1.0, 2.0, 4.0])
     curves = [
         Curve("RK4, feet of the plant", steps, np.array([error(1, h, falls, 34) for h in steps])),

@@ -15,7 +15,7 @@ HARD = "a pack that rollers push over a door that falls open: contacts that begi
 STEPS = (0.25e-3, 0.5e-3, 1e-3, 2e-3)  # [s]
 BASELINE = 0.5e-3  # [s]
 BOUND = 1e-5  # [m]
-TAKEN = 4.9  # [s] just before somebody takes it away
+TAKEN = 4.9  # [s] just before it is taken away
 
 
 @cache
@@ -26,7 +26,7 @@ def end(step: float, *more: str) -> np.ndarray:
 
 
 def off(step: float) -> float:
-    """Distance [m] from where it lies at an accuracy of 1e-8."""
+    """Return the distance [m] from the final position at an accuracy of 1e-8."""
     return float(np.linalg.norm(end(step) - end(STEPS[0], "solver.accuracy=1e-8")))
 
 
@@ -41,7 +41,7 @@ def baseline(step: float) -> float:
 
 
 def run() -> CaseResult:
-    """The end at every step."""
+    """Compare the end at every step."""
     row = Row(
         "end",
         "RK4 with its error controlled, steps of 0.25 to 2 ms at most",
@@ -56,7 +56,7 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Longer and longer steps; without control the run ends with an error at 1 ms."""
+    """Increase the step; without control the run ends with an error at 1 ms."""
     steps = np.array(STEPS)
     curves = [
         Curve("RK4, error controlled", steps, np.array([off(float(step)) for step in steps])),

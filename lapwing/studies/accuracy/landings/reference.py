@@ -1,0 +1,261 @@
+"""Event-located reference of a landing: smooth pieces by SciPy's DOP853, transitions of each foot by root finding.
+
+Written apart from `lapwing.dynamics`: attitudes are matrices, and the law of a foot is spelled out by cases, which
+change only at located events: touch-down and lift-off, full onset of the normal force, the end of its pull, sticking
+and sliding, and the slip at which the dynamic coefficient is reached (theory.md, section 2.8).
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.integrate import DOP853
+from scipy.optimize import brentq
+
+from lapwing.kernels import kernel
+
+TOLERANCE = 1e-12  # relative to 1 + size, of a step
+LONGEST = 1e-3  # [s] of a step, so that no foot touches and leaves within one
+GRAZING = 2e-5  # [m] of the ground, within which a step is searched for a touch
+FULL, SLOW = 1, 4  # other rows of the cases: 0 in the ground, 2 pressing, 3 sliding
+
+
+class LandingBody(NamedTuple):
+    """A rigid body with points that touch the ground, and rotors that slow down."""
+
+    mass: float  # [kg]
+    inertia: np.ndarray  # [kg m^2] principal, shape (3,)
+    points: np.ndarray  # [m] in the body, shape (n, 3)
+    rotors: np.ndarray  # [m] in the body, shape (m, 3)
+    signs: np.ndarray  # of the torque on the body, shape (m,)
+    thrust: float  # [N s^2] over the square of a rotor's speed
+    torque: float  # [N m s^2] over the same
+    lag: float  # [1/s] of the rotors
+    gravity: float  # [m/s^2]
+
+
+class LandingGround(NamedTuple):
+    """Ground z = a x + b y + A sin k x sin k y, and the law of contact."""
+
+    slope: tuple[float, float]
+    bump: float  # [m] A
+    wave: float  # [1/m] k
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+    width: float  # [m]
+    static: float
+    dynamic: float
+    shear_stiffness: float  # [N/m]
+    shear_damping: float  # [N s/m]
+    slow: float  # [m/s] slip of the dynamic coefficient
+
+
+@kernel
+def _foot(body: Any, ground: Any, y: np.ndarray, i: int) -> Any:
+    """Return (arm, normal, slip, depth [m], approach [m/s], slip [m/s], shear, shear [N]) of a point, world."""
+    arm, spun = np.zeros(3), np.zeros(3)
+    b = body.points[i]
+    o = y[15:18]
+    turned = (o[1] * b[2] - o[2] * b[1], o[2] * b[0] - o[0] * b[2], o[0] * b[1] - o[1] * b[0])
+    for row in range(3):
+        for k in range(3):
+            arm[row] += y[3 + 3 * row + k] * b[k]
+            spun[row] += y[3 + 3 * row + k] * turned[k]
+    u, v = ground.wave * (y[0] + arm[0]), ground.wave * (y[1] + arm[1])
+    height = ground.slope[0] * (y[0] + arm[0]) + ground.slope[1] * (y[1] + arm[1])
+    height += ground.bump * math.sin(u) * math.sin(v)
+    steep = ground.bump * ground.wave
+    normal = np.array(
+        [
+            -ground.slope[0] - steep * math.cos(u) * math.sin(v),
+            -ground.slope[1] - steep * math.sin(u) * math.cos(v),
+            1.0,
+        ]
+    )
+    normal /= math.sqrt((normal * normal).sum())
+    velocity = y[12:15] + spun
+    rising = (velocity * normal).sum()
+    slip = velocity - rising * normal
+    deflection = y[len(y) - 3 * (len(body.points) - i) :][:3]
+    along = (deflection * normal).sum()
+    shear = ground.shear_stiffness * (deflection - along * normal) + ground.shear_damping * slip
+    size, speed = math.sqrt((shear * shear).sum()), math.sqrt((slip * slip).sum())
+    return arm, normal, (height - y[2] - arm[2]) * normal[2], -rising, speed, shear, size
+
+
+@kernel
+def _limit(ground: Any, cases: np.ndarray, i: int, depth: float, approach: float, speed: float) -> Any:
+    """Return (normal force, friction at which the point slides) [N] under given cases."""
+    if not (cases[0, i] and cases[2, i]):
+        return 0.0, 0.0
+    xi, slow = depth / ground.width, speed / ground.slow
+    onset = 1.0 if cases[FULL, i] else xi * xi * (3.0 - 2.0 * xi)
+    press = onset * (ground.stiffness * depth + ground.damping * approach)
+    fall = slow * slow * (3.0 - 2.0 * slow) if cases[SLOW, i] else 1.0
+    return press, (ground.static + (ground.dynamic - ground.static) * fall) * press
+
+
+@kernel
+def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return the derivative of (position, R_world_body, velocity, omega_body, rotor speeds, deflections)."""
+    n, m = len(body.points), len(body.rotors)
+    result = np.zeros_like(y)
+    R, o = y[3:12].copy().reshape(3, 3), y[15:18]
+    force, world = np.array([0.0, 0.0, -body.mass * body.gravity]), np.zeros(3)
+    torque = np.zeros(3)
+    for k in range(m):
+        square = y[18 + k] * y[18 + k]
+        force += body.thrust * square * R[:, 2]
+        torque[0] += body.rotors[k, 1] * body.thrust * square
+        torque[1] -= body.rotors[k, 0] * body.thrust * square
+        torque[2] += body.signs[k] * body.torque * square
+        result[18 + k] = -body.lag * y[18 + k]
+    for i in range(n):
+        at = 18 + m + 3 * i
+        stretch = -ground.shear_stiffness / ground.shear_damping * y[at : at + 3]
+        if cases[0, i] and cases[2, i]:
+            arm, normal, depth, approach, speed, shear, size = _foot(body, ground, y, i)
+            press, limit = _limit(ground, cases, i, depth, approach, speed)
+            held = shear * (limit / max(size, 1e-300)) if cases[3, i] else shear
+            stretch = stretch + held / ground.shear_damping
+            push = press * normal - held
+            force += push
+            world += np.array(
+                [
+                    arm[1] * push[2] - arm[2] * push[1],
+                    arm[2] * push[0] - arm[0] * push[2],
+                    arm[0] * push[1] - arm[1] * push[0],
+                ]
+            )
+        result[at : at + 3] = stretch
+    for k in range(3):
+        torque[k] += (R[:, k] * world).sum()
+    h = body.inertia * o
+    result[:3] = y[12:15]
+    for row in range(3):
+        result[3 + 3 * row] = R[row, 1] * o[2] - R[row, 2] * o[1]
+        result[4 + 3 * row] = R[row, 2] * o[0] - R[row, 0] * o[2]
+        result[5 + 3 * row] = R[row, 0] * o[1] - R[row, 1] * o[0]
+    result[12:15] = force / body.mass
+    result[15] = (torque[0] - o[1] * h[2] + o[2] * h[1]) / body.inertia[0]
+    result[16] = (torque[1] - o[2] * h[0] + o[0] * h[2]) / body.inertia[1]
+    result[17] = (torque[2] - o[0] * h[1] + o[1] * h[0]) / body.inertia[2]
+    return result
+
+
+@kernel
+def margins(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Return what is positive where a case holds, shape (5, n); it changes its sign at an event."""
+    result = np.empty((5, len(body.points)))
+    for i in range(len(body.points)):
+        _, _, depth, approach, speed, _, size = _foot(body, ground, y, i)
+        result[0, i], result[1, i] = depth, depth - ground.width
+        result[2, i] = ground.stiffness * depth + ground.damping * approach
+        result[3, i] = size - _limit(ground, cases, i, depth, approach, speed)[1]
+        result[4, i] = ground.slow - speed
+    return result
+
+
+def cases_at(body: LandingBody, ground: LandingGround, y: np.ndarray) -> np.ndarray:
+    """Return the cases of a state."""
+    cases = np.zeros((5, len(body.points)), dtype=bool)
+    for _ in range(2):  # the limit of the friction depends on the others
+        cases = margins(body, ground, cases, y) > 0.0
+    return cases
+
+
+def landing(
+    body: LandingBody, ground: LandingGround, start: np.ndarray, times: np.ndarray, tolerance: float = TOLERANCE
+) -> tuple[np.ndarray, int]:
+    """Return (states at `times`, the first of which is that of `start`; number of events).
+
+    Raises:
+        ValueError: the integration fails.
+    """
+    out = np.empty((len(times), len(start)))
+    out[0] = start
+    t, y, row, events = float(times[0]), start, 1, 0
+    cases = cases_at(body, ground, y)
+    step = None
+    while row < len(times):
+        held = cases
+        solver = DOP853(
+            lambda _, x, held=held: rate(body, ground, held, x), t, y, float(times[-1]),
+            rtol=tolerance, atol=tolerance, max_step=LONGEST, first_step=step and min(step, float(times[-1]) - t),
+        )  # fmt: skip
+        crossed = None
+        while crossed is None and row < len(times):
+            if message := solver.step():
+                raise ValueError(f"reference: {message}")
+            crossed = _first_crossing(body, ground, held, solver)
+            until = crossed[0] if crossed else solver.t
+            while row < len(times) and times[row] <= until:
+                out[row] = _at(body, ground, held, solver, float(times[row]), tolerance)
+                row += 1
+        if crossed:
+            step = max(1e-9, 0.2 * (solver.t - solver.t_old))
+            (t, flipped), y = crossed, _at(body, ground, held, solver, crossed[0], tolerance)
+            cases = held ^ flipped
+            fresh = cases[0] & (flipped[0] | flipped[2])  # what did not count there before
+            now = margins(body, ground, cases, y) > 0.0
+            now[3] |= fresh  # a point slides until it is pressed
+            now[2] |= flipped[0]
+            cases[1:, fresh] = np.where(flipped[1:, fresh], cases[1:, fresh], now[1:, fresh])
+            events += 1
+    return out, events
+
+
+def _at(
+    body: LandingBody, ground: LandingGround, cases: np.ndarray, solver: DOP853, t: float, tolerance: float
+) -> np.ndarray:
+    """Return the state at a time within the last step, integrated once more: more exact than its interpolation."""
+    if t <= solver.t_old:
+        return solver.y_old
+    again = DOP853(
+        lambda _, x: rate(body, ground, cases, x), solver.t_old, solver.y_old, t, rtol=tolerance, atol=tolerance,
+        first_step=t - solver.t_old,
+    )  # fmt: skip
+    while again.status == "running":
+        again.step()
+    return again.y
+
+
+def _first_crossing(
+    body: LandingBody, ground: LandingGround, cases: np.ndarray, solver: DOP853
+) -> tuple[float, np.ndarray] | None:
+    """Return (time, cases that change) of the first event within the last step; None if there is none."""
+
+    def wrong(y: np.ndarray) -> np.ndarray:
+        """Positive where a case does not hold any more; the friction of points that do not press has none."""
+        result = np.where(cases, -1.0, 1.0) * margins(body, ground, cases, y)
+        result[1:, ~cases[0]] = -1.0  # in the air only the touch counts
+        result[3, ~cases[2]] = -1.0
+        return result
+
+    at_end = wrong(solver.y)
+    points = [solver.t]
+    near = np.abs(margins(body, ground, cases, solver.y)[0]).min() < GRAZING
+    dense = None
+    if near:
+        dense = solver.dense_output()
+        points = list(np.linspace(solver.t_old, solver.t, 9)[1:])
+    before = solver.t_old
+    for point in points:
+        values = at_end if point == solver.t else wrong(dense(point))  # type: ignore[misc]
+        if (values > 0.0).any():
+            dense = dense or solver.dense_output()
+            found = [(_root(wrong, dense, before, point, k), k) for k in zip(*np.nonzero(values > 0.0), strict=True)]
+            t = min(found)[0]
+            flipped = np.zeros_like(cases)
+            for root, k in found:
+                flipped[k] = root == t
+            return t, flipped
+        before = point
+    return None
+
+
+def _root(wrong, dense, before: float, after: float, k) -> float:  # type: ignore[no-untyped-def]
+    """Return the time at which a value becomes positive; that before if it is positive there, by round-off."""
+    if wrong(dense(before))[k] >= 0.0:
+        return before
+    return float(brentq(lambda t: wrong(dense(t))[k], before, after, xtol=1e-16, rtol=1e-15))

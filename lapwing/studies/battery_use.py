@@ -1,0 +1,83 @@
+"""Energy that a flight takes from its battery, and what is left of it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.dynamics.effects.battery_thevenin import NOMINAL_VOLTAGE
+from lapwing.studies.flight_data import FlightData
+
+EFFECTS = ("battery", "battery_thevenin")  # that model the charge
+WATT_HOUR = 3600.0  # [J], the unit of every energy that is shown
+LOW = "BAT_LOW_THR"  # parameter: charge below which the autopilot warns, fraction
+
+
+class BatteryUse(NamedTuple):
+    """Battery over the flight at n times, and at the landing, or at the end of the log without one."""
+
+    times: np.ndarray  # [s] shape (n,), as all others
+    charge: np.ndarray  # fraction of the capacity
+    voltage: np.ndarray  # [V] of the pack under load
+    current: np.ndarray  # [A] drawn
+    drawn: np.ndarray  # [W h] since the start
+    cutoff: float | None  # [V] of the pack, below which the motors stop
+    low: float | None  # fraction below which the autopilot warns
+    landing: float  # [s]
+    charge_left: float  # fraction, at the landing
+    energy_left: float  # [W h] at nominal voltage, at the landing
+    least_voltage: float  # [V] until the landing
+
+    def __str__(self) -> str:
+        """Return the margin at the landing as a sentence."""
+        volts = "" if self.cutoff is None else f", {self.cutoff:.1f} V at the cut-off"
+        return (
+            f"At {self.landing:.1f} s, the landing or the end, {100.0 * self.charge_left:.1f} % of the charge is left, "
+            f"{self.energy_left:.1f} W h at {NOMINAL_VOLTAGE} V a cell. Drawn: {self.drawn[-1]:.2f} W h. "
+            f"Lowest voltage: {self.least_voltage:.1f} V{volts}."
+        )
+
+
+def battery_use(flight: FlightData) -> BatteryUse | None:
+    """Return the use of the battery; None if the log has no charge: no effect models it."""
+    if not flight.has("battery"):
+        return None
+    view = flight.topic("battery")
+    charge = np.asarray(view.percentage, float)
+    if not len(charge) or not np.isfinite(charge).all():
+        return None
+    voltage, current = np.asarray(view.voltage, float), np.abs(np.asarray(view.current, float))
+    power = voltage * current
+    steps = np.diff(view.times) * 0.5 * (power[1:] + power[:-1])
+    cells = view["cell_voltage"].shape[1]
+    capacity = float(view.design_capacity[-1])  # [A h]
+    landing = flight.outcome.time
+    last = int(np.searchsorted(view.times, landing, side="right").clip(1, len(view)) - 1)
+    return BatteryUse(
+        view.times,
+        charge,
+        voltage,
+        current,
+        np.concatenate([[0.0], np.cumsum(steps)]) / WATT_HOUR,
+        _cutoff(flight, cells),
+        _low(flight),
+        landing,
+        float(charge[last]),
+        float(charge[last]) * capacity * cells * NOMINAL_VOLTAGE,
+        float(voltage[: last + 1].min()),
+    )
+
+
+def _cutoff(flight: FlightData, cells: int) -> float | None:
+    """Return the cut-off voltage [V] of the pack; None if no effect of the scene has one."""
+    effects = flight.origin.scene.get("effects", {})
+    given = next((effects[name] for name in EFFECTS if name in effects), None)
+    return None if given is None else cells * float(given.get("cutoff_voltage", 3.0))
+
+
+def _low(flight: FlightData) -> float | None:
+    """Return the charge at which the autopilot warns; None without a run configuration or an autopilot of this kind."""
+    try:
+        parameters = getattr(flight.setup.services["autopilot"].parameters, "parameters", ())
+    except (ValueError, KeyError):
+        return None
+    return next((float(parameter.default) for parameter in parameters if parameter.name == LOW), None)

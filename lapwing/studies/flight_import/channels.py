@@ -1,0 +1,150 @@
+"""Time series of a log whose quantities have clocks of their own, and the recording that they become."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from lapwing.studies.flight_import.recording import Recording, Series
+from lapwing.studies.flight_import.rotation_arrays import body_rate, continuous, unit
+from lapwing.studies.flight_import.time_alignment import describe
+
+RATE = 100.0  # [Hz] of the recording
+SHORTEST = 1.0  # [s] of a recording
+SPARSEST = 100  # samples of the grid for one of the log
+FLU = np.array([1.0, -1.0, -1.0])  # signs from FRD to FLU, and back
+
+
+@dataclass
+class Channels:
+    """The quantities of one vehicle's log in SI units, world ENU and body FLU; None where the log has none.
+
+    Attributes:
+        attitude: quaternions w, x, y, z, body to world.
+        position: [m] world.
+        velocity: [m/s] world.
+        omega: [rad/s] body.
+        specific_force: [m/s^2] body.
+        duty: shares of full throttle of each motor.
+        battery: [V], and [A] as a second column where measured.
+        readings: of sensors, by the field of `SENSORS` in `write_log`.
+        notes: facts of the import, a line each.
+        unknown: names of topics without a counterpart.
+    """
+
+    attitude: Series | None = None
+    position: Series | None = None
+    velocity: Series | None = None
+    omega: Series | None = None
+    specific_force: Series | None = None
+    duty: Series | None = None
+    battery: Series | None = None
+    readings: dict[str, Series] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    unknown: Sequence[str] = ()
+
+
+def to_recording(path: Path, channels: Channels, motors: str, rates: str) -> Recording:
+    """Sample all quantities at 100 Hz, over the time that rates, motors, attitude and position have in common.
+
+    Args:
+        path: of the log, for messages.
+        channels: of the log.
+        motors: name of the messages that motor outputs would be in.
+        rates: name of the messages that angular rates would be in.
+
+    Raises:
+        ValueError: no motor outputs, no rates, or too short a flight.
+    """
+    if channels.duty is None or len(channels.duty.time) < 2:
+        raise ValueError(f"{path}: no motor outputs ({motors}); log them and fly again")
+    if channels.omega is None or len(channels.omega.time) < 2:
+        raise ValueError(f"{path}: no rates ({rates}); log them and fly again")
+    names = ("attitude", "position", "velocity", "omega", "specific_force", "duty", "battery")
+    series = {name: s for name in names if (s := getattr(channels, name)) is not None and len(s.time) > 1}
+    common = [series[name] for name in ("attitude", "position", "omega", "duty") if name in series]
+    begin, end = max(s.time[0] for s in common), min(s.time[-1] for s in common)
+    if end - begin < SHORTEST:
+        raise ValueError(f"{path}: its messages overlap for {max(end - begin, 0.0):.1f} s; expected a flight")
+    check_density(path, (end - begin) * RATE, max(len(s.time) for s in common))
+    grid = np.arange(begin, end, 1.0 / RATE)
+    if "attitude" in series:
+        attitude = series["attitude"]
+        series["attitude"] = Series(attitude.time, continuous(unit(attitude.values)))
+    sampled = {name: s.at(grid) for name, s in series.items()}
+    valid = np.logical_and.reduce([s.near(grid) for name, s in series.items() if name != "battery"])
+    notes = list(channels.notes)
+
+    def values(name: str, width: int) -> np.ndarray:
+        if name in sampled:
+            return sampled[name]
+        if name in ("attitude", "position"):
+            notes.append(f"no {name}: the flight cannot be validated")
+        return np.full((len(grid), width), np.nan)
+
+    position, omega, duty = values("position", 3), sampled["omega"], np.clip(sampled["duty"], 0.0, 1.0)
+    quaternion = unit(values("attitude", 4))
+    velocity = sampled.get("velocity", np.gradient(position, grid, axis=0))
+    battery, power = _battery(sampled.get("battery"), len(grid))
+    if not np.isfinite(battery).all():
+        notes.append("no battery voltage: motor voltages are shares of the full voltage")
+    if "attitude" in series:
+        turning = body_rate(quaternion, np.full(len(grid), 1.0 / RATE))
+        notes.append(describe(turning, omega, valid, 1.0 / RATE))
+        check_rate_unit(path, turning, omega, valid)
+    finite = np.isfinite(np.column_stack([sampled[name] for name in series if name != "battery"])).all(axis=1)
+    faults = {
+        "gap in a topic": int((~valid).sum()),
+        "not finite": int((~finite).sum()),
+        "time not increasing": sum(s.dropped for s in (getattr(channels, name) for name in names) if s is not None),
+    }
+    volts = duty * np.where(np.isfinite(battery), battery, 1.0)[:, None]
+    readings = {name: Series(s.time - begin, s.values) for name, s in channels.readings.items()}
+    return Recording(
+        path.stem, 1.0 / RATE, position, quaternion, velocity, omega, values("specific_force", 3), volts, battery,
+        valid & finite, power, faults={cause: count for cause, count in faults.items() if count},
+        notes=tuple(notes), readings=readings, unknown=tuple(channels.unknown),
+    )  # fmt: skip
+
+
+def check_density(path: Path, samples: float, recorded: int) -> None:
+    """Raise ValueError for damaged times, whose uniform grid would need many times the memory of the file.
+
+    Args:
+        path: of the log.
+        samples: of the grid.
+        recorded: of the log.
+    """
+    if not samples <= SPARSEST * recorded:
+        raise ValueError(
+            f"{path}: time is damaged, {recorded} samples for {samples:.0f}; cut the file before the damage"
+        )
+
+
+def _battery(values: np.ndarray | None, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Voltage [V] with dips bridged, and power [W]; NaN where not measured."""
+    from scipy.ndimage import median_filter
+
+    nothing = np.full(n, np.nan)
+    if values is None:
+        return nothing, nothing
+    volts = median_filter(values[:, 0], 31, mode="nearest")
+    return volts, values[:, 0] * values[:, 1] if values.shape[1] > 1 else nothing
+
+
+def check_rate_unit(path: Path, turning: np.ndarray, omega: np.ndarray, valid: np.ndarray) -> None:
+    """Raise ValueError if the gyroscope [rad/s] seems to be in degrees per second.
+
+    Args:
+        path: of the log, for the message.
+        turning: [rad/s] rate of the measured attitude, shape (n, 3).
+        omega: of the gyroscope, shape (n, 3).
+        valid: samples to compare, shape (n,).
+    """
+    if valid.sum() < RATE / 2:
+        return
+    measured, expected = np.nanstd(omega[valid]), np.nanstd(turning[valid])
+    if expected > 0.05 and measured > 15.0 * expected:
+        message = f"gyroscope is {measured / expected:.0f} times the rate of the attitude"
+        raise ValueError(f"{path}: {message}, deg/s is suspected; set omega.unit in the mapping")

@@ -1,0 +1,75 @@
+"""Columns of the Crazyflie's binary logs (micro SD deck), for the mappings of CSV files.
+
+A file has a header (0xBC, version, event types with their variables) and records (event type, time [us], values),
+little-endian. Source: the log format of the Crazyflie firmware's uSD deck driver, versions 1 and 2.
+"""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+
+MAGIC = 0xBC
+VERSIONS = (1, 2)
+TIME = "timestamp"  # [us]
+
+
+def is_usd_log(path: Path) -> bool:
+    """Return True if the file begins as such a log does."""
+    with path.open("rb") as file:
+        start = file.read(3)
+    return len(start) == 3 and start[0] == MAGIC and struct.unpack_from("<H", start, 1)[0] in VERSIONS
+
+
+def read_usd_log(path: Path) -> dict[str, np.ndarray]:
+    """Return the columns of the event type with most records, and the column `timestamp` [us].
+
+    Raises:
+        ValueError: the file's header or all of its records are damaged.
+    """
+    data = path.read_bytes()
+    broken = f"{path}: is not a readable log of the Crazyflie; expected the file that its deck wrote"
+    try:
+        version, types = struct.unpack_from("<HH", data, 1)
+        events, at = {}, 5
+        for _ in range(types):
+            (event,) = struct.unpack_from("<H", data, at)
+            _, at = _text(data, at + 2)
+            (count,) = struct.unpack_from("<H", data, at)
+            at += 2
+            names, codes = [], ""
+            for _ in range(count):
+                text, at = _text(data, at)
+                name, _, code = text.rpartition("(")
+                names.append(name)
+                codes += code.rstrip(")")
+            events[event] = (names, np.dtype([("event", "<u2"), (TIME, "<u8"), *_fields(names, codes)]))
+    except (struct.error, ValueError, KeyError):
+        raise ValueError(broken) from None
+    records: dict[int, list[int]] = {event: [] for event in events}
+    while at + 10 <= len(data):
+        (event,) = struct.unpack_from("<H", data, at)
+        if event not in events or at + events[event][1].itemsize > len(data):
+            break  # the checksum at the end, or a record that was cut
+        records[event].append(at)
+        at += events[event][1].itemsize
+    most = max(records, key=lambda event: len(records[event]), default=None)
+    if most is None or not records[most]:
+        raise ValueError(broken)
+    dtype = events[most][1]
+    width = dtype.itemsize
+    rows = np.frombuffer(data, np.uint8)[np.array(records[most])[:, None] + np.arange(width)]
+    table = np.ascontiguousarray(rows).view(dtype)[:, 0]
+    unit = 1.0 if version > 1 else 1e3  # version 1 counts milliseconds
+    return {name: table[name].astype(float) * (unit if name == TIME else 1.0) for name in (TIME, *events[most][0])}
+
+
+def _text(data: bytes, at: int) -> tuple[str, int]:
+    """Return the text up to the next zero byte, and the place behind it."""
+    end = data.index(b"\0", at)
+    return data[at:end].decode("ascii"), end + 1
+
+
+def _fields(names: list[str], codes: str) -> list[tuple[str, str]]:
+    kinds = {"B": "<u1", "b": "<i1", "H": "<u2", "h": "<i2", "I": "<u4", "i": "<i4", "f": "<f4", "Q": "<u8", "q": "<i8"}
+    return [(name, kinds[code]) for name, code in zip(names, codes, strict=True)]

@@ -1,0 +1,32 @@
+"""Access rule of pages that are served on this machine: secret path, Host and Origin."""
+
+import http
+import secrets
+from collections.abc import Collection
+
+ADDRESS = "127.0.0.1"
+HOSTS = (ADDRESS, "localhost")
+
+
+def hosts(port: int) -> set[str]:
+    """Return the accepted values of the header Host."""
+    return {f"{host}:{port}" for host in HOSTS}
+
+
+def refusal(
+    path: str, host: str | None, origins: Collection[str], token: str, known: Collection[str]
+) -> http.HTTPStatus | None:
+    """Return the status with which a request is rejected, or None if it may pass.
+
+    Args:
+        path: of the request, with the secret as its first part.
+        host: header Host, None without one.
+        origins: all headers Origin.
+        token: the secret; "" rejects every path.
+        known: accepted hosts with their port.
+    """
+    if host not in known or any(not o.startswith("http://") or o[len("http://") :] not in known for o in origins):
+        return http.HTTPStatus.FORBIDDEN
+    given = path.partition("?")[0].strip("/").split("/")[0]
+    matches = bool(token) and secrets.compare_digest(given.encode(), token.encode())
+    return None if matches else http.HTTPStatus.NOT_FOUND

@@ -1,0 +1,51 @@
+"""Waypoints and fence of the flight plan of a flight, for maps and the 3D view."""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.services.autopilot.commander.fence import Fence
+from lapwing.studies.flight_data import FlightData
+
+ACTIONS = ("waypoint", "loiter_time", "land", "takeoff")  # items with a place
+
+
+class FenceShape(NamedTuple):
+    """Outline of an area of the fence."""
+
+    stay_in: bool  # False: the vehicle must stay out
+    corners: np.ndarray  # [m] world x and y, shape (k, 2), not closed
+
+
+def waypoints(flight: FlightData) -> np.ndarray:
+    """Return the places of the mission of the plan in order [m], world, shape (n, 3)."""
+    items = _uploads(flight, "mission_upload")
+    places = [(i.position.x, i.position.y, i.position.z) for i in items if i.action in ACTIONS]
+    found = np.array(places, float).reshape(-1, 3)
+    return found[np.isfinite(found).all(axis=1)]
+
+
+def fence_shapes(flight: FlightData) -> Iterator[FenceShape]:
+    """Yield the areas of the fence of the plan, circles as polygons; nothing if the fence is invalid."""
+    try:
+        shapes = Fence(_uploads(flight, "fence_upload")).shapes
+    except ValueError:
+        return
+    for stay_in, shape in shapes:
+        if isinstance(shape, tuple):
+            angle = np.linspace(0.0, 2.0 * np.pi, 49)[:-1]
+            corners = np.array(shape[:2]) + shape[2] * np.column_stack([np.cos(angle), np.sin(angle)])
+        else:
+            corners = np.array(shape, float)
+        yield FenceShape(stay_in, corners)
+
+
+def _uploads(flight: FlightData, kind: str) -> tuple[Any, ...]:
+    """Return the items of the last upload of a kind in the plan of a flight; empty without one."""
+    try:
+        plan = getattr(flight.setup.services["autopilot"].parameters, "plan", ())
+    except (KeyError, ValueError):
+        return ()
+    found = [command.items for command in plan if command.kind == kind]
+    return tuple(found[-1]) if found else ()

@@ -1,0 +1,37 @@
+"""First page of a flight's report on paper."""
+
+from collections.abc import Sequence
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.report.flight_header import facts
+from lapwing.studies.report.page import accuracy
+from lapwing.studies.report.paper import Cover
+from lapwing.studies.report.sections import labels
+
+
+def cover(flights: Sequence[FlightData]) -> Cover:
+    """Return title, outcomes, table of errors and facts of one flight or of two."""
+    scenes = [flight.origin.scene for flight in flights]
+    names, published = labels(flights), scenes[0].get("published", {})
+    many = len(flights) > 1
+    heads = ["RMSE", *(names if many else ["this flight"])]
+    if published.get("rmse"):
+        heads.append(published.get("source", "published"))
+    rows = [
+        (f"{row.axis} [{row.unit}]", *("" if value is None else f"{value:.4f}" for value in row.values))
+        for row in accuracy(flights, published.get("rmse", {}))
+    ]
+    told = [facts(flight) for flight in flights]
+    keys = dict.fromkeys(key for one in told for key in one)
+    values = {key: list(dict.fromkeys(one.get(key, "") for one in told)) for key in keys}
+    return Cover(
+        " and ".join(names) if many else flights[0].metadata.get("scene") or names[0],
+        " · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
+        tuple(
+            f"{name}: {flight.outcome}" if many else str(flight.outcome)
+            for name, flight in zip(names, flights, strict=True)
+        ),
+        tuple(heads),
+        tuple(rows),
+        tuple((key, " | ".join(text or "none" for text in several)) for key, several in values.items()),
+    )

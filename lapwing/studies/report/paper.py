@@ -1,0 +1,131 @@
+"""Report on paper: A4 pages with title, outcome, table of errors and facts, then the plots, as PDF."""
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from itertools import chain
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from matplotlib import rc_context
+from matplotlib.backends.backend_pdf import PdfPages
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+
+from lapwing.studies.report.matplotlib_figure import draw_plot, styled
+from lapwing.studies.report.plot import Plot
+from lapwing.studies.report.style import QUIET, TEXT, WIDTH
+
+PAGE = (8.27, 11.69)  # [inch] A4
+MARGIN = 0.6  # [inch]
+INNER = (PAGE[0] - 2.0 * MARGIN, PAGE[1] - 2.0 * MARGIN - 0.2)  # [inch] without the page number
+SCALE = INNER[0] / WIDTH  # of a plot's height
+HEADING = 0.35  # [inch] of a plot's title
+FONT = 7.5  # [point] in plots
+LETTERS = 110  # of a line of text
+
+
+class Cover(NamedTuple):
+    """Text of the first page."""
+
+    title: str
+    lead: str
+    outcomes: tuple[str, ...]
+    heads: tuple[str, ...] = ()  # of the table's columns, the first one of the rows' names
+    rows: tuple[tuple[str, ...], ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
+
+
+class Titled(NamedTuple):
+    """A plot with its title."""
+
+    title: str
+    plot: Plot
+
+
+def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
+    """Write the cover and as many plots on each page as fit; pages have one size and are numbered."""
+    packed = _packed(plots)
+    with (
+        styled(),
+        rc_context({"font.size": FONT, "axes.titlesize": FONT}),
+        PdfPages(path, metadata={"CreationDate": None}) as out,
+    ):
+        for number, drawn in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
+            text = f"{cover.title} · page {number} of {1 + len(packed)}"
+            drawn.text(1.0 - MARGIN / PAGE[0], 0.5 * MARGIN / PAGE[1], text, ha="right", fontsize=7, color=QUIET)
+            out.savefig(drawn)
+
+
+def _packed(plots: Iterable[Titled]) -> list[list[Titled]]:
+    """Return the plots of each page."""
+    pages: list[list[Titled]] = []
+    free = 0.0
+    for titled in plots:
+        needed = min(_height(titled), INNER[1])
+        if needed > free:
+            pages.append([])
+            free = INNER[1]
+        pages[-1].append(titled)
+        free -= needed
+    return pages
+
+
+def _height(titled: Titled) -> float:
+    """Return the height of a plot on the page with its title and caption [inch]."""
+    return HEADING + titled.plot.height * SCALE + 0.15 + 0.14 * len(_wrapped(titled.plot.caption))
+
+
+def _page(plots: Sequence[Titled]) -> Figure:
+    heights = [min(_height(titled), INNER[1]) for titled in plots]
+    rest = max(INNER[1] - sum(heights), 0.01)
+    left, bottom = MARGIN / PAGE[0], (MARGIN + 0.2) / PAGE[1]
+    layout = ConstrainedLayoutEngine(rect=(left, bottom, INNER[0] / PAGE[0], INNER[1] / PAGE[1]))
+    made = Figure(figsize=PAGE, layout=layout)
+    ratios = [ratio for height in heights for ratio in (HEADING, height - HEADING)]
+    parts: Any = made.subfigures(len(ratios) + 1, 1, height_ratios=[*ratios, rest])
+    for titled, heading, part in zip(plots, parts[0::2], parts[1::2], strict=False):
+        heading.text(0.01, 0.1, titled.title, va="bottom", fontsize=10, fontweight="bold", color=TEXT)
+        caption = "\n".join(_wrapped(titled.plot.caption))
+        part.supxlabel(caption, x=0.01, ha="left", fontsize=7, color="#555555")
+        draw_plot(titled.plot, part)
+    return made
+
+
+def _cover(cover: Cover) -> Figure:
+    """Return the first page."""
+    made = Figure(figsize=PAGE)
+    left, line = MARGIN / PAGE[0], 0.19 / PAGE[1]
+    y = 1.0 - MARGIN / PAGE[1]
+
+    def write(text: str, size: float, **looks: Any) -> None:
+        nonlocal y
+        for part in textwrap.wrap(text, int(LETTERS * 8.0 / size)) or [""]:
+            made.text(left, y, part, va="top", fontsize=size, **{"color": TEXT, **looks})
+            y -= line * size / 8.0
+
+    write(cover.title, 18, fontweight="bold")
+    write(cover.lead, 9, color="#555555")
+    y -= line
+    for outcome in cover.outcomes:
+        write(outcome, 11)
+    if cover.rows:
+        y -= line
+        for k, row in enumerate((cover.heads, *cover.rows)):
+            weight = "bold" if k == 0 else "normal"
+            for column, text in enumerate(row):
+                x = left + (0.0 if column == 0 else 0.12 + 0.16 * column)
+                looks: dict[str, Any] = {"ha": "left" if column == 0 else "right", "va": "top", "fontweight": weight}
+                made.text(x, y, text, fontsize=9, color=TEXT, **looks)
+            y -= 1.15 * line
+    if cover.facts:
+        y -= line
+        for name, value in cover.facts:
+            made.text(left, y, name, va="top", fontsize=8, color="#555555")
+            for part in textwrap.wrap(value, LETTERS - 22) or [""]:
+                made.text(left + 0.17, y, part, va="top", fontsize=8, color=TEXT)
+                y -= line
+    return made
+
+
+def _wrapped(text: str) -> list[str]:
+    return textwrap.wrap(text, int(LETTERS * 8.0 / 7.0))

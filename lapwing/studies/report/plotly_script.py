@@ -1,0 +1,74 @@
+"""The script of plotly.js from its Python package, reduced to what the plots of this project need.
+
+The package carries one script with about fifty kinds of traces and a map engine, 4.8 MB. It is a sequence of modules,
+`var NAME=W((exports,module)=>{...})`, which esbuild has bundled; the last one registers the kinds of traces. A page
+gets the modules that the kinds it draws refer to, directly or through others: 1.2 MB.
+"""
+
+import base64
+import gzip
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+TRACES = ("scatter", "bar")  # kinds that `plotly_traces` makes
+_MODULE = re.compile(r"(?:^|[;\n}])(var ([\w$]+)=W\()")
+_REGISTER = re.compile(
+    r"\.register\(\[((?:[\w$]+\(\),?)+)\]\);[\w$]+\.exports=[\w$]+\}\);(?=return ([\w$]+)\(\);\}\)\(\);)"
+)
+_KIND = re.compile(r'moduleType:"trace",name:"(\w+)"')
+_ALIAS = re.compile(r'var [\w$]+=W\(\([\w$,]+\)=>\{"use strict";[\w$]+\.exports=([\w$]+)\(\)\}\);?')
+_INNER = re.compile(r"([\w$]+)=(?:Ea\(|\{\};Fp\()")  # modules of the newer kind, beside one of the older
+_NAME = re.compile(r"[\w$]+")
+
+
+def script() -> str:
+    """Return the text of plotly.js from its Python package, without importing it.
+
+    Raises:
+        ValueError: the package is not installed.
+    """
+    found = find_spec("plotly")
+    for folder in (found.submodule_search_locations or ()) if found else ():
+        path = Path(folder) / "package_data" / "plotly.min.js"
+        if path.exists():
+            return path.read_text(encoding="utf-8")
+    raise ValueError("the report needs plotly's script, which is not there: pip install plotly")
+
+
+def reduced(text: str, traces: tuple[str, ...] = TRACES) -> str:
+    """Return plotly.js with these kinds of traces only; unchanged if it is not bundled as described above."""
+    starts = [(match.start(1), match[2]) for match in _MODULE.finditer(text)]
+    register = _REGISTER.search(text)
+    if not starts or register is None or register[2] != starts[-1][1]:
+        return text
+    first, last = starts[0][0], register.end()
+    ends = [start for start, _ in starts[1:]] + [last]
+    bodies = {name: text[start:end] for (start, name), end in zip(starts, ends, strict=True)}
+    # The core registers scatter itself.
+    kept = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in traces]
+    entry = register[2]
+    bodies[entry] = bodies[entry].replace(register[1], ",".join(f"{name}()" for name in kept))
+    owners = {inner: name for name, body in bodies.items() for inner in _INNER.findall(body)}
+    owners |= {name: name for name in bodies}
+    needed: set[str] = set()
+    pending = [entry]
+    while pending:
+        name = pending.pop()
+        if name not in needed:
+            needed.add(name)
+            pending += {owners[used] for used in set(_NAME.findall(bodies[name])) if used in owners} - needed
+    return text[:first] + "".join(body for name, body in bodies.items() if name in needed) + text[last:]
+
+
+def _kind(name: str, bodies: dict[str, str]) -> str:
+    """Return the kind of traces of a registered module, which may only refer to another; "" for all others."""
+    if found := _KIND.search(bodies.get(name, "")):
+        return found[1]
+    alias = _ALIAS.fullmatch(bodies.get(name, ""))
+    return _kind(alias[1], bodies) if alias else ""
+
+
+def compressed(text: str) -> str:
+    """Return a text compressed with gzip, in base64."""
+    return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

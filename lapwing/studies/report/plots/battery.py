@@ -1,0 +1,34 @@
+"""Charge, voltage, current, power and energy of the battery over time."""
+
+from lapwing.studies.battery_use import battery_use
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.report.flight_phases import over
+from lapwing.studies.report.plot import Level, Line, Mark, NotRecordedError, Panel, Plot, column
+from lapwing.studies.report.style import BOUND, STEERED
+
+ORDER = 55
+TITLE = "Battery"
+NEEDS = ("ground_truth", "battery")
+MODELS = STEERED
+
+
+def draw(flight: FlightData) -> Plot:
+    """Plot each quantity in a panel, with the limits of charge and voltage."""
+    use = battery_use(flight)
+    if use is None:
+        raise NotRecordedError("the scene models no battery; [effects.battery] or [effects.battery_thevenin] does")
+    t = use.times
+    charge: list[Mark] = [Line(t, 100.0 * use.charge)]
+    if use.low is not None:
+        charge.append(Level(100.0 * use.low, "low-battery warning", BOUND, "dash"))
+    voltage: list[Mark] = [Line(t, use.voltage)]
+    if use.cutoff is not None:
+        voltage.append(Level(use.cutoff, "cut-off", BOUND, "dot"))
+    panels = (
+        Panel(tuple(charge), "charge [%]"),
+        Panel(tuple(voltage), "voltage [V]"),
+        Panel((Line(t, use.current),), "current [A]"),
+        Panel((Line(t, use.voltage * use.current),), "power [W]"),
+        Panel((Line(t, use.drawn),), "energy drawn [W h]"),
+    )
+    return Plot(caption=f"The pack under load. {use}", **column(panels, 1.35, **over(flight)))

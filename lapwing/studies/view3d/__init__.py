@@ -1,0 +1,19 @@
+"""Flights in space: shaded bodies, ground, trails and arrows in a viser scene, recorded in a page or live.
+
+viser is imported only where a view is made; it comes with the extra `view3d`.
+"""
+
+import importlib.util
+
+MISSING = "the 3D view needs viser; pip install lapwing[view3d]"
+
+
+def available() -> bool:
+    """Return True if the packages of the extra `view3d` are installed."""
+    return importlib.util.find_spec("viser") is not None
+
+
+def require() -> None:
+    """Raise ValueError if the packages of the extra `view3d` are missing."""
+    if not available():
+        raise ValueError(MISSING)

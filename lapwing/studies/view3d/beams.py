@@ -1,0 +1,72 @@
+"""Beams of distance sensors: a cone from the sensor to what it sees, and a point there."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.messages.topics import RANGEFINDER, SONAR
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.view3d.sampling import along, nearest
+from lapwing.studies.view3d.solids import ball, turned
+from lapwing.studies.view3d.surroundings import add_solid
+
+TOPICS = {topic.name.removeprefix("{vehicle}/"): topic for topic in (SONAR, RANGEFINDER)}
+COLOUR, POINT = "#E69F00", "#D55E00"
+NARROWEST = np.radians(1.5)  # [rad] half angle of a drawn beam
+DOWN = -90.0  # [deg] elevation of a beam without one
+
+
+class BeamSamples(NamedTuple):
+    """One distance sensor at k times."""
+
+    name: str
+    origin: tuple[float, float, float]  # [m] in the frame of the body
+    orientation: tuple[float, float, float, float]  # w, x, y, z: turns z along the beam
+    half_angle: float  # [rad]
+    length: np.ndarray  # (k,) [m]; not finite without an echo
+
+
+def beams(flight: FlightData, times: np.ndarray) -> list[BeamSamples]:
+    """Return the beams of the distance sensors of a flight at `times` [s], shape (k,)."""
+    sensors, result = flight.origin.scene.get("sensors", {}), []
+    centre = flight.origin.scene.get("airframe", {}).get("mass", {}).get("centre", (0.0, 0.0, 0.0))
+    for name in TOPICS:
+        if not flight.has(name) or not len(readings := flight.topic(name)):
+            continue
+        table = sensors.get(name, {})
+        azimuth, elevation = (np.radians(table.get(f"{k}_deg", d)) for k, d in (("azimuth", 0.0), ("elevation", DOWN)))
+        level = float(np.cos(elevation))
+        direction = np.array([[level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]])
+        origin = np.array(table["position"]) - np.array(centre) if "position" in table else np.zeros(3)
+        half = max(NARROWEST, 0.5 * float(readings.field_of_view[0]))
+        length = readings.range[nearest(readings.times, times)].astype(float)
+        x, y, z = origin.tolist()
+        result.append(BeamSamples(name, (x, y, z), tuple(along(direction)[0].tolist()), half, length))
+    return result
+
+
+class Beam:
+    """Nodes of a beam below the node of its body."""
+
+    def __init__(self, scene: Any, body: str, samples: BeamSamples, size: float):
+        """Add the nodes; `size` of the vehicle [m] scales the point."""
+        self._wide, self._shown = float(np.tan(samples.half_angle)), 0.0
+        frame = f"{body}/{samples.name}"
+        scene.add_frame(frame, show_axes=False, position=samples.origin, wxyz=samples.orientation)
+        cone = turned([(0.0, 0.0), (1.0, 1.0)], COLOUR, 0.22)
+        self._cone = add_solid(scene, f"{frame}/cone", cone, visible=False)
+        self._point = add_solid(scene, f"{frame}/point", ball((0.0,) * 3, 0.035 * size, POINT), visible=False)
+
+    def show(self, samples: BeamSamples, k: int) -> None:
+        """Show the k-th reading, rounded to 1 cm; hide the beam without an echo."""
+        length = float(samples.length[k])
+        length = round(length, 2) if np.isfinite(length) and length > 0.0 else 0.0
+        if length == self._shown:
+            return
+        for node in (self._cone, self._point):
+            if (length > 0.0) != (self._shown > 0.0):
+                node.visible = length > 0.0
+        self._shown = length
+        if length > 0.0:
+            self._cone.scale = (length * self._wide, length * self._wide, length)
+            self._point.position = (0.0, 0.0, length)

@@ -1,0 +1,72 @@
+"""Moving bodies of a flight: poses by time, solids, rotors, and the lines that join bodies."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.view3d.solids import Solid
+
+LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
+
+
+class Rotor(NamedTuple):
+    """A propeller that turns about z of its body's frame."""
+
+    hub: np.ndarray  # (3,) [m]
+    radius: float  # [m]
+    angle: np.ndarray | None = None  # [rad] at the times of the truth (n,); None: the body itself turns
+    thrust: np.ndarray | None = None  # [N] at the times of the truth (n,)
+
+
+class Body(NamedTuple):
+    """A body that moves as a whole."""
+
+    name: str
+    times: np.ndarray  # [s], shape (n,)
+    position: np.ndarray  # world [m], shape (n, 3)
+    orientation: np.ndarray  # body to world, x, y, z, w, shape (n, 4)
+    solids: tuple[Solid, ...] = ()
+    rotors: tuple[Rotor, ...] = ()
+    force: np.ndarray | None = None  # of contacts or joints, world [N], shape (n, 3)
+
+
+class Link(NamedTuple):
+    """A line between two bodies: a rigid link, or a cable, which sags while the second body feels no force."""
+
+    first: int  # index of the body
+    second: int
+    hook: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m] in the frame of the first; ends at the second's origin
+    length: float = 0.0  # [m] of a cable without tension; 0 for a rigid link
+
+
+class Motion(NamedTuple):
+    """All bodies of a flight and their links."""
+
+    bodies: tuple[Body, ...]
+    links: tuple[Link, ...] = ()
+
+
+def body_of_truth(flight: FlightData, solids: Sequence[Solid], rotors: Sequence[Rotor] = ()) -> Body:
+    """Return the vehicle as one body."""
+    truth = flight.truth
+    return Body(flight.vehicle, truth.times, truth.position, truth.orientation, tuple(solids), tuple(rotors))
+
+
+def recorded_bodies(flight: FlightData, looks: Sequence[tuple[Sequence[Solid], Sequence[Rotor]]]) -> tuple[Body, ...]:
+    """Return the bodies of the topic `body_states` in its order, with solids and rotors of each."""
+    states = flight.topic("body_states")
+    names = states.name[0]
+    return tuple(
+        Body(
+            str(names[k]),
+            states.times,
+            states.position[:, k],
+            states.orientation[:, k],
+            tuple(solids),
+            tuple(rotors),
+            states.force[:, k],
+        )
+        for k, (solids, rotors) in enumerate(looks)
+    )

@@ -1,0 +1,133 @@
+// Camera modes and a link to the time of an enclosing page, in a page of viser's client.
+(() => {
+  const facts = window.lapwing;
+  const observed = []; // scenes and renderers that three.js announces to its developer tools
+  const tools = new EventTarget();
+  tools.addEventListener("observe", ({ detail }) => observed.push(detail));
+  window.__THREE_DEVTOOLS__ = tools;
+  window.__VISER_EMBED_CONFIG__ = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
+
+  const view = { mode: "follow", vehicle: 0, fresh: true, time: null };
+  window.lapwingView = view;
+  const scene = () => observed.find((one) => one.isScene && one.__r3f);
+  const state = () => scene()?.__r3f.root.getState();
+
+  function marker(number) { // the vehicle's own triangle, told by its colour
+    let found = null;
+    scene()?.traverse((one) => {
+      if (one.isMesh && one.material?.color?.getHex() === 0x010200 + number) found = one;
+    });
+    return found;
+  }
+  const markers = [];
+  function pose() {
+    let one = markers[view.vehicle];
+    if (!one || !one.parent || one.__r3f?.isHidden) one = markers[view.vehicle] = marker(view.vehicle);
+    if (!one) return null;
+    one.updateWorldMatrix(true, false);
+    const m = one.matrixWorld.elements;
+    return { place: [m[12], m[13], m[14]], ahead: [m[0], m[1], m[2]], up: [m[8], m[9], m[10]] };
+  }
+
+  function steer() {
+    const now = state();
+    const at = now?.controls && pose();
+    if (at) {
+      const { controls } = now, [x, y, z] = at.place, far = Math.max(0.5, facts.size);
+      if (view.mode === "onboard") {
+        const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * far, back = 0.9 * far;
+        controls.setLookAt(x + up * u - back * a, y + up * v - back * b, z + up * w - back * c, x + 20 * a, y + 20 * b, z + 20 * c, false);
+      } else if (view.fresh) {
+        const usual = view.mode === "top" ? [0, 14, 0.01] : [1.5, 0.75, 1.9];
+        const [dx, dy, dz] = (view.place ?? usual).map((value) => value * far);
+        controls.setLookAt(x + dx, y + dy, z + dz, x, y, z, false);
+      } else if (view.mode !== "orbit") controls.moveTo(x, y, z, false);
+      if (view.fresh || view.mode !== "orbit") now.invalidate();
+      view.fresh = false;
+      if (view.shown) view.ready = true;
+    }
+    const slider = document.querySelector("[role=slider]");
+    if (slider) {
+      view.shown = true;
+      const time = Number(slider.getAttribute("aria-valuenow")) + facts.start;
+      if (time !== view.time) {
+        view.time = time;
+        if (parent !== window) parent.postMessage({ lapwing: "time", time }, "*");
+      }
+    } else if (facts.live) view.shown = true;
+    requestAnimationFrame(steer);
+  }
+
+  view.seek = (time) => { // by the number field of the player, as a user would
+    const field = document.querySelector("input");
+    if (!field) return;
+    Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(field, String(Math.max(0, time - facts.start)));
+    field.dispatchEvent(new Event("input", { bubbles: true }));
+  };
+  addEventListener("message", ({ data, source }) => {
+    if (source === parent && data?.lapwing === "seek") view.seek(Number(data.time));
+  });
+
+  view.camera = () => { // place and target in the axes of three.js, whose y is up
+    const { camera, controls } = state(), { x, y, z } = controls.getTarget(camera.position.clone());
+    return { place: camera.position.toArray(), target: [x, y, z] };
+  };
+  view.frames = () => state().gl.info.render.frame; // that have been drawn
+  view.look = (mode, vehicle = view.vehicle, place = null) => Object.assign(view, { mode, vehicle, place, fresh: true });
+  view.bare = () => document.getElementById("lapwing").remove();
+  view.settle = async (time) => { // until the scene of a time has been drawn
+    const frames = async (count) => {
+      for (let k = 0; k < count; k++) await new Promise((done) => requestAnimationFrame(done));
+    };
+    view.seek(time);
+    for (let k = 0; k < 400 && !(Math.abs(view.time - time) < 2e-3); k++) await frames(1);
+    state().invalidate();
+    await frames(3);
+    state().invalidate();
+    await frames(2);
+  };
+
+  function select(name, options, chosen) {
+    const box = document.createElement("select");
+    box.name = name;
+    box.title = name;
+    options.forEach((text, k) => box.add(new Option(text, k)));
+    box.onchange = () => chosen(Number(box.value));
+    return box;
+  }
+  addEventListener("DOMContentLoaded", () => {
+    const style = document.createElement("style");
+    style.textContent = `.mantine-Notifications-root { display: none }
+      .mantine-Input-input:disabled { opacity: 1; color: inherit; background: none; border: 0; cursor: auto }
+      textarea.mantine-Textarea-input:disabled { height: 55vh !important; max-height: none; font-variant-numeric: tabular-nums }
+      #lapwing { position: fixed; top: 10px; left: 10px; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
+        font: 13px system-ui, sans-serif; color: #1f2328; background: #ffffffd9; border-radius: 6px; padding: 6px 10px }
+      #lapwing select { font: inherit; border: 1px solid #d0d7de; border-radius: 4px; background: #fff; color: inherit; padding: 2px 4px }
+      #lapwing i { display: inline-block; width: 90px; height: 8px; border-radius: 4px;
+        background: linear-gradient(90deg, #004c8c, #008eaa, #56b46e, #deba28, #e06e14) }
+      #lapwing u { text-decoration: none; display: inline-block; width: 10px; height: 10px; border-radius: 5px }
+      @media (prefers-color-scheme: dark) {
+        #lapwing { color: #e6eaee; background: #14181dd9 }
+        #lapwing select { background: #1d232a; border-color: #39424c }
+      }`;
+    document.head.append(style);
+    const bar = document.createElement("div");
+    bar.id = "lapwing";
+    const modes = ["follow", "orbit", "top", "onboard"];
+    bar.append(select("camera", modes, (k) => view.look(modes[k])));
+    if (facts.names.length > 1) {
+      bar.append(select("vehicle", facts.names, (k) => view.look(view.mode, k)));
+      facts.names.forEach((name, k) => {
+        const dot = document.createElement("u");
+        dot.style.background = facts.colours[k];
+        bar.append(dot, name);
+      });
+    }
+    if (facts.error > 0) {
+      const unit = facts.error < 0.1 ? [1000, "mm"] : [1, "m"];
+      bar.append("error 0", document.createElement("i"), `${Number((facts.error * unit[0]).toPrecision(2))} ${unit[1]}`);
+    }
+    document.body.append(bar);
+  });
+  requestAnimationFrame(steer);
+})();

@@ -1,0 +1,98 @@
+"""A page in headless Chromium, controlled over a pipe in the browser's own protocol: no driver is needed."""
+
+import base64
+import json
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+from typing import Any, Self
+
+PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+PROGRAM = next(filter(None, map(shutil.which, PROGRAMS)), None)
+# The browser's own pipe is at descriptors 3 and 4.
+START = 'exec "$0" --headless=new --no-sandbox --disable-dev-shm-usage --use-angle=swiftshader \
+--enable-unsafe-swiftshader --remote-debugging-pipe --user-data-dir="$1" about:blank 3<&{reading} 4>&{writing}'
+
+
+class Browser:
+    """A context manager; `errors` are the exceptions and error lines of the page's console."""
+
+    def __init__(self, page: Path | str, profile: Path | None = None, size: tuple[int, int] | None = None):
+        """Create a browser for a page, by default with a profile that is deleted; `size` of the window [pixel]."""
+        self.errors: list[str] = []
+        self._page, self._size, self._number, self._rest = page, size, 0, b""
+        self._temporary = tempfile.TemporaryDirectory(ignore_cleanup_errors=True) if profile is None else None
+        self._profile = Path(self._temporary.name) if self._temporary else profile
+
+    def __enter__(self) -> Self:
+        if PROGRAM is None:
+            raise ValueError(f"no headless browser: none of {', '.join(PROGRAMS)} is installed; install chromium")
+        reading, self._to = os.pipe()
+        self._from, writing = os.pipe()
+        command = ["bash", "-c", START.format(reading=reading, writing=writing), PROGRAM, str(self._profile)]
+        self._process = subprocess.Popen(command, pass_fds=(reading, writing), stderr=subprocess.DEVNULL)
+        os.close(reading)
+        os.close(writing)
+        self._session = None
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log"):
+            self.call(f"{domain}.enable")
+        if self._size:
+            width, height = self._size
+            metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+            self.call("Emulation.setDeviceMetricsOverride", **metrics)
+        self.call("Page.navigate", url=self._page if isinstance(self._page, str) else self._page.resolve().as_uri())
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.terminate()
+        self._process.wait()
+        os.close(self._to)
+        os.close(self._from)
+        if self._temporary:
+            self._temporary.cleanup()
+
+    def run(self, body: str) -> Any:
+        """Run the body of an asynchronous function in the page and return its result."""
+        given = {"expression": f"(async () => {{{body}}})()", "awaitPromise": True, "returnByValue": True}
+        result = self.call("Runtime.evaluate", **given)
+        assert "exceptionDetails" not in result, result
+        return result["result"].get("value")
+
+    def picture(self) -> bytes:
+        """Return the window as a PNG."""
+        return base64.b64decode(self.call("Page.captureScreenshot", format="png", optimizeForSpeed=True)["data"])
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        """Call a method of the browser's protocol; return its result."""
+        self._number += 1
+        message = {"id": self._number, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        os.write(self._to, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._next()
+            if answer.get("id") == self._number:
+                assert "error" not in answer, answer
+                return answer["result"]
+            self._note(answer)
+
+    def _next(self) -> Any:
+        while b"\0" not in self._rest:
+            part = os.read(self._from, 1 << 16)
+            assert part, "the browser has ended"
+            self._rest += part
+        text, self._rest = self._rest.split(b"\0", 1)
+        return json.loads(text)
+
+    def _note(self, event: Any) -> None:
+        method, result = event.get("method"), event.get("params", {})
+        if method == "Runtime.exceptionThrown":
+            self.errors.append(str(result["exceptionDetails"]))
+        elif method == "Log.entryAdded" and result["entry"]["level"] == "error":
+            self.errors.append(result["entry"]["text"])
+        elif method == "Runtime.consoleAPICalled" and result["type"] == "error":
+            self.errors.append(str(result["args"]))

@@ -1,0 +1,110 @@
+"""Flights recorded as one page of viser's player, which needs no network."""
+
+import json
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.report.style import COLOURS
+from lapwing.studies.view3d import require
+from lapwing.studies.view3d.local_server import serving
+from lapwing.studies.view3d.samples import sample
+from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
+from lapwing.studies.view3d.surroundings import add_surroundings
+
+RATE = 30.0  # [1/s] frames of a recording
+FRAMES = 2000  # of a recording at most; a longer one has fewer a second
+FLEET_FRAMES = 6000  # of all vehicles together
+PIECES = 100  # of a trail, which appear one after the other
+POINTS = 1500  # of a trail
+
+
+def page(flights: Sequence[FlightData], names: Sequence[str], rate: float = RATE, frames: int = FRAMES) -> str:
+    """Return the page of a flight with its fleet, or of flights that are compared.
+
+    Args:
+        flights: one flight; or several, of which all but the first are drawn translucent.
+        names: their names, as they are shown.
+        rate: frames a second.
+        frames: the largest count of frames.
+
+    Raises:
+        ValueError: viser is not installed.
+    """
+    require()
+    compared = len(flights) > 1
+    shown = list(flights) if compared else [flights[0], *flights[0].others]
+    titles = list(names) if compared else [flight.vehicle for flight in shown]
+    if compared or len(shown) == 1:
+        colours = list(vehicle_colours(len(shown), compared))
+    else:
+        order = list(flights[0].fleet)
+        colours = [COLOURS[order.index(name) % len(COLOURS)] for name in titles]
+    start = min(float(flight.truth.times[0]) for flight in shown)
+    stop = max(float(flight.truth.times[-1]) for flight in shown)
+    count = min(frames, FLEET_FRAMES // len(shown), max(2, round((stop - start) * rate) + 1))
+    times = np.linspace(start, stop, count)
+    with serving() as server, server.atomic():  # no client is connected, so nothing has to be sent
+        add_surroundings(server.scene, shown[0])
+        vehicles = [
+            Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0)
+            for k, (flight, title, colour) in enumerate(zip(shown, titles, colours, strict=True))
+        ]
+        recording, most = _record(server, shown, vehicles, times)
+        html: str = recording.as_html()
+    facts = {
+        "names": titles,
+        "colours": colours,
+        "size": max(reach(vehicle.motion) for vehicle in vehicles),
+        "start": start,
+        "error": most,
+        "live": False,
+    }
+    return with_bridge(html, facts)
+
+
+def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle], times: np.ndarray) -> Any:
+    """Record all frames; return the recording and the error [m] at the end of the colour scale."""
+    samples = [sample(flight, vehicle.motion, times) for flight, vehicle in zip(shown, vehicles, strict=True)]
+    errors = [result.error for result in samples if result.error is not None]
+    most = float(max(np.quantile(error, 0.995) for error in errors)) if errors else 0.0
+    pieces: list[list[Any]] = []
+    step = max(1, -(-len(times) // POINTS))
+    for vehicle, result in zip(vehicles, samples, strict=True):
+        cuts = np.unique(np.linspace(0, len(times) - 1, min(PIECES, len(times) - 1) + 1).round().astype(int))
+        path = result.bodies[0].position
+        if result.desired is not None:
+            vehicle.desired_path(result.desired[::step])
+        parts = []
+        for i, (a, b) in enumerate(pairwise(cuts)):
+            rows = np.unique(np.append(np.arange(a, b, step), b))
+            error = None if result.error is None else result.error[rows]
+            parts.append((int(b), vehicle.trail(str(i), path[rows], error, most, visible=False)))
+        pieces.append(parts)
+    for vehicle, result in zip(vehicles, samples, strict=True):
+        vehicle.show(result, 0)
+    recording = server.get_scene_serializer()
+    for k in range(len(times)):
+        for vehicle, result, parts in zip(vehicles, samples, pieces, strict=True):
+            vehicle.show(result, k)
+            while parts and parts[0][0] <= k:
+                parts.pop(0)[1].visible = True
+        if k + 1 < len(times):
+            recording.insert_sleep(float(times[k + 1] - times[k]))
+    return recording, most
+
+
+def with_bridge(html: str, facts: dict[str, Any]) -> str:
+    """Return a page of viser's client with the camera and time controls of this project.
+
+    Args:
+        html: the page.
+        facts: names and colours of the vehicles, the size of the largest [m], start [s], largest error [m], "live".
+    """
+    code = (Path(__file__).parent / "bridge.js").read_text(encoding="utf-8")
+    given = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")
+    return html.replace("<head>", f"<head><script>window.lapwing={given};{code}</script>", 1)

@@ -1,0 +1,141 @@
+"""Pictures and films of the 3D view, drawn by a headless browser."""
+
+import io
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.view3d import require
+from lapwing.studies.view3d.headless import Browser
+
+FORMATS = (".mp4", ".webp", ".gif", ".png")
+QUALITY = 80  # of WebP, 0 to 100
+CAMERAS = ("follow", "orbit", "top", "onboard")
+PLAYER = 40  # [pixel] of the play bar below the scene
+SMALLEST, LARGEST = 64, 3840  # [pixel]
+START = """
+const until = async (holds) => {
+  for (let k = 0; k < 2400 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+  if (!holds()) throw new Error(`never: ${holds}`);
+};
+await until(() => window.lapwingView?.ready);
+lapwingView.bare();
+"""
+
+
+class Shot(NamedTuple):
+    """A film from `start` to `stop` [s], or a picture at `start`."""
+
+    start: float | None = None  # None: of the whole flight; of a picture its middle
+    stop: float | None = None
+    rate: float = 25.0  # [1/s] pictures of a film
+    speed: float = 1.0  # simulated seconds in a second of the film
+    camera: str = "follow"
+    size: tuple[int, int] = (1280, 720)  # [pixel]
+    place: tuple[float, float, float] | None = None  # of the camera from the vehicle, in its sizes; None: as usual
+
+
+def check(target: Path, shot: Shot) -> None:
+    """Raise ValueError for an unknown format or camera, and for numbers out of range."""
+    if target.suffix not in FORMATS:
+        raise ValueError(f"--out {target}: expected a name that ends in {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+    if shot.camera not in CAMERAS:
+        raise ValueError(f"--camera {shot.camera}: expected {', '.join(CAMERAS[:-1])} or {CAMERAS[-1]}")
+    if not all(SMALLEST <= side <= LARGEST and side % 2 == 0 for side in shot.size):
+        limits = f"even numbers from {SMALLEST} to {LARGEST}"
+        raise ValueError(f"--size {shot.size[0]}x{shot.size[1]}: expected {limits}, e.g. 1280x720")
+    if not (0.0 < shot.rate <= 120.0 and 0.0 < shot.speed <= 1000.0):
+        raise ValueError("--fps and --speed: expected above 0, at most 120 and 1000")
+
+
+def render(
+    flights: Sequence[FlightData],
+    names: Sequence[str],
+    target: Path,
+    shot: Shot,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Path:
+    """Write a picture or a film of flights; return its path.
+
+    Args:
+        flights: one, or several of which all but the first are translucent.
+        names: their names.
+        target: .png, .gif, .webp or .mp4.
+        shot: times, camera and size.
+        progress: called with the pictures done and their count.
+
+    Raises:
+        ValueError: no browser, viser is missing, a time outside of the flight, or the file cannot be written.
+    """
+    require()
+    check(target, shot)
+    from lapwing.studies.view3d.recording import page
+
+    times = _times(flights[0], target, shot)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "view.html"
+        path.write_text(page(flights, names), encoding="utf-8")
+        width, height = shot.size
+        with Browser(path, size=(width, height + PLAYER)) as browser:
+            browser.run(f"{START} lapwingView.look({shot.camera!r}, 0, {_list(shot.place)});")
+            pictures = _pictures(browser, times, shot.size, progress)
+            try:
+                _write(target, pictures, shot)
+            except OSError as fault:
+                with suppress(OSError):
+                    target.unlink(missing_ok=True)
+                raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
+    return target
+
+
+def _times(flight: FlightData, target: Path, shot: Shot) -> np.ndarray:
+    first, last = (float(flight.truth.times[k]) for k in (0, -1))
+    start = shot.start if shot.start is not None else 0.5 * (first + last) if target.suffix == ".png" else first
+    stop = last if shot.stop is None else shot.stop
+    if not first <= start <= stop <= last + 1e-9:
+        raise ValueError(f"--from {start:g} --to {stop:g}: expected times of the flight, {first:g} to {last:g} s")
+    if target.suffix == ".png":
+        return np.array([start])
+    return start + shot.speed / shot.rate * np.arange(max(1, int((stop - start) / shot.speed * shot.rate) + 1))
+
+
+def _pictures(browser: Browser, times: np.ndarray, size: tuple[int, int], progress: Any) -> Iterator[Any]:
+    from PIL import Image
+
+    width, height = size
+    for k, time in enumerate(times):
+        browser.run(f"await lapwingView.settle({float(time)!r});")
+        image = Image.open(io.BytesIO(browser.picture())).convert("RGB")
+        progress(k + 1, len(times))
+        yield image.crop((0, 0, width, height))
+
+
+def _write(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
+    if target.suffix == ".mp4":
+        import imageio_ffmpeg
+
+        writer = imageio_ffmpeg.write_frames(str(target), shot.size, fps=shot.rate, quality=7, macro_block_size=2)
+        writer.send(None)
+        for picture in pictures:
+            writer.send(np.ascontiguousarray(picture))
+        writer.close()
+        return
+    first = next(pictures)
+    if target.suffix == ".png":
+        first.save(target)
+        return
+    timing = {"save_all": True, "duration": round(1000.0 / shot.rate), "loop": 0}
+    if target.suffix == ".webp":
+        first.save(target, append_images=pictures, quality=QUALITY, method=6, **timing)
+        return
+    rest = (picture.quantize(128, dither=0) for picture in pictures)  # each has its own colours
+    first.quantize(128, dither=0).save(target, append_images=rest, **timing)
+
+
+def _list(place: tuple[float, float, float] | None) -> str:
+    return "null" if place is None else str(list(place))

@@ -1,0 +1,70 @@
+"""Poses, rotors, arrows and ghosts of a flight at given times, as arrays."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.view3d.beams import BeamSamples, beams
+from lapwing.studies.view3d.bodies import Body, Motion
+from lapwing.studies.view3d.sampling import about_z, nearest, rounded, rounded_angle
+
+
+class BodySamples(NamedTuple):
+    """One body at k times."""
+
+    position: np.ndarray  # (k, 3) [m] world
+    orientation: np.ndarray  # (k, 4) w, x, y, z
+    spin: list[np.ndarray | None]  # (k, 4) w, x, y, z of each rotor in its body
+    thrust: list[np.ndarray | None]  # (k,) [N] of each rotor
+    force: np.ndarray | None  # (k, 3) [N] world
+
+
+class Samples(NamedTuple):
+    """One vehicle at k times."""
+
+    times: np.ndarray  # (k,) [s]
+    bodies: list[BodySamples]
+    wind: np.ndarray | None  # (k, 3) [m/s] world
+    desired: np.ndarray | None  # (k, 3) [m]
+    desired_yaw: np.ndarray | None  # (k, 4) w, x, y, z
+    estimate: np.ndarray | None  # (k, 3) [m]
+    estimate_std: np.ndarray | None  # (k, 3) [m]
+    contacts: np.ndarray | None  # (k, points, 3) [m] world
+    contact_forces: np.ndarray | None  # (k, points, 3) [N] world
+    error: np.ndarray | None  # (k,) [m] distance from the reference
+    beams: list[BeamSamples]
+
+
+def sample(flight: FlightData, motion: Motion, times: np.ndarray) -> Samples:
+    """Return all that is drawn of a flight at `times` [s], shape (k,)."""
+    truth = flight.truth
+    rows = nearest(truth.times, times)
+    path = truth.position[rows]
+    wind = truth.wind[rows] if "wind" in truth.fields and np.any(truth.wind) else None
+    desired = yaw = error = None
+    if len(flight.reference):
+        last = np.minimum(rows, len(flight.reference) - 1)
+        desired, yaw = flight.reference[last, :3], about_z(flight.reference[last, 5])
+        error = np.linalg.norm(path - desired, axis=1)
+    estimate = std = None
+    if flight.has("estimate"):
+        said = flight.topic("estimate")
+        own = nearest(said.times, times)
+        estimate, std = said.position[own], said.position_std[own]
+    contacts = forces = None
+    if flight.has("contact_forces"):
+        said = flight.topic("contact_forces")
+        own = nearest(said.times, times)
+        contacts, forces = said.position[own], said.force[own]
+    bodies = [_body(body, times, rows) for body in motion.bodies]
+    return Samples(times, bodies, wind, desired, yaw, estimate, std, contacts, forces, error, beams(flight, times))
+
+
+def _body(body: Body, times: np.ndarray, rows: np.ndarray) -> BodySamples:
+    own = nearest(body.times, times)
+    place = np.column_stack([np.interp(times, body.times, along) for along in body.position.T])
+    spin = [None if r.angle is None else about_z(rounded_angle(r.angle[rows])) for r in body.rotors]
+    thrust = [None if r.thrust is None else r.thrust[rows] for r in body.rotors]
+    force = body.force[own] if body.force is not None and np.any(body.force) else None
+    return BodySamples(rounded(place), rounded(body.orientation[own][:, [3, 0, 1, 2]]), spin, thrust, force)

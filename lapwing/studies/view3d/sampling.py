@@ -1,0 +1,41 @@
+"""Rows of samples by time, and rounded quaternions, which keep a recording small."""
+
+from typing import Any
+
+import numpy as np
+
+GRID = 2048.0  # positions and quaternions are rounded to 1 / GRID, so that a recording is small
+TURNS = 48  # angles of a drawn propeller in a turn
+NEAR_ZERO = 1e-9
+
+
+def nearest(known: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the index of the last known time at or before each of `times`, at least 0."""
+    return (np.searchsorted(known, np.asarray(times) + 1e-9, side="right") - 1).clip(0, len(known) - 1)
+
+
+def about_z(angle: np.ndarray) -> np.ndarray:
+    """Return quaternions w, x, y, z of turns about z [rad], shape (k, 4)."""
+    zero = np.zeros_like(angle)
+    return rounded(np.column_stack([np.cos(angle / 2.0), zero, zero, np.sin(angle / 2.0)]))
+
+
+def along(direction: np.ndarray) -> np.ndarray:
+    """Return quaternions w, x, y, z that turn z into each direction, shape (k, 4); none for vectors near zero."""
+    length = np.linalg.norm(direction, axis=1)
+    unit = np.where(length[:, None] > NEAR_ZERO, direction / np.maximum(length, NEAR_ZERO)[:, None], (0.0, 0.0, 1.0))
+    w, x, y = 1.0 + unit[:, 2], -unit[:, 1], unit[:, 0]
+    down = w < 1e-6
+    result = np.column_stack([np.where(down, 0.0, w), np.where(down, 1.0, x), np.where(down, 0.0, y), 0.0 * w])
+    return rounded(result / np.linalg.norm(result, axis=1)[:, None])
+
+
+def rounded_angle(angle: np.ndarray) -> np.ndarray:
+    """Return angles [rad] rounded to a share of a turn."""
+    step = 2.0 * np.pi / TURNS
+    return np.remainder(np.round(angle / step), TURNS) * step
+
+
+def rounded(values: Any) -> np.ndarray:
+    """Return values rounded to 1 / GRID."""
+    return np.round(np.asarray(values, float) * GRID) / GRID

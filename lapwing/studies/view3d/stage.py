@@ -1,0 +1,229 @@
+"""Nodes of the vehicles of a flight in a viser scene, and their motion."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.report.style import BOUND, FLOWN, QUIET
+from lapwing.studies.view3d.beams import Beam
+from lapwing.studies.view3d.bodies import Body, Link, Motion
+from lapwing.studies.view3d.samples import Samples
+from lapwing.studies.view3d.sampling import along
+from lapwing.studies.view3d.solids import Solid, arrow, ball, box, lifted, merged, rod
+from lapwing.studies.view3d.surroundings import add_solid, rgb
+from lapwing.studies.view3d.vehicle_bodies import motion
+
+BLADE, WIND, THRUST, FORCE, REFERENCE, ESTIMATE = "#20262B", "#56B4E9", "#009E73", BOUND, QUIET, "#CC79A7"
+WIND_SCALE = 0.12  # [m] of arrow for 1 m/s
+SIGMAS = 3.0  # of the drawn ellipsoid
+SAG = 12  # parts of a drawn cable
+HIDDEN = 1e-3  # [m] shortest arrow that is shown
+EVERY = 3  # frames between two changes of an arrow
+# Ends of the colour scale of a trail, from no error to the largest: dark blue to yellow, told apart by lightness too.
+SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (224, 110, 20)], float)
+
+
+class Vehicle:
+    """One vehicle: its bodies, arrows and ghosts."""
+
+    def __init__(self, scene: Any, number: int, flight: FlightData, name: str, colour: str, ghost: bool = False):
+        """Add the nodes; `number` makes their names unique, and marks the vehicle for the camera of the page."""
+        self.name, self.colour, self.motion = name, colour, motion(flight)
+        self._scene, self._root = scene, f"/{number} {name.replace('/', '_')}"
+        self._sent: dict[tuple[str, str], Any] = {}
+        self._size = reach(self.motion)
+        self._frames: list[Any] = []
+        self._spins: list[list[Any]] = []
+        self._thrusts: list[list[Any]] = []
+        self._per_newton = self._thrust_scale()
+        self._optional: dict[str, Any] = {}
+        self._beams: dict[str, Beam] = {}
+        for k, body in enumerate(self.motion.bodies):
+            self._add_body(f"{self._root}/{k} {body.name.replace('/', '_')}", body, ghost)
+        marker = Solid(1e-4 * np.eye(3), np.array([[0, 1, 2]]), f"#0102{number:02x}")
+        add_solid(scene, f"{self._frames[0].name}/marker", marker)
+        if number or ghost:
+            scene.add_label(f"{self._frames[0].name}/label", name, position=(0.0, 0.0, 0.9 * self._size))
+
+    def _add_body(self, node: str, body: Body, ghost: bool) -> None:
+        self._frames.append(self._scene.add_frame(node, show_axes=False))
+        for k, solid in enumerate(body.solids):
+            looks = solid._replace(colour=self.colour, opacity=0.45) if ghost else solid
+            add_solid(self._scene, f"{node}/solid {k}", looks)
+        spins, thrusts = [], []
+        for k, rotor in enumerate(body.rotors):
+            hub, r = f"{node}/rotor {k + 1}", rotor.radius
+            self._scene.add_frame(hub, show_axes=False, position=tuple(rotor.hub))
+            up = 0.05 * r
+            disc = rod((0.0, 0.0, up), (0.0, 0.0, 1.2 * up), r, self.colour, 0.28)
+            add_solid(self._scene, f"{hub}/disc", disc)
+            spin = self._scene.add_frame(f"{hub}/turning", show_axes=False)
+            blades = box((0.0, 0.0, 1.2 * up), (1.9 * r, 0.12 * r, 0.02 * r), BLADE, 0.9)
+            add_solid(self._scene, f"{hub}/turning/blades", blades)
+            spins.append(spin)
+            has_arrow = rotor.thrust is not None and not ghost
+            thrusts.append(self._arrow(f"{hub}/thrust", THRUST, 0.04 * r, 0.75) if has_arrow else None)
+        self._spins.append(spins)
+        self._thrusts.append(thrusts)
+
+    def _thrust_scale(self) -> float:
+        """Return the length of a thrust arrow for 1 N: two radii at the mean thrust."""
+        result = [
+            (r.thrust[r.thrust > 0.0], r.radius) for b in self.motion.bodies for r in b.rotors if r.thrust is not None
+        ]
+        means = [(float(thrust.mean()), radius) for thrust, radius in result if len(thrust)]
+        return 1.6 * max(radius for _, radius in means) / max(mean for mean, _ in means) if means else 0.02
+
+    def _arrow(self, name: str, colour: str, radius: float, opacity: float = 1.0) -> Any:
+        handle = add_solid(self._scene, name, arrow(colour, radius, opacity), visible=False)
+        return handle
+
+    def _node(self, name: str, make: Any) -> Any:
+        if name not in self._optional:
+            self._optional[name] = make(f"{self._root}/{name}")
+        return self._optional[name]
+
+    def show(self, samples: Samples, k: int) -> None:
+        """Move all nodes to the k-th of the samples."""
+        for frame, spins, thrusts, body in zip(self._frames, self._spins, self._thrusts, samples.bodies, strict=True):
+            self._set(frame, "position", body.position[k])
+            self._set(frame, "wxyz", body.orientation[k])
+            for spin, turned in zip(spins, body.spin, strict=True):
+                if turned is not None:
+                    self._set(spin, "wxyz", turned[k])
+            if k % EVERY:
+                continue
+            for handle, thrust in zip(thrusts, body.thrust, strict=True):
+                if handle is not None and thrust is not None:
+                    self._lengthen(handle, self._per_newton * float(thrust[k]))
+        place = samples.bodies[0].position[k]
+        if samples.wind is not None:
+            node = self._node("wind", lambda name: self._arrow(name, WIND, 0.035 * self._size))
+            self._point(node, lifted(place, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
+        if samples.desired is not None:
+            ghost = self._node("reference", self._reference_ghost)
+            self._set(ghost, "position", np.round(samples.desired[k], 3))
+            if samples.desired_yaw is not None:
+                self._set(ghost, "wxyz", samples.desired_yaw[k])
+        if samples.estimate is not None and samples.estimate_std is not None:
+            node = self._node("estimate", lambda name: add_solid(self._scene, name, ball((0,) * 3, 1.0, ESTIMATE, 0.3)))
+            self._set(node, "position", np.round(samples.estimate[k], 3))
+            if not k % EVERY:
+                sizes = (SIGMAS * samples.estimate_std[k]).clip(0.01, 50.0)
+                self._set(node, "scale", np.round(sizes, 2))
+        self._show_forces(samples, k)
+        for beam in samples.beams:
+            if beam.name not in self._beams:
+                self._beams[beam.name] = Beam(self._scene, self._frames[0].name, beam, self._size)
+            if not k % EVERY:
+                self._beams[beam.name].show(beam, k)
+        for link in self.motion.links:
+            self._show_link(link, samples, k)
+
+    def _show_forces(self, samples: Samples, k: int) -> None:
+        pushes = []
+        if samples.contacts is not None and samples.contact_forces is not None:
+            pushes = list(zip(samples.contacts[k], samples.contact_forces[k], strict=True))
+        for i, (place, force) in enumerate(pushes):
+            node = self._node(f"force {i + 1}", lambda name: self._arrow(name, FORCE, 0.03 * self._size))
+            self._point(node, place, force, self._per_newton, k)
+
+    def _reference_ghost(self, name: str) -> Any:
+        """Add a small cross where the vehicle should be, pointing along the desired heading."""
+        size = 0.5 * self._size
+        node = self._scene.add_frame(name, show_axes=False)
+        lines = [rod((-size, 0, 0), (1.4 * size, 0, 0), 0.02 * self._size, REFERENCE, 0.5)]
+        lines.append(rod((0, -size, 0), (0, size, 0), 0.02 * self._size, REFERENCE, 0.5))
+        for solid in merged(lines):
+            add_solid(self._scene, f"{name}/cross", solid)
+        return node
+
+    def _show_link(self, link: Link, samples: Samples, k: int) -> None:
+        first, second = samples.bodies[link.first], samples.bodies[link.second]
+        start = first.position[k] + _turned(first.orientation[k], np.array(link.hook))
+        stop = second.position[k]
+        points = np.linspace(start, stop, SAG + 1)
+        apart = float(np.linalg.norm(stop - start))
+        if link.length > apart and (second.force is None or not np.any(second.force[k])):
+            points += _sag(start, stop, link.length)
+        pairs = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
+        handle = self._node(f"link {link.second}", lambda name: _lines(self._scene, name, pairs, BLADE, 0.012))
+        handle.points = pairs
+
+    def _lengthen(self, handle: Any, length: float) -> None:
+        self._set(handle, "visible", length > HIDDEN)
+        if length > HIDDEN:
+            self._set(handle, "scale", (1.0, 1.0, round(length, 2) or 0.01))
+
+    def _point(self, handle: Any, place: np.ndarray, vector: np.ndarray, scale: float, k: int) -> None:
+        self._set(handle, "position", np.round(place, 3))
+        if k % EVERY == 0:
+            self._set(handle, "wxyz", along(vector[None, :])[0])
+            self._lengthen(handle, scale * float(np.linalg.norm(vector)))
+
+    def _set(self, handle: Any, field: str, value: Any) -> None:
+        """Set a property unless it has that value: a recording holds changes only."""
+        plain = value if isinstance(value, bool) else tuple(float(v) for v in value)
+        if self._sent.get((handle.name, field)) != plain:
+            self._sent[handle.name, field] = plain
+            setattr(handle, field, plain)
+
+    def trail(self, name: str, path: np.ndarray, error: np.ndarray | None, most: float, visible: bool = True) -> Any:
+        """Add a piece of the flown path, coloured by the error [m] up to `most`; return its handle."""
+        points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
+        if error is None or most <= 0.0:
+            return _lines(self._scene, f"{self._root}/trail/{name}", points, self.colour, 0.03, visible)
+        colours = error_colours(error / most)
+        pairs = np.stack([colours[:-1], colours[1:]], axis=1)
+        return _lines(self._scene, f"{self._root}/trail/{name}", points, pairs, 0.03, visible)
+
+    def desired_path(self, path: np.ndarray) -> None:
+        """Add the desired path, shape (n, 3) [m], as a thin line."""
+        points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
+        _lines(self._scene, f"{self._root}/desired path", points[::2], "#FFFFFF", 0.015)
+
+
+def reach(moved: Motion) -> float:
+    """Return the size of the first body [m]: the distance of its farthest point or rotor tip, at least 0.1 m."""
+    body = moved.bodies[0]
+    tips = [float(np.linalg.norm(rotor.hub)) + rotor.radius for rotor in body.rotors]
+    corners = [float(np.linalg.norm(solid.vertices, axis=1).max()) for solid in body.solids if len(solid.vertices)]
+    return max([0.1, *tips, *corners])
+
+
+def error_colours(share: np.ndarray) -> np.ndarray:
+    """Return red, green, blue of errors as shares of the largest, shape (n, 3) uint8."""
+    at = np.linspace(0.0, 1.0, len(SCALE))
+    return np.column_stack([np.interp(share.clip(0.0, 1.0), at, SCALE[:, i]) for i in range(3)]).astype(np.uint8)
+
+
+def vehicle_colours(count: int, compared: bool) -> Sequence[str]:
+    """Return colours of flights that are compared; of a fleet see `lapwing.studies.report.style`."""
+    return (FLOWN, BOUND)[:count] if compared else (FLOWN,) * count
+
+
+def _lines(scene: Any, name: str, points: np.ndarray, colour: Any, width: float, visible: bool = True) -> Any:
+    colours = rgb(colour) if isinstance(colour, str) else colour
+    return scene.add_line_segments(name, points, colours, thickness=width, thickness_units="world", visible=visible)
+
+
+def _sag(start: np.ndarray, stop: np.ndarray, length: float) -> np.ndarray:
+    """Return offsets from the chord of a slack cable, a parabola of about its length, shape (SAG + 1, 3) [m]."""
+    chord = stop - start
+    apart = float(np.linalg.norm(chord))
+    depth = np.sqrt(3.0 * apart * (length - apart) / 8.0) if apart > 0.0 else length / 2.0
+    down = np.array([0.0, 0.0, -1.0])
+    across = down - chord * float(down @ chord) / max(apart * apart, 1e-9)
+    size = float(np.linalg.norm(across))
+    across = across / size if size > 1e-3 else np.array([1.0, 0.0, 0.0])  # a vertical chord bows to one side
+    share = np.linspace(0.0, 1.0, SAG + 1)
+    return (depth * 4.0 * share * (1.0 - share))[:, None] * across
+
+
+def _turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Return a vector turned by a quaternion w, x, y, z."""
+    w, axis = wxyz[0], wxyz[1:]
+    twice = 2.0 * np.cross(axis, vector)
+    return vector + w * twice + np.cross(axis, twice)

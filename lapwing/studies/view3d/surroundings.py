@@ -1,0 +1,123 @@
+"""Ground, terrain, obstacles, fences and flight plan of a scene in space."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.terrain.terrain_queries import Level, surface
+from lapwing.services.common.environment_schema import Terrain
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.plan_shapes import fence_shapes, waypoints
+from lapwing.studies.report.style import AXIS_COLOURS, BOUND, QUIET
+from lapwing.studies.view3d.solids import Solid, ball, box, merged, rod
+
+SKY = ((126, 170, 205), (226, 236, 242))  # red, green, blue at the top and at the horizon
+SOIL, LINE, WIDE_LINE = (214, 219, 215), (190, 197, 193), (160, 168, 164)
+OBSTACLE, EARTH = "#8C9BA5", "#B9C2B4"
+POINTS = 81  # of the terrain along each side
+MARGIN = 15.0  # [m] of terrain around the flight
+FENCE_HEIGHT = 12.0  # [m] of the drawn walls
+
+
+def add_ground(scene: Any, low: float) -> None:
+    """Add the sky, lights, and an infinite grid at the height `low` [m]."""
+    scene.set_up_direction("+z")
+    scene.world_axes.visible = False
+    share = np.linspace(0.0, 1.0, 128)[:, None, None] ** 0.8
+    sky = (1.0 - share) * np.array(SKY[0]) + share * np.array(SKY[1])
+    scene.set_background_image(np.repeat(sky, 8, axis=1).astype(np.uint8), format="png")
+    scene.add_grid(
+        "/ground",
+        infinite_grid=True,
+        cell_size=1.0,
+        section_size=10.0,
+        cell_color=LINE,
+        section_color=WIDE_LINE,
+        plane_color=SOIL,
+        plane_opacity=1.0,
+        shadow_opacity=0.5,
+        fade_distance=180.0,
+        position=(0.0, 0.0, low),
+    )
+
+
+def add_surroundings(scene: Any, flight: FlightData) -> None:
+    """Add ground, terrain, obstacles, fence and plan of the scene of a flight."""
+    tree = flight.origin.scene.get("environment", {}).get("terrain", {})
+    try:
+        terrain = Terrain.model_validate({k: v for k, v in tree.items() if v is not None})
+        relief = terrain.model_copy(update={"box": (), "cylinder": ()}).ground()
+    except (ValueError, ConfigError):
+        terrain, relief = Terrain(), Level()
+    solids = list(_obstacles(terrain))
+    low = -0.002
+    if not isinstance(relief, Level):
+        solids.append(_relief(relief, flight.truth.position))
+        low = float(solids[-1].vertices[:, 2].min()) - 0.05
+    add_ground(scene, low)
+    solids += [*_fence(flight), *_plan(flight)]
+    for k, solid in enumerate(merged(solids)):
+        add_solid(scene, f"/surroundings/{k}", solid)
+
+
+def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
+    """Add the triangles of a solid; return the handle."""
+    opaque = solid.opacity >= 1.0
+    return scene.add_mesh_simple(
+        name,
+        np.asarray(solid.vertices, np.float32),
+        np.asarray(solid.faces, np.uint32),
+        color=rgb(solid.colour),
+        opacity=None if opaque else solid.opacity,
+        flat_shading=True,
+        side="double",
+        cast_shadow=opaque,
+        **options,
+    )
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Return red, green and blue of "#RRGGBB"."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def _obstacles(terrain: Terrain) -> Iterator[Solid]:
+    for block in terrain.box:
+        solid = box((0.0, 0.0, 0.5 * block.top), (*block.size, max(abs(block.top), 0.01)), OBSTACLE)
+        c, s = np.cos(block.heading), np.sin(block.heading)
+        turned = solid.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        yield solid._replace(vertices=turned + np.array([*block.position, 0.0]))
+    for post in terrain.cylinder:
+        yield rod((*post.position, 0.0), (*post.position, post.top), post.radius, OBSTACLE)
+
+
+def _relief(relief: Any, path: np.ndarray) -> Solid:
+    """Return the surface of the ground around a path."""
+    low, high = path[:, :2].min(axis=0) - MARGIN, path[:, :2].max(axis=0) + MARGIN
+    x, y = (np.linspace(low[i], high[i], POINTS) for i in (0, 1))
+    heights = np.array([[surface(relief, float(a), float(b))[0] for a in x] for b in y])
+    grid_x, grid_y = np.meshgrid(x, y)
+    vertices = np.column_stack([grid_x.ravel(), grid_y.ravel(), heights.ravel()])
+    corner = (np.arange(POINTS - 1)[:, None] * POINTS + np.arange(POINTS - 1)).ravel()
+    one = np.column_stack([corner, corner + 1, corner + POINTS + 1])
+    other = np.column_stack([corner, corner + POINTS + 1, corner + POINTS])
+    return Solid(vertices, np.concatenate([one, other]), EARTH)
+
+
+def _fence(flight: FlightData) -> Iterator[Solid]:
+    """Yield translucent walls: orange where the vehicle must stay out, green where it must stay in."""
+    for shape in fence_shapes(flight):
+        corners, count = shape.corners, len(shape.corners)
+        vertices = np.concatenate([np.column_stack([corners, np.full(count, z)]) for z in (0.0, FENCE_HEIGHT)])
+        k, n = np.arange(count), (np.arange(count) + 1) % count
+        faces = np.concatenate([np.column_stack([k, n, n + count]), np.column_stack([k, n + count, k + count])])
+        yield Solid(vertices, faces, AXIS_COLOURS[2] if shape.stay_in else BOUND, 0.18)
+
+
+def _plan(flight: FlightData) -> Iterator[Solid]:
+    """Yield the waypoints of the plan as balls on thin posts."""
+    for place in waypoints(flight):
+        yield ball(place, 0.15, BOUND)
+        yield rod((place[0], place[1], 0.0), place, 0.02, QUIET)

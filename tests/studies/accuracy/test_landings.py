@@ -1,0 +1,57 @@
+"""Landings against the event-located reference: error got is at most error asked, in the whole state, at every tick."""
+
+import numpy as np
+import pytest
+
+import lapwing
+from lapwing.studies.accuracy.coordinates import error
+from lapwing.studies.accuracy.landings import cases
+from lapwing.studies.accuracy.systems.landing import TOUCH_DOWNS, problems
+
+pytestmark = pytest.mark.long
+
+
+def test_sliding_touch_down_meets_accuracy():
+    case = TOUCH_DOWNS["landing_level"]
+    exact, events = cases.exact(case)
+    assert events > 5
+    for accuracy in cases.ACCURACIES:
+        assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
+
+
+@pytest.mark.parametrize("seed", [0, 6, 11])
+def test_random_landing_meets_accuracy(seed):
+    """`python -m benchmarks.landings` has 200 of them; 11 is on bumps."""
+    case = cases.draw(seed)
+    exact, events = cases.exact(case)
+    assert events > 20
+    for accuracy in (1e-3, 1e-6, 1e-9):
+        assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
+
+
+def test_reference_is_independent_of_its_tolerance():
+    case = cases.draw(2)
+    coarse, fine = (cases.exact(case, tolerance)[0] for tolerance in (1e-11, 1e-13))
+    assert cases.errors(coarse, fine).max() < 1e-8
+
+
+def test_accuracy_problem_improves_with_its_setting():
+    problem = problems()["landing_level"]
+    way = problem.ways[0]
+    ends = [way.read(a, way.prepare(a)()).samples[-1] for a in (1e-3, 1e-8)]
+    coarse, fine = (error(end, problem.reference()) for end in ends)
+    assert fine < 1e-8 < 1e-3
+    assert fine < coarse < 1e-3
+
+
+def test_batch_of_sliding_landings_meets_accuracy():
+    """The touch-down of which three in four were millimetres off, whatever accuracy was asked."""
+    ends = []
+    for accuracy in (1e-4, 1e-6, 1e-10):
+        solver = {"solver.accuracy": accuracy, "solver.integrator": "rk4_renormalised", "solver.step": 0.001}
+        batch = lapwing.BatchSimulator("hover", 1, overrides=solver)
+        batch.reset(position_world=(0, 0, 0.355), velocity_world=(0.4, 0, -0.1), rotor_speed=np.zeros(4))
+        state = batch.step(motor_voltages=np.zeros((1, 4)), ticks=60)
+        ends.append(np.concatenate([state.position_world[0], state.velocity_world[0]]))
+    assert np.abs(ends[0] - ends[2]).max() < 1e-4
+    assert np.abs(ends[1] - ends[2]).max() < 1e-6

@@ -1,0 +1,65 @@
+"""Normalised errors against closed forms, a textbook's bounds, and the estimator in wind and at touch-down."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import lapwing
+from lapwing.services.autopilot.estimator.filter_state import SIZE
+from lapwing.studies import consistency
+from lapwing.studies.metrics import metrics
+
+WIND = {"effects.random_wind_force.mean": (9.0, 3.0, 0.0), "effects.random_wind_force.sigma": 3.0}
+
+
+def test_bounds_equal_textbook_example():
+    """Bar-Shalom, Li, Kirubarajan, example 5.4.3-1: 50 runs of two states, sum within 74.2 and 129.6."""
+    assert consistency.bounds(2, 50) == pytest.approx((74.22 / 50, 129.56 / 50), rel=1e-4)
+
+
+def test_nees_of_drawn_errors_has_chi_square_mean():
+    random = np.random.default_rng(1)
+    factor = random.normal(size=(9, 9)) * 10.0 ** np.linspace(-4, 1, 9)[:, None]
+    error = random.normal(size=(20_000, 9)) @ factor.T
+    values = consistency.nees(error, np.broadcast_to(factor @ factor.T, (20_000, 9, 9)))
+    assert values.mean() == pytest.approx(9.0, abs=4 * np.sqrt(18 / 20_000))
+    assert np.mean(values < 16.919) == pytest.approx(0.95, abs=0.006)
+
+
+def test_joint_covariance_restores_upper_triangle():
+    square = np.arange(SIZE * SIZE, dtype=float).reshape(SIZE, SIZE)
+    square += square.T
+    restored = consistency.joint_covariance(square[np.triu_indices(SIZE)][None])
+    np.testing.assert_array_equal(restored[0], square[:9, :9])
+
+
+def test_rotation_vector_equals_scipy():
+    random = np.random.default_rng(2)
+    before = Rotation.random(50, random_state=3)
+    turn = random.normal(size=(50, 3)) * np.logspace(-9, 0, 50)[:, None]
+    after = Rotation.from_rotvec(turn) * before
+    found = consistency._rotation_vector(after.as_quat(), before.as_quat())
+    np.testing.assert_allclose(found, turn, rtol=1e-6, atol=1e-15)
+
+
+def vertical_speed_sigmas(flight):
+    """Greatest error of the vertical velocity, in standard deviations of the estimate, after two seconds."""
+    e, t = flight.estimate, flight.truth
+    rows = np.searchsorted(t.times, e.times - 1e-6)
+    late = e.times > 2.0
+    return np.abs((t.velocity[rows, 2] - e.velocity[:, 2]) / e.velocity_std[:, 2])[late].max()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("overrides", [{}, WIND], ids=["light wind", "strong wind"])
+def test_joint_nees_is_within_its_bounds(overrides):
+    flights = lapwing.campaign("delivery_mission", range(1, 13), overrides=overrides)
+    low, high = consistency.bounds(consistency.JOINT, len(flights))
+    assert low < np.mean([metrics(flight)["nees"] for flight in flights]) < high
+
+
+@pytest.mark.long
+def test_touch_down_stays_within_stated_velocity_error():
+    """An impact shorter than the interval of the IMU does not appear in any reading: these seeds had 100 sigma."""
+    for seed in (4, 29, 40):
+        assert vertical_speed_sigmas(lapwing.fly("quad_x", seed=seed)) < 5.0

@@ -1,0 +1,102 @@
+"""Numbers and trouble at the top of a report, and a click on an event."""
+
+import re
+
+import numpy as np
+import pytest
+import synthetic_flights
+
+from lapwing.studies.effects.console_output import percent
+from lapwing.studies.flight_events import Event
+from lapwing.studies.report import write
+from lapwing.studies.report.key_numbers import key_numbers, trouble
+from lapwing.studies.report.sections import labels
+from lapwing.studies.view3d import headless
+
+TICKS, RATE = 400, 100
+
+
+def flight():
+    """0.3 m east and 0.4 m north of its reference."""
+    position = np.tile((0.3, 0.4, 2.0), (TICKS, 1))
+    position[:, 2] += np.arange(TICKS) / RATE
+    truth = {
+        "pose.position": position,
+        "pose.orientation": synthetic_flights.LEVEL,
+        "rotor_speed": (1.0,) * 4,
+        **dict.fromkeys(("motor_voltage", "motor_current", "rotor_thrust", "rotor_torque"), (1.0,) * 4),
+        "motor_power": (900.0,) * 4,
+        "velocity": (0.0, 0.0, 1.0),
+        "acceleration": (0.0,) * 3,
+        "air_density": 1.2,
+        "wind": (0.0,) * 3,
+        "ground_contact": np.zeros(TICKS, bool),
+    }
+    setpoint = {"position": position - (0.3, 0.4, 0.0), "yaw": 0.0, "phase": np.full(TICKS, "climb", object)}
+    actuators = {"attitude_reference": (0.0, 0.0, 0.0), "armed": np.ones(TICKS, bool), "motor_voltage": (1.0,) * 4}
+    scene = {"published": {"rmse": {"x": 0.1, "y": 0.1, "z": 0.1}, "source": "paper"}}
+    result = synthetic_flights.flight(
+        TICKS, RATE, scene=scene, ground_truth=truth, setpoint=setpoint, actuators=actuators
+    )
+    result.digest = "0" * 32
+    result.events = [Event(1.0, "phase", "climb"), Event(2.0, "fault", "<b>rotor 1</b> fails")]
+    return result
+
+
+def test_error_is_beyond_published_one():
+    error, largest, *_ = key_numbers(flight())
+    assert (error.value, error.limit, error.good) == (pytest.approx(0.5), pytest.approx(0.03**0.5), False)
+    assert largest.value == pytest.approx(0.5)
+    assert largest.good
+
+
+def test_trouble_is_faults_without_phases():
+    assert [event.kind for event in trouble(flight())] == ["fault"]
+
+
+def test_report_begins_with_verdict_numbers_and_escaped_trouble(tmp_path):
+    text = write(flight(), tmp_path / "a.html").read_text(encoding="utf-8")
+    places = [
+        text.index(part)
+        for part in ('id="outcome"', 'class="numbers"', 'class="trouble"', 'id="mission_map"', 'id="space"')
+    ]
+    assert places == sorted(places)
+    assert "<b>rotor" not in text
+    assert "beyond 0.173 m (paper)" in text
+
+
+def test_flights_of_comparison_have_their_names():
+    one, other = flight(), flight()
+    one.name, other.name = "PID", "Lee"
+    assert labels([one, other]) == ("PID", "Lee")
+
+
+@pytest.mark.parametrize(("share", "text"), [(-1.0, "-100 %"), (0.123, "+12 %"), (0.0123, "+1.2 %"), (0.0, "+0 %")])
+def test_percent_has_no_exponent(share, text):
+    assert percent(share) == text
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+def test_click_on_event_moves_plots(tmp_path):
+    page = write(flight(), tmp_path / "a.html")
+    with headless.Browser(page, tmp_path / "profile") as browser:
+        ranges = browser.run(
+            """
+            const until = async (holds) => {
+              for (let k = 0; k < 1200 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+              if (!holds()) throw new Error(`never: ${holds}`);
+            };
+            await until(() => document.readyState === "complete");
+            const figure = document.querySelector("#position figure");
+            figure.scrollIntoView();
+            await until(() => figure.querySelector(".js-plotly-plot")?.layout);
+            document.querySelector(".trouble button").click();
+            const range = () => figure.querySelector(".js-plotly-plot").layout.xaxis.range;
+            await until(() => range()[0] === -3);
+            return range();
+            """
+        )
+        assert browser.errors == []
+    assert ranges == pytest.approx([-3.0, 12.0])  # 5 s before the fault at 2 s to 10 s after it
+    assert re.search(r'data-time="2.0"', page.read_text(encoding="utf-8"))

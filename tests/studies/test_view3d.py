@@ -1,0 +1,408 @@
+"""Flights in space: solids, poses, the recorded page, and its player in a browser."""
+
+import copy
+import json
+import re
+
+import numpy as np
+import pytest
+import synthetic_flights
+
+from lapwing.services.common.mesh_file import Mesh
+from lapwing.services.common.mesh_schema import pack
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.report import write
+from lapwing.studies.topic_view import TopicView
+from lapwing.studies.view3d import headless as chromium
+from lapwing.studies.view3d import sampling, solids, vehicle_bodies
+from lapwing.studies.view3d.samples import sample
+from lapwing.studies.view3d.sampling import along
+from lapwing.studies.view3d.stage import Vehicle, error_colours, reach
+from lapwing.studies.view3d.surroundings import add_surroundings
+from lapwing.studies.view3d.vehicle_bodies import motion
+from tests.golden.digests import sample_file
+
+pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
+
+TICKS, RATE = 400, 100
+T = np.arange(TICKS) / RATE
+HUBS = [[0.3, 0.3, 0.0], [-0.3, 0.3, 0.0], [-0.3, -0.3, 0.0], [0.3, -0.3, 0.0]]
+AIRFRAME = {
+    "rotors": {"position": HUBS, "spin_direction": ["cw", "ccw", "cw", "ccw"]},
+    "propeller": {"diameter": 0.5},
+    "contact": {"feet": [[0.2, 0.2, -0.3]]},
+    "mass": {"payload": 2.0},
+}
+READY = """
+    const until = async (holds) => {
+      for (let k = 0; k < 1200 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+      if (!holds()) throw new Error(`never: ${holds}`);
+    };
+    await until(() => document.readyState === "complete" && window.lapwingView && lapwingView.ready);
+"""
+
+
+def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
+    """Up at 1 m/s, rotors at 1 rad/s, wind of 3 m/s along x."""
+    t = np.arange(ticks) / RATE
+    truth = {
+        "pose.position": np.column_stack([0.0 * t, 0.0 * t, t]),
+        "pose.orientation": synthetic_flights.LEVEL,
+        "rotor_speed": (1.0,) * 4,
+        **dict.fromkeys(("motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque"), (1.0,) * 4),
+        "velocity": (0.0, 0.0, 1.0),
+        "acceleration": (0.0,) * 3,
+        "air_density": 1.2,
+        "wind": (3.0, 0.0, 0.0),
+        "ground_contact": np.zeros(ticks, bool),
+    }
+    tables = {"vehicle": {"model": model}, **({"airframe": AIRFRAME} if scene is None else scene)}
+    result = synthetic_flights.flight(ticks, RATE, scene=tables, ground_truth=truth, **topics)
+    result.digest = "0" * 32
+    return result
+
+
+def volume(solid):
+    a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
+
+
+@pytest.mark.parametrize(
+    ("solid", "expected"),
+    [
+        (solids.box((1.0, 2.0, 3.0), (1.0, 2.0, 3.0), "#000000"), 6.0),
+        (solids.rod((1.0, 0.0, 2.0), (0.0, 1.0, 5.0), 0.5, "#000000"), np.pi * 0.25 * 11.0**0.5),
+        (solids.rod((0.0, 0.0, 0.0), (0.0, 0.0, -2.0), 0.5, "#000000"), np.pi * 0.25 * 2.0),
+        (solids.ball((0.0, 0.0, 1.0), 1.0, "#000000"), 4.0 / 3.0 * np.pi),
+    ],
+)
+def test_solids_have_their_volume_and_face_outwards(solid, expected):
+    assert volume(solid) == pytest.approx(expected, rel=0.03)
+
+
+def test_rod_ends_at_its_points():
+    rod = solids.rod((1.0, 2.0, 3.0), (1.0, 2.0, 7.0), 0.5, "#000000")
+    assert rod.vertices.min(axis=0) == pytest.approx([0.5, 1.5, 3.0])
+    assert rod.vertices.max(axis=0) == pytest.approx([1.5, 2.5, 7.0])
+
+
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.0, -2.0, 0.0), (0.3, 0.4, -0.5), (0.0, 0.0, -1.0)])
+def test_arrows_point_along_their_vector(direction):
+    w, *axis = along(np.array([direction]))[0]
+    twice = 2.0 * np.cross(axis, (0.0, 0.0, 1.0))
+    tip = np.array([0.0, 0.0, 1.0]) + w * twice + np.cross(axis, twice)
+    assert tip == pytest.approx(np.array(direction) / np.linalg.norm(direction), abs=2e-3)
+
+
+def test_rotors_turn_in_their_own_direction():
+    values = flight()
+    moved = motion(values)
+    assert [tuple(rotor.hub) for rotor in moved.bodies[0].rotors] == [tuple(hub) for hub in HUBS]
+    assert [rotor.radius for rotor in moved.bodies[0].rotors] == [0.25] * 4
+    assert moved.bodies[0].rotors[1].angle == pytest.approx(T)  # ccw seen from above is about +z
+    assert moved.bodies[0].rotors[0].angle == pytest.approx(-T)
+    (body,) = sample(values, moved, np.array([1.0])).bodies
+    step = 2.0 * np.pi / sampling.TURNS
+    for k, sign in ((0, -1.0), (1, 1.0)):
+        w, _, _, z = body.spin[k][0]
+        assert np.exp(2j * np.arctan2(z, w)) == pytest.approx(np.exp(1j * sign), abs=step)
+
+
+def test_samples_follow_pose_wind_and_thrust():
+    values = flight()
+    result = sample(values, motion(values), np.array([0.0, 2.0]))
+    assert result.bodies[0].position[:, 2] == pytest.approx([0.0, 2.0], abs=1e-3)
+    assert result.bodies[0].orientation[1] == pytest.approx([1.0, 0.0, 0.0, 0.0])  # w, x, y, z
+    assert result.wind[1] == pytest.approx([3.0, 0.0, 0.0])
+    assert [thrust[0] for thrust in result.bodies[0].thrust] == [1.0] * 4
+
+
+def test_airframe_model_has_feet_and_payload_volume():
+    (body,) = motion(flight()).bodies
+    lowest = min(solid.vertices[:, 2].min() for solid in body.solids)
+    assert lowest == pytest.approx(-0.3, abs=0.02)
+    (payload,) = (solid for solid in body.solids if solid.colour == vehicle_bodies.PAYLOAD)
+    assert volume(payload) == pytest.approx(2.0 / vehicle_bodies.DENSITY)
+    assert reach(motion(flight())) == pytest.approx(0.3 * 2**0.5 + 0.25)
+
+
+def fleet():
+    """Two vehicles, the second 4 m north of the first."""
+    first = flight()
+    truth = {name: first.truth[name] for name in first.truth.fields}
+    truth["pose.position"] = first.truth.position + np.array([0.0, 4.0, 0.0])
+    second = FlightData({"ground_truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
+    second.vehicle = "second"
+    first.others = (second,)
+    first.fleet = {"second": second.truth, first.vehicle: first.truth}
+    return first
+
+
+SLING = {"mass": 0.4, "length": 2.0, "hook": [0.1, 0.0, -0.1]}
+OFF = {**AIRFRAME, "mass": {"payload": 0.0, "centre": [0.1, 0.0, 0.2]}}
+
+
+def slung():
+    """A load 1.5 m below the hook: on a slack cable for the first half, pulled for the second."""
+    place = np.zeros((TICKS, 1, 3))
+    place[:, 0, 2] = T - 0.3 - 1.5
+    force = np.where((np.arange(TICKS) < TICKS // 2)[:, None, None], 0.0, [[[0.0, 0.0, 4.0]]])
+    load_states = {
+        "name": np.full((TICKS, 1), "load", object),
+        "pose": np.concatenate([place, np.tile(synthetic_flights.LEVEL, (TICKS, 1, 1))], axis=2),
+        "force": force,
+    }
+    return flight("slung_load", scene={"airframe": OFF, "slung_load": SLING}, body_states=load_states)
+
+
+class Recorder:
+    """A viser scene that keeps what is added."""
+
+    def __init__(self):
+        self.nodes = {}
+
+    def __getattr__(self, kind):
+        def add(name, *arguments, **options):
+            handle = type("Node", (), {"name": name, "kind": kind, "arguments": arguments, **options})()
+            self.nodes[name if isinstance(name, str) else kind] = handle
+            return handle
+
+        return add
+
+
+def test_cable_is_straight_if_taut_and_keeps_length_if_slack():
+    values, scene = slung(), Recorder()
+    vehicle = Vehicle(scene, 0, values, "drone1", "#0072B2")
+    result = sample(values, vehicle.motion, np.array([1.0, 3.0]))
+    lengths = []
+    for k, time in enumerate((1.0, 3.0)):
+        vehicle.show(result, k)
+        (cable,) = (node for name, node in scene.nodes.items() if name.endswith("/link 1"))
+        assert cable.points[0, 0] == pytest.approx([0.0, 0.0, time - 0.3], abs=2e-3)
+        assert cable.points[-1, 1] == pytest.approx([0.0, 0.0, time - 1.8], abs=2e-3)
+        lengths.append(np.linalg.norm(np.diff(cable.points, axis=1), axis=2).sum())
+    assert lengths == pytest.approx([2.0, 1.5], rel=0.1)
+
+
+def test_body_without_new_samples_moves_evenly_in_between():
+    whole = slung()
+    seldom = TopicView(
+        np.arange(0, TICKS, 10) * 10**7, {k: whole.topic("body_states")[k][::10] for k in ("name", "pose", "force")}
+    )
+    views = {name: whole.topic(name) for name in whole.topics} | {"body_states": seldom}
+    values = FlightData(views, whole.origin)
+    result = sample(values, motion(values), np.array([1.0, 1.05]))
+    assert result.bodies[1].position[:, 2] == pytest.approx([-0.8, -0.75], abs=1e-3)
+
+
+def test_contact_forces_are_drawn_at_their_points():
+    place, force = np.zeros((TICKS, 2, 3)), np.zeros((TICKS, 2, 3))
+    place[:, 0, 0], place[:, 1, 0], force[:, :, 2] = 0.2, -0.2, 50.0
+    whole = flight()
+    contact = TopicView(np.arange(TICKS) * 10**7, {"position": place, "force": force})
+    values = FlightData({**{name: whole.topic(name) for name in whole.topics}, "contact_forces": contact}, whole.origin)
+    scene = Recorder()
+    vehicle = Vehicle(scene, 0, values, "drone1", "#0072B2")
+    vehicle.show(sample(values, vehicle.motion, np.array([1.0])), 0)
+    arrows = [node for name, node in scene.nodes.items() if "/force" in name]
+    assert [arrow.position[0] for arrow in arrows] == pytest.approx([0.2, -0.2])
+    assert all(arrow.visible and arrow.wxyz == pytest.approx((1.0, 0.0, 0.0, 0.0)) for arrow in arrows)
+
+
+@pytest.mark.parametrize(
+    ("name", "table", "origin", "direction"),
+    [
+        ("sonar", {}, (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)),
+        (
+            "rangefinder",
+            {"azimuth_deg": 90.0, "elevation_deg": 0.0, "position": [0.1, 0.0, 0.2]},
+            (0.1, 0.0, 0.2),
+            (0, 1, 0),
+        ),
+        ("rangefinder", {"elevation_deg": 30.0, "position": [0.0, 0.0, 0.0]}, (0.0, 0.0, 0.0), (0.75**0.5, 0.0, 0.5)),
+    ],
+)
+def test_beam_reaches_from_its_sensor_to_what_it_sees(name, table, origin, direction):
+    ranges = np.where(T < 2.0, 1.5, np.inf)
+    whole = flight(scene={"airframe": AIRFRAME, "sensors": {name: table}})
+    reading = TopicView(np.arange(TICKS) * 10**7, {"range": ranges, "field_of_view": np.full(TICKS, 0.5)})
+    values = FlightData({**{key: whole.topic(key) for key in whole.topics}, name: reading}, whole.origin)
+    scene = Recorder()
+    vehicle = Vehicle(scene, 0, values, "drone1", "#0072B2")
+    result = sample(values, vehicle.motion, np.array([1.0, 1.0, 1.0, 3.0]))
+    vehicle.show(result, 0)
+    frame = next(node for path, node in scene.nodes.items() if path.endswith(f"/{name}"))
+    cone, point = (
+        next(node for path, node in scene.nodes.items() if path.endswith(end)) for end in ("/cone", "/point")
+    )
+    w, *axis = frame.wxyz
+    twice = 2.0 * np.cross(axis, (0.0, 0.0, 1.0))
+    assert np.array([0.0, 0.0, 1.0]) + w * twice + np.cross(axis, twice) == pytest.approx(direction, abs=2e-3)
+    assert frame.position == pytest.approx(origin)
+    assert cone.scale == pytest.approx((1.5 * np.tan(0.25), 1.5 * np.tan(0.25), 1.5))
+    assert point.position == pytest.approx((0.0, 0.0, 1.5))
+    assert (cone.visible, point.visible) == (True, True)
+    vehicle.show(result, 3)
+    assert (cone.visible, point.visible) == (False, False)
+
+
+def test_terrain_of_grid_is_drawn_at_its_heights():
+    heights = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 0.0]]
+    grid = {"spacing": 10.0, "corner": [-10.0, -10.0], "heights": heights}
+    scene = {"airframe": AIRFRAME, "environment": {"terrain": {"grid": grid}}}
+    recorder = Recorder()
+    add_surroundings(recorder, flight(scene=scene))
+    (node,) = (node for node in recorder.nodes.values() if node.kind == "add_mesh_simple")
+    vertices = node.arguments[0]
+    assert vertices[np.argmax(vertices[:, 2])] == pytest.approx([0.0, 0.0, 0.0], abs=0.01)  # heights are from home's
+    assert vertices[:, 2].min() == pytest.approx(-2.0)
+
+
+def test_node_is_sent_only_when_it_changes():
+    values, scene = flight(), Recorder()
+    vehicle = Vehicle(scene, 0, values, "a/b", "#0072B2")
+    result = sample(values, vehicle.motion, np.array([1.0]))
+    vehicle.show(result, 0)
+    (frame,) = (node for name, node in scene.nodes.items() if name.startswith("/0 a_b/0") and name.count("/") == 2)
+    frame.position = None
+    vehicle.show(result, 0)
+    assert frame.position is None
+
+
+def test_error_colours_run_from_dark_blue_to_orange():
+    low, high = error_colours(np.array([0.0, 2.0]))
+    assert (low.tolist(), high.tolist()) == ([0, 76, 140], [224, 110, 20])
+
+
+TRIANGLE = Mesh(np.array([(0.5, 0.0, 0.0), (0.0, 0.25, 0.0), (0.0, 0.0, 0.125)]), np.array([(0, 1, 2)]))
+WITH_MESH = {"airframe": {**AIRFRAME, "mesh": "a.stl"}, "meshes": {"a.stl": pack(TRIANGLE)}}
+
+
+def test_mesh_replaces_airframe():
+    (body,) = motion(flight(scene=WITH_MESH)).bodies
+    assert [solid.vertices.tolist() for solid in body.solids] == [TRIANGLE.vertices.tolist()]
+
+
+def test_vehicle_without_shape_has_its_axes():
+    (body,) = motion(flight("something new", scene={})).bodies
+    assert len(body.solids) == 3
+
+
+@pytest.mark.parametrize(
+    ("scene", "bodies", "rotors", "links"),
+    [
+        ("hover", 1, 4, 0),
+        ("delivery_full", 1, 4, 0),
+        ("gyrostat_attitude", 1, 0, 0),
+        ("os4_motors", 1, 4, 0),
+        ("cooperative_load", 3, 8, 2),
+        ("slung_load", 2, 4, 1),
+        ("unload", 8, 0, 0),
+    ],
+)
+def test_every_kind_of_scene_is_drawn_in_its_own_shape(scene, bodies, rotors, links):
+    recorded = FlightData.read(sample_file(scene))  # the samples carry no run configuration
+    views = {name: recorded.topic(name) for name in recorded.topics}
+    result = motion(FlightData(views, Origin.of_setup(resolve(load(scene)))))
+    count = (len(result.bodies), sum(len(body.rotors) for body in result.bodies), len(result.links))
+    assert count == (bodies, rotors, links)
+    assert all(body.solids or body.rotors or body.force is not None for body in result.bodies)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    return write(flight(), tmp_path_factory.mktemp("page") / "flight.html", view3d=True)
+
+
+def embedded(page):
+    """The page of the 3D view within a report."""
+    text = page.read_text(encoding="utf-8").partition('id="space"')[2]
+    return json.loads(re.search(r'<script type="application/json">(".*?")</script>', text)[1])
+
+
+def test_page_is_self_contained_and_small(page):
+    text = page.read_text(encoding="utf-8")
+    assert not re.search(r"<(script|link|img|iframe)[^>]+(src|href)=\"http", text)
+    assert text.index('id="space"') < text.index('id="position"')
+    assert len(text) < 5_000_000
+
+
+def test_names_of_scene_cannot_end_script(tmp_path):
+    values = fleet()
+    values.others[0].vehicle = "</script><script>alert(1)</script>"
+    values.fleet = {values.others[0].vehicle: values.others[0].truth, values.vehicle: values.truth}
+    text = write(values, tmp_path / "flight.html", view3d=True).read_text(encoding="utf-8")
+    assert "<script>alert(1)" not in text
+    assert "<script>alert(1)" not in embedded(tmp_path / "flight.html")
+
+
+def test_report_without_viser_names_extra(tmp_path, monkeypatch):
+    monkeypatch.setattr("lapwing.studies.view3d.available", lambda: False)
+    text = write(flight(), tmp_path / "flight.html", view3d=True).read_text(encoding="utf-8")
+    assert "pip install lapwing[view3d]" in text
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_browser_follows_vehicle_and_seeks(tmp_path, page):
+    path = tmp_path / "view.html"
+    path.write_text(embedded(page), encoding="utf-8")
+    with chromium.Browser(path, tmp_path / "profile") as browser:
+        shown, seen, onboard, place = browser.run(
+            READY
+            + """
+            const camera = () => lapwingView.camera();
+            lapwingView.seek(2.5);
+            await until(() => Math.abs(lapwingView.time - 2.5) < 0.01);
+            await until(() => Math.abs(camera().target[1] - 2.5) < 0.05);  // y is up in three.js
+            const followed = camera();
+            lapwingView.look("onboard");
+            const far = ({ place, target }) => Math.hypot(target[0] - place[0], target[2] - place[2]);
+            await until(() => far(camera()) > 15);
+            return [lapwingView.time, followed.target, camera().target, camera().place];
+            """
+        )
+        assert browser.errors == []
+    assert shown == pytest.approx(2.5, abs=0.01)
+    assert seen == pytest.approx([0.0, 2.5, 0.0], abs=0.05)
+    assert onboard[1] == pytest.approx(2.5, abs=0.1)  # along x of the body, which is level
+    assert np.hypot(onboard[0], onboard[2]) == pytest.approx(20.0, abs=0.1)
+    assert np.dot(np.subtract(onboard, place), onboard) > 0.0
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_browser_ties_view_to_plots(tmp_path, page):
+    with chromium.Browser(page, tmp_path / "profile") as browser:
+        played, sought, cursor = browser.run(
+            """
+            const until = async (holds) => {
+              for (let k = 0; k < 1200 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+              if (!holds()) throw new Error(`never: ${holds}`);
+            };
+            await until(() => document.readyState === "complete");
+            const space = document.querySelector("#space .space");
+            space.closest("details").open = true;
+            space.scrollIntoView();
+            await until(() => Number(space.dataset.time) > 0.1);
+            const played = Number(space.dataset.time);
+            space.querySelector("iframe").contentWindow.postMessage({ lapwing: "seek", time: 2.5 }, "*");
+            await until(() => Math.abs(Number(space.dataset.time) - 2.5) < 0.01);
+            const sought = Number(space.dataset.time);
+            const figure = document.querySelector("#position figure");
+            figure.scrollIntoView();
+            await until(() => figure.querySelector(".js-plotly-plot"));
+            const view = space.querySelector("iframe").contentWindow;
+            await until(() => {
+              view.postMessage({ lapwing: "seek", time: 1 + Math.random() / 100 }, "*");
+              return figure.querySelector(".hoverlayer text");
+            });
+            return [played, sought, figure.querySelector(".hoverlayer").textContent];
+            """
+        )
+        assert browser.errors == []
+    assert 0.1 < played < 4.0
+    assert sought == pytest.approx(2.5, abs=0.01)
+    assert re.match(r"(0\.99|1|2\.5)\S* s", cursor)

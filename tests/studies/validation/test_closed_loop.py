@@ -1,0 +1,74 @@
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from flight_recordings import INTERVAL, simulated
+
+from lapwing.studies.flight_import.open_flight import open_flight
+from lapwing.studies.validation.closed_loop import fly_setpoints
+from lapwing.studies.validation.plant_rows import MOTION, PlantRows
+
+SCENE = "crazyflie_21"
+
+
+def lapwing(*arguments):
+    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    path = tmp_path_factory.mktemp("flown") / "flown.mcap"
+    done = lapwing("run", SCENE, "--mode", "single-process", "--log", path)
+    assert done.returncode == 0, done.stderr
+    return path
+
+
+def test_own_setpoints_give_own_flight(log):
+    flown = fly_setpoints(SCENE, open_flight(log))
+    assert flown.time[-1] > 3.0
+    assert flown.difference < 0.01  # begins in the recording's climb, from rest
+
+
+def test_flight_without_setpoints_is_left_out(log):
+    assert fly_setpoints(SCENE, replace(open_flight(log), setpoint=np.empty((0, 3)))) is None
+
+
+def test_power_matches_closed_form():
+    plant = PlantRows(SCENE, INTERVAL)
+    blocks = plant.start(np.zeros(3, int))
+    plant.write(blocks, slice(0, MOTION), np.tile([0.0, 0.0, 3.0, 1.0, *[0.0] * 9], (3, 1)))
+    volts = np.array([[2.0, 2.5, 3.0, 3.5]] * 3)
+    plant.advance(blocks, volts)
+    speed = plant.read(blocks, slice(MOTION, MOTION + 4), 3)
+    layout = plant.like.parameters.layout
+    drag = next(e.torque_constant for e in plant.like.parameters.effects if hasattr(e, "torque_constant"))
+    current = drag * speed**2 / layout.volt_per_speed + layout.no_load_current
+    assert plant.power(blocks, 3) == pytest.approx((volts * current).sum(axis=1), rel=1e-9)
+
+
+def test_power_of_simulated_flight_is_predicted(log):
+    from lapwing.studies.validation.procedure import FIELDS, validate
+
+    result = validate(SCENE, [log], None, (1, 50))
+    power = result.plant[-1][FIELDS.index("power")].mean
+    assert power < 0.01 * np.nanmean(open_flight(log).power)
+
+
+def test_recording_without_power_has_no_power_error():
+    from lapwing.studies.validation.prediction_metrics import constant_velocity
+
+    (flight,) = simulated(PlantRows(SCENE, INTERVAL), 2.0, [1])
+    assert np.isnan(constant_velocity(flight, np.arange(20, 40), (1, 10)).power).all()
+
+
+def test_command_overlays_closed_loop(log, tmp_path):
+    out, page = tmp_path / "errors.json", tmp_path / "page.html"
+    done = lapwing("validate", SCENE, log, "--closed-loop", "--horizons", "50", "--json", out, "--report", page)
+    assert done.returncode == 0, done.stderr
+    assert "closed loop: flown" in done.stdout
+    (flight,) = json.loads(out.read_text())["closed_loop"]
+    assert flight["difference"] < 0.05
+    assert "the recorded setpoints, flown" in page.read_text()
