@@ -1,0 +1,219 @@
+"""Form of a scene: a field for each key, from the JSON schema and the values of the scene."""
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from typing import Any, NamedTuple
+
+from lapwing.cosim.scene import Scene
+from lapwing.cosim.scene.load import SCENE_FILE
+from lapwing.file_schemas.annotations import Schema
+
+FIRST = ("run", "vehicle", "trajectory", "effects", "sensors", "environment", "autopilot", "solver", "communication")
+OWN = ("airframe", "mavlink")  # tables that each of several vehicles has its own of
+OPEN = ("run", "vehicle", "effects", "trajectory")  # tables whose fields are visible at first
+LEFT_OUT = ("published", "services", "meshes", "ros2")  # tables that are not of a flight's behaviour, or large
+FIXED = ("run.title", "vehicle.name")  # keys that are not worth a change
+ADDED = ("effects", "sensors")  # tables to which the form can add others
+MOST_ITEMS = 40  # of a list of tables, with fields of their own
+LONGEST = 2000  # letters of a value that can be changed in a form
+_UNIT = re.compile(r"\[([^\]]*)\]\s*")
+
+
+class Field(NamedTuple):
+    """A key that can be changed."""
+
+    key: str  # dotted, as for --set
+    label: str
+    text: str  # of its value as in TOML, a plain text without quotes; "" if it is unset
+    kind: str  # "number", "integer", "text", "choice" or "toml"
+    unit: str = ""
+    meaning: str = ""
+    bounds: str = ""  # for people: "0 to 1"
+    choices: tuple[str, ...] = ()
+    default: str = ""
+
+
+class Group(NamedTuple):
+    """A table of a scene: its fields, and the tables within it."""
+
+    key: str
+    label: str
+    meaning: str
+    fields: tuple[Field, ...]
+    groups: tuple["Group", ...]
+    open: bool = False
+
+    def all_fields(self) -> Iterator[Field]:
+        """Yield the fields of this table and of those within it."""
+        yield from self.fields
+        for group in self.groups:
+            yield from group.all_fields()
+
+
+def form(scene: Scene, schema: Schema) -> list[Group]:
+    """Return the tables of a scene as groups of fields, the important ones first."""
+    written = tomllib.loads(scene.sources[SCENE_FILE].decode())
+    for override in scene.given or ():  # added tables are those of overrides
+        if isinstance(override.value, dict) and not override.value:
+            _table_at(written, override.key)
+    resolved = scene.resolved
+    member = resolved["vehicle"][0] if scene.vehicles else {}
+    tables = {**{name: table for name, table in member.items() if name != "vehicle"}, **resolved}
+    names = [name for name in (*FIRST, *sorted(set(tables) - set(FIRST))) if name in tables and name not in LEFT_OUT]
+    reader = _Reader(schema)
+    groups = []
+    for name in names:
+        part = schema["properties"].get(name)
+        if part is None or (scene.vehicles and name in OWN):
+            continue
+        value = written[name] if name == "vehicle" and scene.vehicles else tables[name]
+        found = reader.group(name, name, part, written.get(name), value)
+        if found.fields or found.groups:
+            groups.append(found._replace(open=name in OPEN))
+    return groups
+
+
+def additions(scene: Scene, schema: Schema) -> list[tuple[str, str]]:
+    """Return key and meaning of the tables that can be added: effects and sensors that the scene lacks."""
+    known = [vehicle.resolved for vehicle in scene.vehicles or (scene,)]
+    return [
+        (f"{name}.{key}", str(part.get("description", "")))
+        for name in ADDED
+        for key, part in schema["properties"][name]["properties"].items()
+        if not any(key in tree.get(name, {}) for tree in known)
+    ]
+
+
+def plain(value: Any) -> str:
+    """Return the text of a value in a form: TOML, but a text without quotes."""
+    return value if isinstance(value, str) else toml(value)
+
+
+def toml(value: Any) -> str:
+    """Return a value as TOML on one line. Raise ValueError if it has none."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{_bare(key)} = {toml(item)}" for key, item in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(toml, value)) + "]"
+    raise ValueError(f"{value!r}: not a TOML value; use numbers, texts, lists and tables")
+
+
+def _bare(key: str) -> str:
+    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else json.dumps(key)
+
+
+def _table_at(tree: dict[str, Any], key: str) -> None:
+    for part in key.split("."):
+        tree = tree.setdefault(part, {}) if isinstance(tree, dict) else {}
+
+
+class _Reader:
+    """Walks schema and values together."""
+
+    def __init__(self, schema: Schema):
+        self._schema = schema
+
+    def group(self, key: str, label: str, part: Schema, written: Any, value: Any) -> Group:
+        """Return a table; `written` is its content in the scene file, `value` with all defaults."""
+        part = self._alternative(part, value if isinstance(value, dict | list) else written)
+        fields: list[Field] = []
+        groups: list[Group] = []
+        meaning = str(part.get("description", ""))
+        if isinstance(written, list) and written and isinstance(written[0], dict):  # a list of tables
+            items = part.get("items", {})
+            resolved = value if isinstance(value, list) and len(value) == len(written) else [{}] * len(written)
+            for k, (own, full) in enumerate(zip(written[:MOST_ITEMS], resolved, strict=False)):
+                name = str(own.get("name") or own.get("kind") or k + 1)
+                shown = _nested(full, own)
+                groups.append(self.group(f"{key}.{k}", f"{label} {name}", items, own, shown))
+            return Group(key, label, meaning, (), tuple(groups))
+        known = part.get("properties", {})
+        written, value = written if isinstance(written, dict) else {}, value if isinstance(value, dict) else {}
+        for name in [*known, *(name for name in {**value, **written} if name not in known)]:
+            below, inner = f"{key}.{name}", known.get(name, {})
+            own, full = written.get(name), value.get(name)
+            if _is_tables(own) or isinstance(own, dict) or (own is None and isinstance(full, dict)):
+                found = self.group(below, name, inner, own, full)
+                if found.fields or found.groups or isinstance(own, dict):
+                    groups.append(found)
+            elif not (_is_tables(full) or full == []):
+                fields += self._field(below, name, inner, full if own is None else own)
+        return Group(key, label, meaning, tuple(fields), tuple(groups))
+
+    def _alternative(self, part: Schema, value: Any) -> Schema:
+        """Return the part of the schema that fits a value, with references resolved."""
+        if "$ref" in part:
+            target: Any = self._schema
+            for name in part["$ref"].removeprefix("#/").split("/"):
+                target = target[name]
+            part = {**target, **{k: v for k, v in part.items() if k != "$ref"}}
+        if "anyOf" not in part:
+            return part
+        choices = [self._alternative(choice, value) for choice in part["anyOf"]]
+        fitting = [choice for choice in choices if _fits(choice, value)]
+        return {**{k: v for k, v in part.items() if k != "anyOf"}, **(fitting or choices)[0]}
+
+    def _field(self, key: str, label: str, part: Schema, value: Any) -> list[Field]:
+        text = "" if value is None else plain(value)
+        if len(text) > LONGEST:
+            return []
+        part = self._alternative(part, value)
+        if key in FIXED or len(part.get("enum", ())) == 1 or (value is None and part.get("type") == "object"):
+            return []  # nothing to choose; a table that is not there
+        description = str(part.get("description", ""))
+        unit = match[1].replace("^2", "²").replace("^3", "³") if (match := _UNIT.match(description)) else ""
+        meaning = _UNIT.sub("", description, count=1) if match else description
+        kind = {"number": "number", "integer": "integer", "string": "text", "boolean": "choice"}.get(
+            str(part.get("type", "")), "toml"
+        )
+        choices: tuple[str, ...] = ("true", "false") if part.get("type") == "boolean" else ()
+        if "enum" in part:
+            kind, choices = "choice", tuple(map(str, part["enum"]))
+        if isinstance(value, str) and kind == "toml":
+            kind = "text"
+        if kind == "choice" and text not in choices:
+            choices = (text, *choices)
+        default = plain(part["default"]) if part.get("default") not in (None, "") else ""
+        return [Field(key, label, text, kind, unit, meaning, _bounds(part), choices, default)]
+
+
+def _bounds(part: Schema) -> str:
+    """Return the range of a number, or of the numbers of a list, for people."""
+    items = part.get("items", {})
+    part = items if isinstance(items, dict) and part.get("type") == "array" else part
+    low, above = part.get("minimum"), part.get("exclusiveMinimum")
+    high, below = part.get("maximum"), part.get("exclusiveMaximum")
+    least = f"{low:g}" if low is not None else f"above {above:g}" if above is not None else ""
+    most = f"{high:g}" if high is not None else f"below {below:.3g}" if below is not None else ""
+    if least and most:
+        return f"{least} to {most}"
+    return (f"at least {least}" if low is not None else least) or (f"at most {most}" if high is not None else most)
+
+
+def _fits(choice: Schema, value: Any) -> bool:
+    kind = choice.get("properties", {}).get("kind", {}).get("enum")
+    if kind is not None:
+        return isinstance(value, dict) and value.get("kind") in kind
+    types = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer", float: "number"}
+    return choice.get("type") == types.get(type(value)) or (type(value) is int and choice.get("type") == "number")
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
+
+
+def _nested(full: Any, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the resolved values of a table; where the file has a table and the resolved a list of one, that."""
+    if not isinstance(full, dict):
+        return {}
+    return {
+        name: item[0] if _is_tables(item) and isinstance(own.get(name), dict) else item for name, item in full.items()
+    }

@@ -1,0 +1,131 @@
+"""Logs in the folder of recordings: summary, picture and report of each."""
+
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import datetime
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from lapwing.cosim.output_lock import is_locked
+from lapwing.flight import Flight
+from lapwing.studies.flight_data import SHOWN
+from lapwing.studies.report import write
+from lapwing.studies.report.key_numbers import KeyNumber, key_numbers, trouble
+from lapwing.studies.report.page import LOOKS
+from lapwing.studio.path_picture import Picture, picture
+
+FOLDER = Path("recordings")  # where `lapwing run` writes logs
+MOST = 200  # logs that are listed, the newest
+
+
+class FlightSummary(NamedTuple):
+    """A log as the page lists it."""
+
+    name: str  # of the file
+    scene: str
+    title: str
+    recorded: str  # local date and time
+    looks: str  # "good" or "bad"
+    outcome: str
+    kind: str  # of the outcome
+    vehicles: tuple[str, ...]
+    numbers: tuple[KeyNumber, ...]
+    trouble: int  # events that went wrong
+    duration: float  # [s]
+    picture: Picture | None
+    tree: dict[str, Any]  # the scene with all defaults
+    error: str = ""  # why the log cannot be read
+
+    def matches(self, words: Sequence[str]) -> bool:
+        """Return True if every word, in lower case, occurs in the name, title, outcome or a vehicle's name."""
+        text = " ".join((self.name, self.scene, self.title, self.outcome, *self.vehicles)).lower()
+        return all(word in text for word in words)
+
+
+class RecentFlights:
+    """Summaries and reports of the logs of a folder, kept while the logs do not change."""
+
+    def __init__(self, reports: Path, folder: Path = FOLDER):
+        """Use a folder of logs; `reports` takes pages that are written on demand."""
+        self._folder, self._reports = folder, reports
+        self._known: dict[tuple[str, int], FlightSummary] = {}
+        self._lock = threading.Lock()
+
+    def names(self) -> list[str]:
+        """Return the file names of the logs, the newest first; without one that is being written."""
+        paths = [path for path in self._folder.glob("*.mcap") if path.is_file()] if self._folder.is_dir() else []
+        dated = [(modified, path.name) for path in paths if (modified := _modified(path)) and not is_locked(path)]
+        return [name for _, name in sorted(dated, reverse=True)[:MOST]]
+
+    def path(self, name: str) -> Path:
+        """Return the path of a log of the folder. Raise KeyError for any other name."""
+        if name not in self.names():
+            raise KeyError(name)
+        return self._folder / name
+
+    def summary(self, name: str) -> FlightSummary:
+        """Return the summary of a log. Raise KeyError if there is none of this name."""
+        path = self.path(name)
+        key = (name, _modified(path))
+        with self._lock:
+            if key not in self._known:
+                self._known[key] = _summary(path)
+            return self._known[key]
+
+    def read_all(self) -> None:
+        """Read the summaries of all logs, the newest first; logs that vanish meanwhile are passed over."""
+        for name in self.names():
+            with suppress(KeyError):
+                self.summary(name)
+
+    def search(self, text: str) -> list[str]:
+        """Return the names of the logs that match all words, the newest first."""
+        words = text.lower().split()
+        return [name for name in self.names() if not words or self.summary(name).matches(words)]
+
+    def report(self, *names: str) -> Path:
+        """Return the report of one log, or of two laid over each other. Raise KeyError or ValueError."""
+        paths = [self.path(name) for name in names]
+        stamp = "_".join(str(_modified(path)) for path in paths)
+        target = self._reports / f"{'_'.join(path.stem for path in paths)[:120]}_{stamp}.html"
+        with self._lock:
+            if not target.exists():
+                write([Flight.read(path, only=SHOWN) for path in paths], target, view3d=True)
+        return target
+
+
+def _modified(path: Path) -> int:
+    """Return the time of the last write [ns], 0 if the file is gone."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
+def _summary(path: Path) -> FlightSummary:
+    recorded = datetime.fromtimestamp(_modified(path) * 1e-9).strftime("%Y-%m-%d %H:%M")
+    try:
+        flights = [flight for flight in Flight.read_all(path, SHOWN) if len(flight.truth)]
+        if not flights:
+            raise ValueError("no flight in this log")
+    except ValueError as error:
+        reason = str(error).removeprefix(f"{path}: ")
+        return FlightSummary(path.name, path.stem, "", recorded, "bad", "", "", (), (), 0, 0.0, None, {}, reason)
+    worst = max(flights, key=lambda flight: flight.outcome.kind not in LOOKS)
+    run = worst.origin.scene.get("run", {})
+    return FlightSummary(
+        path.name,
+        worst.metadata.get("scene") or path.stem,
+        str(run.get("title", "")),
+        recorded,
+        LOOKS.get(worst.outcome.kind, "bad"),
+        f"{worst.vehicle}: {worst.outcome}" if len(flights) > 1 else str(worst.outcome),
+        worst.outcome.kind,
+        tuple(flight.vehicle for flight in flights),
+        tuple(key_numbers(worst)),
+        sum(len(trouble(flight)) for flight in flights),
+        float(worst.truth.times[-1] - worst.truth.times[0]),
+        picture([flight.truth.position for flight in flights]),
+        worst.origin.scene,
+    )

@@ -1,0 +1,153 @@
+"""Runs that the page has started: the process of `lapwing run`, its output and its result."""
+
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from lapwing.studio.scene_changes import Change, command_line
+
+LINES = 400  # of the output that are kept
+PATIENCE = 10.0  # [s] that a run has to end after SIGINT
+_LIVE = re.compile(r"live: (http://127\.0\.0\.1:\d+/[\w-]+/)$")
+_TIME = re.compile(r"t =\s*([\d.]+) s\s+([\d.]+)x")
+
+
+class StudioRun:
+    """One run of a scene with changes."""
+
+    def __init__(self, number: int, scene: str, changed: Sequence[Change], speed: str, view: bool, folder: Path):
+        """Start `lapwing run`; `folder` takes its JSON result."""
+        self.number, self.scene, self.changed, self.speed, self.view = number, scene, tuple(changed), speed, view
+        self.command = command_line(scene, changed, speed, view)
+        self.lines: list[str] = []
+        self.live, self.sim_time, self.rate = "", 0.0, 0.0  # address of the 3D view; [s]; simulated over wall time
+        self.result: dict[str, Any] = {}
+        self.code: int | None = None
+        self._json, self._stopped = folder / f"{number}.json", False
+        words = [sys.executable, "-m", "lapwing", *self.command[1:], "--json", str(self._json)]
+        self._process = subprocess.Popen(
+            words,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            errors="replace",
+            # The page shows the view, so no other window opens; lines come as they are printed.
+            env=os.environ | {"BROWSER": "true", "COLUMNS": "100", "PYTHONUNBUFFERED": "1"},
+            start_new_session=True,  # Ctrl-C ends the page, which ends the run
+        )
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            line = line.rstrip("\n")
+            if match := _LIVE.match(line):
+                self.live = match[1]
+            elif match := _TIME.match(line):
+                self.sim_time, self.rate = float(match[1]), float(match[2])
+            else:
+                self.lines = [*self.lines[-LINES:], line]
+        code = self._process.wait()
+        with suppress(OSError, ValueError):  # a run that failed has no result
+            self.result = json.loads(self._json.read_text(encoding="utf-8"))
+        self.live, self.code = "", code
+
+    @property
+    def running(self) -> bool:
+        """True until the process has ended and its result is known."""
+        return self.code is None
+
+    @property
+    def log(self) -> Path | None:
+        """Path of the log, None if there is none."""
+        return Path(self.result["log"]) if "log" in self.result else None
+
+    @property
+    def stopped(self) -> bool:
+        """True if the run was ended by the user."""
+        return self._stopped
+
+    @property
+    def error(self) -> str:
+        """The last line of the output of a run that failed without a result; "" otherwise."""
+        if self.running or not self.code or self.result:
+            return ""
+        last = next((line for line in reversed(self.lines) if line.strip()), "")
+        return last.removeprefix("lapwing: ") or f"ended with exit code {self.code}"
+
+    def state(self) -> dict[str, Any]:
+        """Return what the page polls."""
+        return {
+            "running": self.running,
+            "live": self.live,
+            "time": self.sim_time,
+            "rate": self.rate,
+            "lines": self.lines[-12:],
+        }
+
+    def stop(self) -> None:
+        """Interrupt the run, which then writes its log and report."""
+        if self._process.poll() is None:
+            self._stopped = True
+            self._process.send_signal(signal.SIGINT)
+
+    def end(self) -> None:
+        """Interrupt the run and wait; kill its processes if it does not end."""
+        self.stop()
+        try:
+            self._process.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            with suppress(ProcessLookupError):
+                os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait()
+        self._reader.join(PATIENCE)
+
+
+class StudioRuns:
+    """All runs of a page, one at a time; a context manager that ends the last."""
+
+    def __init__(self) -> None:
+        """Create a folder for results."""
+        self._folder = tempfile.TemporaryDirectory(prefix="lapwing-studio-")
+        self._numbers, self._lock = count(1), threading.Lock()
+        self.all: dict[int, StudioRun] = {}
+
+    @property
+    def folder(self) -> Path:
+        """Folder for files of this page, deleted at its end."""
+        return Path(self._folder.name)
+
+    @property
+    def current(self) -> StudioRun | None:
+        """The run that is under way, None without one."""
+        return next((run for run in self.all.values() if run.running), None)
+
+    def start(self, scene: str, changed: Sequence[Change], speed: str, view: bool) -> StudioRun:
+        """Start a run. Raise ValueError if another is under way."""
+        with self._lock:
+            if (other := self.current) is not None:
+                raise ValueError(f"run {other.number} of {other.scene} is under way; stop it first")
+            number = next(self._numbers)
+            self.all[number] = StudioRun(number, scene, changed, speed, view, self.folder)
+            return self.all[number]
+
+    def __enter__(self) -> "StudioRuns":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        for run in self.all.values():
+            if run.running:
+                run.end()
+        self._folder.cleanup()

@@ -1,0 +1,144 @@
+"""Forms of scenes: fields from the schema, overrides from texts, command line and Python."""
+
+import shlex
+
+import pytest
+
+from lapwing.cosim.scene import SceneError
+from lapwing.file_schemas.json_schema import scene_schema
+from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.scene_resolver import load
+from lapwing.studio.form_fields import additions, form, toml
+from lapwing.studio.scene_changes import Change, changes, command_line, python, shown
+
+
+@pytest.fixture(scope="module")
+def schema():
+    return scene_schema()
+
+
+def fields(scene, schema):
+    return {field.key: field for group in form(load(scene), schema) for field in group.all_fields()}
+
+
+def test_field_has_unit_range_help_and_value(schema):
+    duration = fields("hover", schema)["run.duration"]
+    assert (duration.text, duration.kind, duration.unit) == ("20.0", "number", "s")
+    assert duration.bounds == "above 0 to 1e+06"
+    assert duration.meaning == "latest end of the run"
+
+
+def test_choices_come_from_schema(schema):
+    known = fields("delivery_mission", schema)
+    assert known["sensors.gps.preset"].choices[:2] == ("rtk", "standard")
+    assert known["communication.coupling"].choices == ("gauss_seidel", "jacobi")
+    assert known["trajectory.phase.0.release"].choices == ("true", "false")
+
+
+def test_segments_of_phases_have_fields_of_their_kind(schema):
+    known = fields("delivery_mission", schema)
+    assert known["trajectory.phase.1.z.rate"].text == "1.0"
+    assert known["trajectory.phase.1.z.rate"].bounds == "above 0"
+
+
+@pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))
+def test_every_field_is_key_that_its_scene_takes(scene, schema):
+    known = fields(scene, schema)
+    assert len(known) > 20
+    shown = {key: field for key, field in known.items() if field.text}
+    empty = {key: field._replace(text="") for key, field in shown.items()}
+    changed, faults = changes(empty.values(), {key: field.text for key, field in shown.items()}, ())
+    assert faults == {}
+    assert len(changed) == len(shown)
+    load(scene, [change.override for change in changed])
+
+
+def test_tables_that_scene_lacks_can_be_added(schema):
+    scene = load("hover")
+    names = dict(additions(scene, schema))
+    assert "effects.battery" in names
+    assert "effects.gravity" not in names
+    added = load("hover", {"effects.random_wind_force": {}})
+    known = {field.key for group in form(added, schema) for field in group.all_fields()}
+    assert "effects.random_wind_force.mean" in known
+
+
+def test_unchanged_texts_are_no_changes(schema):
+    known = fields("delivery_mission", schema)
+    assert changes(known.values(), {key: field.text for key, field in known.items()}, ()) == ([], {})
+
+
+def test_texts_become_values_of_field(schema):
+    known = fields("delivery_mission", schema)
+    posted = {
+        "run.seed": "2",
+        "run.duration": "30",
+        "effects.random_wind_force.mean": "[1, 2.5, 0]",
+        "sensors.gps.preset": "standard",
+        "trajectory.phase.1.z.to": "8",
+        "trajectory.phase.0.release": "true",
+    }
+    changed, faults = changes(known.values(), posted, ["effects.battery"])
+    assert faults == {}
+    assert dict(changed) == {
+        "effects.battery": {},
+        "run.seed": 2,
+        "run.duration": 30.0,
+        "effects.random_wind_force.mean": [1, 2.5, 0],
+        "sensors.gps.preset": "standard",
+        "trajectory.phase.1.z.to": 8.0,
+        "trajectory.phase.0.release": True,
+    }
+    scene = load("delivery_mission", [change.override for change in changed])
+    assert scene == load("delivery_mission", dict(changed))
+    assert scene.lookup("run.seed") == 2
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "message"),
+    [
+        ("run.seed", "1.5", "got 1.5; expected a whole number"),
+        ("run.duration", "long", "got long; expected a number"),
+        ("run.duration", "[1]", "got [1]; expected a number"),
+        ("effects.random_wind_force.mean", "3, 1", "got 3, 1; expected a TOML value, e.g. [1.0, 2.0]"),
+        ("run.duration", "1\nx = 2", "got 1\nx = 2; expected a number"),
+    ],
+)
+def test_text_of_another_kind_is_fault(schema, key, text, message):
+    known = fields("delivery_mission", schema)
+    assert changes(known.values(), {key: text}, ()) == ([], {key: message})
+
+
+def test_command_line_and_python_fly_same():
+    changed = [Change("run.seed", 3), Change("vehicle.airframe", "my drone.toml"), Change("effects.battery", {})]
+    words = command_line("hover", changed, "2", True)
+    assert shlex.split(shown(words)) == words
+    overrides = [words[k + 1] for k, word in enumerate(words) if word == "--set"]
+    with pytest.raises(SceneError, match=r"my drone\.toml"):
+        load("hover", overrides)
+    assert load("hover", [o for o in overrides if "airframe" not in o]) == load(
+        "hover", {change.key: change.value for change in changed if "airframe" not in change.key}
+    )
+    code = python("hover", changed)
+    given = {}
+    exec(
+        code.replace("import lapwing\n", "").replace("print(flight.outcome)\nflight.report()\n", ""),
+        {"lapwing": Spy(given)},
+    )
+    assert given == {"scene": "hover", "overrides": dict(changed)}
+
+
+class Spy:
+    def __init__(self, given):
+        self._given = given
+
+    def fly(self, scene, overrides=()):
+        self._given.update(scene=scene, overrides=overrides)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(True, "true"), ('a "b"', '"a \\"b\\""'), ([1, 2.0], "[1, 2.0]"), ({"a b": {}}, '{"a b" = {}}'), (1e-9, "1e-09")],
+)
+def test_values_as_toml(value, text):
+    assert toml(value) == text
