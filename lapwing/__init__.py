@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from lapwing.cosim.run_errors import LockStepError
     from lapwing.cosim.scene import Scene, SceneError
     from lapwing.flight import Flight
-    from lapwing.services.common.ports import Reference
+    from lapwing.services.common.ports import Setpoint
     from lapwing.simulator import Observation, Simulator
     from lapwing.studies.campaign.distributions import choice, linspace, loguniform, normal, uniform
     from lapwing.studies.flight_events import Event
@@ -31,7 +31,7 @@ _WHERE = {
     "Flight": "lapwing.flight",
     "LockStepError": "lapwing.cosim.run_errors",
     "Observation": "lapwing.simulator",
-    "Reference": "lapwing.services.common.ports",
+    "Setpoint": "lapwing.services.common.ports",
     "Scene": "lapwing.cosim.scene",
     "SceneError": "lapwing.cosim.scene",
     "Simulator": "lapwing.simulator",
@@ -55,9 +55,9 @@ __all__ = [
     "FlightOutcome",
     "LockStepError",
     "Observation",
-    "Reference",
     "Scene",
     "SceneError",
+    "Setpoint",
     "Simulator",
     "campaign",
     "choice",
@@ -72,7 +72,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """The public names, imported when they are first asked for: `lapwing --help` needs none of them."""
+    """Import a public name when it is first used: `lapwing --help` needs none of them."""
     import importlib
 
     if name not in _WHERE:

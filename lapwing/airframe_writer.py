@@ -21,15 +21,15 @@ FAMILY = {  # blade-element constants of common two-blade propellers
     "zero_lift_angle": 0.0,
     "lift_curve_slope": 6.11,
 }
-SPINS = {  # clockwise or counter-clockwise seen from above; six survive most single failures
+SPINS = {  # clockwise or counter-clockwise seen from above, alternating
     4: ("cw", "ccw", "cw", "ccw"),
-    6: ("cw", "cw", "ccw", "ccw", "cw", "ccw"),
+    6: ("cw", "ccw", "cw", "ccw", "cw", "ccw"),
     8: ("cw", "ccw", "cw", "ccw", "cw", "ccw", "cw", "ccw"),
 }
 
 
 def airframe_of(v: Values) -> Airframe:
-    """The airframe of the figures.
+    """Return the airframe for the figures.
 
     Raises:
         ValueError: figures that do not go together.
@@ -41,7 +41,7 @@ def airframe_of(v: Values) -> Airframe:
 
 
 def written(name: str, v: Values, known: set[str]) -> str:
-    """The airframe's file; figures that are not `known` are marked as guessed."""
+    """Return the text of the airframe file; figures that are not `known` are marked as guessed."""
     count = int(v["rotors"])
     geometry = {"diameter": v["diameter"], "pitch": v["pitch"], "blades": int(v["blades"]), **FAMILY}
     shape = Propeller.model_validate({**geometry, "lift_correction": 1.0, "zero_lift_drag": 0.0})
@@ -69,7 +69,7 @@ def written(name: str, v: Values, known: set[str]) -> str:
         _line("spin_direction", list(SPINS[count]), "seen from above: compare with yours"),
         _line("inertia", v["rotor_inertia"], "kg m^2 about the shaft"),
         "",
-        "[propeller]  # lift_correction and zero_lift_drag meet the thrust stand, the others are of the family",
+        "[propeller]  # lift_correction and zero_lift_drag fit the thrust stand, the others are typical values",
         *[_line(key, value) for key, value in geometry.items()],
         "",
         "[motor]",

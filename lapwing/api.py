@@ -10,8 +10,11 @@ from typing import Any
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.flight import Flight
+from lapwing.runs.compile_notice import notify_on_compile
+from lapwing.runs.solver import with_solver
+from lapwing.runs.work_progress import WorkProgress
 from lapwing.services import scene_resolver
-from lapwing.services.common.user_code import lent
+from lapwing.services.common.user_code import registered
 from lapwing.services.scene_resolver import reseed, resolve
 from lapwing.studies import simulate as studied
 from lapwing.studies.campaign.distributions import Distribution
@@ -53,7 +56,7 @@ def fly(
         seed: of all randomness, 0 to 2^63 - 1; None: the scene's.
         controller: one's own in the place of the scene's: a class, an object of one (each take-off begins with a copy
             of it), or "module:Class", as in a scene. It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
-            `lapwing.services.common.controller_api`. A class in a module of its own becomes part of the flight's
+            `lapwing.services.common.controller_api`. A class in a separate module becomes part of the flight's
             set-up, so that
             `lapwing resimulate` can fly a saved log again; one that was typed at a prompt or in a script cannot be.
         controller_options: of the constructor of the class: numbers, texts, lists of numbers, by name.
@@ -61,7 +64,7 @@ def fly(
         estimator_options: the same.
 
     Raises:
-        SceneError: the scene is not sound, or the controller does not fit it: what is wrong with which key.
+        SceneError: the scene is invalid, or the controller does not fit it; names the key and the fault.
     """
     given = {"controller": (controller, controller_options), "estimator": (estimator, estimator_options)}
     folder = Path(scene.path if isinstance(scene, Scene) else scene).parent
@@ -69,14 +72,15 @@ def fly(
         own: dict[str, Any] = {} if seed is None else {"run.seed": seed}
         for key, (thing, options) in given.items():
             if thing is not None:
-                own[f"autopilot.{key}"] = stack.enter_context(lent(thing, folder))
+                own[f"autopilot.{key}"] = stack.enter_context(registered(thing, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        return _flown(resolve(load_scene(scene_resolver.load_one(scene, overrides), own)))
+        chosen = with_solver(scene_resolver.load_one(scene, overrides))
+        return _flown_with_bar(resolve(load_scene(chosen, own)))
 
 
 def read_log(log: str | Path) -> Flight:
-    """The flight of an MCAP log.
+    """Return the flight of an MCAP log.
 
     Raises:
         ValueError: no such file, no MCAP log, or no flight in it.
@@ -108,7 +112,7 @@ def campaign(
         `lapwing campaign --runs n`.
 
     Raises:
-        SceneError: the scene is not sound, or what was drawn does not fit it.
+        SceneError: the scene is invalid, or a drawn value does not fit it.
         ValueError: an argument is out of its range.
     """
     base = scene_resolver.load_one(scene, overrides)
@@ -121,15 +125,39 @@ def campaign(
     drawn = plan(base.name, (), len(seeds), seed, vary, design=design)
     fixed = None if drawn.keys else resolve(base)
 
-    def one(run: int) -> Flight:
+    def setup(run: int) -> RunConfig:
         if fixed is not None:
-            return _flown(reseed(fixed, seeds[run]))
-        return _flown(resolve(load_scene(base, {**drawn.values(run), "run.seed": seeds[run]})))
+            return reseed(fixed, seeds[run])
+        return resolve(load_scene(base, {**drawn.values(run), "run.seed": seeds[run]}))
 
-    first = one(0)  # alone: it compiles
-    with ThreadPoolExecutor(cpu_count()) as pool:
-        return [first, *pool.map(one, range(1, len(seeds)))]
+    def one(run: int) -> Flight:
+        return _flown(setup(run))
+
+    with WorkProgress(f"campaign {base.name}", len(seeds), "flights") as bar:
+        first = setup(0)
+        with notify_on_compile(first, bar.compiling, alone=False):
+            flights = [_flown(first)]  # alone: it compiles
+        bar.show(1)
+        with ThreadPoolExecutor(cpu_count()) as pool:
+            for flight in pool.map(one, range(1, len(seeds))):
+                flights.append(flight)
+                bar.show(len(flights))
+    return flights
 
 
 def _flown(setup: RunConfig) -> Flight:
     return studied.fly(setup, kind=Flight)
+
+
+def _flown_with_bar(setup: RunConfig) -> Flight:
+    """Fly with a progress bar, if it takes long and somebody looks."""
+    with (
+        WorkProgress(setup.scene, setup.last_tick * setup.interval, "s") as bar,
+        notify_on_compile(setup, bar.compiling, alone=False) as compiling,
+    ):
+
+        def observe(tick: int) -> None:
+            compiling.ended()
+            bar.show(tick * setup.interval)
+
+        return studied.fly(setup, kind=Flight, observe=observe)

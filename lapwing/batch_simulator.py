@@ -1,11 +1,11 @@
 """Many vehicles of a scene stepped together, with numpy arrays."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from os import cpu_count
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +13,10 @@ from numpy.typing import ArrayLike
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.dynamics import simd_batch
 from lapwing.dynamics.effects._types import Motion
+from lapwing.dynamics.rate_control import RateController
+from lapwing.dynamics.terrain import Relief
 from lapwing.kernels.row_packing import pack_row, row_width
+from lapwing.runs.solver import with_solver
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.motor import RPM
@@ -27,7 +30,8 @@ from lapwing.studies.campaign.distributions import Distribution
 from lapwing.studies.campaign.plan import plan
 
 RATE_BANDWIDTH = 15.0  # [rad/s] with which body rates are followed
-OMEGA = slice(10, 13)  # columns of a motion
+UNIT = 1e-6  # largest difference of the norm of an attitude from 1
+DEEPEST = 1e-3  # [m] of a centre of mass under the ground
 
 
 class BatchState(NamedTuple):
@@ -39,6 +43,7 @@ class BatchState(NamedTuple):
     velocity_world: np.ndarray  # [m/s], shape (n, 3)
     omega_body: np.ndarray  # [rad/s], shape (n, 3)
     rotor_speed: np.ndarray  # [rad/s], shape (n, rotors)
+    valid: np.ndarray  # shape (n,): False after a step that left a state non-finite, or turning too fast for its error
 
 
 class BatchSimulator:
@@ -63,41 +68,47 @@ class BatchSimulator:
         *,
         seed: int = 1,
     ):
-        """n vehicles at rest where the scene puts them.
+        """Place n vehicles at rest at the start of the scene.
 
         Args:
             scene: what to simulate: a path, a name, or a loaded one; its model is "rigid_body".
             n: how many.
             vary: how keys of the scene vary from member to member; member k draws what run k of a campaign draws. Each
                 costs the resolving of a scene, about 6 ms.
-            overrides: as of `lapwing.load_scene`.
+            overrides: see `lapwing.load_scene`.
             seed: of the draws, and of the members' randomness.
 
         Raises:
-            SceneError: the scene is not sound, or has another model.
+            SceneError: the scene is invalid, or has another model.
             ValueError: n is below 1, or members would differ in more than numbers.
         """
         if n < 1:
             raise ValueError(f"n: expected at least 1 member, got {n}")
-        base = load_one(scene, overrides)
+        base = with_solver(load_one(scene, overrides))
         drawn = plan(base.name, (), n, seed, vary)
         first = _plant(load(base, drawn.given(0)))
         self._core, self.n, self.interval = first.core, n, first.core.interval
         self._like = simd_batch.member(first.core.vehicle, first.start.vehicle)
         self._motion = row_width(self._like.motion)
         self._blocks = simd_batch.blocks(n, self._like)
+        self._flat = self._blocks.reshape(-1)
         members = len(self._blocks) * simd_batch.WIDTH  # those beyond n fill the last block
         name = base[Vehicle].name
         self._keys = np.array([noise_key(drawn.seed_of(min(k, n - 1)), name) for k in range(members)], np.int64)
         self._ticks = np.zeros(members, np.int64)
+        self._valid = np.ones(members, bool)
+        self._on_ground = any(hasattr(e, "terrain") for e in first.core.vehicle.effects)
         self._fresh = np.empty((members, row_width(self._like)))  # rows of the members before their first step
         self._fresh[:] = pack_row(self._like)
+        self._commands = np.zeros((members, len(self._like.voltage)))  # [V]
+        self.setpoints = np.zeros((members, 4))  # thrust [N], body rates [rad/s]
         for k in range(1, n) if drawn.keys else ():
             plant = _plant(load(base, drawn.given(k)))
             if _kinds(plant.core) != _kinds(first.core):
                 raise ValueError(f"member {k}: has other effects or another solver than member 0")
             self._fresh[k] = pack_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))
-        self._place(np.arange(members))
+        self._place(np.arange(n))
+        self._fill()
         self._pool = ThreadPoolExecutor(cpu_count())
         self._scene = base
 
@@ -113,6 +124,11 @@ class BatchSimulator:
         return np.full(len(self._like.voltage), np.sqrt(thrust / self._steered.motor.thrust_coefficient))
 
     @property
+    def memory(self) -> tuple[np.ndarray, int, np.ndarray, np.ndarray]:
+        """Memory for compiled code: that of `simd_batch.blocks`, flat; columns of a block; ticks; which are valid."""
+        return self._flat, self._blocks.shape[1], self._ticks, self._valid
+
+    @property
     def state(self) -> BatchState:
         """The present states, copied."""
         rows = self._rows(self._motion)[: self.n]
@@ -120,7 +136,7 @@ class BatchSimulator:
         for part in self._like.motion:
             parts.append(rows[:, at : at + len(part)].copy())
             at += len(part)
-        return BatchState(self._ticks[: self.n] * self.interval, *parts)
+        return BatchState._make([self._ticks[: self.n] * self.interval, *parts, self._valid[: self.n].copy()])
 
     def step(
         self,
@@ -128,6 +144,7 @@ class BatchSimulator:
         thrust: ArrayLike | None = None,
         body_rates: ArrayLike | None = None,
         ticks: int = 1,
+        strict: bool = False,
     ) -> BatchState:
         """Go on for some ticks under one command.
 
@@ -137,9 +154,11 @@ class BatchSimulator:
             body_rates: [rad/s] to be followed, shape (n, 3): by a proportional controller of 15 rad/s at every tick,
                 on the nominal airframe.
             ticks: how many; one is `interval` seconds.
+            strict: raise an error if a member is no longer valid.
 
         Raises:
-            ValueError: another command, shape, or number that is not finite.
+            ValueError: another command, shape, or number that is not finite; with `strict` the members that are not
+                `valid` after the step.
         """
         if (motor_voltages is None) == (thrust is None) or (thrust is None) != (body_rates is None):
             raise ValueError("step: expected motor_voltages, or thrust and body_rates")
@@ -148,9 +167,13 @@ class BatchSimulator:
         if motor_voltages is not None:
             self._advance(_sound("motor_voltages", motor_voltages, (self.n, len(self._like.voltage))), ticks)
         else:
-            wanted = _sound("thrust", thrust, (self.n,)), _sound("body_rates", body_rates, (self.n, 3))
-            for _ in range(ticks):
-                self._advance(self._voltages(*wanted), 1)
+            self.setpoints[: self.n, 0] = _sound("thrust", thrust, (self.n,))
+            self.setpoints[: self.n, 1:] = _sound("body_rates", body_rates, (self.n, 3))
+            self.setpoints[self.n :] = self.setpoints[self.n - 1]
+            self.run_blocks(lambda first, last: self.advance_under_rates(first, last, ticks))
+        if strict and not self._valid[: self.n].all():
+            members = ", ".join(map(str, np.flatnonzero(~self._valid[: self.n])[:10]))
+            raise ValueError(f"step: members {members} are not finite or turn too fast for the step; reset them")
         return self.state
 
     def reset(self, members: Sequence[int] | np.ndarray | None = None, **state: ArrayLike) -> BatchState:
@@ -163,11 +186,17 @@ class BatchSimulator:
         Raises:
             ValueError: no such member or field, or another shape.
         """
+        self.restart(members, **state)
+        return self.state
+
+    def restart(self, members: Sequence[int] | np.ndarray | None = None, **state: ArrayLike) -> None:
+        """Begin anew as `reset` does, without copying the states."""
         chosen = np.arange(self.n) if members is None else np.atleast_1d(np.asarray(members))
         if chosen.dtype == bool:
             chosen = np.flatnonzero(chosen)
         if chosen.size and not (chosen.dtype.kind in "iu" and chosen.min() >= 0 and chosen.max() < self.n):
             raise ValueError(f"members: expected numbers from 0 to {self.n - 1}")
+        self._check_start(state)
         self._place(chosen)
         at = 0
         for name, part in zip(Motion._fields, self._like.motion, strict=True):
@@ -179,55 +208,95 @@ class BatchSimulator:
             at += len(part)
         if state:
             raise ValueError(f"{next(iter(state))}: unknown; expected one of {', '.join(Motion._fields)}")
-        return self.state
+        self._fill()
+
+    def run_blocks(self, work: Callable[[int, int], None]) -> None:
+        """Call work(first, last) for parts of the blocks, one part for each core, in threads."""
+        count = len(self._blocks)
+        parts = min(cpu_count() or 1, count)
+        if parts == 1:
+            work(0, count)
+            return
+        edges = [count * k // parts for k in range(parts + 1)]
+        list(self._pool.map(work, edges[:-1], edges[1:]))
+
+    def advance_under_rates(self, first: int, last: int, ticks: int) -> None:
+        """Advance the blocks `first` to before `last` under the rows of `setpoints`."""
+        simd_batch.advance(*self._advanced, first, last, ticks, self._controller, self.setpoints)
+        self._mark_invalid(first, last)
+
+    @cached_property
+    def _advanced(self) -> tuple[Any, Any, np.ndarray, int, np.ndarray, np.ndarray, np.ndarray, float, int]:
+        """First arguments of `simd_batch.advance`."""
+        memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands)
+        return (self._core.method, *memory, self._core.step, self._core.steps)
+
+    @cached_property
+    def _controller(self) -> RateController:
+        a, motor = self._steered, self._steered.motor
+        unit = np.array([controller_parameters.lift(a), *controller_parameters.moments(a)])
+        mixer = np.array(controller_parameters.shares(a)[0]) / unit
+        speed = RPM / (motor.gear_ratio * motor.speed_constant)
+        return RateController(RATE_BANDWIDTH, a.inertia_body, mixer, motor.thrust_coefficient, speed, a.voltage_max)
 
     @cached_property
     def _steered(self) -> Airframe:
         return known_airframe(self._scene)
 
     def _rows(self, columns: int) -> np.ndarray:
-        """The first numbers of the members, shape (members, columns)."""
+        """Return the first numbers of the batch elements, shape (members, columns)."""
         return self._blocks[:, :columns].transpose(0, 2, 1).reshape(-1, columns)
 
     def _place(self, members: np.ndarray) -> None:
         self._blocks[members // simd_batch.WIDTH, :, members % simd_batch.WIDTH] = self._fresh[members]
         self._ticks[members] = 0
+        self._valid[members] = True
+
+    def _fill(self) -> None:
+        """Copy the last member to the rest of its block: what stands on the ground would slow the others down."""
+        last = (self.n - 1) % simd_batch.WIDTH
+        self._blocks[-1, :, last + 1 :] = self._blocks[-1, :, last, None]
+        self._ticks[self.n :] = self._ticks[self.n - 1]
+        self._valid[self.n :] = True
+
+    def _check_start(self, state: Mapping[str, ArrayLike]) -> None:
+        """Raise ValueError for a state that no vehicle can have."""
+        checks = {
+            "attitude": ("unit quaternions", lambda v: abs(np.linalg.norm(v, axis=1) - 1.0) <= UNIT),
+            "rotor_speed": ("speeds of at least 0 rad/s", lambda v: (v >= 0.0).all(axis=1)),
+        }
+        if self._on_ground:
+            checks["position_world"] = ("a centre of mass above the ground", lambda v: v[:, 2] >= -DEEPEST)
+        for name, (expected, holds) in checks.items():
+            if name in state:
+                value = np.atleast_2d(np.asarray(state[name], float))
+                if not holds(value).all():
+                    raise ValueError(f"{name}: expected {expected}, got {value[~holds(value)][0].tolist()}")
 
     def _advance(self, voltages: np.ndarray, ticks: int) -> None:
-        commands = np.zeros((len(self._ticks), voltages.shape[1]))
-        commands[: self.n] = voltages
-        flat, (count, columns, _) = self._blocks.reshape(-1), self._blocks.shape
-        given = (self._core.method, self._like, flat, columns, self._keys, self._ticks, commands, self._core.step)
-        parts = min(cpu_count() or 1, count)
-        edges = [count * k // parts for k in range(parts + 1)]
+        self._commands[: self.n], self._commands[self.n :] = voltages, voltages[-1]
 
-        def fly(k: int) -> None:
-            simd_batch.advance(*given, self._core.steps, edges[k], edges[k + 1], ticks)
+        def work(first: int, last: int) -> None:
+            simd_batch.advance(*self._advanced, first, last, ticks)
+            self._mark_invalid(first, last)
 
-        if parts == 1:
-            fly(0)
-        else:
-            list(self._pool.map(fly, range(parts)))
+        self.run_blocks(work)
 
-    def _voltages(self, thrust: np.ndarray, body_rates: np.ndarray) -> np.ndarray:
-        """What holds the thrusts that follow body rates, shape (n, rotors) [V]."""
-        a = self._steered
-        omega, inertia = self._rows(self._motion)[: self.n, OMEGA], np.array(a.inertia_body)
-        torque = inertia * RATE_BANDWIDTH * (body_rates - omega) + np.cross(omega, inertia * omega)
-        shares, each = (
-            np.array(controller_parameters.shares(a)[0]),
-            np.array([controller_parameters.lift(a), *controller_parameters.moments(a)]),
-        )
-        demands = np.column_stack([thrust, torque]) / each
-        single = (demands[:, None, :] * shares).sum(axis=2)  # not as a matrix product, whose bits depend on n
-        propeller = np.sqrt(np.clip(single, 0.0, None) / a.motor.thrust_coefficient)
-        return np.clip(propeller * RPM / (a.motor.gear_ratio * a.motor.speed_constant), 0.0, a.voltage_max)
+    def _mark_invalid(self, first: int, last: int) -> None:
+        layout = (self._flat, self._blocks.shape[1], self._motion, self._core.step)
+        simd_batch.mark_invalid(*layout, self._valid, first, last)
 
 
 def _plant(scene: Scene) -> PlantSetup:
     plant: PlantSetup = resolve(scene).services["plant"].parameters
     if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
         raise SceneError("vehicle.model", f"got {plant.model!r}", '"rigid_body", the only one that batches step')
+    if any(isinstance(getattr(e, "terrain", None), Relief) for e in plant.core.vehicle.effects):
+        raise SceneError("environment", "batches step over level ground", "a scene without slope, bumps and steps")
+    for effect in plant.core.vehicle.effects:
+        if any(isinstance(part, np.ndarray) for part in effect):
+            name = type(effect).__module__.rpartition(".")[2]
+            raise SceneError(f"effects.{name}", "batches step effects without tables of numbers", "a scene without it")
     if plant.others:
         raise SceneError(
             "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"
@@ -240,13 +309,13 @@ def _kinds(core: MultirotorPlant) -> tuple:
 
 
 def _sound(name: str, given: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:
-    """An array of finite numbers of a shape."""
+    """Return an array of finite numbers of a shape."""
     try:
-        found = np.asarray(given, float)
+        result = np.asarray(given, float)
     except (TypeError, ValueError):
-        found = np.empty(0)
-    if found.shape != shape:
+        result = np.empty(0)
+    if result.shape != shape:
         raise ValueError(f"{name}: expected numbers of shape {shape}, got {np.shape(given)}")  # type: ignore[arg-type]
-    if not np.isfinite(found).all():
+    if not np.isfinite(result).all():
         raise ValueError(f"{name}: expected finite numbers")
-    return found
+    return result

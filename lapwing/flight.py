@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lapwing.cosim.config.provenance import attachments, failure, metadata
-from lapwing.cosim.diagram.block_diagram import pages_of
+from lapwing.cosim.diagram.block_diagram import to_record_batches
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.messages.topics import EVENTS
@@ -16,20 +16,21 @@ from lapwing.studies import flight_data as studied
 from lapwing.studies.flight_topics import topic_of
 from lapwing.studies.report import write
 from lapwing.studies.report.overview import overview
+from lapwing.studies.view3d.view import View
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
 class Flight(studied.FlightData):
-    """What was said in a flight, topic by topic, and what that comes to.
+    """Recorded flight: its topics, and the outcome and metrics computed from them.
 
     `flight.truth.position` is an array by time, shape (n, 3) [m] in the world frame, `flight.truth.times` its times
     [s]; `flight.topic("gps/fix")` is any topic.
 
     Attributes:
         vehicle: its name.
-        failure: why the flight ended before its time: a state that is not sound, an error in a user's controller; ""
+        failure: reason of an early end: an invalid state, or an error in a user's controller; ""
             where it did not, or where a log does not say.
         origin: where it comes from: a log or a set-up.
     """
@@ -51,7 +52,7 @@ class Flight(studied.FlightData):
         for name in self.topics:
             topic = topic_of(name)
             said += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
-        pages = pages_of(said)
+        pages = to_record_batches(said)
         last = max((int(np.max(page.ticks)) for page in pages), default=0)
         about = metadata(setup, "memory") | (failure(self.failure, self.diverged) if self.failure else {})
         with LogWriter(target, about, attachments(setup, {})) as writer:
@@ -62,12 +63,15 @@ class Flight(studied.FlightData):
                 writer.write(EVENTS.key(self.vehicle), EVENTS.message, payload, time_ns, deterministic=False)
         return target
 
-    def report(self, path: str | Path | None = None, compare_with: studied.FlightData | None = None) -> Path:
+    def report(
+        self, path: str | Path | None = None, compare_with: studied.FlightData | None = None, view3d: bool = True
+    ) -> Path:
         """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png).
 
         Args:
             path: of the report; by default an .html beside the log, or SCENE.html here for a flight in memory.
             compare_with: second flight, drawn over this one in every plot.
+            view3d: put the 3D view into the page, if viser is installed (`pip install lapwing[view3d]`).
 
         Returns:
             The report's path.
@@ -77,10 +81,26 @@ class Flight(studied.FlightData):
         """
         source = Path(self.origin.source)
         flights = [self] if compare_with is None else [self, compare_with]
-        return write(flights, Path(path) if path else source.with_suffix(".html"))
+        return write(flights, Path(path) if path else source.with_suffix(".html"), view3d)
+
+    def view(self, compare_with: studied.FlightData | None = None, height: int = 480) -> View:
+        """Return the 3D view of the flight; a notebook shows it, `save` writes it to a page.
+
+        Args:
+            compare_with: second flight, drawn translucent beside this one.
+            height: of the notebook cell [pixel].
+
+        Raises:
+            ValueError: viser is not installed.
+        """
+        from lapwing.studies.report.sections import labels
+        from lapwing.studies.view3d.recording import page
+
+        flights = [self] if compare_with is None else [self, compare_with]
+        return View(page(flights, labels(flights)), height)
 
     def plot(self, path: str | Path | None = None) -> "Figure":
-        """The displacements over time beside their references, and the path in space.
+        """Plot displacements and references over time, and the path in space.
 
         Args:
             path: where to write the picture, too: .png, .svg or .pdf.

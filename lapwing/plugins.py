@@ -1,9 +1,11 @@
 """Interface for extensions: everything that a user's own module imports, besides `lapwing` itself.
 
-- controllers: `VehicleModel`, `StateEstimate`, `Reference`, `ThrustAndMoments`, `MotorVoltages`
+- controllers: `VehicleModel`, `StateEstimate`, `Setpoint`, `ThrustAndMoments`, `MotorVoltages`
 - estimators: `VehicleModel`, `StateEstimate` and the readings of the sensors
 - effects: the hooks (`wrench`, `air`, `loads`, ...), `EffectInputs`, `Motion`, `Air`, ...
 - sensors: `TrueState`, random numbers (`normal`, `uniform`)
+- trajectory segments: `Segment`, `Piece`, and the types of keys `Finite` and `Positive`
+- MAVLink messages: `stream` declares one, `mavlink` has the message classes
 - compiled code: `kernel`, `python_function`, vectors and rotations
 
 A name is imported when it is first used, so an effect does not import the controller interface.
@@ -33,8 +35,12 @@ _MODULES = {
     "lapwing.services.common.controller_api": ("MotorVoltages", "ThrustAndMoments", "VehicleModel"),
     "lapwing.services.common.ports": (
         *("AirspeedReading", "BarometerReading", "BatteryReading", "DistanceReading", "GpsReading", "ImuReading"),
-        *("MagnetometerReading", "OpticalFlowReading", "Reference", "StateEstimate", "TrueState"),
+        *("MagnetometerReading", "OpticalFlowReading", "Setpoint", "StateEstimate", "TrueState"),
     ),
+    "lapwing.services.common.mavlink.dialect": ("mavlink",),
+    "lapwing.services.mavlink.telemetry.message_stream": ("stream",),
+    "lapwing.services.trajectory.polynomial_piece": ("Piece",),
+    "lapwing.services.trajectory.segments.segment": ("Finite", "Positive", "Segment"),
 }
 _HOOKS = "lapwing.dynamics.effects._hooks"
 _MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}

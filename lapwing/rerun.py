@@ -1,4 +1,4 @@
-"""A log in Rerun, a viewer of its own program: converted, with a blueprint that lays out what is in it."""
+"""Conversion of a log for the viewer Rerun, with a blueprint of its content."""
 
 import importlib.util
 import shutil
@@ -15,7 +15,7 @@ PLOTTED = ("battery", "sonar", "baro", "imu")  # topics that Rerun draws as curv
 
 
 def program() -> str | None:
-    """The path of Rerun's program: of this environment, or of the search path; None where there is none."""
+    """Return the path of Rerun's program, of this environment or the search path; None if it is missing."""
     return shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
 
 
@@ -27,12 +27,12 @@ def open_in_rerun(log: Path) -> None:
     """
     with LogReader(log) as recorded:
         topics = set(recorded.topics())
-    found = program()
-    if found is None or importlib.util.find_spec("rerun") is None:
+    result = program()
+    if result is None or importlib.util.find_spec("rerun") is None:
         raise ValueError(MISSING)
     target = log.with_suffix(".rrd")
     convert(log, topics, target)
-    subprocess.Popen([found, "--bind", "127.0.0.1", str(target)], start_new_session=True)
+    subprocess.Popen([result, "--bind", "127.0.0.1", str(target)], start_new_session=True)
 
 
 def convert(log: Path, topics: set[str], target: Path) -> None:

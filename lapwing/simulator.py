@@ -12,13 +12,17 @@ from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.scene import KeyOrigin, Overrides, Scene, SceneError
 from lapwing.kernels.row_packing import pack_row, row_width
+from lapwing.runs.compile_notice import notify_on_compile
+from lapwing.runs.solver import with_solver
+from lapwing.runs.work_progress import WorkProgress
 from lapwing.services.autopilot.block import NO_TRAJECTORY, ORDER, ControllerInput
 from lapwing.services.common import ports
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Reference, StateEstimate, TrueState
-from lapwing.services.process_table import create
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint, StateEstimate, TrueState
+from lapwing.services.process_table import create, foreign_firmware
 from lapwing.services.scene_resolver import load, load_one, resolve
 
 KEEP = 64  # ticks that can be looked at
+LOOK = 250  # [ticks] between two updates of the progress bar
 
 
 class Observation(NamedTuple):
@@ -32,7 +36,7 @@ class Observation(NamedTuple):
 
 
 class UserCommandBlock:
-    """Stands for the autopilot, or for its commander: gives what the user has asked for."""
+    """Block that replaces the autopilot or its commander and outputs the user's command."""
 
     name = "simulator.given"
 
@@ -42,21 +46,21 @@ class UserCommandBlock:
     def bind(self, graph: BlockDiagram) -> None:
         """Nothing to be known."""
 
-    def act(self, tick: int) -> int:
-        """The values are put by the simulator."""
+    def on_tick(self, tick: int) -> int:
+        """Do nothing: the simulator writes the values."""
         return NEVER
 
 
-def _sound(setpoint: Reference) -> Reference:
-    """A setpoint with numbers where they are expected; ValueError for anything else."""
+def _sound(setpoint: Setpoint) -> Setpoint:
+    """Return a valid setpoint; raise ValueError if a field is not a number."""
     try:
-        found = Reference(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in setpoint))  # type: ignore[arg-type]
-        row = pack_row(found)
+        result = Setpoint(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in setpoint))  # type: ignore[arg-type]
+        row = pack_row(result)
     except (TypeError, ValueError):
         row = np.empty(0)
-    if not isinstance(setpoint, Reference) or len(row) != row_width(Reference()) or not np.isfinite(row).all():
-        raise ValueError(f"setpoint: expected a Reference of finite numbers, got {setpoint!r}")
-    return found
+    if not isinstance(setpoint, Setpoint) or len(row) != row_width(Setpoint()) or not np.isfinite(row).all():
+        raise ValueError(f"setpoint: expected a Setpoint of finite numbers, got {setpoint!r}")
+    return result
 
 
 class Simulator:
@@ -65,7 +69,7 @@ class Simulator:
     ```python
     sim = Simulator("hover", seed=1)
     seen = sim.step(motor_voltages=(33.5, 33.5, 33.5, 33.5))
-    seen = sim.reset().step(setpoint=Reference(position_world=(0.0, 0.0, 2.0)), ticks=250)
+    seen = sim.reset().step(setpoint=Setpoint(position_world=(0.0, 0.0, 2.0)), ticks=250)
     ```
 
     The first step after a reset decides what is given from then on: motor voltages, which go to the plant, or setpoints
@@ -73,7 +77,7 @@ class Simulator:
     """
 
     def __init__(self, scene: Scene | str | Path, overrides: Overrides = (), seed: int | None = None):
-        """A vehicle at rest where the scene puts it.
+        """Create a vehicle at rest at its initial position.
 
         Args:
             scene: path or name of a scene with an autopilot, or a loaded one.
@@ -81,16 +85,16 @@ class Simulator:
             seed: of all randomness; None: the scene's.
 
         Raises:
-            SceneError: the scene is not sound, or nobody steers in it.
+            SceneError: the scene is invalid, or has no autopilot.
         """
-        self._scene = load_one(scene, overrides)
+        self._scene = with_solver(load_one(scene, overrides))
         self._graph: BlockDiagram | None = None
         self._kind = ""
         self._set_up(seed)
 
     @property
     def setup(self) -> RunConfig:
-        """What is simulated."""
+        """Run configuration that is simulated."""
         return self._setup
 
     def reset(self, seed: int | None = None) -> "Simulator":
@@ -101,13 +105,13 @@ class Simulator:
         return self
 
     def step(
-        self, motor_voltages: Sequence[float] | None = None, setpoint: Reference | None = None, ticks: int = 1
+        self, motor_voltages: Sequence[float] | None = None, setpoint: Setpoint | None = None, ticks: int = 1
     ) -> Observation:
         """Go on for some ticks under one command.
 
         Args:
             motor_voltages: [V] of each motor, in the order of the airframe; shape (4,) of a quadrotor.
-            setpoint: where the vehicle ought to be, a `lapwing.Reference`; exactly one of both.
+            setpoint: where the vehicle ought to be, a `lapwing.Setpoint`; exactly one of both.
             ticks: how many, at least 1; one is `setup.interval` seconds.
 
         Raises:
@@ -120,7 +124,8 @@ class Simulator:
             raise ValueError(f"step: expected ticks = 1, 2, ..., got {ticks!r}")
         kind = "setpoint" if motor_voltages is None else "motor_voltages"
         if self._graph is None:
-            self._graph, self._kind = self._begin(kind), kind
+            with WorkProgress(self._setup.scene, 1.0, "s") as bar, notify_on_compile(self._setup, bar.compiling):
+                self._graph, self._kind = self._begin(kind), kind
         if kind != self._kind:
             raise ValueError(f"step: expected {self._kind} as before; reset() to go over to {kind}")
         graph = self._graph
@@ -128,17 +133,36 @@ class Simulator:
             graph.put(ORDER, graph.tick, ControllerInput(False, _sound(setpoint), armed=True))
         voltages = () if motor_voltages is None else self._voltages(motor_voltages)
         stop = min(graph.tick + ticks, self._setup.last_tick + 1)
-        while graph.tick < stop and not graph.ended:
-            if motor_voltages is not None:
-                self._command(graph, voltages)
-            graph.advance(stop if motor_voltages is None else graph.tick + 1)
+        if stop - graph.tick > LOOK:
+            self._advance_long(graph, voltages if motor_voltages is not None else None, stop)
+        else:
+            self._advance(graph, voltages if motor_voltages is not None else None, stop)
         return self._observe(graph)
+
+    def _advance(self, graph: BlockDiagram, voltages: tuple[float, ...] | None, stop: int) -> None:
+        while graph.tick < stop and not graph.ended:
+            if voltages is not None:
+                self._command(graph, voltages)
+            graph.advance(stop if voltages is None else graph.tick + 1)
+
+    def _advance_long(self, graph: BlockDiagram, voltages: tuple[float, ...] | None, stop: int) -> None:
+        """Advance with a progress bar."""
+        first, interval = graph.tick, self._setup.interval
+        with WorkProgress(self._setup.scene, (stop - first) * interval, "s") as bar:
+            while graph.tick < stop and not graph.ended:
+                self._advance(graph, voltages, min(graph.tick + LOOK, stop))
+                bar.show((graph.tick - first) * interval)
 
     def _set_up(self, seed: int | None) -> None:
         scene = load(self._scene, () if seed is None else {"run.seed": seed})
         self._setup = resolve(scene)
+        if firmware := foreign_firmware(self._setup):
+            message, expected = f"{firmware} flies the vehicle", 'autopilot.firmware = "lapwing"'
+            raise SceneError("autopilot.firmware", message, expected, KeyOrigin(scene.path))
         if "autopilot" not in self._setup.services:
-            raise SceneError("autopilot", "nobody steers there", "a scene with [autopilot]", KeyOrigin(scene.path))
+            raise SceneError(
+                "autopilot", "the scene has no autopilot", "a scene with [autopilot]", KeyOrigin(scene.path)
+            )
 
     def _begin(self, kind: str) -> BlockDiagram:
         setup = self._setup
@@ -149,7 +173,7 @@ class Simulator:
             services.append(Service("simulator", [UserCommandBlock(*outputs)], []))
             return BlockDiagram(setup, services, KEEP)
         autopilot = create(setup, "autopilot")
-        given = UserCommandBlock(Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Reference(), LATCHED))
+        given = UserCommandBlock(Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Setpoint(), LATCHED))
         autopilot.parts = [given if part.name == "autopilot.commander" else part for part in autopilot.parts]
         if ports.TRAJECTORY in setup.ports:
             services.append(Service("trajectory", [UserCommandBlock(setup.port(ports.TRAJECTORY))], []))
@@ -158,12 +182,12 @@ class Simulator:
     def _voltages(self, given: Sequence[float]) -> tuple[float, ...]:
         n = len(self._setup.port(ports.ACTUATORS).like.motor_voltage)
         try:
-            found = tuple(map(float, given))
+            result = tuple(map(float, given))
         except (TypeError, ValueError):
-            found = ()
-        if len(found) != n:
+            result = ()
+        if len(result) != n:
             raise ValueError(f"motor_voltages: expected {n} numbers [V], got {given!r}")
-        return found
+        return result
 
     def _command(self, graph: BlockDiagram, voltages: tuple[float, ...]) -> None:
         like: MotorCommand = self._setup.port(ports.ACTUATORS).like

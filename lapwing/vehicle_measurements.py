@@ -1,4 +1,4 @@
-"""What must be measured of a multirotor to make an airframe of it, how, and what it is likely to be."""
+"""Measurements that an airframe file needs, with instructions and plausible values."""
 
 import math
 from collections.abc import Callable, Mapping
@@ -35,7 +35,7 @@ class Figure(NamedTuple):
             raise ConfigError(self.name, f"got {value:g}", f"a number {low}{high}, in {self.unit}")
 
     def doubt(self, value: float, guess: float) -> str:
-        """What to ask of a value that is far from its guess; "" of one that is not."""
+        """Return a question about a value that is far from its guess; "" for a plausible value."""
         if not (value > 0.0 and guess > 0.0) or 1.0 / self.far <= value / guess <= self.far:
             return ""
         return f"{self.name} = {value:g} {self.unit}, where about {guess:.2g} is usual: is that the unit?"
@@ -43,7 +43,7 @@ class Figure(NamedTuple):
 
 FIGURES = (
     Figure("mass", "kg", lambda v: 2.0, "All of it, with battery and payload, on scales.", most=1e4, far=100.0),
-    Figure("payload", "kg", lambda v: 0.0, "The part of the mass that is let go in flight.", zero=True),
+    Figure("payload", "kg", lambda v: 0.0, "The part of the mass that is released in flight.", zero=True),
     Figure("rotors", "count", lambda v: 4.0, "4, 6 or 8, on a circle, with two of them side by side in front."),
     Figure("arm", "m", lambda v: 0.16 * v["mass"] ** 0.5, "From the centre of mass to a hub, with a ruler.", most=1e2),
     Figure(
@@ -112,6 +112,7 @@ FIGURES = (
         "ohm",
         lambda v: 0.07 * (CELL_VOLTAGE * v["cells"]) ** 2 / _hover_power(v),
         "Between two leads of the motor, four wires, with the leads of the controller.",
+        far=50.0,  # motors of one power differ widely; a wrong unit is a factor of 1000
     ),
     Figure(
         "esc_current",
@@ -153,6 +154,6 @@ def _hover(v: Values) -> float:
 
 
 def _hover_power(v: Values) -> float:
-    """Of one rotor in hover, at its shaft [W]."""
+    """Return the shaft power of one rotor in hover [W]."""
     speed = _hover(v)
     return v["stand_torque"] * (speed / v["stand_speed"]) ** 2 * speed

@@ -6,10 +6,11 @@ import typer
 from typer.core import TyperGroup
 
 GROUPS = {  # in the order of a workflow
-    "Fly": ("scenes", "check", "run", "service"),
-    "Look": ("report", "view", "parameters"),
+    "Fly": ("scenes", "check", "run", "service", "autopilot"),
+    "Look": ("studio", "report", "view", "render", "parameters"),
     "Study": ("performance", "effects", "accuracy", "stability", "tune", "campaign", "compare", "validate", "identify"),
     "Logs": ("import", "info", "verify", "recover", "export", "replay", "resimulate"),
+    "Couple": ("export-fmu", "export-ssp", "export-library"),
     "Set up": ("new", "precompile", "certificates", "protocol", "schema"),
 }
 

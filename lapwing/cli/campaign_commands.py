@@ -9,7 +9,7 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_folder, claim_report
-from lapwing.cli.preflight import with_solver_selected
+from lapwing.cli.preflight import check_firmware_program, with_solver_selected
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -67,6 +67,7 @@ def campaign(
 
     Reports error distributions, the failure probability, and which parameters matter.
     """
+    from lapwing.file_schemas.key_units import key_units
     from lapwing.studies.campaign import console_output
     from lapwing.studies.campaign.campaign_report import write
     from lapwing.studies.campaign.distributions import parse
@@ -95,14 +96,14 @@ def campaign(
             if not equals or not key:
                 raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
             if key in varied:
-                raise ValueError(f"--vary {text}: {key} already has a distribution; give one for each key")
+                raise ValueError(f"--vary {text}: {key} already has a distribution; use one for each key")
             try:
                 varied[key] = parse(drawn)
             except ValueError as fault:
                 raise ValueError(f"--vary {text}: {fault}") from None
-        campaign_plan = plan(
-            str(scene), with_solver_selected(scene, set_ or []).overrides, runs, seed, varied, sweep, design
-        )
+        selected = with_solver_selected(scene, set_ or [])
+        check_firmware_program(selected)
+        campaign_plan = plan(str(scene), selected.overrides, runs, seed, varied, sweep, design)
         first = _reference(screen, campaign_plan)
         about = manifest(campaign_plan, first)
         folder = begin(out or default_path(about), campaign_plan, about)
@@ -112,7 +113,7 @@ def campaign(
         if shard is not None and folder.missing():
             screen.print(f"{folder.path}: part {shard} complete, {len(folder.missing())} shards missing")
             return
-        digest, results = folder.finish(csv), Results(folder)
+        digest, results = folder.finish(csv), Results(folder, key_units(campaign_plan.keys))
         console_output.show(screen, results)
         if json:
             console_output.write_json(json, results, digest)

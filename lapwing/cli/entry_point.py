@@ -1,22 +1,40 @@
 """Entry point of the command `lapwing`: handles Ctrl-C before the other modules are imported."""
 
+FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # by their numbers
+
 
 def main() -> None:
     """Run the command `lapwing`."""
     try:
-        from lapwing.cosim.processes.interrupt import Interrupted, end_at_once, say_end
+        from lapwing.cosim.processes.interrupt import Interrupted, end_at_once, report_interrupt
 
         try:
             end_at_once()
-            from lapwing.cli.std_streams import prepare_streams
-
             prepare_streams()
             from lapwing.cli.main import main as carry_out
 
             carry_out()
         except Interrupted as interrupted:
-            raise SystemExit(say_end(interrupted)) from None
+            raise SystemExit(report_interrupt(interrupted)) from None
     except KeyboardInterrupt:  # what Python makes of SIGINT up to `end_at_once`
-        from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, say_end
+        from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, report_interrupt
 
-        raise SystemExit(say_end(Interrupted(SIGINT))) from None
+        raise SystemExit(report_interrupt(Interrupted(SIGINT))) from None
+
+
+def prepare_streams() -> None:
+    """Open the null device for closed streams, and escape characters that the encoding of an output lacks."""
+    import io
+    import os
+    import sys
+
+    for number, (name, mode) in enumerate(FILES):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:
+                os.dup2(null, number)
+                os.close(null)
+            setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper) and stream.errors == "strict":
+            stream.reconfigure(errors="backslashreplace")

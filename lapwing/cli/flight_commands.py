@@ -15,14 +15,17 @@ from lapwing.cli.output_paths import check_distinct, check_log, claim
 
 Flights = Annotated[
     list[Path],
-    typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), ULogs (.ulg), or .csv and .csv.gz with --mapping"),
+    typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads"),
 ]
 MappingName = Annotated[
-    str | None, typer.Option("--mapping", metavar="NAME|FILE", help="columns of CSV files: nanobench, or a .toml file")
+    str | None,
+    typer.Option(
+        "--mapping", metavar="NAME|FILE", help="columns: nanobench, betaflight, crazyflie_usd, or a .toml file"
+    ),
 ]
 TrimForce = Annotated[float, typer.Option(metavar="S", min=0.0, help="memory of the force trim; 0: none")]
 TrimTorque = Annotated[float, typer.Option(metavar="S", min=0.0, help="memory of the torque trim; 0: none")]
-FORCE_MEMORY, TORQUE_MEMORY = 0.15, 3.0  # [s] as `start_states.USUAL_TRIM`, which takes time to import
+FORCE_MEMORY, TORQUE_MEMORY = 0.15, 10.0  # [s] as `start_states.USUAL_TRIM`, which takes time to import
 
 
 @app.command()
@@ -34,6 +37,9 @@ def validate(
     stride: Annotated[int, typer.Option(metavar="N", min=1, help="samples between the starts of two windows")] = 5,
     trim_force: TrimForce = FORCE_MEMORY,
     trim_torque: TrimTorque = TORQUE_MEMORY,
+    closed_loop: Annotated[
+        bool, typer.Option("--closed-loop", help="fly the recorded setpoints with the scene's autopilot, too")
+    ] = False,
     set_: Overrides = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all errors as JSON")] = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="write errors over the envelope (HTML)")] = None,
@@ -53,12 +59,12 @@ def validate(
         claim(report)
         with _bar() as say:
             memory = TrimMemory(trim_force, trim_torque)
-            found = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, say)
-        console_output.show(console(), found)
+            result = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
+        console_output.show(console(), result)
         if json:
-            procedure.write_json(json, found)
+            procedure.write_json(json, result)
         if report:
-            report_page.write(report, found)
+            report_page.write(report, result)
             typer.echo(f"{report}: errors over the envelope and residual spectra")
 
 
@@ -66,11 +72,15 @@ def validate(
 def identify(
     scene: SceneFile,
     flights: Flights,
-    free: Annotated[str, typer.Option(metavar="KEY,KEY,...", help="parameters to estimate: numbers of the scene")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="the airframe file to write (.toml)")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="the file to write: the airframe, or the sensors (.toml)")],
+    free: Annotated[str, typer.Option(metavar="KEY,KEY,...", help="parameters to estimate: numbers of the scene")] = "",
+    sensors: Annotated[
+        bool, typer.Option("--sensors", help="estimate noise, bias and latency of sensors instead")
+    ] = False,
     mapping: MappingName = None,
     windows: Annotated[int, typer.Option(metavar="N", min=20, help="windows to fit, about")] = 1000,
     trim_force: TrimForce = FORCE_MEMORY,
+    horizons: Annotated[str, typer.Option(metavar="N,N,...", help="samples after which errors count")] = "10,25,50",
     trim_torque: TrimTorque = TORQUE_MEMORY,
     seed: Annotated[int, typer.Option(metavar="N", help="seed of the choice of held-out flights")] = 1,
     set_: Overrides = None,
@@ -88,49 +98,70 @@ def identify(
         _check_flights(flights)
         if out.suffix != ".toml":
             raise ValueError(f"--out {out}: expected a name that ends in .toml")
+        if sensors:
+            if free or json:
+                raise ValueError("--sensors: estimates all sensors; leave out --free and --json")
+            _fit_sensors(flights, mapping, out)
+            return
         keys = [key.strip() for key in free.split(",") if key.strip()]
         if not keys or len(set(keys)) < len(keys):
-            raise ValueError(f"--free {free}: expected different keys with commas between them")
+            raise ValueError(f"--free {free}: expected different keys with commas between them, or --sensors")
+        steps = _horizons(horizons)
         check_distinct({"--out": out, "--json": json})
         claim(out)
         claim(json)
         memory, progress = TrimMemory(trim_force, trim_torque), out.with_name(f"{out.name}.progress")
         with _bar() as say:
-            found = procedure.identify(scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say)
-        console_output.show(console(), found)
-        procedure.write_airframe(out, scene, found, set_ or [])
+            result = procedure.identify(
+                scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
+            )
+        console_output.show(console(), result)
+        procedure.write_airframe(out, scene, result, set_ or [])
         typer.echo(f"{out}: the airframe; its first lines hold what belongs to the scene")
         if json:
-            console_output.write_json(json, found)
+            console_output.write_json(json, result)
+
+
+def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
+    from lapwing.studies.flight_import.open_flight import open_flight
+    from lapwing.studies.identification.sensor_fit import fit_all
+    from lapwing.studies.identification.toml_tables import dump
+
+    tables, notes = fit_all([open_flight(path, mapping) for path in flights])
+    claim(out)
+    names = ", ".join(path.name for path in flights)
+    text = dump({"sensors": tables})
+    out.write_text(f"# Sensors as estimated from {names}; put these tables into a scene.\n\n{text}", encoding="utf-8")
+    typer.echo(f"{out}: {', '.join(tables)}; put the tables into a scene")
+    for note in notes:
+        typer.echo(note)
 
 
 @app.command("import")
 def import_(
     flight: Annotated[
-        Path, typer.Argument(metavar="FLIGHT", help="a ULog of PX4 (.ulg), or .csv, .csv.gz with --mapping")
+        Path, typer.Argument(metavar="FLIGHT", help="a log of PX4, ArduPilot, MAVLink, Betaflight, ROS 2 or a CSV file")
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="the log to write (.mcap)")],
     mapping: MappingName = None,
 ) -> None:
-    """Convert a recorded flight from an autopilot into a log."""
+    """Convert a recorded flight from an autopilot into a log.
+
+    Formats: ULog (.ulg), dataflash (.bin, .log), MAVLink telemetry (.tlog), rosbag2 folders, logs of the Crazyflie's
+    uSD deck, and CSV files (.csv, .csv.gz) with --mapping.
+    """
     from lapwing.studies.flight_import.open_flight import open_flight
-    from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
     from lapwing.studies.flight_import.write_log import write_log
 
     with user_errors():
-        _check_flights([flight])
         check_distinct({"FLIGHT": flight, "--out": out})
         if out.suffix != ".mcap" or flight.suffix == ".mcap":
             raise ValueError(f"--out {out}: expected a .mcap file, made from a flight of another format")
-        unknown: tuple[str, ...] = ()
-        if flight.suffix == ".ulg":
-            recording, unknown = read_ulog_flight(flight)
-        else:
-            recording = open_flight(flight, mapping)
+        recording = open_flight(flight, mapping)
         if not recording.valid.any():
             raise ValueError(f"{flight}: no valid sample; check the --mapping")
         check_log(out)
-        write_log(out, recording, flight.name, unknown)
+        write_log(out, recording, flight.name)
         typer.echo(
             f"{out}: {len(recording) * recording.interval:.1f} s, {int((~recording.valid).sum())} samples left out"
         )
@@ -138,8 +169,8 @@ def import_(
             typer.echo(f"marked samples: {cause}: {count}")
         for note in recording.notes:
             typer.echo(note)
-        if unknown:
-            typer.echo(f"topics without a counterpart: {', '.join(unknown)}")
+        if recording.unknown:
+            typer.echo(f"topics without a counterpart: {', '.join(recording.unknown)}")
 
 
 def _horizons(text: str) -> tuple[int, ...]:
@@ -154,13 +185,13 @@ def _horizons(text: str) -> tuple[int, ...]:
 
 def _check_flights(flights: list[Path]) -> None:
     for path in flights:
-        if not path.is_file():
-            raise ValueError(f"{path}: no such file; give the path of a recorded flight")
+        if not path.exists():
+            raise ValueError(f"{path}: no such file; use the path of a recorded flight")
 
 
 @contextmanager
 def _bar() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress on a terminal; silence elsewhere."""
+    """Return a progress bar on a terminal, else a silent one."""
     from rich.progress import Progress
 
     from lapwing.studies.terminal import console

@@ -1,4 +1,4 @@
-"""Single keys from a terminal, while something else goes on."""
+"""Single key presses from a terminal."""
 
 import os
 import select
@@ -6,16 +6,16 @@ from typing import Any
 
 
 class Keyboard:
-    """A context manager in which a terminal hands over each key at once and shows none; elsewhere there are no keys."""
+    """Context manager that reads single keys of a terminal without echo; other inputs have no keys."""
 
     def __init__(self, descriptor: int = 0):
-        """Of a file descriptor, by default standard input."""
+        """Read keys of a file descriptor, by default standard input."""
         self._descriptor = descriptor
         self._before: Any = None
         self.there = os.isatty(descriptor) and _in_foreground(descriptor)
 
     def keys(self) -> str:
-        """What has been typed since the call before."""
+        """Return the keys that were typed since the last call."""
         if not self.there or not select.select([self._descriptor], [], [], 0.0)[0]:
             return ""
         typed = os.read(self._descriptor, 64)
@@ -39,7 +39,7 @@ class Keyboard:
 
 
 def _in_foreground(descriptor: int) -> bool:
-    """Whether a terminal's keys are this process's: a job in the background would be stopped if it took them."""
+    """Return True if this process owns the terminal: a background job would be stopped when it reads from it."""
     try:
         return os.tcgetpgrp(descriptor) == os.getpgrp()
     except OSError:  # not the terminal that controls this process

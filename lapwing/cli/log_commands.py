@@ -41,6 +41,9 @@ def verify(
     other: Annotated[
         Path | None, typer.Argument(metavar="[FILE]", help="second log, to compare with the first")
     ] = None,
+    explain: Annotated[
+        bool, typer.Option("--explain", help="also show what recorded the log, and whether its digest is expected here")
+    ] = False,
 ) -> None:
     """Check the digest of a log, or find where two logs differ.
 
@@ -50,6 +53,8 @@ def verify(
 
     with user_errors():
         if other is not None:
+            if explain:
+                raise ValueError("--explain: describes one log; leave out the second FILE")
             from lapwing.studies.logs.log_comparison import compare
 
             check_distinct({"FILE": log, "the second FILE": other})
@@ -61,7 +66,14 @@ def verify(
             typer.echo(f"{log} and {other}: identical messages")
             return
         with LogReader(log) as read:
-            stated, computed = read.metadata.get("digest"), read.digest()
+            stated, computed, about = read.metadata.get("digest"), read.digest(), read.metadata
+        if explain:
+            from lapwing.studies.logs.reproduction import expectation, facts
+
+            for fact in facts(about):
+                same = "same" if fact.recorded == fact.here else f"here {fact.here}"
+                typer.echo(f"  {fact.name:<10} {fact.recorded} ({same})")
+            typer.echo(f"  {'expected':<10} {expectation(about)}")
         if stated is None:
             raise ValueError(f"{log}: has no digest; expected a complete log (lapwing recover completes one)")
         if stated != computed:
@@ -81,10 +93,10 @@ def recover(
         target = out or log.with_name(f"{log.stem}_recovered.mcap")
         check_distinct({"FILE": log, "--out": target})
         check_log(target)
-        found = save(log, target)
-        for line in found.damaged:
+        result = save(log, target)
+        for line in result.damaged:
             typer.echo(f"left out: {line}")
-        typer.echo(f"{target}: {found.messages} messages up to t = {found.end_ns * 1e-9:g} s, digest {found.digest}")
+        typer.echo(f"{target}: {result.messages} messages up to t = {result.end_ns * 1e-9:g} s, digest {result.digest}")
 
 
 @app.command()
@@ -109,7 +121,7 @@ def export(
         check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat})
         claim(mat)
         with LogReader(log) as read:
-            found = tables.tables(read, topics.split(",") if topics is not None else None)
+            result = tables.tables(read, topics.split(",") if topics is not None else None)
         for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
             if folder is None:
                 continue
@@ -117,7 +129,7 @@ def export(
                 if folder is not mat:
                     folder.mkdir(exist_ok=True)
                     claim_folder(folder)
-                for path in write(found, folder):
+                for path in write(result, folder):
                     typer.echo(path)
             except OSError as fault:
                 raise ValueError(f"{folder}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None

@@ -112,19 +112,19 @@ def _link_servers(options: ReplayOptions, speed: float | None, stack: ExitStack)
     from lapwing.runs.resimulate import recorded_setup
     from lapwing.services.mavlink.link_options import Options
     from lapwing.services.mavlink.link_server import LinkServer
-    from lapwing.services.mavlink.links import numbered
+    from lapwing.services.mavlink.links import for_vehicle_index
     from lapwing.services.mavlink.signing import read_key
     from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
     with LogReader(options.log) as reader:
         if SETUP_FILE in reader.attachments:
-            vehicles = {m.vehicle: m.beside.get("mavlink") for m in members(recorded_setup(reader))}
+            vehicles = {m.vehicle: m.auxiliary.get("mavlink") for m in members(recorded_setup(reader))}
         else:  # written by another tool
             vehicles = {next((t.split("/")[1] for t in reader.topics() if t.endswith("/status")), "drone1"): None}
     key = read_key(options.mavlink_key) if options.mavlink_key else None
     servers: dict[str, LinkServer] = {}
     for i, (name, description) in enumerate(vehicles.items()):
-        urls = tuple(numbered(url, i) for url in options.mavlink)
+        urls = tuple(for_vehicle_index(url, i) for url in options.mavlink)
         link = Options(urls, key, options.insecure, options.log, speed=speed)
         first = next(iter(servers.values()), None)
         servers[name] = stack.enter_context(LinkServer(description or VehicleDescription(name), link, None, first))
@@ -157,7 +157,7 @@ def _viewers(options: ReplayOptions, stack: ExitStack) -> list[Any]:
 def resimulate(
     log: LogFile,
     allow_code: Annotated[
-        bool, typer.Option("--allow-code", help="allow Python modules stored in the log to run")
+        bool, typer.Option("--allow-code", help="allow Python modules and FMUs of the log to run")
     ] = False,
 ) -> None:
     """Repeat a recorded run from its log and compare digests.
@@ -166,9 +166,11 @@ def resimulate(
     """
     from lapwing.cli.progress import Display
     from lapwing.runs import resimulate as runs
+    from lapwing.services.common import foreign_code
     from lapwing.studies.terminal import console
 
     with user_errors():
+        foreign_code.allow(allow_code)
         with Display(console(), 0.0) as display:
             recorded, computed = runs.resimulate(log, display, allow_code)
         if recorded != computed:

@@ -1,24 +1,28 @@
 """The command line. The other modules of this package register the commands, which import what they need."""
 
 import os
+import resource
 import sys
 from typing import Annotated
 
 import typer
 
 from lapwing.cli import (  # noqa: F401 (they register themselves)
+    autopilot_command,
     campaign_commands,
-    certificates_command,
+    export_commands,
     flight_commands,
     log_commands,
     log_playback,
     new_command,
     new_vehicle,
     protocol,
+    report_commands,
     run_command,
     scene_commands,
-    schema_command,
     service_command,
+    setup_commands,
+    studio_command,
     study_commands,
 )
 from lapwing.cli.app import app
@@ -29,11 +33,21 @@ from lapwing.cli.stdout_guard import checked_output
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
 
 
+FEWEST_FILES = 64  # that may be open; a run in processes needs about 30
+
+
 def _check_working_directory() -> None:
     try:
         os.getcwd()
     except OSError:
         raise ValueError("working directory: does not exist; change to another folder") from None
+
+
+def _check_open_files() -> None:
+    """Raise ValueError if so few files may be open that libraries end the process."""
+    limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+    if 0 <= limit < FEWEST_FILES:
+        raise ValueError(f"too many open files: at most {limit} are allowed; use ulimit -n 1024")
 
 
 def _show_version(requested: bool) -> None:
@@ -57,9 +71,12 @@ def main() -> None:
     """Run the command of the command line."""
     with user_errors(), checked_output():
         _check_working_directory()
-        from lapwing.cosim.processes.gc_tuning import leave_garbage
+        _check_open_files()
+        from lapwing.cosim.processes.gc_tuning import relax_gc
+        from lapwing.services.common import foreign_code
 
-        leave_garbage()
+        relax_gc()
+        foreign_code.allow(False)
         try:
             app(sys.argv[1:] or ["--help"], standalone_mode=False)
         except UsageError as error:

@@ -1,6 +1,7 @@
 """`lapwing new`: files to start from."""
 
 from pathlib import Path
+from string import Template
 from typing import Annotated
 
 import typer
@@ -11,6 +12,7 @@ from lapwing.cli.error_exit import user_errors
 new = typer.Typer(help="Create a scene, airframe, effect or other extension.", rich_markup_mode=None)
 app.add_typer(new, name="new")
 
+TEMPLATES = Path(__file__).parent / "templates"
 ModuleName = Annotated[str, typer.Argument(metavar="NAME", help="name of the module, e.g. tether_drag")]
 
 
@@ -45,6 +47,12 @@ def effect(name: ModuleName) -> None:
     _create("effect", name)
 
 
+@new.command()
+def segment(name: ModuleName) -> None:
+    """Create a trajectory segment: NAME.py and test_NAME.py."""
+    _create("segment", name)
+
+
 def _create(kind: str, name: str) -> None:
     with user_errors():
         for path in write_module(kind, name, Path()):
@@ -71,10 +79,10 @@ def write_module(kind: str, name: str, folder: Path) -> list[Path]:
     Raises:
         ValueError: the name is invalid or taken, or a file exists.
     """
-    from lapwing.cli.new_templates import TEMPLATES
     from lapwing.cosim.config.user_module import installed_module
     from lapwing.dynamics import effects
     from lapwing.services.sensors import registry
+    from lapwing.services.trajectory.segments import KINDS
 
     cls = effects.class_name(name)
     if not name.isidentifier() or name != name.lower() or cls == name:
@@ -83,8 +91,18 @@ def write_module(kind: str, name: str, folder: Path) -> list[Path]:
     for path in paths:
         if path.exists():
             raise ValueError(f"{path}: exists already; choose another name")
-    if name in effects.names() or name in registry.sensors() or installed_module(name):
-        raise ValueError(f"NAME {name}: an effect, a sensor or a module has this name; choose another")
-    for path, text in zip(paths, TEMPLATES[kind], strict=True):
-        path.write_text(text.format(name=name, cls=cls), encoding="utf-8")
+    if name in {*effects.names(), *registry.sensors(), *KINDS} or installed_module(name):
+        raise ValueError(f"NAME {name}: an effect, sensor, segment or module has this name; choose another")
+    for path, text in zip(paths, templates(kind, name), strict=True):
+        path.write_text(text, encoding="utf-8")
     return paths
+
+
+def templates(kind: str, name: str) -> tuple[str, str]:
+    """Return the texts of an extension and of its test."""
+    from lapwing.dynamics import effects
+
+    names = {"name": name, "cls": effects.class_name(name)}
+    files = [TEMPLATES / f"{kind}{suffix}.py.template" for suffix in ("", "_test")]
+    module, test = (Template(file.read_text(encoding="utf-8")).substitute(names) for file in files)
+    return module, test

@@ -26,7 +26,7 @@ def vehicle(
         typer.Option("--set", metavar="FIGURE=VALUE", help="a figure instead of a question: mass=2.0 (repeatable)"),
     ] = None,
 ) -> None:
-    """An airframe of your own: vehicles/NAME.toml in this folder, from figures that a workshop can measure.
+    """Create an airframe, vehicles/NAME.toml in this folder, from figures that a workshop can measure.
 
     In a terminal it asks for each figure and says how to measure it (docs/guides/new_airframe.md has more);
     elsewhere, figures
@@ -103,10 +103,10 @@ class Interview:
         self._name, self._answers, self._begun = name, dict(given), False
 
     def ask(self, figure: "Figure", guess: float) -> float | None:
-        """What was measured of a figure; None where the guess will do.
+        """Return the measured value of a figure; None to accept the guess.
 
         Raises:
-            ValueError: nobody answers.
+            ValueError: no user answers.
         """
         if not self._begun:
             typer.echo("Enter takes the value in brackets, a guess from the figures before it; Ctrl-C ends.")
@@ -130,7 +130,7 @@ class Interview:
         return None
 
     def tell(self) -> None:
-        """With what the next interview can begin where this one has ended."""
+        """Return the answers so far as the start of the next interview."""
         if self._begun and self._answers:
             given = " ".join(f"--set {name}={value:.9g}" for name, value in self._answers.items())
             typer.echo(f"\nnothing is written; with these answers: lapwing new vehicle {self._name} {given}")
@@ -140,20 +140,20 @@ def _answer(question: str) -> str:
     try:
         return input(question).strip()
     except EOFError:
-        raise ValueError("nobody answers any more") from None
+        raise ValueError("standard input has ended; run the interview in a terminal") from None
 
 
 def _given(measured: list[str]) -> dict[str, float]:
-    """Figures by name, of texts FIGURE=VALUE."""
+    """Return figures by name from texts FIGURE=VALUE."""
     from lapwing.vehicle_measurements import FIGURES
 
-    names, found = [figure.name for figure in FIGURES], {}
+    names, result = [figure.name for figure in FIGURES], {}
     for text in measured:
         name, _, value = (part.strip() for part in text.partition("="))
         if name not in names:
             raise ConfigError.unknown(f"--set {text}", "figure", name, names)
         try:
-            found[name] = float(value)
+            result[name] = float(value)
         except ValueError:
             raise ConfigError(f"--set {text}", f"got {value!r}", "a number") from None
-    return found
+    return result

@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and commands whose options are one frozen value."""
+"""Arguments and options that several commands share; commands with one frozen options value."""
 
 import inspect
 from collections.abc import Callable

@@ -9,11 +9,11 @@ if TYPE_CHECKING:
 
 
 def overrides(given: list[str], scene: Path, set_: list[str]) -> list[str]:
-    """What goes with the plans in the scene: their vehicles are operated, and leave its trajectory.
+    """Return the overrides for vehicles with plans: they accept commands and do not follow the trajectory.
 
     Raises:
         ValueError: it is not said which vehicle flies which, or one that is not there.
-        SceneError: the scene is not sound.
+        SceneError: the scene is invalid.
     """
     from lapwing.services.common.flight_plan_file import OPERATED
     from lapwing.services.scene_resolver import load
@@ -29,7 +29,7 @@ def overrides(given: list[str], scene: Path, set_: list[str]) -> list[str]:
 
 
 def commands(given: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]:
-    """The commands of each vehicle that flies a plan, by its name. ValueError: as of `overrides`, or no such plan."""
+    """Return the commands of each vehicle that flies a plan, by name. ValueError: see `overrides`, or no such plan."""
     from lapwing.services.common.environment_schema import environment
     from lapwing.services.common.flight_plan_file import read
     from lapwing.services.common.vehicle_schema import start_height
@@ -42,17 +42,17 @@ def commands(given: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]
 
 
 def files(given: list[str], loaded: "Scene") -> dict[str, Path]:
-    """The plan of each vehicle that flies one, by its name. ValueError: as of `overrides`."""
+    """Return the plan of each vehicle that flies one, by name. See `overrides` for errors."""
     if not loaded.vehicles:
         if len(given) > 1:
             raise ValueError(f"--plan {given[1]}: expected one plan, the scene has one vehicle")
         return {loaded.lookup("vehicle.name"): Path(path) for path in given}
     names = [vehicle.lookup("vehicle.name") for vehicle in loaded.vehicles]
-    found: dict[str, Path] = {}
+    result: dict[str, Path] = {}
     for text in given:
         name, equals, path = text.partition("=")
-        if not equals or name not in names or name in found:
+        if not equals or name not in names or name in result:
             expected = f"NAME=FILE, a plan for each of {', '.join(names)} that flies one"
             raise ValueError(f"--plan {text}: the scene has several vehicles; expected {expected}")
-        found[name] = Path(path)
-    return found
+        result[name] = Path(path)
+    return result

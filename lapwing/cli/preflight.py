@@ -1,5 +1,6 @@
-"""Preparation of a scene: solver selection, success criteria, gain check."""
+"""Preparation of a scene: solver selection, success criteria, gain check, program of the firmware."""
 
+import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,3 +36,23 @@ def warn_of_gains(scene: "Scene") -> None:
         of = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
         for line in unstable_loops(vehicle):
             typer.echo(f"lapwing: warning: {of}{line}", err=True)
+
+
+def check_firmware_program(scene: "Scene") -> None:
+    """Raise ConfigError if `autopilot.command` or `autopilot.directory` names no program or folder of this machine."""
+    from lapwing.dynamics.config_error import ConfigError
+    from lapwing.services.common.firmware.schema import TABLE, flown_by_firmware
+
+    for vehicle in filter(flown_by_firmware, scene.vehicles or (scene,)):
+        keys = vehicle.section(TABLE)
+        folder = Path(keys.directory or ".")
+        if not folder.is_dir():
+            raise ConfigError(f"{TABLE}.directory", f"no folder {folder}", "the working directory of the program")
+        if keys.command and not _is_program(folder, keys.command[0]):
+            expected = "path of a program, or a name on the PATH"
+            raise ConfigError(f"{TABLE}.command", f"cannot start {keys.command[0]}", expected)
+
+
+def _is_program(folder: Path, name: str) -> bool:
+    """Return True if a process in `folder` can start `name`; a name without a slash is looked up on the PATH."""
+    return shutil.which(str(folder / name) if "/" in name else name) is not None

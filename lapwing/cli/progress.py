@@ -1,4 +1,4 @@
-"""How far a run is: a progress bar in a terminal, a line now and then elsewhere."""
+"""Progress display of a run: a progress bar in a terminal, otherwise occasional lines."""
 
 import time
 
@@ -22,7 +22,7 @@ class _Factor(ProgressColumn):
 
 
 class _Done(ProgressColumn):
-    """How far: simulated seconds, or while kernels are compiled the seconds of the guess."""
+    """Show the progress: simulated seconds, or seconds of the estimate while kernels compile."""
 
     def render(self, task: Task) -> Text:
         if guess := task.fields.get("guess"):
@@ -44,7 +44,7 @@ class Display:
     """Shows simulation time, real-time factor, position and phase."""
 
     def __init__(self, console: Console, duration: float):
-        """`duration` [s] is where the bar ends."""
+        """Show a bar that ends at `duration` [s]."""
         self._console = console
         self._duration = duration
         self._started = time.monotonic()
@@ -71,14 +71,14 @@ class Display:
             self._bar.stop()
 
     def begin(self) -> None:
-        """The first message has come: from now on time counts."""
+        """Start the clock: the first message has arrived."""
         self._started = time.monotonic()
         self._next_line = self._started + LINE_PERIOD
         if self._bar:
             self._bar.reset(self._task, total=self._duration, description="", guess=None)
 
     def compiling(self, what: Compilation) -> None:
-        """Kernels are being compiled."""
+        """Show that kernels are being compiled."""
         if self._bar:
             said = f"compiling {what.scene}, once"
             self._bar.reset(self._task, total=self._duration, description=said, guess=what.seconds)

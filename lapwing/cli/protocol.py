@@ -36,18 +36,18 @@ def protocol(
         claim(json)
         claim(plot)
         setup = resolve(with_solver_selected(scene, set_ or []))
-        found = layout(setup)
+        result = layout(setup)
         if plot:
             from lapwing.studies.service_diagram import draw
 
             draw(setup, plot)
         if json:
-            json.write_text(json_module.dumps(found, indent=1) + "\n", encoding="utf-8")
+            json.write_text(json_module.dumps(result, indent=1) + "\n", encoding="utf-8")
         if json or plot:
             return
-        typer.echo(f"{found['rate']} Hz, {found['interval_ns']} ns per tick, last tick {found['last_tick']}")
-        for name in found["order"]:
-            _show(name, found["services"][name])
+        typer.echo(f"{result['rate']} Hz, {result['interval_ns']} ns per tick, last tick {result['last_tick']}")
+        for name in result["order"]:
+            _show(name, result["services"][name])
 
 
 def _show(name: str, service: dict[str, Any]) -> None:

@@ -22,7 +22,7 @@ from lapwing.cli.output_paths import (
     remove_on_failure,
     reserve_log,
 )
-from lapwing.cli.preflight import warn_of_gains, with_solver_selected
+from lapwing.cli.preflight import check_firmware_program, warn_of_gains, with_solver_selected
 from lapwing.cli.run_options import MULTI_PROCESS, SINGLE_PROCESS, RunOptions
 from lapwing.cosim.processes.child_process import Child, started_early
 
@@ -44,6 +44,8 @@ def run(options: RunOptions) -> None:
         options.validate()
         scene = _load(options)
         options = _with_ros2_of_scene(options, scene)
+        if not options.external:
+            check_firmware_program(scene)
         warn_of_gains(scene)
         spec = _spec(options, scene)
         flights = _fly_and_report(options, scene, spec, early)
@@ -59,7 +61,7 @@ def _started_early(options: RunOptions) -> Iterator[dict[str, Child]]:
         yield {}
         return
     from lapwing.services.process_main import import_ahead
-    from lapwing.services.process_table import FOXGLOVE, MAVLINK, ROS2, ROUTER, usual
+    from lapwing.services.process_table import FOXGLOVE, MAVLINK, ROS2, ROUTER, always_required
 
     optional = {
         ROUTER: options.listen,
@@ -67,7 +69,7 @@ def _started_early(options: RunOptions) -> Iterator[dict[str, Child]]:
         FOXGLOVE: options.foxglove,
         ROS2: options.ros2 is not None,
     }
-    names = usual()
+    names = always_required()
     import_ahead(names)
     with started_early([*names, *(name for name, requested in optional.items() if requested)]) as early:
         yield early
@@ -89,11 +91,11 @@ def _load(options: RunOptions) -> "Scene":
 
 
 def _with_ros2_of_scene(options: RunOptions, scene: "Scene") -> RunOptions:
-    from lapwing.services.ros2.schema import Bus
+    from lapwing.services.ros2.schema import Ros2
 
-    if options.ros2 is not None or not scene.has(Bus) or not scene[Bus].ros2:
+    if options.ros2 is not None or not scene.has(Ros2) or not scene[Ros2].enabled:
         return options
-    options = replace(options, ros2=scene[Bus].ros2_domain)
+    options = replace(options, ros2=scene[Ros2].domain_id)
     options.validate_mode()
     options.validate_links()
     return options
@@ -104,18 +106,24 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     from lapwing.cosim.executors.realtime import why_not
     from lapwing.cosim.processes.run_monitor import MONITOR
     from lapwing.runs.distributed_run import check_complete, external_services, parse_external
+    from lapwing.services.common import foreign_code
     from lapwing.services.common.run_schema import Run
     from lapwing.services.process_main import ProcessSpec
-    from lapwing.services.process_table import needed
+    from lapwing.services.process_table import foreign_firmware, required_processes
     from lapwing.services.scene_resolver import resolve
 
     setup = resolve(scene, plan_options.commands(options.plan or [], scene))
+    if options.mavlink and (firmware := foreign_firmware(setup)):
+        message = f"--mavlink: {firmware} flies the vehicle and has its own MAVLink or MSP links"
+        raise ValueError(f"{message}; connect the ground station to the firmware")
+    foreign_code.allow(options.allow_code)
+    foreign_code.check(setup)
     speed, table, realtime = options.speed, options.table, options.realtime
     if speed is None:
         paced = options.mavlink or options.view or realtime or options.ros2 is not None
         speed = str(scene[Run].real_time_factor) if scene[Run].real_time_factor else "1" if paced else None
     if table is not None:
-        check_complete(table, [*needed(setup, external_services(table)), MONITOR])
+        check_complete(table, [*required_processes(setup, external_services(table)), MONITOR])
     log = options.log or reserve_log(scene.name)
     report = options.report or log.with_suffix(".html")
     check_distinct({"SCENE": options.scene, "--log": log, "--json": options.json, "--report": report})
@@ -169,8 +177,18 @@ def _fly_and_report(
     except BaseException:
         with suppress(ValueError):  # the first error is reported
             report(None)
+        if modification_time(log) != before:
+            _advise_recovery(log)
         raise
     return report(elapsed)
+
+
+def _advise_recovery(log: Path) -> None:
+    """Print the command that completes a log whose recorder was killed: readers that seek reject it."""
+    from lapwing.cosim.log.mcap_contents import has_footer
+
+    if log.is_file() and not has_footer(log):
+        typer.echo(f"{log}: incomplete, some programs reject it; run `lapwing recover {log}`")
 
 
 def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, Child]) -> "Elapsed":

@@ -13,7 +13,7 @@ MULTI_PROCESS, SINGLE_PROCESS = "multi-process", "single-process"
 ALTERNATIVES = {  # options of a run that starts its own processes, and what to use in other runs
     "--mavlink": "with --endpoints start the service mavlink instead",
     "--ros2": "with --endpoints start the service ros2 instead",
-    "--external": "with --endpoints give NAME_messages an endpoint",
+    "--external": "with --endpoints, add an endpoint NAME_messages",
     "--foxglove": "with --endpoints start the service foxglove instead; lapwing replay shows a log",
     "--view": "lapwing view shows the log of other runs",
     "--realtime": f"--mode {SINGLE_PROCESS} keeps a --speed without it",
@@ -55,6 +55,7 @@ class RunOptions(LinkOptions):
         typer.Option(metavar="NAME=ENDPOINT", help="service run by your own program, at this endpoint (repeatable)"),
     ] = None
     keys: Keys = None
+    allow_code: Annotated[bool, typer.Option("--allow-code", help="allow FMUs of the scene to run")] = False
 
     @property
     def table(self) -> dict[str, str] | None:
@@ -80,6 +81,11 @@ class RunOptions(LinkOptions):
             raise ValueError("--keys: expected with --listen or --endpoints")
         check_external(self.external or [], self.insecure)
         self.validate_links()
+        if self.view:
+            from lapwing.studies.view3d import available
+
+            if not available():
+                raise ValueError("--view: viser is not installed; pip install lapwing[view3d]")
         if (self.run_ is None) != (self.campaign is None):
             raise ValueError("--run and --campaign: belong together; expected both")
 

@@ -1,4 +1,4 @@
-"""What a run comes to: the verdict, the events and the figures that `lapwing run` prints and writes as JSON."""
+"""Run summary: the outcome, events and metrics that `lapwing run` prints and writes as JSON."""
 
 import json
 import math
@@ -26,7 +26,7 @@ COLOURS = {"landed": "green", "completed": "green", "landed elsewhere": "yellow"
 
 
 def fleet(log: Path) -> list[Flight]:
-    """The flights of all vehicles of a log, as far as a run's end shows them; empty where nothing was flown."""
+    """Return the flights of all vehicles of a log; empty if the run recorded nothing."""
     try:
         return [flight for flight in Flight.read_all(log, SHOWN) if len(flight.truth)]
     except ValueError:
@@ -61,8 +61,9 @@ def report_results(
         "sim_time_s": elapsed.simulated if elapsed else float(first.truth.times[-1]),
         "wall_time_s": elapsed.wall if elapsed else None,
         "real_time_factor": (elapsed.simulated / elapsed.wall if elapsed.wall else 0.0) if elapsed else None,
+        "firmware": [text for key, text in first.metadata.items() if key.rpartition("/")[2].startswith("firmware")],
         "log": str(first.origin.source),
-        "report": str(first.report(report)),
+        "report": str(first.report(report, view3d=False)),
     }
     if write_to:
         write_json(write_to, result)
@@ -122,6 +123,8 @@ def _ending(console: Console, result: dict[str, Any]) -> None:
             f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})",
             highlight=False,
         )
+    for line in result["firmware"]:
+        console.print(line, soft_wrap=True, highlight=False)
     for name in ("digest", "log", "report"):
         if result[name]:
             console.print(f"{name:<7} {result[name]}", soft_wrap=True)

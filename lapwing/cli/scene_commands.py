@@ -1,4 +1,4 @@
-"""Scenes listed, checked and precompiled; reports of logs; autopilot parameters."""
+"""Scenes listed, checked and precompiled; autopilot parameters."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -7,7 +7,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
-from lapwing.cli.options import LogFile, Overrides, SceneFile
+from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.preflight import warn_of_gains, with_solver_selected
 
 
@@ -96,57 +96,10 @@ def _scenes_of(path: Path) -> list[Path]:
     """Return a scene, or all scenes of a folder."""
     if not path.is_dir():
         return [path]
-    found = sorted(path.glob("*.toml"))
-    if not found:
+    result = sorted(path.glob("*.toml"))
+    if not result:
         raise ValueError(f"{path}: no scenes there; expected a folder with .toml files")
-    return found
-
-
-@app.command()
-def report(
-    log: LogFile,
-    other: Annotated[
-        Path | None, typer.Argument(metavar="[FILE]", help="second log, drawn over the first in every plot")
-    ] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [beside the first log, .html]")
-    ] = None,
-    vehicle: Annotated[str | None, typer.Option(metavar="NAME", help="vehicle to report [first in the log]")] = None,
-) -> None:
-    """Write a report of a log, or a comparison of two logs."""
-    from lapwing.cli.output_paths import check_distinct, claim_report
-    from lapwing.flight import Flight
-    from lapwing.studies.flight_data import SHOWN
-
-    with user_errors():
-        check_distinct({"FILE": log, "the second FILE": other, "--out": out})
-        claim_report("--out", out or log.with_suffix(".html"))
-        beside = Flight.read(other, vehicle, SHOWN) if other else None
-        typer.echo(Flight.read(log, vehicle, SHOWN).report(out, beside))
-
-
-@app.command()
-def view(
-    log: LogFile,
-    rerun: Annotated[
-        bool, typer.Option("--rerun", help="open the log in Rerun instead; needs pip install lapwing[view]")
-    ] = False,
-) -> None:
-    """Write the report of a log and open it in the browser."""
-    import webbrowser
-
-    from lapwing.flight import Flight
-    from lapwing.rerun import open_in_rerun
-    from lapwing.studies.flight_data import SHOWN
-
-    with user_errors():
-        if rerun:
-            open_in_rerun(log)
-            return
-        page = Flight.read(log, only=SHOWN).report()
-        if not webbrowser.open(page.resolve().as_uri()):
-            typer.echo("no browser found; open this page:")
-        typer.echo(page)
+    return result
 
 
 @app.command()

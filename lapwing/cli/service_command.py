@@ -54,14 +54,14 @@ def service(options: ServiceOptions) -> None:
     from lapwing.cosim.transport.key_prefix import check_key_prefix
     from lapwing.runs.distributed_run import external_services, parse_endpoints
     from lapwing.services import process_table
-    from lapwing.services.process_main import ProcessSpec, take_part
+    from lapwing.services.process_main import ProcessSpec, run_participant
     from lapwing.services.scene_resolver import resolve
 
     name, scene, overrides, plan = options.name, options.scene, options.set_ or [], options.plan or []
     with user_errors():
         check_key_prefix(options.key_prefix)
         table = parse_endpoints(options.endpoints)
-        entry = process_table.entry(process_table.encoded(name) or name)
+        entry = process_table.entry(process_table.encoded_service(name) or name)
         if name not in table:
             raise ValueError(f"--endpoints: no endpoint for {name} itself")
         check_endpoints("--endpoints", table.values(), options.keys, options.insecure)
@@ -79,7 +79,7 @@ def service(options: ServiceOptions) -> None:
         if entry.lock_step and entry.name not in setup.services:
             typer.echo(f"{name}: not part of {scene}")  # compose starts every service
             return
-        take_part(
+        run_participant(
             ProcessSpec(
                 name=name,
                 setup=setup,

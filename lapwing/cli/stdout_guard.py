@@ -1,4 +1,4 @@
-"""Standard output that may be full or closed: an error of its own, which nobody takes for one of the log's."""
+"""Guard of standard output: errors of a full disk or closed pipe, distinct from those of the log."""
 
 import io
 import sys
@@ -11,7 +11,7 @@ class OutputError(Exception):
     """Standard output cannot be written.
 
     Attributes:
-        closed: whoever read it has gone, as `lapwing ... | head` does.
+        closed: its reader has exited, as in `lapwing ... | head`.
     """
 
     def __init__(self, error: OSError):

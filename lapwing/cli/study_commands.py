@@ -46,12 +46,12 @@ def _study(
     check_distinct({name: subject, "--json": json, "--plot": plot})
     claim(json)
     claim_plot(plot)
-    found = find()
-    module.show(console, found)
+    result = find()
+    module.show(console, result)
     if json:
-        module.write_json(json, found)
+        module.write_json(json, result)
     if plot:
-        module.plot(plot, found)
+        module.plot(plot, result)
 
 
 @contextmanager
@@ -219,15 +219,15 @@ def tune(
                 progress.console.print(text, highlight=False, soft_wrap=True)
 
             with _compiling(loaded, progress, task):
-                found = procedure.tune(
+                result = procedure.tune(
                     loaded, target, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
                 )
-        console_output.show(screen, found)
-        if out and (force or not found.failures):
-            procedure.write(out, found.gains)
+        console_output.show(screen, result)
+        if out and (force or not result.failures):
+            procedure.write(out, result.gains)
             typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
         if report:
-            page.write(report, found)
+            page.write(report, result)
             typer.echo(f"{report}: Bode plots, margins and steps")
-        if out and found.failures and not force:
-            fail(f"{out}: not written, the gains fail {'; '.join(found.failures)}; use --force to write them", 1)
+        if out and result.failures and not force:
+            fail(f"{out}: not written, the gains fail {'; '.join(result.failures)}; use --force to write them", 1)

@@ -23,37 +23,37 @@ BOUNDS = {
 
 
 def table_schema(cls: type, leave_out: Iterable[str] = ()) -> Schema:
-    """The schema of a table that a class declares, without some of its keys."""
-    found = [key for key in keys(cls) if key.name not in leave_out]
+    """Return the schema of a table that a class declares, without some of its keys."""
+    result = [key for key in keys(cls) if key.name not in leave_out]
     return {
-        **closed({key.name: key_schema(key) for key in found}),
-        **required([key.name for key in found if key.default is REQUIRED]),
+        **closed({key.name: key_schema(key) for key in result}),
+        **required([key.name for key in result if key.default is REQUIRED]),
     }
 
 
 def closed(properties: Mapping[str, Schema]) -> Schema:
-    """A table with these keys and no others."""
+    """Return the schema of a table with these keys and no others."""
     return {"type": "object", "properties": dict(properties), "additionalProperties": False}
 
 
 def required(names: list[str]) -> Schema:
-    """The part of a table's schema that says which keys it must have."""
+    """Return the part of a table's schema with its required keys."""
     return {"required": names} if names else {}
 
 
 def key_schema(key: Key) -> Schema:
-    """The schema of a key with its description and default."""
-    found = schema_of(key.hint)
+    """Return the schema of a key with its description and default."""
+    result = schema_of(key.hint)
     description = " ".join(filter(None, (f"[{key.unit}]" if key.unit else "", key.meaning)))
     if description:
-        found["description"] = description
+        result["description"] = description
     if (plain := _plain(key.default)) is not None:
-        found["default"] = plain
-    return found
+        result["default"] = plain
+    return result
 
 
 def _plain(default: Any) -> Any:
-    """A default as JSON has it; None where it is none, or a table, or not finite."""
+    """Return a default as JSON value; None for a table, a non-finite number, or no default."""
     if default is REQUIRED or is_table(type(default)) or isinstance(default, dict):
         return None
     if isinstance(default, float) and not math.isfinite(default):
@@ -62,7 +62,7 @@ def _plain(default: Any) -> Any:
 
 
 def schema_of(hint: Any) -> Schema:
-    """The schema of what an annotation allows; None stands for a key that is left out."""
+    """Return the schema of an annotation; None in a union is a key that is left out."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _bounded(schema_of(arguments[0]), arguments[1:])
@@ -98,7 +98,7 @@ def _mapping(name: Any, value: Any) -> Schema:
 
 
 def _array(arguments: tuple, open_ended: bool) -> Schema:
-    """A list of equal items; all tuples of tables are such."""
+    """Return the schema of a list of equal items, as tuples of tables are."""
     items = schema_of(arguments[0])
     if open_ended:
         return {"type": "array", "items": items}

@@ -1,19 +1,23 @@
-"""JSON schemas of the TOML files that people write: scenes, airframes, gain sets."""
+"""JSON schemas of the TOML files that users write: scenes, airframes, gain sets."""
 
+import sys
 from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 from lapwing.cosim.scene import SceneTable
 from lapwing.cosim.scene.vehicle_scenes import MOST
-from lapwing.dynamics import integrators
+from lapwing.dynamics import effects, integrators
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.file_schemas.annotations import Schema, closed, required, table_schema
-from lapwing.file_schemas.catalogue import effect_tables, flight_parameters, sensor_tables
+from lapwing.services.autopilot import gains
 from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.common import autopilot_parameters
 from lapwing.services.common.autopilot_parameters import Parameter
 from lapwing.services.plant import models
-from lapwing.services.scene_resolver import vocabulary
+from lapwing.services.scene_resolver import load, vocabulary
 from lapwing.services.sensors.fault_schedule import SLOTS, FaultTable
+from lapwing.services.sensors.registry import sensors
 from lapwing.services.trajectory.segments import KINDS
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS
 
@@ -21,14 +25,46 @@ DRAFT = "http://json-schema.org/draft-07/schema#"
 TEXT: Schema = {"type": "string"}
 OWN: Schema = {
     "type": "object",
-    "description": "one of the user's own, with parameters of its own",
+    "description": "user-defined, with its own parameters",
     "properties": {"module": {**TEXT, "description": "that declares it"}},
     "required": ["module"],
 }
+USER_SEGMENT: Schema = {
+    **OWN,
+    "properties": {**OWN["properties"], "kind": {**TEXT, "description": "name of the segment in the module"}},
+    "required": ["kind", "module"],
+}
+
+
+def effect_tables() -> dict[str, tuple[type, type]]:
+    """Return (parameter class, class with the keys of its table) of every effect, by name."""
+    return {name: (cls := effects.parameter_class(name), _settings(cls)) for name in effects.names()}
+
+
+def _settings(cls: type) -> type:
+    """Return the class with the keys of an effect's table; some effects resolve it to another class."""
+    return sys.modules[cls.__module__].Settings if hasattr(cls, "from_scene") else cls
+
+
+def sensor_tables() -> dict[str, tuple[ModuleType, type]]:
+    """Return (module, parameter class) of every sensor, by name."""
+    return {name: (module, type(next(iter(module.PRESETS.values())))) for name, module in sensors().items()}
+
+
+OWN_FIRMWARE = "lapwing"
+FIRMWARE_PARAMETERS = {"description": "values by name, or the name of a file of them", "type": ["object", "string"]}
+
+
+def flight_parameters() -> tuple[list[Parameter], list[Parameter]]:
+    """Return the autopilot's parameters: those that all gain sets share, and those that depend on the gain set."""
+    tables = [autopilot_parameters.table(load("hover", {"autopilot.gains": name})) for name in gains.names()]
+    first, *others = tables
+    fixed = [p for name, p in first.items() if all(table[name] == p for table in others)]
+    return fixed, [p for p in first.values() if p not in fixed]
 
 
 def scene_schema() -> Schema:
-    """The JSON schema of a scene as it is written, before the files that it names become part of it."""
+    """Return the JSON schema of a scene file, without the content of the files that it names."""
     known = vocabulary().sections
     sections = {name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE}  # not what is only resolved
     tables = {name: _section(section) for name, section in sections.items()}
@@ -36,7 +72,9 @@ def scene_schema() -> Schema:
     tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
     tables["solver"]["properties"]["integrator"]["enum"] = integrators.names()
     tables["vehicle"]["properties"]["model"]["enum"] = list(models.names())
-    tables["autopilot"]["properties"]["parameters"] = _parameters()
+    tables["autopilot"]["properties"]["parameters"] = FIRMWARE_PARAMETERS
+    own_autopilot = {"properties": {"firmware": {"const": OWN_FIRMWARE}}}
+    tables["autopilot"] |= {"if": own_autopilot, "then": {"properties": {"parameters": _parameters()}}}
     for name, section in sections.items():
         if section.FROM_FILE:  # what a scene says of it is laid over the file's content
             tables[name] = _optional(tables[name])
@@ -50,17 +88,17 @@ def scene_schema() -> Schema:
         }
     tables["vehicle"] = {"anyOf": [tables["vehicle"], _fleet(tables, sections)]}
     needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
-    found = {**_head("Lapwing scene"), **closed(tables), **required(needed)}
-    return {**found, "definitions": {"segment": {"anyOf": [_segment(kind) for kind in KINDS]}}}
+    result = {**_head("Lapwing scene"), **closed(tables), **required(needed)}
+    return {**result, "definitions": {"segment": {"anyOf": [*map(_segment, KINDS), USER_SEGMENT]}}}
 
 
 def airframe_schema() -> Schema:
-    """The JSON schema of an airframe's file."""
+    """Return the JSON schema of an airframe file."""
     return {**_head("Lapwing airframe"), **table_schema(Airframe)}
 
 
 def gains_schema() -> Schema:
-    """The JSON schema of a gain set's file."""
+    """Return the JSON schema of a gain set file."""
     return {**_head("Lapwing gain set"), **table_schema(GainSet)}
 
 
@@ -91,7 +129,7 @@ def _fleet(tables: Schema, sections: dict[str, type[SceneTable]]) -> Schema:
 
 
 def _partial(schema: Schema, place: str) -> Schema:
-    """A schema at a place of the document without what is required, by reference where nothing is."""
+    """Return a part of the schema without required keys, by reference if it has none."""
     optional: Schema = _optional(schema)
     if optional == schema:
         return {"$ref": place}
@@ -107,12 +145,14 @@ def _or_own(tables: dict[str, Schema]) -> Schema:
 
 
 def _sensor(module: Any, cls: type) -> Schema:
-    """A preset, keys that differ from it, and faults."""
+    """Return the schema of a sensor: a preset, keys that differ from it, and faults where it has channels."""
+    preset = {"enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
+    if not hasattr(module, "CHANNELS"):
+        return closed({"preset": preset, **table_schema(cls)["properties"]})
     fault = table_schema(FaultTable)
     fault["properties"]["channel"] = {"enum": ["all", *module.CHANNELS], "default": "all"}
     faults = {"type": "array", "items": fault, "maxItems": SLOTS, "description": "by schedule"}
     table = table_schema(cls, leave_out=["faults"])
-    preset = {"enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
     return closed({"preset": preset, **table["properties"], "faults": faults})
 
 
@@ -130,7 +170,7 @@ def _parameter(p: Parameter) -> Schema:
 
 
 def _segment(kind: str) -> Schema:
-    """A segment of one kind; the points of a table may be in a file."""
+    """Return the schema of a segment of one kind; the points of a table may be in a file."""
     table = table_schema(KINDS[kind])
     table["description"] = " ".join((KINDS[kind].__doc__ or "").split())
     table["properties"]["kind"] = {"enum": [kind]}
@@ -139,7 +179,7 @@ def _segment(kind: str) -> Schema:
 
 
 def _optional(schema: Any) -> Any:
-    """A schema none of whose keys is required."""
+    """Return a schema without required keys."""
     if isinstance(schema, dict):
         return {key: _optional(value) for key, value in schema.items() if key != "required"}
     return schema

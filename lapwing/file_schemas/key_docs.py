@@ -23,24 +23,24 @@ class Key(NamedTuple):
 
 
 def keys(cls: type) -> list[Key]:
-    """The keys of a table, which is a pydantic model or a NamedTuple, in their order."""
+    """Return the keys of a table, a pydantic model or NamedTuple, in their order."""
     said = {name: split(comment) for name, comment in comments(cls).items()}
     return [Key(name, hint, default, *said.get(name, ("", _purpose(hint)))) for name, hint, default in _fields(cls)]
 
 
 def _purpose(hint: Any) -> str:
-    """What a table is for, as its class says."""
+    """Return the description of a table from the docstring of its class."""
     members = [member for member in get_args(hint) or (hint,) if isinstance(member, type) and member is not type(None)]
     return first_sentence(members[0]) if members and is_table(members[0]) else ""
 
 
 def is_table(cls: type) -> bool:
-    """Whether a class declares a table: a pydantic model, or a NamedTuple."""
+    """Return True if a class declares a table: a pydantic model or a NamedTuple."""
     return issubclass(cls, BaseModel) or hasattr(cls, "_fields")
 
 
 def first_sentence(thing: Any) -> str:
-    """The first sentence of a docstring on one line, without its full stop."""
+    """Return the first sentence of a docstring on one line, without its full stop."""
     text = " ".join((inspect.getdoc(thing) or "").split())
     return re.split(r"(?<!eq)(?<!e\.g)\.(?:\s|$)", text)[0]
 
@@ -61,7 +61,7 @@ def _fields(cls: type) -> list[tuple[str, Any, Any]]:
 
 
 def default(field: Any) -> Any:
-    """The default of a field of a pydantic model, REQUIRED where it has none."""
+    """Return the default of a field of a pydantic model, REQUIRED if it has none."""
     if field.default_factory is not None:
         return field.default_factory()
     return REQUIRED if field.default is PydanticUndefined else field.default

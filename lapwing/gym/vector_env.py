@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.batch_simulator import BatchSimulator, BatchState
+from lapwing.batch_simulator import BatchSimulator
 from lapwing.cosim.scene import Overrides, Scene
-from lapwing.gym.tasks import TASKS, Target
+from lapwing.gym import step_kernels
+from lapwing.gym.step_kernels import BOUNDS, Episodes, Results
+from lapwing.gym.tasks import TASKS, starts
 from lapwing.studies.campaign.distributions import Distribution
 
 try:
@@ -21,8 +23,6 @@ except ImportError:
     raise ImportError("lapwing.gym: Gymnasium is not installed; pip install lapwing[gym]") from None
 
 RATE = 50.0  # [Hz] of the actions
-RATES = np.array([6.0, 6.0, 2.0])  # [rad/s] about body x, y, z of an action of 1
-NUMBERS = 21  # of an observation
 
 
 class DroneVectorEnv(VectorEnv):
@@ -30,8 +30,9 @@ class DroneVectorEnv(VectorEnv):
 
     An action is (thrust, rates about body x, y, z), each from -1 to 1: no thrust to twice the weight; 6, 6 and 2 rad/s.
     An observation is the way to the target and to the one after it [m], the velocity past the target [m/s], all in the
-    world frame; the rotation matrix body to world, row by row; and the body rates [rad/s]. An episode that is over
-    begins anew with the next step.
+    world frame; the rotation matrix body to world, row by row; and the body rates [rad/s]. Ways, velocities and
+    rates saturate at 50, the bounds of the observation space. A vehicle whose state becomes invalid is lost. An episode
+    that is over begins anew with the next step.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012
@@ -51,60 +52,65 @@ class DroneVectorEnv(VectorEnv):
             num_envs: how many.
             task: one of `TASKS`.
             scene: whose vehicle and physics.
-            overrides: as of `lapwing.load_scene`.
+            overrides: see `lapwing.load_scene`.
             vary: how keys of the scene vary from vehicle to vehicle.
             render_mode: none is known.
 
         Raises:
             ValueError: unknown task.
-            SceneError: the scene is not sound.
+            SceneError: the scene is invalid.
         """
         if task not in TASKS:
             raise ValueError(f"task: expected one of {', '.join(TASKS)}, got {task!r}")
-        self.task, self.num_envs, self.render_mode = TASKS[task](), num_envs, render_mode
+        self.task, self.num_envs, self.render_mode = TASKS[task], num_envs, render_mode
         self.batch = BatchSimulator(scene, num_envs, vary, overrides)
         self._ticks = max(1, round(1.0 / (RATE * self.batch.interval)))
         self._ground = float(self.batch.state.position_world[0, 2])
+        self._vehicles = step_kernels.Vehicles(*self.batch.memory, self.batch.interval, self._ground)
+        self._weight, self._hover_speed = self.batch.weight, self.batch.hover_speed
         self.single_action_space = Box(-1.0, 1.0, (4,), np.float32)
-        self.single_observation_space = Box(-np.inf, np.inf, (NUMBERS,), np.float32)
+        self.single_observation_space = Box(-BOUNDS, BOUNDS, dtype=np.float32)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self._over, self._memory = np.zeros(num_envs, bool), np.zeros((num_envs, 1))
+        self._episodes = Episodes(np.zeros(num_envs, np.int64), np.zeros(num_envs, bool), np.zeros((num_envs, 6)))
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
         """Begin an episode with every vehicle."""
         if seed is not None:
             self._np_random, self._np_random_seed = seeding.np_random(seed)
-        state = self._begin(np.arange(self.num_envs))
-        self._over[:] = False
-        return self._observed(state, self._target(state)), {}
+        observations = np.empty((self.num_envs, len(BOUNDS)), np.float32)
+        self._begin(np.arange(self.num_envs), observations)
+        return observations, {}
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
-        """Go on by 20 ms; episodes that were over begin anew instead."""
-        asked = np.clip(np.asarray(actions, float).reshape(self.num_envs, 4), -1.0, 1.0)
-        before = self.batch.state
-        thrust, rates = self.batch.weight * (1.0 + asked[:, 0]), RATES * asked[:, 1:]
-        now = self.batch.step(thrust=thrust, body_rates=rates, ticks=self._ticks)
-        judged = self.task.judge(before, now, self._target(now), self._memory, self._ground)
-        late = (now.time >= self.task.seconds) & ~judged.terminated
-        terminated, reward = judged.terminated & ~self._over, np.where(self._over, 0.0, judged.reward)
-        truncated = late & ~self._over
-        if self._over.any():
-            now = self._begin(np.flatnonzero(self._over))
-        self._over = terminated | truncated
-        return self._observed(now, self._target(now)), reward, terminated, truncated, {}
+        """Go on by 20 ms; episodes that were over begin anew instead.
 
-    def _begin(self, members: np.ndarray) -> BatchState:
-        start, self._memory[members] = self.task.begin(self.np_random, self._ground, len(members))
-        return self.batch.reset(members, position_world=start, rotor_speed=self.batch.hover_speed)
+        Raises:
+            ValueError: actions of another shape, or not finite.
+        """
+        n, batch, episodes = self.num_envs, self.batch, self._episodes
+        numbers = np.asarray(actions, float).reshape(n, 4)
+        if not step_kernels.read_actions(numbers, self._weight, batch.setpoints):
+            raise ValueError("actions: expected finite numbers")
+        shape = (n, len(BOUNDS))
+        results = Results(np.empty(shape, np.float32), np.empty(n), np.empty(n, bool), np.empty(n, bool))
 
-    def _target(self, state: BatchState) -> Target:
-        return self.task.target(state.time, self._memory, self._ground)
+        def work(first: int, last: int) -> None:
+            batch.advance_under_rates(first, last, self._ticks)
+            step_kernels.judge(self.task, self._vehicles, episodes, results, first, last)
 
-    def _observed(self, state: BatchState, target: Target) -> np.ndarray:
-        ways = [target.position_world - state.position_world, target.ahead_world - state.position_world]
-        past = state.velocity_world - target.velocity_world
-        return np.column_stack([*ways, past, _matrices(state.attitude), state.omega_body]).astype(np.float32)
+        batch.run_blocks(work)
+        if episodes.over.any():
+            self._begin(np.flatnonzero(episodes.over), results.observations)
+        np.logical_or(results.terminated, results.truncated, out=episodes.over)
+        return *results, {}
+
+    def _begin(self, members: np.ndarray, observations: np.ndarray) -> None:
+        """Begin episodes of these vehicles, and observe them."""
+        place = starts(self.np_random, self._ground, len(members))
+        self.batch.restart(members, position_world=place, rotor_speed=self._hover_speed)
+        self._episodes.gates[members], self._episodes.over[members] = 0, False
+        step_kernels.observe_members(self.task, self._vehicles, self._episodes, observations, members)
 
 
 class DroneEnv(gymnasium.Env):
@@ -127,17 +133,6 @@ class DroneEnv(gymnasium.Env):
         """Go on by 20 ms."""
         observed, reward, terminated, truncated, _ = self._all.step(np.asarray(action)[None])
         return observed[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), {}
-
-
-def _matrices(wxyz: np.ndarray) -> np.ndarray:
-    """Rotation matrices body to world of unit quaternions (n, 4), row by row, shape (n, 9)."""
-    w, x, y, z = wxyz.T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.column_stack([number for row in rows for number in row])
 
 
 for _task in TASKS:

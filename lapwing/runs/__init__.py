@@ -1,1 +1,1 @@
-"""Runs of a set-up that leave a log: in this process, in processes of its own, or joined to processes elsewhere."""
+"""Runs that write a log: in one process, in several processes, or with processes on other hosts."""

@@ -1,4 +1,8 @@
-"""The user is told when something compiles, and only then: what, and about how long, which is the longest so far."""
+"""Compile-time notice: tells the user that kernels compile, and the time that this takes on this machine.
+
+The estimate is the longest time so far, or EACH for a service, times `slowness`: the present time of a fixed piece of
+Python, which grows with the load of the machine as compiling does.
+"""
 
 import contextlib
 import json
@@ -11,13 +15,15 @@ from typing import NamedTuple
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.kernels import cache_folder, on_compile
 
-EACH = 5.0  # [s] a service takes to compile, on an idle core of 2024, where nothing is known of this machine
-FILE = "compile_seconds.json"
+EACH = 7.0  # [s] for one service at a slowness of 1, where none of this machine is known; measured with scene hover
+PROBE = 250_000  # turns of the loop that measures the slowness
+PROBE_SECONDS = 0.033  # [s] of that loop on the idle core of EACH
+FILE = "compile_effort.json"  # seconds at a slowness of 1, by kind of run
 ONE = "one process"
 
 
 class Compilation(NamedTuple):
-    """Of the kernels of a run.
+    """Compile-time notice for the kernels of a run.
 
     Attributes:
         scene: its name.
@@ -31,45 +37,47 @@ class Compilation(NamedTuple):
 
     @property
     def notice(self) -> str:
-        """What is said where there is no bar."""
+        """Text of the notice for output without a progress bar."""
         about = f"about {self.seconds:.0f} s (kept for later runs)"
         return f"{self.scene}: compiling kernels of {', '.join(self.services)}, {about} ..."
 
 
 class Stopwatch:
-    """How long the kernels of a run compile: a guess before, what it was after.
+    """Stopwatch of the compilation of a run: an estimate before, the measured time after.
 
-    It is told of the first compilation with `began`, and of the end with `ended`; a run that finds all kernels on the
-    disk tells it of neither, and nothing is said.
+    `began` marks the first compilation, `ended` the end; a run that finds all kernels on the
+    disk triggers neither, and no notice is printed.
     """
 
     def __init__(self, mode: str, setup: RunConfig, say: Callable[[Compilation], None]):
-        """`say` is called once, when something compiles."""
+        """Prepare a notice; `say` is called once, when the first kernel compiles."""
         self._key, self._say, self._started = _key(mode, setup), say, 0.0
-        self._guess = guessed(setup, mode)
+        self._setup, self._mode, self._slowness = setup, mode, 1.0
 
     def began(self) -> None:
         """Something compiles; said once."""
         if not self._started:
-            self._started = time.monotonic()
-            self._say(self._guess)
+            self._started, self._slowness = time.monotonic(), slowness()
+            self._say(_guessed(self._setup, self._mode, self._slowness))
 
     def ended(self) -> None:
         """Everything is compiled."""
         if self._started:
-            known, taken = _known(), round(time.monotonic() - self._started, 1)
+            mean = 0.5 * (self._slowness + slowness())
+            known, taken = _known(), round((time.monotonic() - self._started) / mean, 1)
             _keep({**known, self._key: max(taken, known.get(self._key, 0.0))})
             self._started = 0.0
 
 
 @contextmanager
-def notify_on_compile(setup: RunConfig, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[None]:
+def notify_on_compile(setup: RunConfig, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[Stopwatch]:
     """Say so once, as soon as a kernel is compiled within the context for a run in this process.
 
     Args:
         setup: of the run.
-        say: is told.
-        alone: whether the context does nothing else, so that its time is the next guess.
+        say: shows the notice.
+        alone: True if the context does nothing else, so that its time is the next guess; otherwise the caller calls
+            `ended` of the yielded stopwatch.
     """
     watch, waiting = Stopwatch(ONE, setup, say), True
 
@@ -79,7 +87,7 @@ def notify_on_compile(setup: RunConfig, say: Callable[[Compilation], None], alon
 
     on_compile(listener)
     try:
-        yield
+        yield watch
         if alone:
             watch.ended()
     finally:
@@ -87,9 +95,21 @@ def notify_on_compile(setup: RunConfig, say: Callable[[Compilation], None], alon
 
 
 def guessed(setup: RunConfig, mode: str = ONE) -> Compilation:
-    """What a run compiles where none of its kernels is kept."""
+    """Return what a run compiles with an empty cache, and the time that it takes at present."""
+    return _guessed(setup, mode, slowness())
+
+
+def slowness() -> float:
+    """Return the present time of a fixed loop in Python over its time on an idle core of EACH."""
+    started, x = time.perf_counter(), 0
+    for i in range(PROBE):
+        x = (x * 31 + i) % 1_000_003
+    return (time.perf_counter() - started) / PROBE_SECONDS
+
+
+def _guessed(setup: RunConfig, mode: str, slow: float) -> Compilation:
     seconds = _known().get(_key(mode, setup), EACH * len(setup.services))
-    return Compilation(setup.scene, tuple(setup.services), seconds)
+    return Compilation(setup.scene, tuple(setup.services), slow * seconds)
 
 
 def _key(mode: str, setup: RunConfig) -> str:
@@ -102,11 +122,11 @@ def _file() -> Path | None:
 
 
 def _known() -> dict[str, float]:
-    """Seconds by kind of run; what cannot be read is not known."""
+    """Return seconds by kind of run; entries that cannot be read are omitted."""
     path = _file()
     with contextlib.suppress(OSError, ValueError, TypeError):
-        if path is not None and isinstance(found := json.loads(path.read_text(encoding="utf-8")), dict):
-            return {str(key): float(value) for key, value in found.items()}
+        if path is not None and isinstance(result := json.loads(path.read_text(encoding="utf-8")), dict):
+            return {str(key): float(value) for key, value in result.items()}
     return {}
 
 

@@ -1,4 +1,4 @@
-"""A run whose services are started elsewhere: watched to its end."""
+"""Monitoring of a run whose services are started separately."""
 
 import re
 import time
@@ -27,7 +27,7 @@ CLOSE_TIMEOUT = 5.0  # [s] the recorder gets to close its log when a run has fai
 def monitor_run(
     given: ProcessSpec, observer: Observer, live: Callable[[RunMonitor], None] = lambda watch: None
 ) -> Elapsed:
-    """Watch a run whose services are started elsewhere, to its end; `live` is shown it some five times a second.
+    """Monitor a run whose services are started separately to its end; `live` is called about five times a second.
 
     Raises:
         RunFailed: a service does not come, or is gone before the end.
@@ -38,10 +38,10 @@ def monitor_run(
     check_key_prefix(key_prefix)
     external = given.external or {}
     clock, participants = Clock(observer, setup), PublisherIds(key_prefix, external=tuple(external))
-    names = set(process_table.needed(setup, external))
+    names = set(process_table.required_processes(setup, external))
     listen, connect = mesh(MONITOR, peers)
-    mark, security = participants.mark(MONITOR), settings(setup, MONITOR, key_prefix, given.keys)
-    with Stop() as stop, ZenohBus(listen, connect, mark=mark, security=security) as bus:
+    gid, security = participants.gid(MONITOR), settings(setup, MONITOR, key_prefix, given.keys)
+    with Stop() as stop, ZenohBus(listen, connect, gid=gid, security=security) as bus:
         watch = RunMonitor(bus, participants, peers, LOST, setup.services)
         leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{MONITOR}")
         try:
@@ -56,7 +56,7 @@ def monitor_run(
 
 
 def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: Callable[[RunMonitor], None]) -> None:
-    """RunMonitor the run of the participants `names` to its end; errors as of `monitor_run`."""
+    """Monitor the run of the participants `names` to its end. See `monitor_run` for errors."""
     deadline = time.monotonic() + JOIN_TIMEOUT
     while not (watch.ended and process_table.RECORDER in watch.gone):
         live(watch)
@@ -66,14 +66,14 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
         if not names <= watch.present:
             watch.last_news = time.monotonic()
             if time.monotonic() > deadline:
-                raise RunFailed(f"nobody answers as {', '.join(sorted(names - watch.present))}")
+                raise RunFailed(f"no participant {', '.join(sorted(names - watch.present))} within {JOIN_TIMEOUT:g} s")
         elif not watch.ended and watch.gone & names and not _comes(watch, lambda: watch.ended, GRACE):
             raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
         elif watch.began is None and time.monotonic() < deadline:
             watch.last_news = time.monotonic()  # set-ups are compared, which takes a while over a slow network
         elif culprit := watch.stall_message(names):
             raise RunFailed(culprit)
-    # After a cut, links come back one after another; whoever says how it ended stays until it is heard
+    # After a cut, links recover one by one; the clock owner stays until its outcome is confirmed
     others = names - {process_table.RECORDER}
     _comes(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
     live(watch)
@@ -82,7 +82,7 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
 
 
 def _comes(watch: RunMonitor, news: Callable[[], bool], seconds: float) -> bool:
-    """Whether some news arrives within so many seconds, by other links than the news that somebody has gone."""
+    """Return True if `news` becomes true within `seconds`; the loss of a participant may arrive earlier."""
     deadline = time.monotonic() + seconds
     while not news() and time.monotonic() < deadline:
         watch.poll(0.2)
@@ -90,7 +90,7 @@ def _comes(watch: RunMonitor, news: Callable[[], bool], seconds: float) -> bool:
 
 
 def parse_endpoints(text: str) -> dict[str, str]:
-    """ "name=endpoint,..." as a table. Programs of somebody else's stand first: all others connect to them.
+    """Return "name=endpoint,..." as a table, external services first: all others connect to them.
 
     Raises:
         ValueError: not of this form, or no endpoint.
@@ -114,25 +114,25 @@ def check_complete(peers: Mapping[str, str], needed: Iterable[str]) -> None:
 
 
 def external_services(peers: Mapping[str, str]) -> dict[str, str]:
-    """The programs of somebody else's in a table: services whose messages have a process of their own in it."""
+    """Return the external services of a table: those with a separate process that encodes their messages."""
     return {name: endpoint for name, endpoint in peers.items() if f"{name}{ENCODER}" in peers}
 
 
 def parse_external(texts: Iterable[str], setup: RunConfig) -> dict[str, str]:
-    """Each "name=endpoint" as a table.
+    """Return each "name=endpoint" as a table.
 
     Raises:
         ValueError: not of this form, no endpoint, or no service of the lock step that could be elsewhere.
     """
-    found = {}
+    result = {}
     for text in texts:
         name, _, endpoint = text.partition("=")
         choices = [service for service in setup.services if service != process_table.CLOCK_OWNER]
         if name not in choices:
             raise ValueError(f"--external {text}: expected NAME=ENDPOINT with one of {', '.join(choices)}")
         check_endpoint(f"--external {name}", endpoint)
-        found[name] = endpoint
-    return found
+        result[name] = endpoint
+    return result
 
 
 def check_endpoint(option: str, text: str) -> None:

@@ -1,4 +1,4 @@
-"""A run in processes followed while it goes on: what is new of it, and what happened, for those who show it."""
+"""Live feed of a multi-process run: new steps and events for displays."""
 
 from collections.abc import Callable, Iterable, Sequence
 
@@ -19,17 +19,23 @@ class LiveFeed:
     """Tells of each step of a run; events also go out on their topic, for viewers that are processes of the run."""
 
     def __init__(self, setup: RunConfig, shows: Iterable[Shows] = ()):
-        """Of a run that is about to begin; each of `shows` is given a step of every vehicle and what happened in it."""
+        """Prepare the feed of a run; each of `shows` receives the steps of all vehicles with their events."""
         self._flights, self._after = [LiveFlight(member) for member in members(setup)], -1.0
         self._services, self._shows = set(setup.services), tuple(shows)
 
     def observe(self, watch: RunMonitor) -> None:
-        """Take in what is new in a run that is watched."""
+        """Publish and show the new part of a run; at its end, end the events for viewers, who wait for that."""
         watch.listen = self._take
+        self._observe(watch)
+        if watch.complete:  # again and again: a message to viewers may be dropped
+            for flight in self._flights:
+                watch.publish(EVENTS.name.format(vehicle=flight.vehicle), watch.time_ns, b"")
+
+    def _observe(self, watch: RunMonitor) -> None:
         if not watch.reporting_services >= self._services:
             return
         steps = [step for flight in self._flights if (step := flight.step(watch.time_ns)) is not None]
-        if len(steps) < len(self._flights):  # the plant tells of all vehicles at once, or of none
+        if len(steps) < len(self._flights):  # the plant publishes all vehicles at once, or none
             return
         happened = [new_events(step, self._after) for step in steps]
         self._after = float(steps[0].truth.times[-1])

@@ -1,111 +1,127 @@
-"""A page in the browser that shows a run while it goes on: an address on this machine that nobody can guess."""
+"""Browser page that shows a run live, at an unguessable local address."""
 
-import queue
 import secrets
 import threading
 import time
+from collections import deque
 from collections.abc import Sequence
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from contextlib import ExitStack
 from typing import Any, Self
+
+import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
-from lapwing.studies.report.motion_3d import steps_to_json
-from lapwing.studies.report.page import live_page
+from lapwing.studies.report.style import COLOURS, FLOWN
+from lapwing.studies.view3d.local_server import serving
+from lapwing.studies.view3d.recording import with_bridge
+from lapwing.studies.view3d.samples import Samples, sample
+from lapwing.studies.view3d.stage import Vehicle
+from lapwing.studies.view3d.surroundings import add_surroundings
+from lapwing.studies.view3d.vehicle_bodies import motion
 
-KEPT = 3000  # steps for a browser that comes late
-WAITING = 300  # steps that a browser may be behind
-FAREWELL = 1.0  # [s] that browsers get to hear of the end
-STREAM, ICON = "steps", "/favicon.ico"  # browsers ask for the icon, which is empty
-OVER = "event: over\ndata:\n\n"
+FRAMES = 8  # of a step, shown evenly until the next
+PIECES = 1200  # of all trails, of which the oldest go
+LINES = 200  # of events
+LAG = (0.02, 0.5)  # [s] shortest and longest time over which a step is spread
+ERROR = 0.25  # [m] at the end of the trail's colours
+SIZE = 1.0  # [m] from which the camera takes its distance
+FAREWELL = 0.3  # [s] that browsers have to receive the last frame
 
 
 class LivePage:
-    """Serves the page; a context manager. The sockets are closed at its end."""
+    """Serves the 3D view of a run; a context manager. The sockets are closed at its end."""
 
     def __init__(self, setup: RunConfig):
-        """Of a run that is about to begin."""
-        self._lock = threading.Lock()
-        self._steps: list[str] = []
-        self._browsers: list[queue.Queue[str]] = []
-        self._over = False
+        """Open the page before the run begins."""
         token = secrets.token_urlsafe(16)
-        page = live_page(setup, STREAM).encode()
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), handler(f"/{token}/", page, self))
-        self._server.daemon_threads = True
-        self.address = f"http://127.0.0.1:{self._server.server_address[1]}/{token}/"
-        threading.Thread(target=self._server.serve_forever, args=(0.1,), daemon=True).start()
+        names = list(setup.vehicles)
+        colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))] if len(names) > 1 else [FLOWN]
+        facts = {"names": names, "colours": colours, "size": SIZE, "start": 0.0, "error": ERROR, "live": True}
+        self._colours = colours
+        self._stack = ExitStack()
+        self._server = self._stack.enter_context(serving(token, lambda html: with_bridge(html, facts)))
+        self.address = f"http://127.0.0.1:{self._server.get_port()}/{token}/"
+        self._vehicles: list[Vehicle] = []
+        self._pieces: deque[Any] = deque()
+        self._frames: deque[tuple[float, list[Samples], int]] = deque()  # wall time [s], samples, index
+        self._ready, self._over, self._before = threading.Condition(), False, time.monotonic()
+        gui = self._server.gui
+        gui.configure_theme(control_layout="collapsible", show_logo=False, show_share_button=False)
+        gui.set_panel_label(setup.scene)
+        self._time = gui.add_text("time", "waiting for the flight", disabled=True)
+        self._events = gui.add_text("events", "", multiline=True, disabled=True)
+        self._player = threading.Thread(target=self._play, daemon=True)
+        self._player.start()
 
     def show(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
-        """Show what is new of every vehicle, and what happened in it."""
-        self._put(f"data: {steps_to_json(steps, events, first=not self._steps)}\n\n")
+        """Show what is new of every vehicle, and what happened to it."""
+        if not self._vehicles:
+            add_surroundings(self._server.scene, steps[0])
+            for k, (step, colour) in enumerate(zip(steps, self._colours, strict=True)):
+                self._vehicles.append(Vehicle(self._server.scene, k, step, step.vehicle, colour))
+        now = time.monotonic()
+        spread, self._before = float(np.clip(now - self._before, *LAG)), now
+        first, last = (float(steps[0].truth.times[k]) for k in (0, -1))
+        times = np.linspace(first, last, FRAMES + 1)[1:]
+        result = [sample(step, motion(step), times) for step in steps]
+        with self._ready:
+            self._frames.extend((now + spread * k / FRAMES, result, k) for k in range(FRAMES))
+            self._ready.notify()
+        with self._server.atomic():
+            for vehicle, step in zip(self._vehicles, steps, strict=True):
+                self._extend_trail(vehicle, step)
+            self._tell(steps, events)
 
-    def _put(self, text: str) -> None:
-        with self._lock:
-            self._steps.append(text)
-            del self._steps[1 : max(1, len(self._steps) - KEPT)]  # the first has the shape
-            for browser in self._browsers:
-                if browser.full():  # misses the oldest
-                    browser.get()
-                browser.put(text)
+    def _extend_trail(self, vehicle: Vehicle, step: FlightData) -> None:
+        rows = np.unique(np.linspace(0, len(step.truth) - 1, FRAMES + 1).round().astype(int))
+        path, error = step.truth.position[rows], None
+        if len(step.reference):
+            error = np.linalg.norm(path - step.reference[np.minimum(rows, len(step.reference) - 1), :3], axis=1)
+        if len(rows) > 1:
+            self._pieces.append(vehicle.trail(f"{step.truth.times[-1]:.3f}", path, error, ERROR))
+        if len(self._pieces) > PIECES:
+            self._pieces.popleft().remove()
 
-    def steps(self) -> Any:
-        """What there is for a browser, and what comes, to the end."""
-        mine: queue.Queue[str] = queue.Queue(WAITING)
-        with self._lock:
-            known, over = list(self._steps), self._over
-            self._browsers.append(mine)
-        try:
-            yield from known
-            while not over:
-                yield (text := mine.get())
-                over = text is OVER
-        finally:
-            with self._lock:
-                self._browsers.remove(mine)
+    def _tell(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
+        several = len(steps) > 1
+        lines = [
+            f"{event.time:8.2f}  {f'{step.vehicle}  ' if several else ''}{event.kind}  {event.text}"
+            for step, happened in zip(steps, events, strict=True)
+            for event in happened
+        ]
+        if lines:
+            known = self._events.value.splitlines()
+            self._events.value = "\n".join([*sorted(lines, reverse=True), *known][:LINES])
+
+    def _play(self) -> None:
+        """Show each frame at its time, until the end."""
+        while True:
+            with self._ready:
+                while not self._frames and not self._over:
+                    self._ready.wait()
+                if not self._frames:
+                    return
+                due, result, k = self._frames.popleft()
+                late = len(self._frames) > 4 * FRAMES
+            if not late:
+                time.sleep(max(0.0, due - time.monotonic()) if not self._over else 0.0)
+            with self._server.atomic():
+                for vehicle, samples in zip(self._vehicles, result, strict=True):
+                    vehicle.show(samples, k)
+                self._time.value = f"{result[0].times[k]:.2f} s"
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._over = True
-        self._put(OVER)
-        self._server.shutdown()
-        deadline = time.monotonic() + FAREWELL
-        while self._browsers and time.monotonic() < deadline:
-            time.sleep(0.01)
-        self._server.server_close()
-
-
-def handler(root: str, page: bytes, live: LivePage) -> type[BaseHTTPRequestHandler]:
-    """Who answers a browser: the page at `root`, its steps below."""
-
-    class Handler(BaseHTTPRequestHandler):
-        """Gives the page, and the steps of the flight as server-sent events; nothing at any other address."""
-
-        def do_GET(self) -> None:
-            kinds = {root: "text/html; charset=utf-8", root + STREAM: "text/event-stream", ICON: "image/x-icon"}
-            asked = self.path.encode()
-            kind = next((kinds[path] for path in kinds if secrets.compare_digest(path.encode(), asked)), None)
-            if kind is None:
-                self.send_error(404)
-                return
-            self.send_response(200)
-            self.send_header("Content-Type", kind)
-            self.send_header("Cache-Control", "no-store")
-            self.send_header("Referrer-Policy", "no-referrer")
-            self.end_headers()
-            try:
-                if self.path == root:
-                    self.wfile.write(page)
-                elif self.path != ICON:
-                    for text in live.steps():
-                        self.wfile.write(text.encode())
-            except OSError:  # the browser is gone
-                return
-
-        def log_message(self, *_: Any) -> None:
-            """Say nothing."""
-
-    return Handler
+        with self._ready:
+            self._over = True
+            self._ready.notify()
+        self._player.join(FAREWELL)
+        self._time.value = f"{self._time.value}, the flight is over"
+        if self._server.get_clients():
+            self._server.flush()
+            time.sleep(FAREWELL)
+        self._stack.close()

@@ -12,17 +12,17 @@ from lapwing.studies.flight_events import Event
 
 
 def event_messages(events: Iterable[Event]) -> list[tuple[int, bytes]]:
-    """Time [ns] and payload of each event, in order."""
-    found = []
+    """Return time [ns] and payload of each event, in order."""
+    result = []
     for event in events:
         time_ns = max(0, round(event.time * 1e9))
         level = Log.WARN if KINDS[event.kind].serious else Log.INFO
-        found.append((time_ns, Log(stamp(time_ns), level, event.kind, event.text).encode()))
-    return found
+        result.append((time_ns, Log(stamp(time_ns), level, event.kind, event.text).encode()))
+    return result
 
 
 def add_events(log: Path, flight: FlightData) -> None:
-    """Write the events of a recorded flight into its log, which has its end and does not tell of them.
+    """Write the events of a recorded flight into its finished log, which has no events yet.
 
     Raises:
         ValueError: the log cannot be written.

@@ -1,4 +1,4 @@
-"""A run with every service in a process of its own."""
+"""Run with every service in a separate process."""
 
 import os
 from collections.abc import Callable, Iterable
@@ -6,7 +6,7 @@ from typing import IO
 
 from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.diagram.multi_vehicle import leading
+from lapwing.cosim.diagram.multi_vehicle import primary_topic
 from lapwing.cosim.processes.child_process import Child
 from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.launcher import launch
@@ -16,7 +16,7 @@ from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import Stopwatch
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
-from lapwing.services.process_main import ProcessSpec, hand_over
+from lapwing.services.process_main import ProcessSpec, write_spec
 
 
 def fly_processes(
@@ -26,25 +26,25 @@ def fly_processes(
     live: Callable[[RunMonitor], None] = lambda watch: None,
     early: dict[str, Child] | None = None,
 ) -> Elapsed:
-    """Fly with every service in a process of its own.
+    """Fly with every service in a separate process.
 
     Args:
         given: what every process is given, but for its name and the endpoints.
-        observer: is told how far the run is, and at the end what the processes beside had to say.
-        beside: processes without which the flight goes on.
-        live: is shown the run as it is seen, some five times a second.
+        observer: shows the progress, and at the end the output of the auxiliary processes.
+        beside: auxiliary processes, without which the run continues.
+        live: called about five times a second with the run monitor.
         early: processes that are already started.
 
     Raises:
         RunFailed: a service died or froze, or the run ended before its time.
-        ValueError: not a key prefix, or a service refused what it was given.
+        ValueError: invalid key prefix, or a service rejected its configuration.
         Interrupted: ended by a signal.
     """
     check_key_prefix(given.key_prefix)
     setup, given = given.setup, given._replace(secret=new_secret())
     clock = Clock(observer, setup)
     external = given.external or {}
-    names = [*process_table.needed(setup, external), *([process_table.ROUTER] if given.open else [])]
+    names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if given.open else [])]
     core = shared_core(setup)
 
     def give(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
@@ -55,7 +55,7 @@ def fly_processes(
             open=given.open if name == process_table.ROUTER else (),
             with_parent=True,
         )
-        hand_over(own, stream)
+        write_spec(own, stream)
 
     participants = PublisherIds(given.key_prefix, given.secret, tuple(external))
     with Stop() as stop:
@@ -70,7 +70,7 @@ def fly_processes(
                 observer.say(f"{name}: {line}")
         stop.check()
     if clock.refused:
-        observer.say(f"refused: {clock.refused} messages that no participant of this run has sent")
+        observer.say(f"rejected: {clock.refused} messages from outside the run")
     return clock.elapsed
 
 
@@ -79,7 +79,7 @@ class Clock:
 
     def __init__(self, observer: Observer, setup: RunConfig):
         self._observer, self._began, self._slow_disk = observer, False, False
-        self._pose, self._status = leading(setup, POSE), leading(setup, STATUS)
+        self._pose, self._status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
         self._compiling = Stopwatch("multi-process", setup, observer.compiling)
         self.elapsed, self.refused = Elapsed(0.0, 0.0), 0
 
@@ -103,7 +103,7 @@ class Clock:
 
 
 def shared_core(setup: RunConfig) -> int | None:
-    """The core for all services of a sequential lock step, in which only one works at a time; None: leave it free."""
+    """Return the core for all services of a sequential lock step, which work one at a time; None for any core."""
     if setup.coupling != "gauss_seidel" or not hasattr(os, "sched_getaffinity"):
         return None
     cores = sorted(os.sched_getaffinity(0))

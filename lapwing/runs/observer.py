@@ -1,4 +1,4 @@
-"""What a run tells while it goes on."""
+"""Observer of a run in progress."""
 
 from typing import NamedTuple, Protocol
 
@@ -6,34 +6,34 @@ from lapwing.runs.compile_notice import Compilation
 
 
 class Elapsed(NamedTuple):
-    """How long a run took."""
+    """Simulated and wall time of a run."""
 
     simulated: float  # [s]
     wall: float  # [s]
 
 
 class Observer(Protocol):
-    """Who is told how far a run is: a display, or nobody."""
+    """Interface of a progress display."""
 
     def begin(self) -> None:
-        """The first tick is being flown."""
+        """Note that the first tick is flown."""
         ...
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
-        """The run is at `time_ns`; the newest payloads of the pose and status topics."""
+        """Show the progress at `time_ns`, with the newest payloads of the pose and status topics."""
         ...
 
     def compiling(self, what: Compilation) -> None:
-        """Kernels are being compiled, which ends with `begin`."""
+        """Show that kernels are being compiled, until `begin`."""
         ...
 
     def say(self, line: str) -> None:
-        """A line for the user."""
+        """Show a line to the user."""
         ...
 
 
 class Silent:
-    """Nobody."""
+    """Observer that shows nothing."""
 
     def begin(self) -> None:
         """Say nothing."""

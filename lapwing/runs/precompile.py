@@ -12,7 +12,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.runs.compile_notice import Compilation, guessed, notify_on_compile
-from lapwing.services.process_table import create_all
+from lapwing.services.process_table import create_all, foreign_firmware
 from lapwing.studies import metrics
 
 NEARLY = 0.97  # of a scene's guess, where the bar waits
@@ -49,7 +49,8 @@ def compile_ahead(setups: Mapping[str, RunConfig], console: Console) -> None:
 
             started = time.perf_counter()
             with notify_on_compile(setup, say):
-                BlockDiagram(setup, create_all(setup), PAGE).advance(1)  # what steps the parts is compiled, too
+                ticks = 0 if foreign_firmware(setup) else 1  # the first tick of a firmware would start it
+                BlockDiagram(setup, create_all(setup), PAGE).advance(ticks)  # what steps the parts is compiled, too
                 metrics.compile_ahead()
             done += guess
             console.print(f"{name}: ready after {time.perf_counter() - started:.1f} s", soft_wrap=True)

@@ -7,19 +7,23 @@ from pathlib import Path
 from typing import Any
 
 from lapwing.cosim.config import user_module
+from lapwing.cosim.config.former_names import present_config
 from lapwing.cosim.config.provenance import SETUP_FILE
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import from_json
+from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.log import LogReader
 from lapwing.messages import OperatorInput
 from lapwing.messages.topics import OPERATOR
 from lapwing.runs.observer import Observer
 from lapwing.runs.single_process_run import fly_single
+from lapwing.services.common.firmware.playback import TOPICS, Recorded
+from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.process_table import Operator
 
 
 def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> RunConfig:
-    """The set-up of a run's log, which may have classes of these modules.
+    """Return the run configuration of a log, which may have classes of these modules.
 
     Raises:
         ValueError: it carries none, or one of another version.
@@ -27,16 +31,16 @@ def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> RunConfig:
     if SETUP_FILE not in read.attachments:
         raise ValueError(f"{read.path}: carries no set-up; expected a log that `lapwing run` has written")
     try:
-        found = from_json(read.attachments[SETUP_FILE].decode(), modules)
+        result = from_json(read.attachments[SETUP_FILE].decode(), modules)
     except ValueError as error:
         raise ValueError(f"{read.path}: its set-up cannot be read: {error}; expected {read.versions}") from None
-    if not isinstance(found, RunConfig):
+    if not isinstance(result, RunConfig):
         raise ValueError(f"{read.path}: its attachment {SETUP_FILE} is no set-up")
-    return found
+    return present_config(result)
 
 
 def carried_modules(read: LogReader) -> dict[str, str]:
-    """The texts of the modules that the set-up of a run's log carries, by name; none of its classes is imported."""
+    """Return the texts of the modules in the run configuration of a log by name, without importing its classes."""
     try:
         return dict(json.loads(read.attachments.get(SETUP_FILE, b"{}"))["resolved"].get("modules", {}))
     except (ValueError, LookupError, TypeError, AttributeError):
@@ -44,12 +48,12 @@ def carried_modules(read: LogReader) -> dict[str, str]:
 
 
 def given_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
-    """The commands from outside, with the ticks at which they applied; none where nobody was listened to.
+    """Yield the operator commands with the ticks at which they applied; none if the vehicle accepts no commands.
 
     Args:
         read: a log.
         setup: its own.
-        vehicle: whose; "" of the first.
+        vehicle: name; "" for the first.
 
     Raises:
         ValueError: they are of another version.
@@ -63,35 +67,53 @@ def given_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> Iter
 
 
 def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = False) -> tuple[str, str]:
-    """Digests of the log, and of the run flown again up to the log's last tick.
+    """Return the digests of the log, and of the run resimulated up to the log's last tick.
 
     Args:
         log: of a run.
-        observer: is told how far the run is.
+        observer: shows the progress.
         allow_code: whether Python modules that the log carries may be run.
 
     Raises:
         ValueError: no log, or none of a run, it carries modules that must not be run, or a service was a program
-            of somebody else's.
+            an external program.
     """
     with LogReader(log) as read:
         modules = carried_modules(read)
         if modules and not allow_code:
             files = ", ".join(f"modules.{name}.py" for name in modules)
-            raise ValueError(f"{log}: carries code of its author ({files}): read it, and give --allow-code to run it")
+            raise ValueError(f"{log}: contains code of its author ({files}); read it, then use --allow-code to run it")
         user_module.install(modules)
         setup = without_plan(recorded_setup(read, modules))
+        if "fmu" in setup.services and not allow_code:
+            files = ", ".join(fmu.path for fmu in setup.services["fmu"].parameters.fmus)
+            raise ValueError(f"{log}: has FMUs, machine code of their authors ({files}); use --allow-code to run them")
         if elsewhere := read.metadata.get("external"):
-            raise ValueError(f"{log}: cannot be flown again: {elsewhere} was a program of somebody else's")
+            raise ValueError(f"{log}: cannot be resimulated: {elsewhere} was an external service")
+        recorded = {vehicle: _firmware_messages(read, setup, vehicle) for vehicle in firmware_vehicles(setup)}
         operators = {vehicle: _at(dict(given_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
         times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
         last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
         before = read.digest(current_names=True)
     with tempfile.TemporaryDirectory() as place:
         again = Path(place) / "again.mcap"
-        fly_single(setup, again, observer=observer, operator=operators, last=last)
+        fly_single(setup, again, observer=observer, operator=operators, last=last, recorded=recorded)
         with LogReader(again) as read:
             return before, read.digest()
+
+
+def firmware_vehicles(setup: RunConfig) -> list[str]:
+    """Return the names of the vehicles that a foreign firmware flies."""
+    return [member.vehicle for member in members(setup) if any(name in member.services for name in FIRMWARES)]
+
+
+def _firmware_messages(read: LogReader, setup: RunConfig, vehicle: str) -> Recorded:
+    """Return the messages of a firmware's adapter in a log."""
+    keys = {topic.key(vehicle): topic for topic in TOPICS}
+    result: Recorded = {topic: {} for topic in TOPICS}
+    for key, _, time_ns, payload in read.messages([key for key in keys if key in read.topics()]):
+        result[keys[key]][time_ns // setup.interval_ns] = payload
+    return result
 
 
 def _at(given: Mapping[int, tuple[Any, ...]]) -> Operator:
@@ -99,7 +121,7 @@ def _at(given: Mapping[int, tuple[Any, ...]]) -> Operator:
 
 
 def without_plan(setup: RunConfig) -> RunConfig:
-    """The set-up without the plan's commands, which a log has among those that the autopilot took."""
+    """Return the run configuration without the plan's commands, which the log has among the accepted commands."""
     if "autopilot" not in setup.services or not setup.vehicle:  # a fleet has no plan
         return setup
     autopilot = setup.services["autopilot"]

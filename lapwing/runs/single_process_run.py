@@ -1,13 +1,15 @@
 """A run with all services in this process."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
 from lapwing.cosim.config.provenance import attachments, failure, metadata
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.diagram.multi_vehicle import leading
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
+from lapwing.cosim.diagram.multi_vehicle import primary_topic
 from lapwing.cosim.executors.single_process import PAGE, run_single
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
@@ -27,8 +29,10 @@ def fly_single(
     observer: Observer | None = None,
     operator: Operator | Mapping[str, Operator] | None = None,
     last: int | None = None,
+    recorded: Mapping[str, Any] = MappingProxyType({}),
+    services: Sequence[Service] | None = None,
 ) -> Elapsed:
-    """Fly with all services in this process, to the end or until a state is not sound; the log then says so.
+    """Fly with all services in this process, to the end or until a state is invalid, which the log records.
 
     Args:
         setup: what to fly.
@@ -36,8 +40,10 @@ def fly_single(
         sources: the files that were resolved, for the log.
         speed: simulated seconds per second, None for as fast as it goes.
         observer: is notify_on_compile how far the run is.
-        operator: gives the commands that have come until a tick; for several vehicles one for each, by name.
+        operator: returns the commands received until a tick; for several vehicles one function for each, by name.
         last: the tick after which to stop, None for the end of the run.
+        recorded: messages of foreign firmwares to fly again, by vehicle name (`process_table.create`).
+        services: of the run, in their order; None for those of the process table.
 
     Raises:
         LockStepError: an own controller or estimator failed.
@@ -46,24 +52,31 @@ def fly_single(
     """
     watcher = observer or Silent()
     with notify_on_compile(setup, watcher.compiling):
-        graph = BlockDiagram(setup, create_all(setup, operator), PAGE)
+        graph = BlockDiagram(setup, services or create_all(setup, operator, recorded), PAGE)
     with Stop() as stop, LogWriter(log, metadata(setup, "single-process"), attachments(setup, sources or {})) as writer:
         recording = Recording(writer, setup)
-        pose, status = leading(setup, POSE), leading(setup, STATUS)
+        pose, status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
 
         def observe(graph: BlockDiagram) -> bool:
             newest = recording.newest
             watcher.show((graph.tick - 1) * setup.interval_ns, newest.get(pose), newest.get(status))
             return stop.number is not None
 
-        watcher.begin()
-        started = time.perf_counter()
+        def waits(_: str) -> None:
+            stop.check()
+
         try:
+            graph.open(waits)
+            watcher.begin()
+            started = time.perf_counter()
             run_single(graph, recording, speed, observe, last)
         except LockStepError as error:
             writer.metadata |= failure(str(error), isinstance(error, DivergedError))
             if not isinstance(error, DivergedError):
                 raise
+        finally:
+            writer.metadata |= graph.reports
+            graph.close()
         wall = time.perf_counter() - started
         if stop.number is not None:
             writer.metadata |= failure(str(Interrupted(stop.number)))

@@ -1,0 +1,125 @@
+"""Reports, views and films of logs."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from lapwing.cli.app import app
+from lapwing.cli.error_exit import user_errors
+from lapwing.cli.options import LogFile
+
+
+@app.command()
+def report(
+    log: LogFile,
+    other: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="second log, drawn over the first in every plot")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [beside the first log, .html]")
+    ] = None,
+    vehicle: Annotated[str | None, typer.Option(metavar="NAME", help="vehicle to report [first in the log]")] = None,
+    names: Annotated[
+        str | None, typer.Option(metavar="NAME,NAME", help="names of the two flights [those of the logs]")
+    ] = None,
+) -> None:
+    """Write a report of a log, or a comparison of two logs."""
+    from lapwing.cli.output_paths import check_distinct, claim_report
+    from lapwing.flight import Flight
+    from lapwing.studies.flight_data import SHOWN
+
+    with user_errors():
+        check_distinct({"FILE": log, "the second FILE": other, "--out": out})
+        claim_report("--out", out or log.with_suffix(".html"))
+        called = _names(names, other)
+        beside = Flight.read(other, vehicle, SHOWN) if other else None
+        flight = Flight.read(log, vehicle, SHOWN)
+        for each, name in zip((flight, beside), called, strict=False):
+            if each is not None:
+                each.name = name
+        typer.echo(flight.report(out, beside))
+
+
+@app.command()
+def view(
+    log: LogFile,
+    rerun: Annotated[
+        bool, typer.Option("--rerun", help="open the log in Rerun instead; needs pip install lapwing[view]")
+    ] = False,
+) -> None:
+    """Write the report of a log and open it in the browser."""
+    import webbrowser
+
+    from lapwing.flight import Flight
+    from lapwing.rerun import open_in_rerun
+    from lapwing.studies.flight_data import SHOWN
+
+    with user_errors():
+        if rerun:
+            open_in_rerun(log)
+            return
+        page = Flight.read(log, only=SHOWN).report()
+        if not webbrowser.open(page.resolve().as_uri()):
+            typer.echo("no browser found; open this page:")
+        typer.echo(page)
+
+
+@app.command()
+def render(
+    log: LogFile,
+    out: Annotated[Path, typer.Option(metavar="FILE.mp4|webp|gif|png", help="film or picture to write")],
+    other: Annotated[
+        Path | None, typer.Option("--with", metavar="FILE", help="second log, drawn translucent in the same scene")
+    ] = None,
+    camera: Annotated[str, typer.Option(metavar="follow|orbit|top|onboard", help="place of the camera")] = "follow",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="pixels, even numbers")] = "1280x720",
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="first time; of a picture its time [middle]")
+    ] = None,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="last time of a film")] = None,
+    fps: Annotated[float, typer.Option(metavar="N", help="pictures a second of a film")] = 25.0,
+    speed: Annotated[float, typer.Option(metavar="N", help="simulated seconds in a second of a film")] = 1.0,
+) -> None:
+    """Write a film or a picture of a log's 3D view.
+
+    Needs chromium, and pip install lapwing[view3d].
+    """
+    from lapwing.cli.output_paths import check_distinct, claim
+    from lapwing.flight import Flight
+    from lapwing.studies.flight_data import SHOWN
+    from lapwing.studies.report.sections import labels
+    from lapwing.studies.terminal import console
+    from lapwing.studies.view3d.render import Shot, check
+    from lapwing.studies.view3d.render import render as draw
+
+    with user_errors():
+        shot = Shot(start, stop, fps, speed, camera, _size(size))
+        check(out, shot)
+        check_distinct({"FILE": log, "--with": other, "--out": out})
+        flights = [Flight.read(path, only=SHOWN) for path in (log, other) if path]
+        claim(out)
+        from rich.progress import Progress
+
+        screen = console()
+        with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
+            task = bar.add_task("pictures", total=1)
+            draw(flights, labels(flights), out, shot, lambda done, all_: bar.update(task, completed=done, total=all_))
+        typer.echo(out)
+
+
+def _names(text: str | None, other: Path | None) -> list[str]:
+    """Return the names of --names, empty without it."""
+    if text is None:
+        return []
+    result = [name.strip() for name in text.split(",")]
+    if other is None or len(result) != 2 or not all(result) or len(set(result)) != 2:
+        raise ValueError(f"--names {text}: expected two different names for two logs, e.g. --names PID,Lee")
+    return result
+
+
+def _size(text: str) -> tuple[int, int]:
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise ValueError(f"--size {text}: expected WIDTHxHEIGHT, e.g. 1280x720")
+    return int(width), int(height)

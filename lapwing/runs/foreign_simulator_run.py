@@ -1,0 +1,105 @@
+"""Lapwing's autopilot on a foreign simulator that speaks PX4's simulator interface: no plant, no sensors of our own."""
+
+from typing import Any
+
+from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
+from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.kernels import python_function
+from lapwing.services.common import ports
+from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.firmware.motor_order import motor_order
+from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.process_table import create
+from lapwing.services.px4.resolve import LAYOUT
+from lapwing.services.px4.simulator_blocks import NAME, Receiver, Sender, SimulatorSetup
+from lapwing.services.px4.simulator_client import SimulatorClient
+from lapwing.services.px4.simulator_readings import PROVIDED
+from lapwing.services.sensors import encoders, error_models, triad
+
+TRAJECTORY = "trajectory"
+REPLACED = ("plant", "sensors")  # services whose place the simulator takes
+_variance = python_function(error_models.sample_variance)
+_deviation = python_function(error_models.white_deviation)
+_NANO = 1e-9  # [T] in nT
+
+
+def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunConfig:
+    """Return the configuration of a run in which a simulator takes the place of plant and sensors.
+
+    Raises:
+        ConfigError: the scene needs something that the simulator's interface does not have.
+    """
+    if not setup.vehicle:
+        raise ConfigError("vehicle", "a fleet", "a scene with one vehicle for --px4-sim")
+    if "autopilot" not in setup.services:
+        raise ConfigError("autopilot.firmware", "another firmware flies the vehicle", '"lapwing" for --px4-sim')
+    if "sensors" not in setup.services:
+        raise ConfigError("sensors", "missing", "the sensors of the simulator, [sensors.imu] and others")
+    sensors = setup.services["sensors"]
+    kept = {name: service for name, service in setup.services.items() if name not in REPLACED}
+    if TRAJECTORY in kept:  # the truth only holds it back to the plant's pace
+        kept[TRAJECTORY] = kept[TRAJECTORY]._replace(inputs=())
+    wanted = {i.port for service in kept.values() for i in service.inputs} - {
+        p.name for service in kept.values() for p in service.ports
+    }
+    if ports.TRUTH in wanted:
+        raise ConfigError("autopilot.estimator", "ground_truth is not in the simulator's interface", '"kalman"')
+    if missing := sorted(wanted - {*PROVIDED, ports.BATTERY}):
+        message = f"the simulator's interface has no {', '.join(missing)}"
+        raise ConfigError(f"sensors.{missing[0]}", message, f"one of {', '.join(PROVIDED)}")
+    instruments = dict(zip((p.name for p in sensors.ports), sensors.parameters.instruments, strict=True))
+    given = [p for p in sensors.ports if p.name in PROVIDED]
+    nominal = {p.name: _nominal(p, instruments[p.name].sensor) for p in given}
+    frame = airframe(scene)
+    own = SimulatorSetup(
+        host,
+        port,
+        nominal,
+        motor_order(frame, LAYOUT, "px4"),
+        frame.motor.max_voltage,
+        environment(scene).home,
+        setup.interval_ns,
+        next(p.period for p in given if p.name == ports.IMU),
+        scene.lookup("autopilot.start_timeout"),
+        scene.lookup("autopilot.step_timeout"),
+    )
+    battery = Port(ports.BATTERY, ports.BatteryReading())
+    kept[NAME] = ServiceConfig(own, (InputPort(ports.ACTUATORS, 1),), (*given, battery))
+    return setup._replace(services=kept)
+
+
+def _nominal(port: Port, p: Any) -> Any:
+    """Return the invalid reading of a sensor with the variances of its parameters."""
+    blank, rate = port.like, p.rate
+    if port.name == ports.IMU:
+        g, a = python_function(triad.gyro_units)(p.gyro), python_function(triad.accelerometer_units)(p.accelerometer)
+        omega, force = _variance(g.noise, g.resolution, rate), _variance(a.noise, a.resolution, rate)
+        return blank._replace(omega_variance=omega, specific_force_variance=force)
+    if port.name == ports.GPS:
+        v = _deviation(p.noise_velocity_m_per_s_per_sqrt_hz, rate)
+        east = _fix_variance(p.noise_horizontal_m_per_sqrt_hz, p.correlated_error_horizontal, rate)
+        up = _fix_variance(p.noise_vertical_m_per_sqrt_hz, p.correlated_error_vertical, rate)
+        return blank._replace(position_variance=(east, east, up), velocity_variance=v * v)
+    if port.name == ports.MAGNETOMETER:
+        return blank._replace(variance=_variance(p.noise_nt_per_sqrt_hz * _NANO, p.resolution_nt * _NANO, rate))
+    if port.name in (ports.BAROMETER, ports.AIRSPEED):
+        return blank._replace(variance=_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, rate))
+    return blank._replace(variance=_variance(p.noise_m_per_sqrt_hz, p.resolution, rate))
+
+
+def _fix_variance(density: float, correlated: float, rate: float) -> float:
+    return float(_deviation(density, rate) ** 2 + correlated * correlated)
+
+
+def services(setup: RunConfig) -> list[Service]:
+    """Return the services of a run on a simulator, in their order."""
+    given = setup.services[NAME]
+    own: SimulatorSetup = given.parameters
+    client = SimulatorClient(own.host, own.port)
+    receiver = Receiver(own, client, given.ports)
+    first = Service(f"{NAME}.receive", [receiver], encoders.wires(setup, None, 0))
+    last = Service(f"{NAME}.send", [Sender(own, client, receiver)], [])
+    return [first, *(create(setup, name) for name in setup.order if name != NAME), last]

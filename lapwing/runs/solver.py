@@ -1,0 +1,18 @@
+"""Integrator and step of scenes that set an accuracy only."""
+
+from lapwing.cosim.scene import Scene
+from lapwing.services.plant.schema import Solver
+from lapwing.services.scene_resolver import load
+
+
+def with_solver(scene: Scene) -> Scene:
+    """Return the scene with integrator and step that meet its accuracy; unchanged if it sets a step, or no accuracy.
+
+    Raises:
+        SceneError: no integrator meets the accuracy on this plant.
+    """
+    if scene.vehicles or not scene[Solver].undecided:  # each vehicle of several would select its own
+        return scene
+    from lapwing.studies.accuracy import solver_selection  # scenes that set a step have no use for it
+
+    return load(scene, solver_selection.overrides(scene, lambda _: None))

@@ -1,0 +1,130 @@
+"""Progress of long work started from Python: a bar in a terminal or a notebook, nothing elsewhere."""
+
+import html
+import sys
+import threading
+import time
+from typing import Any, Protocol
+
+from lapwing.runs.compile_notice import Compilation
+from lapwing.runs.time_left import TimeLeft
+
+DELAY = 2.0  # [s] of work before a bar appears
+PERIOD = 0.25  # [s] between two pictures
+NEARLY = 0.97  # of an estimate that was too short, where the bar waits
+
+
+class Picture(Protocol):
+    """Place on which a bar is drawn."""
+
+    def draw(self, share: float, text: str) -> None:
+        """Show a bar, `share` of it full (0 to 1), and a line."""
+        ...
+
+    def clear(self) -> None:
+        """Remove the bar."""
+        ...
+
+
+class TerminalPicture:
+    """Bar on the standard error output, removed at its end."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn
+
+        columns = (BarColumn(bar_width=24), TextColumn("{task.description}", markup=False))
+        self._bar = Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
+        self._task = self._bar.add_task("", total=1.0)
+        self._bar.start()
+
+    def draw(self, share: float, text: str) -> None:
+        """Show a bar, `share` of it full (0 to 1), and a line."""
+        self._bar.update(self._task, completed=share, description=text, refresh=True)
+
+    def clear(self) -> None:
+        """Remove the bar."""
+        self._bar.stop()
+
+
+class NotebookPicture:
+    """Bar in the output of a notebook's cell, emptied at its end."""
+
+    def __init__(self) -> None:
+        from IPython.display import HTML, display
+
+        self._page = HTML
+        self._output: Any = display(HTML(""), display_id=True)
+
+    def draw(self, share: float, text: str) -> None:
+        """Show a bar, `share` of it full (0 to 1), and a line."""
+        bar = f'<progress value="{share:.3f}" max="1"></progress> <code>{html.escape(text)}</code>'
+        self._output.update(self._page(bar))
+
+    def clear(self) -> None:
+        """Remove the bar."""
+        self._output.update(self._page(""))
+
+
+def picture() -> type[Picture] | None:
+    """Return the picture for this program; None where nobody looks: no terminal, no notebook."""
+    shell = sys.modules.get("IPython")
+    if shell is not None and hasattr(shell.get_ipython(), "kernel"):
+        return NotebookPicture
+    return TerminalPicture if sys.stderr is not None and sys.stderr.isatty() else None
+
+
+class WorkProgress:
+    """Bar of one piece of work; a context manager. It appears after DELAY seconds and disappears at the end."""
+
+    def __init__(self, title: str, total: float, unit: str):
+        """Create the bar of work that ends at `total`, in `unit`."""
+        self._title, self._total, self._unit = title, total, unit
+        self._compiles: Compilation | None = None
+        self._began, self._done, self._left = time.monotonic(), 0.0, TimeLeft()
+        self._end, self._thread = threading.Event(), None
+        if (kind := picture()) is not None:
+            self._thread = threading.Thread(target=self._run, args=(kind,), daemon=True)
+
+    def __enter__(self) -> "WorkProgress":
+        if self._thread:
+            self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._thread:
+            self._end.set()
+            self._thread.join()
+
+    def compiling(self, what: Compilation) -> None:
+        """Note that kernels compile, until the first call of `show`."""
+        self._began, self._compiles = time.monotonic(), what
+
+    def show(self, done: float) -> None:
+        """Note that `done` of the total is reached."""
+        if self._compiles is not None:
+            self._compiles, self._left = None, TimeLeft()
+        self._done = done
+        self._left.done(done)
+
+    def state(self) -> tuple[float, str]:
+        """Return the share of the bar that is full, and its line."""
+        if (what := self._compiles) is not None:
+            elapsed = time.monotonic() - self._began
+            share = min(NEARLY, elapsed / max(what.seconds, 1e-9))
+            return share, f"{self._title}: compiling once, {elapsed:.0f} of about {what.seconds:.0f} s"
+        left = self._left.text(self._total)
+        line = f"{self._title}: {self._done:.{0 if self._unit == 'flights' else 1}f} of {self._total:.4g} {self._unit}"
+        return self._done / self._total, f"{line}, {left}" if left else line
+
+    def _run(self, kind: type[Picture]) -> None:
+        if self._end.wait(DELAY):
+            return
+        shown = kind()
+        try:
+            while True:
+                shown.draw(*self.state())
+                if self._end.wait(PERIOD):
+                    return
+        finally:
+            shown.clear()
