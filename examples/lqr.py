@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_continuous_are
 from scipy.spatial.transform import Rotation
 
-from lapwing.plugins import Reference, StateEstimate, ThrustAndMoments, VehicleModel
+from lapwing.plugins import Setpoint, StateEstimate, ThrustAndMoments, VehicleModel
 
 
 class Lqr:
@@ -64,7 +64,7 @@ class Lqr:
         self.vehicle, self.tilt_max = vehicle, tilt_max
         self.integral = np.zeros(3)  # world [m s]
 
-    def step(self, time: float, estimate: StateEstimate, setpoint: Reference) -> ThrustAndMoments:
+    def step(self, time: float, estimate: StateEstimate, setpoint: Setpoint) -> ThrustAndMoments:
         """Thrust and moments at `time` [s]."""
         w, x, y, z = estimate.attitude
         heading, pitch, roll = Rotation.from_quat([x, y, z, w]).as_euler("ZYX")

@@ -34,8 +34,8 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node) -> None:
     """One that has crashed has none."""
-    if found := getattr(node, "workeroutput", {}).get(_PEAK):
-        node.config.stash[_peaks][node.gateway.id] = found
+    if result := getattr(node, "workeroutput", {}).get(_PEAK):
+        node.config.stash[_peaks][node.gateway.id] = result
 
 
 def pytest_terminal_summary(terminalreporter) -> None:

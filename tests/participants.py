@@ -9,11 +9,11 @@ from lapwing.services.process_table import PROCESSES
 def participants(launcher):
     """Process numbers of a launcher's children that take part, by name."""
     names = {process.name for process in PROCESSES}
-    found = {}
+    result = {}
     with suppress(OSError):
         for child in Path(f"/proc/{launcher}/task/{launcher}/children").read_text().split():
             with suppress(OSError):
                 name = Path(f"/proc/{child}/comm").read_text().strip()
                 if name in names:
-                    found[name] = int(child)
-    return found
+                    result[name] = int(child)
+    return result

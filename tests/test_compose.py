@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -19,6 +20,7 @@ from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.runs.distributed_run import parse_endpoints
 from lapwing.services import process_table as processes
 from lapwing.services import security
+from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.scene_resolver import load, resolve
 from tests.services.foxglove.client import patient
 
@@ -56,7 +58,7 @@ def free_port(kind=socket.SOCK_STREAM):
         return s.getsockname()[1]
 
 
-def test_every_service_has_a_known_command_and_needs_only_what_is_there():
+def test_compose_services_have_known_commands():
     services = compose()
     for name, service in services.items():
         assert set(service.get("depends_on", ())) <= set(services), name
@@ -68,7 +70,7 @@ def test_every_service_has_a_known_command_and_needs_only_what_is_there():
             assert command[1] in ("run", "service", "replay", "campaign", "-m")
 
 
-def test_a_profile_starts_all_that_it_needs_and_nothing_else():
+def test_profile_starts_exactly_its_dependencies():
     services = compose()
     assert "profiles" not in services.pop("keys")  # docker-compose 1.29 finds what others need only so
     for name, service in services.items():
@@ -77,13 +79,15 @@ def test_a_profile_starts_all_that_it_needs_and_nothing_else():
             assert set(service["profiles"]) <= set(services[needed]["profiles"]), f"{name} needs {needed}"
     profiles = ("cluster", "mission", "groundstation", "view")
     of = {p: {n for n, s in services.items() if p in s["profiles"]} for p in profiles}
+    for firmware in FIRMWARES:
+        assert {n for n, s in services.items() if firmware in s["profiles"]} == {firmware}
     assert of["cluster"] == {"scheduler", "worker", "campaign"}
     assert of["mission"] | {"keys"} == {"mission", *services["mission"]["depends_on"]}
     assert of["groundstation"] == {*of["mission"], "groundstation"}
     assert of["view"] == {*of["mission"], "foxglove"}
 
 
-def test_every_image_is_a_stage_of_the_dockerfile():
+def test_every_image_is_stage_of_dockerfile():
     stages = set(re.findall(r"^FROM \S+ AS (\S+)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE))
     images = {(service["image"], service["build"]["target"]) for service in compose().values()}
     assert {target for _, target in images} <= stages
@@ -99,11 +103,11 @@ def own_certificates(services):
 
 
 def mounted(service):
-    """Where what a service is given of certificates comes from, and goes to."""
+    """Return source and target of each service's certificates."""
     return [volume for volume in service.get("volumes", ()) if "keys" in volume]
 
 
-def test_every_container_is_given_its_own_certificate_and_no_other():
+def test_container_gets_only_its_own_certificate():
     services = compose()
     services.pop("tests")
     keys, own = services.pop("keys"), own_certificates(services)
@@ -120,7 +124,7 @@ def test_every_container_is_given_its_own_certificate_and_no_other():
     assert set(declared) == {volume.partition(":")[0] for volume in mounted(keys)}
 
 
-def test_links_between_containers_are_certified_unless_that_is_asked_for():
+def test_container_links_are_certified_by_default():
     services, opened = compose(), compose(SCHEME="tcp", LINKS="--insecure")
     for name in own_certificates({name: each for name, each in services.items() if "command" in each}):
         command, insecure = services[name]["command"], opened[name]["command"]
@@ -159,19 +163,19 @@ def endpoints():
 
 
 @pytest.mark.parametrize("scene", sorted(Path("scenes").glob("*.toml")), ids=lambda path: path.stem)
-def test_every_process_that_a_scene_needs_has_a_container_and_an_endpoint(scene):
+def test_required_processes_have_container_and_endpoint(scene):
     peers, started = endpoints()
-    needed = {MONITOR, *processes.needed(resolve(load(scene)))}
+    needed = {MONITOR, *processes.required_processes(resolve(load(scene)))}
     assert needed <= set(peers)
     assert needed <= started
 
 
-def test_every_process_of_the_table_has_an_endpoint():
+def test_every_process_of_table_has_endpoint():
     peers, _ = endpoints()
     assert {entry.name for entry in processes.PROCESSES} <= set(peers)
 
 
-def test_a_cluster_flies_a_campaign(tmp_path):
+def test_cluster_flies_campaign(tmp_path):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
     services, port = compose(), str(free_port())
 
@@ -181,8 +185,8 @@ def test_a_cluster_flies_a_campaign(tmp_path):
         other = {"/tmp": str(tmp_path), SET["SCENE"]: "lapwing/scenes/hover.toml"}
         words = [other.get(word, word) for word in words]
         program = [sys.executable, *words[1:]] if words[0] == "python" else [sys.executable, "-m", *words]
-        with (tmp_path / f"{name}.txt").open("w") as said:
-            return subprocess.Popen([*program, *more], cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
+        with (tmp_path / f"{name}.txt").open("w") as output:
+            return subprocess.Popen([*program, *more], cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
 
     with ended_after(60) as helpers:
         helpers.append(begun("scheduler"))
@@ -210,13 +214,13 @@ def flying(services, name, folder, *more):
     with ended_after(30) as processes:
         for each in [*({*services[name]["depends_on"]} - {"keys"}), name]:
             command = [sys.executable, "-m", "lapwing", *map(here, services[each]["command"][1:]), *more]
-            with (folder / f"{each}.txt").open("w") as said:
-                running[each] = subprocess.Popen(command, cwd=ROOT, stdout=said, stderr=subprocess.STDOUT)
+            with (folder / f"{each}.txt").open("w") as output:
+                running[each] = subprocess.Popen(command, cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
             processes.append(running[each])
         yield running, ports
 
 
-def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(tmp_path):
+def test_viewer_with_certificate_receives_flight_and_events(tmp_path):
     pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
     keys = tmp_path / "keys"
     make(keys, security.names(), 1)
@@ -234,7 +238,7 @@ def test_with_certificates_a_viewer_is_shown_the_flight_and_what_happens_in_it(t
     assert seen[1] > 0
 
 
-def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
+def test_groundstations_services_fly_as_separate_processes(tmp_path):
     services = compose(SCHEME="tcp", LINKS="--insecure")
     with flying(services, "groundstation", tmp_path) as (_, ports):
         port = ports["0.0.0.0:5760"]
@@ -266,3 +270,34 @@ def test_the_groundstations_services_fly_as_separate_processes(tmp_path):
             pass
         station.close()
         assert "not part of" in (tmp_path / "trajectory.txt").read_text()
+
+
+@pytest.mark.parametrize("firmware", FIRMWARES)
+def test_firmware_profile_starts_program_of_its_mount(firmware):
+    service = compose(SCENE=f"{firmware}_quad")[firmware]
+    mount = next(v for v in service["volumes"] if ":/opt/" in v)
+    host, target, mode = mount.split(":")
+    assert (host[:2], mode) == ("./", "ro")
+    overrides = [value for option, value in pairwise(service["command"]) if option == "--set"]
+    setup = resolve(load(service["command"][2], overrides)).services[firmware].parameters
+    assert setup.command[0].startswith(target)
+    assert service["healthcheck"] == {"disable": True}
+
+
+@pytest.mark.parametrize(
+    ("firmware", "program", "skipped", "ends"),
+    [("px4", "bin/px4", 2, "Landed"), ("ardupilot", "arducopter", 0, "leaves the ground")],
+)
+def test_firmware_profile_flies_mounted_program(firmware, program, skipped, ends, tmp_path):
+    peer = ROOT / f"tests/services/{firmware}/scripted_{firmware}.py"
+    file = tmp_path / program
+    file.parent.mkdir(exist_ok=True)
+    file.write_text(f'#!/bin/sh\nshift {skipped}\nexec "{sys.executable}" "{peer}" "$@"\n')
+    file.chmod(0o755)
+    service = compose(SCENE=f"{firmware}_quad", LOG=str(tmp_path / "flight.mcap"))[firmware]
+    command = [part.replace(f"/opt/{firmware}", str(tmp_path)) for part in service["command"][1:]]
+    short = ["--set", "run.duration=15.0"] if firmware == "ardupilot" else []
+    done = subprocess.run(
+        [sys.executable, "-m", "lapwing", *command, *short], capture_output=True, text=True, timeout=900, check=False
+    )
+    assert ends in done.stdout, done.stdout + done.stderr

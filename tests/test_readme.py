@@ -38,12 +38,12 @@ def folder(tmp_path_factory):
 def begun(folder, request):
     """The commands that are asked for, as many at a time as there are cores, each with what it will end with."""
     names = {item.callspec.params["command"] for item in request.session.items if _is_flown(item)}
-    found: dict[str, Future] = {}
+    result: dict[str, Future] = {}
     pool = ThreadPoolExecutor(os.cpu_count())
     for number, command in enumerate(c for c in FLOWN if c in names):
-        before = [found[c] for c in found if _written(c) & set(shlex.split(command))]
-        found[command] = pool.submit(_run, command, f"test-readme-{number}", folder, before)
-    yield found
+        before = [result[c] for c in result if _written(c) & set(shlex.split(command))]
+        result[command] = pool.submit(_run, command, f"test-readme-{number}", folder, before)
+    yield result
     pool.shutdown(cancel_futures=True)
 
 

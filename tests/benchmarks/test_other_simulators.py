@@ -44,7 +44,7 @@ def test_simulators_measure_rows_of_cases(name, package):
     assert max(loops.values()) < 1e-5  # three digits below the baseline method: the same body, turning the same way
 
 
-def test_drake_four_bars_follow_the_equation_of_motion():
+def test_drake_four_bars_follow_equation_of_motion():
     pytest.importorskip("pydrake")
     simulator = discovery.get(stability, "drake_sim", "simulator")
     assert simulator.four_bars()["four_bar"][simulator.DISCRETE] < 0.05  # [m], of tips that move by 2 m
@@ -60,7 +60,7 @@ def test_set_down_vehicle_touches_with_two_balls(axis, angle):
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3])
-def test_toppling_edge_is_below_the_centre_of_mass(off):
+def test_toppling_edge_is_below_centre_of_mass(off):
     def falls(axis, angle):
         _, attitude = _ball_feet.set_down(axis, angle - off)
         R = np.reshape(rotation_matrix(Quaternion(*attitude)), (3, 3))

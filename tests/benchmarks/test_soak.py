@@ -7,12 +7,12 @@ from benchmarks.soak import Sample, rows
 
 def samples(slower, dearer):
     """40 of a flight that is `slower` in its last quarter, and whose simulated seconds are `dearer` there."""
-    found, wall, processor = [], 0.0, 0.0
+    result, wall, processor = [], 0.0, 0.0
     for k in range(41):
-        found.append(Sample(wall, float(k), 1000.0, 90, 40, processor, 0.15 * k))
+        result.append(Sample(wall, float(k), 1000.0, 90, 40, processor, 0.15 * k))
         late = k >= 30
         wall, processor = wall + 0.1 * (slower if late else 1.0), processor + 0.2 * (dearer if late else 1.0)
-    return found
+    return result
 
 
 @pytest.mark.parametrize(
@@ -24,8 +24,8 @@ def samples(slower, dearer):
         (0.5, 0.5, []),
     ],
 )
-def test_a_run_that_becomes_slow_falls_short(slower, dearer, short):
-    found = {row.what.removeprefix("flight: "): row for row in rows(samples(slower, dearer), "flight")}
-    assert [what for what, row in found.items() if row.short] == short
-    assert found["speed, to the first"].measured == pytest.approx(1 / slower)
-    assert found["processor time, to the first"].measured == pytest.approx(dearer)
+def test_run_that_becomes_slow_falls_short(slower, dearer, short):
+    result = {row.what.removeprefix("flight: "): row for row in rows(samples(slower, dearer), "flight")}
+    assert [what for what, row in result.items() if row.short] == short
+    assert result["speed, to the first"].measured == pytest.approx(1 / slower)
+    assert result["processor time, to the first"].measured == pytest.approx(dearer)

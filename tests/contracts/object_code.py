@@ -35,10 +35,10 @@ def _object_code(library: Any) -> bytes:
 
 def imported_by_kernels() -> dict[str, set[str]]:
     """Return, for every imported symbol, the kernels of this process that import it."""
-    found: dict[str, set[str]] = {}
+    results: dict[str, set[str]] = {}
     for dispatcher in [each for each in gc.get_objects() if isinstance(each, KernelDispatcher)]:
         for result in dispatcher.overloads.values():
             if not isinstance(result.library, InnerLibrary):
                 for symbol in undefined_symbols(_object_code(result.library)):
-                    found.setdefault(symbol, set()).add(dispatcher.py_func.__qualname__)
-    return found
+                    results.setdefault(symbol, set()).add(dispatcher.py_func.__qualname__)
+    return results

@@ -1,4 +1,4 @@
-"""What holds for every effect that the catalogue finds."""
+"""Contract of every effect in the catalogue."""
 
 import math
 import re
@@ -27,6 +27,7 @@ KEY = stream_key(1, "drone1", "effects")
 HOVER = (32.6, 32.5, 32.7, 32.6)
 
 NEEDED = {  # the keys that a scene cannot leave out
+    "ceiling_effect": {"height": 12.0},
     "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
     "rotational_drag": {"linear": [0.1, 0.1, 0.1]},
     "rotor_damage": {"rotor": 1},
@@ -40,8 +41,8 @@ NEEDED = {  # the keys that a scene cannot leave out
     "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 0.0, "duration": 1.0},
 }
 OTHERS = (  # of which another is among them
-    "battery_thevenin", "coaxial_interference", "gravity", "dynamic_inflow", "rotor_quadratic", "rotor_table",
-    "wind_dryden_rates", "wind_von_karman",
+    "battery_thevenin", "coaxial_interference", "gravity", "ground_effect", "dynamic_inflow", "rotor_interference",
+    "rotor_quadratic", "rotor_table", "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
 COAXIAL = DRONE.model_copy(
     update={
@@ -51,15 +52,17 @@ COAXIAL = DRONE.model_copy(
     }
 )
 FRAMES = {"coaxial_interference": COAXIAL}  # of effects that the drone cannot have
-BESIDE = {"coaxial_interference": {"rotor_thrust": {}}}  # what an effect goes with
+BESIDE = {
+    name: {"rotor_thrust": {}} for name in ("coaxial_interference", "rotor_interference")
+}  # what an effect goes with
 FREE = {**NEEDED, "random_wind_force": {"allow_body_drag": True}}
 ALL = {name: FREE.get(name, {}) for name in effects.names() if name not in OTHERS}
 
 
 def made(name, table):
     """The effect, on a vehicle that can have it."""
-    found = effects.from_scene({**BESIDE.get(name, {}), name: table}, FRAMES.get(name, DRONE))
-    return next(e for e in found if type(e) is effects.parameter_class(name))
+    result = effects.from_scene({**BESIDE.get(name, {}), name: table}, FRAMES.get(name, DRONE))
+    return next(e for e in result if type(e) is effects.parameter_class(name))
 
 
 @pytest.mark.parametrize("name", effects.names())
@@ -72,12 +75,12 @@ def test_is_documented(name):
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_registers_a_hook(name):
+def test_registers_hook(name):
     assert any(effects.parameter_class(name) in registered for registered in hooks.HOOKS.values())
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_is_built_from_a_scene_and_refuses_unknown_keys(name):
+def test_is_built_from_scene_and_refuses_unknown_keys(name):
     assert isinstance(hooks.initial_discrete_state(made(name, NEEDED.get(name, {}))), tuple)
     with pytest.raises(ValueError, match=rf"^effects\.{name}\.nonsense: ") as error:
         made(name, {**NEEDED.get(name, {}), "nonsense": 1.0})
@@ -85,7 +88,7 @@ def test_is_built_from_a_scene_and_refuses_unknown_keys(name):
 
 
 @pytest.mark.parametrize("name", NEEDED)
-def test_names_the_key_that_is_missing(name):
+def test_names_key_that_is_missing(name):
     with pytest.raises(ValueError, match=rf"^effects\.{name}\.{next(iter(NEEDED[name]))}: missing; expected"):
         effects.from_scene({name: {}}, DRONE)
 
@@ -104,7 +107,7 @@ def numbers(name):
     ("name", "key", "count"), [(name, *entry) for name in effects.names() for entry in numbers(name)]
 )
 @pytest.mark.parametrize("value", [-1e12, 1e12])
-def test_names_the_key_that_is_out_of_range(name, key, count, value):
+def test_names_key_that_is_out_of_range(name, key, count, value):
     if value > 0.0 and key in ("release_time", "start", "duration", "time"):
         pytest.skip("a time may be as late as one likes")
     table = {**NEEDED.get(name, {}), key: [value] * count if count else value}
@@ -112,7 +115,7 @@ def test_names_the_key_that_is_out_of_range(name, key, count, value):
         effects.from_scene({name: table}, DRONE)
 
 
-def test_says_the_whole_range_whatever_is_wrong_with_a_number():
+def test_range_error_names_both_limits():
     for charge, wrong in (
         (1.5, "got 1.5"),
         (-1.0, "got -1.0"),
@@ -124,7 +127,7 @@ def test_says_the_whole_range_whatever_is_wrong_with_a_number():
         effects.from_scene({"wind_gust": {"peak": [1.0, 0.0, 0.0]}}, DRONE)
 
 
-def test_unknown_effect_lists_the_choices():
+def test_unknown_effect_lists_choices():
     with pytest.raises(
         ValueError,
         match=r"unknown effect 'gravitation'; did you mean gravity_altitude\? expected one of air_density",
@@ -132,7 +135,7 @@ def test_unknown_effect_lists_the_choices():
         effects.from_scene({"gravitation": {}}, DRONE)
 
 
-def test_two_of_a_kind_exclude_each_other():
+def test_two_of_kind_exclude_each_other():
     with pytest.raises(ValueError, match=r"effects.gravity_altitude: excludes effects.gravity, both are a gravity"):
         effects.from_scene({"gravity": {}, "gravity_altitude": {}}, DRONE)
 
@@ -154,7 +157,7 @@ def test_all_effects_at_once_fly():
     assert [len(memory) > 0 for memory in state.memory].count(True) >= 6
 
 
-def test_the_order_of_the_scenes_tables_does_not_matter():
+def test_order_of_scenes_tables_does_not_matter():
     one = effects.from_scene(ALL, DRONE)
     assert one == effects.from_scene(dict(reversed(ALL.items())), DRONE)
 
@@ -200,7 +203,7 @@ def test_effects_that_are_off_leave_every_bit():
     assert not math.isclose(state.motion.omega_body[0], 0.0)
 
 
-def test_a_step_takes_about_as_long_as_one_written_by_hand():
+def test_step_takes_about_as_long_as_one_written_by_hand():
     """Processor time of the plant's step to that of the loop above, the least of many short runs in turn."""
     p = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))
     start, steps = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=330.0), 10_000
@@ -218,6 +221,6 @@ def test_a_step_takes_about_as_long_as_one_written_by_hand():
     assert plant < 1.5 * by_hand  # measured: 1.02
 
 
-def test_a_sleeping_effect_leaves_every_bit():
+def test_disabled_effect_changes_no_bit():
     """High above the ground the contact changes nothing."""
     assert fly({"gravity": {}, "ground_contact": {}}, RK4).motion == fly({"gravity": {}}, RK4).motion

@@ -13,7 +13,7 @@ def imports():
     ]
     files = {path: path.with_suffix("").as_posix().replace("/", ".") for path in paths}
     names = {name.removesuffix(".__init__"): path for path, name in files.items()}
-    found = {}
+    result = {}
     for name, path in names.items():
         taken = set()
         for node in ast.walk(ast.parse(path.read_text())):
@@ -23,8 +23,8 @@ def imports():
                 inner = {f"{node.module}.{alias.name}" for alias in node.names}
                 taken |= inner & names.keys() or {node.module}
                 taken |= {node.module} if inner - names.keys() else set()
-        found[name] = (taken & names.keys()) - {name}
-    return found
+        result[name] = (taken & names.keys()) - {name}
+    return result
 
 
 def cycle(graph):
@@ -37,15 +37,15 @@ def cycle(graph):
         if name in done:
             return None
         for other in sorted(graph[name]):
-            if found := search(other, [*way, name]):
-                return found
+            if result := search(other, [*way, name]):
+                return result
         done.add(name)
         return None
 
-    return next((found for name in sorted(graph) if (found := search(name, []))), None)
+    return next((result for name in sorted(graph) if (result := search(name, []))), None)
 
 
-def test_a_cycle_is_found():
+def test_cycle_is_found():
     assert cycle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
 
 

@@ -188,12 +188,12 @@ def test_evaluations_are_as_declared(name):
     assert count[0] == method.EVALUATIONS
 
 
-def test_an_unknown_name_lists_the_choices():
+def test_unknown_name_lists_choices():
     with pytest.raises(ValueError, match=r"unknown integrator 'rk5'; did you mean .* \(integrators: .*rk4.*rkmk4"):
         integrators.get("rk5")
 
 
-def test_a_drifting_method_says_so():
+def test_drifting_method_declares_its_drift():
     p, x0 = SPACES
     drifting = [n for n in integrators.names() if not integrators.get(n).ON_MANIFOLD]
     assert drifting

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 import lapwing.plugins
-from lapwing.cli.new_templates import TEMPLATES
+from lapwing.cli.new_command import TEMPLATES, templates
 
 PUBLIC = {"lapwing", "lapwing.plugins", "lapwing.gym"}
 TEMPLATE_TEXTS = {
-    f"{kind} {part}": text.format(name="own", cls="Own")
-    for kind, texts in TEMPLATES.items()
-    for part, text in zip(("module", "test"), texts, strict=True)
+    f"{path.name} {k}": text
+    for path in sorted(TEMPLATES.glob("*_test.py.template"))
+    for k, text in enumerate(templates(path.name.removesuffix("_test.py.template"), "own"))
 }
 EXAMPLES = {path.name: path.read_text() for path in sorted(Path("examples").glob("*.py"))}
 TUTORIALS = {

@@ -1,4 +1,4 @@
-"""What a process of the lock step imports of others: what it needs to fly, nothing that resolves, draws or prints."""
+"""Imports of lock-step processes: only those needed to fly, none that resolve, draw or print."""
 
 import subprocess
 import sys
@@ -6,7 +6,7 @@ from io import BytesIO
 
 import pytest
 
-from lapwing.services.process_main import ProcessSpec, hand_over
+from lapwing.services.process_main import ProcessSpec, write_spec
 from lapwing.services.scene_resolver import load, resolve
 
 pytestmark = pytest.mark.long
@@ -18,8 +18,8 @@ BY_OTHERS = {"cffi", "charset_normalizer", "colorama", "cython_runtime", "pycpar
 CHILD = """
 import sys
 before = set(sys.modules)
-from lapwing.services.process_main import take_over
-given = take_over()
+from lapwing.services.process_main import read_spec
+given = read_spec()
 import lapwing.cosim.transport.bus, lapwing.cosim.executors.lockstep
 from lapwing.services import process_table
 process_table.create(given.setup, given.name)
@@ -46,10 +46,12 @@ def setup():
 
 
 @pytest.mark.parametrize("name", ["plant", "sensors", "autopilot", "trajectory"])
-def test_a_process_imports_what_it_needs_to_fly(setup, name):
-    given = BytesIO()
-    hand_over(ProcessSpec(name, setup, {}, "lapwing"), given)
-    ended = subprocess.run([sys.executable, "-P", "-c", CHILD], input=given.getvalue(), capture_output=True, check=True)
+def test_process_imports_are_minimal(setup, name):
+    values = BytesIO()
+    write_spec(ProcessSpec(name, setup, {}, "lapwing"), values)
+    ended = subprocess.run(
+        [sys.executable, "-P", "-c", CHILD], input=values.getvalue(), capture_output=True, check=True
+    )
     modules = ended.stdout.decode().split()
     packages = {module.partition(".")[0] for module in modules} - sys.stdlib_module_names
     assert {p for p in packages if not p.startswith("_")} - OWN - BY_OTHERS <= NEEDED
@@ -61,12 +63,12 @@ def check_scipy(modules):
     assert {p for p in parts if not p.startswith("scipy._")} <= {"scipy.linalg", "scipy.version"}  # numba: BLAS
 
 
-def test_a_fork_of_the_command_has_nothing_that_resolves_draws_or_prints(tmp_path):
+def test_fork_imports_no_resolver_plot_or_console_module(tmp_path):
     command = [sys.executable, "-c", FORKED, tmp_path / "l.mcap", tmp_path / "r.html"]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    found = {line for line in said.splitlines() if line.startswith("at the fork:")}
-    assert found
-    for line in found:
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    result = {line for line in output.splitlines() if line.startswith("at the fork:")}
+    assert result
+    for line in result:
         modules = line.split()[3:]
         assert not {m.partition(".")[0] for m in modules} & {"rich", "jinja2", "control", "matplotlib", "plotly"}
         assert not [m for m in modules if m.endswith(".resolve")]

@@ -12,7 +12,7 @@ import lapwing.cosim.diagram.execution_groups
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.compiled_block import run
 from lapwing.cosim.log import LogReader
-from lapwing.services.common.operator_inbox import nobody
+from lapwing.services.common.operator_inbox import no_operator
 from lapwing.services.common.run_schema import Published, Run
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
@@ -33,7 +33,7 @@ def fly(scene, folder):
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: path.stem)
-def test_scene_is_valid_and_says_what_it_is(scene):
+def test_scene_is_valid_and_has_description(scene):
     assert load(scene)[Run].title
 
 
@@ -53,7 +53,7 @@ def test_no_part_makes_arrays(scene, monkeypatch):
     monkeypatch.setattr(lapwing.cosim.diagram.execution_groups, "run", watched)
     setup = resolve(load(scene))
     _nrt_python.memsys_enable_stats()
-    BlockDiagram(setup, create_all(setup, nobody), 1).advance(250)
+    BlockDiagram(setup, create_all(setup, no_operator), 1).advance(250)
     _nrt_python.memsys_disable_stats()
     assert made == 0
 
@@ -67,7 +67,7 @@ def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):
         assert flown["rmse"][axis] < value, axis
 
 
-def test_paper_gains_on_the_truth_repeat_table_7_in_translation(tmp_path):
+def test_paper_gains_on_truth_repeat_table_7_in_translation(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_paper.toml"
     published = load(scene)[Published].rmse
     flown = fly(scene, tmp_path)
@@ -76,7 +76,7 @@ def test_paper_gains_on_the_truth_repeat_table_7_in_translation(tmp_path):
         assert flown["rmse"][axis] == pytest.approx(published[axis], rel=0.25), axis
 
 
-def test_the_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
+def test_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_full.toml"
     published = load(scene)[Published].rmse
     flown = fly(scene, tmp_path)

@@ -45,26 +45,26 @@ app(sys.argv[2:], standalone_mode=False)
 
 
 def kernels(*words):
-    """Of a command from its beginning to its end: (the kernels that it compiles, those that it looks up)."""
+    """Return (compiled kernels, kernels looked up) of a command."""
     run = subprocess.run([sys.executable, "-c", RUN, *words], check=True, capture_output=True, text=True)
     return json.loads(run.stdout.splitlines()[-1])
 
 
 def flown(folder):
-    """The same of a run."""
+    """Return (compiled kernels, kernels looked up) of a run."""
     return kernels(
         "run", "hover", "--mode", "single-process", "--set", "run.duration=0.2", "--log", str(folder / "log.mcap")
     )
 
 
-def test_the_second_run_compiles_nothing(tmp_path):
+def test_second_run_does_not_compile(tmp_path):
     flown(tmp_path)
     compiled, looked_up = flown(tmp_path)
     assert compiled == []
     assert looked_up
 
 
-def test_a_run_needs_nothing_that_compiling_ahead_does_not_look_up(tmp_path):
+def test_precompile_covers_all_kernels_of_run(tmp_path):
     """And hence compiles, and keeps: without a cache of its own, for which all would be compiled once more."""
     _, ahead = kernels("precompile", "hover")
     compiled, looked_up = flown(tmp_path)
@@ -74,10 +74,10 @@ def test_a_run_needs_nothing_that_compiling_ahead_does_not_look_up(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are not forked")
 @pytest.mark.parametrize("scene", ["hover", "delivery_mission"])
-def test_no_process_compiles_once_the_run_has_begun(tmp_path, monkeypatch, scene):
+def test_no_process_compiles_once_run_has_begun(tmp_path, monkeypatch, scene):
     monkeypatch.setenv("LAPWING_CACHE", str(tmp_path / "cache"))
     words = ["run", scene, "--set", "run.duration=0.5", "--set", "success.require=[]", "--log", tmp_path / "log.mcap"]
     subprocess.run([sys.executable, "-c", JOINS, tmp_path / "told", *words], check=True, capture_output=True)
-    told = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]
-    assert "lapwing.cosim.diagram.compiled_block.run" in [kernel for kernel, _ in told]
-    assert [(kernel, process) for kernel, process in told if process] == []
+    reported = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]
+    assert "lapwing.cosim.diagram.compiled_block.run" in [kernel for kernel, _ in reported]
+    assert [(kernel, process) for kernel, process in reported if process] == []

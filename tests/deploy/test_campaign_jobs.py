@@ -26,27 +26,27 @@ WORDS = [
 
 
 def calls(folder, *command, **environment):
-    """What a command calls of `lapwing` and `sbatch`, both of which only tell it; argv of each, in order."""
-    said = folder / "said"
-    said.unlink(missing_ok=True)
+    """Return the argv of each call of `lapwing` and `sbatch`, both replaced by recorders, in order."""
+    output = folder / "said"
+    output.unlink(missing_ok=True)
     for name in ("lapwing", "sbatch"):
         (folder / name).write_text(TOLD + ('print("77")\n' if name == "sbatch" else ""))
         (folder / name).chmod(0o755)
-    environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "SAID": str(said), **environment}
+    environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "SAID": str(output), **environment}
     subprocess.run(command, env=environment, check=True, cwd=folder, stdout=subprocess.DEVNULL)
-    return [[Path(program).name, *words] for program, *words in map(json.loads, said.read_text().splitlines())]
+    return [[Path(program).name, *words] for program, *words in map(json.loads, output.read_text().splitlines())]
 
 
-def test_slurm_submits_the_parts_and_then_the_table(tmp_path):
-    given = {"PARTS": "3", "DIR": str(tmp_path / "it's here")}
-    array, last = calls(tmp_path, str(DEPLOY / "campaign.slurm"), *WORDS, **given)
+def test_slurm_submits_parts_and_then_table(tmp_path):
+    values = {"PARTS": "3", "DIR": str(tmp_path / "it's here")}
+    array, last = calls(tmp_path, str(DEPLOY / "campaign.slurm"), *WORDS, **values)
     assert array[:4] == ["sbatch", "--parsable", "--export=ALL", "--array=1-3"]
     assert last[:4] == ["sbatch", "--export=ALL", "--dependency=afterany:77", "--wrap"]
     for part in (1, 2, 3):
-        (flown,) = calls(tmp_path, *array[4:], **given, SLURM_ARRAY_TASK_ID=str(part))
-        wanted = ["--out", given["DIR"], "--shard", f"{part}/3", "--workers", "1"]
-        assert flown == ["lapwing", "campaign", *WORDS, *wanted]
-    assert calls(tmp_path, "sh", "-c", last[4]) == [["lapwing", "campaign", *WORDS, "--out", given["DIR"]]]
+        (flown,) = calls(tmp_path, *array[4:], **values, SLURM_ARRAY_TASK_ID=str(part))
+        expected = ["--out", values["DIR"], "--shard", f"{part}/3", "--workers", "1"]
+        assert flown == ["lapwing", "campaign", *WORDS, *expected]
+    assert calls(tmp_path, "sh", "-c", last[4]) == [["lapwing", "campaign", *WORDS, "--out", values["DIR"]]]
 
 
 def test_kubernetes_flies_each_part_once(tmp_path):

@@ -22,7 +22,7 @@ pytestmark = [
 
 @pytest.fixture
 def folder(tmp_path):
-    """What the container sees: folders for volumes and recordings, and programs; `chown` writes down who gets what."""
+    """Return a container's folders for volumes, recordings and programs; `chown` records owners."""
     for name in NAMES:
         (tmp_path / "keys" / name).mkdir(parents=True)
     (tmp_path / "recordings").mkdir()
@@ -47,7 +47,7 @@ def authorities(folder):
     return {(folder / "keys" / name / "authority.pem").read_text() for name in NAMES}
 
 
-def test_everybody_gets_his_own_and_nobody_the_authority(folder):
+def test_each_participant_gets_only_its_own_key(folder):
     assert run(folder).startswith("certificates of mission, plant, viewer, until ")
     (trusted,) = authorities(folder)
     for name in NAMES:
@@ -58,13 +58,13 @@ def test_everybody_gets_his_own_and_nobody_the_authority(folder):
         subject = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         assert subject.rstrip().endswith(f"CN = {name}")
     assert "PRIVATE" not in trusted
-    given = dict(reversed(line.split(maxsplit=1)) for line in (folder / "given").read_text().splitlines())
+    values = dict(reversed(line.split(maxsplit=1)) for line in (folder / "given").read_text().splitlines())
     owner = f"{(folder / 'recordings').stat().st_uid}:{(folder / 'recordings').stat().st_gid}"
     expected = {"mission": owner, "plant": "lapwing", "viewer": "lapwing"}
-    assert given == {f"keys/{name}/key.pem keys/{name}/zenoh.json5": user for name, user in expected.items()}
+    assert values == {f"keys/{name}/key.pem keys/{name}/zenoh.json5": user for name, user in expected.items()}
 
 
-def test_what_is_sound_stays(folder):
+def test_valid_certificates_are_kept(folder):
     run(folder)
     before = authorities(folder)
     run(folder)
@@ -72,7 +72,7 @@ def test_what_is_sound_stays(folder):
 
 
 @pytest.mark.parametrize("lost", [*sorted(FILES), "expired", "of another authority"])
-def test_what_is_not_is_made_anew_for_everybody(folder, lost):
+def test_invalid_certificates_are_all_renewed(folder, lost):
     run(folder)
     before = authorities(folder)
     if lost in FILES:

@@ -1,4 +1,4 @@
-"""What images ship is in the bill of materials, and audited."""
+"""Contents of the images are in the bill of materials and audited."""
 
 import shutil
 import subprocess
@@ -11,9 +11,11 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.skipif(not shutil.which("make"), reason="needs make")
 @pytest.mark.parametrize("target", ["sbom", "audit"])
-def test_every_lock_of_an_image_that_ships_is_read(target):
+def test_every_lock_of_image_that_ships_is_read(target):
     command = ["make", "--dry-run", "--no-print-directory", target]
-    said = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    output = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     locks = {f"deploy/{path.name}" for path in (ROOT / "deploy").glob("requirements*.lock")}
-    reads = next(line for line in reversed(said.splitlines()) if "--require-hashes" in line and "--requirement" in line)
+    reads = next(
+        line for line in reversed(output.splitlines()) if "--require-hashes" in line and "--requirement" in line
+    )
     assert {word for word in reads.split() if word in locks} == locks - {"deploy/requirements-tests.lock"}

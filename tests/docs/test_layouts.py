@@ -15,7 +15,7 @@ BY_KEY = {topic.key("drone1"): topic for topic in TOPICS}
 
 
 def check(topic, fields):
-    """Whether a topic has a field, each part by its name; an element of a sequence as "name[0]"."""
+    """Return True if a topic has a field by its dotted name; an element of a sequence as "name[0]"."""
     type_name = BY_KEY[topic].message.type_name
     for part in fields:
         name, index = re.fullmatch(r"(\w+)(\[\d\])?", part).groups()
@@ -30,7 +30,7 @@ def foxglove():
     return json.loads((FOLDER / "foxglove.json").read_text())
 
 
-def test_foxglove_plots_what_there_is():
+def test_foxglove_layout_uses_existing_fields():
     paths = [path["value"] for panel in foxglove()["configById"].values() for path in panel.get("paths", ())]
     assert len(paths) > 15
     for path in paths:
@@ -56,7 +56,7 @@ def test_foxglove_places_every_panel_once():
     assert sorted(panels(layout["layout"])) == sorted(layout["configById"])
 
 
-def test_plotjuggler_plots_what_there_is():
+def test_plotjuggler_layout_uses_existing_fields():
     curves = [curve.attrib["name"] for curve in ET.parse(FOLDER / "plotjuggler.xml").iter("curve")]
     assert len(curves) > 30
     for curve in curves:
@@ -64,6 +64,6 @@ def test_plotjuggler_plots_what_there_is():
         check(f"/{vehicle}/{topic}", fields)
 
 
-def test_a_field_that_is_not_there_is_found():
+def test_missing_layout_field_is_detected():
     with pytest.raises(ValueError):
         check("/drone1/ground_truth", ["pose", "yaw"])

@@ -21,14 +21,14 @@ PAGE = (Path(__file__).parents[2] / "docs/guides/new_airframe.md").read_text()
 EXAMPLE = tomllib.loads(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1])
 
 
-def test_the_example_is_valid_and_a_scene_takes_it(tmp_path):
+def test_example_airframe_is_valid_in_scene(tmp_path):
     jsonschema.Draft7Validator(airframe_schema()).validate(EXAMPLE)
     path = tmp_path / "my_quad.toml"
     path.write_text(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1])
     assert load("hover", {"vehicle.airframe": str(path)}).lookup("airframe.mass.total") == 2.0
 
 
-def test_the_thrust_stand_gives_the_propeller_of_the_example():
+def test_thrust_stand_data_reproduce_example_propeller():
     names: dict = {}
     exec(re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1], names)
     assert names["lift_correction"] == pytest.approx(EXAMPLE["propeller"]["lift_correction"], abs=5e-5)
@@ -39,7 +39,7 @@ def test_the_thrust_stand_gives_the_propeller_of_the_example():
     assert rho * torque_coefficient(met) * n**2 * D**5 == pytest.approx(names["torque"], rel=1e-3)
 
 
-def test_the_example_could_fly():
+def test_example_could_fly():
     vehicle = Airframe.model_validate(EXAMPLE)
     assert 1.8 < performance.maximum_thrust(vehicle) / (vehicle.mass.total * performance.GRAVITY) < 2.5
     assert performance.trim(vehicle).thrust == pytest.approx(2.0 * 9.80665 / 4.0)

@@ -24,7 +24,7 @@ def folder(tmp_path, monkeypatch):
     matplotlib.use(before)
 
 
-def test_the_tutorial_runs(folder):
+def test_tutorial_runs(folder):
     assert callable(lapwing.fly)
     assert len(BLOCKS) > 10
     names: dict = {}

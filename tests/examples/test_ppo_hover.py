@@ -10,7 +10,7 @@ pytest.importorskip("jax", reason="the extra learn is not installed")
 pytestmark = pytest.mark.long
 
 
-def test_a_few_updates_change_the_policy(monkeypatch):
+def test_few_updates_change_policy(monkeypatch):
     from examples import ppo_hover
 
     monkeypatch.setattr(ppo_hover, "VEHICLES", 8)

@@ -48,7 +48,7 @@ def fly(program, tmp_path, log, *more):
         own.kill()
 
 
-def test_it_flies_to_the_same_digest_twice(program, tmp_path):
+def test_rust_controller_flight_is_repeatable(program, tmp_path):
     digests = []
     for log in (tmp_path / "first.mcap", tmp_path / "second.mcap"):
         run, ended = fly(program, tmp_path, log)
@@ -60,11 +60,11 @@ def test_it_flies_to_the_same_digest_twice(program, tmp_path):
     assert flight.rmse["z"] < 0.2
     assert flight.truth["pose.position"][-1, 2] > 4.0
     assert flight.topic("status")["armed"][-1]
-    with pytest.raises(ValueError, match="cannot be flown again: autopilot was a program of somebody else's"):
+    with pytest.raises(ValueError, match="cannot be resimulated: autopilot was an external service"):
         resimulate(tmp_path / "first.mcap")
 
 
-def test_another_scene_than_the_others_is_refused(program, tmp_path):
+def test_another_scene_than_others_is_refused(program, tmp_path):
     run, _ = fly(program, tmp_path, tmp_path / "log.mcap", "--set", "run.seed=3")
     assert run.returncode == 2
-    assert "seed is 3 here, 1 for autopilot: resolve the same scene" in run.stderr
+    assert "seed is 3 here but 1 in autopilot; start all services from the same scene" in run.stderr

@@ -23,17 +23,17 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, help="of processor time for each target, instead of --inputs")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("targets", nargs="*", metavar="TARGET", help=", ".join(TARGETS))
-    given = parser.parse_args()
+    values = parser.parse_args()
     wrong = 0
-    for name in given.targets or TARGETS:
-        target, chance = TARGETS[name](), random.Random(f"{name} {given.seed}")
+    for name in values.targets or TARGETS:
+        target, chance = TARGETS[name](), random.Random(f"{name} {values.seed}")
         for seed in target.seeds:  # what is loaded once is not counted
             target.read(seed)
         refused, slowest = 0, 0.0
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         begun = started = time.process_time()
         number = 0
-        while (time.process_time() - begun < given.seconds) if given.seconds else number < given.inputs:
+        while (time.process_time() - begun < values.seconds) if values.seconds else number < values.inputs:
             number += 1
             data = mutated(chance, target.seeds)
             try:

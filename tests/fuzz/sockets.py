@@ -1,21 +1,20 @@
-"""What reads bytes that programs send: the MAVLink link, the page that shows a flight, viewers' WebSocket."""
+"""Readers of bytes from other programs: MAVLink link, live page, viewers' WebSocket."""
 
 import atexit
-import io
 import os
 from collections.abc import Callable
+from email.message import Message
 from types import SimpleNamespace
-from typing import Any
 
 from lapwing.messages import Estimate, header
 from lapwing.messages.topics import ESTIMATE
-from lapwing.runs.live_page import OVER, handler
 from lapwing.services import scene_resolver
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.foxglove.server import Server
 from lapwing.services.mavlink.adapter import Adapter
-from lapwing.services.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.resolve import describe
+from lapwing.studies.view3d.local_server import Guard
 from tests.fuzz.mutate import MOST
 from tests.fuzz.target import Target
 from tests.services.foxglove.client import Client
@@ -69,16 +68,26 @@ def frames() -> Target:
 
 
 def page() -> Target:
-    """Requests to the page of `lapwing run --view`."""
-    live: Any = SimpleNamespace(steps=lambda: iter(["data: {}\n\n", OVER]))
-    reader = handler("/token/", b"<!doctype html>", live)
+    """Requests to the page of `lapwing run --view`: what its guard makes of a path and headers."""
+    guard = Guard("token", None)
+    guard.hosts = {"127.0.0.1:8000"}
+    guard.answer = lambda connection, request: None
+    connection = SimpleNamespace(respond=lambda status, text: None)
 
     def read(data: bytes) -> None:
-        connection = SimpleNamespace(makefile=lambda *_: io.BytesIO(data), sendall=lambda sent: None)
-        reader(connection, ("127.0.0.1", 1), SimpleNamespace())  # type: ignore[arg-type]
+        first, *lines = data.decode("latin-1").split("\r\n")
+        headers = Message()
+        for line in lines:
+            name, _, value = line.partition(": ")
+            headers[name] = value
+        words = first.split(" ")
+        request = SimpleNamespace(path=words[1] if len(words) > 1 else "", headers=headers)
+        guard(connection, request)
 
     host = b"Host: 127.0.0.1:8000\r\nConnection: keep-alive\r\n\r\n"
-    return Target(read, (b"GET /token/ HTTP/1.1\r\n" + host, b"GET /token/steps HTTP/1.0\r\n" + host))
+    return Target(
+        read, (b"GET /token/ HTTP/1.1\r\n" + host, b"GET /token/?a=b HTTP/1.1\r\nUpgrade: websocket\r\n" + host)
+    )
 
 
 def _server() -> Server:
@@ -99,7 +108,7 @@ _BINARY = b"\1\0\0\0\0"
 
 
 def _missing(data: bytes) -> int:
-    """How many bytes the last of these frames lacks: a server looks at a frame when it is whole."""
+    """Return the number of bytes missing from the last frame, since a server handles only complete frames."""
     padded, place = data + bytes(_LONGEST_HEAD), 0
     while place < len(data):
         size, mask = padded[place + 1] & 0x7F, 4 if padded[place + 1] & 0x80 else 0
@@ -132,15 +141,15 @@ def websocket() -> Target:
 
 
 def requests() -> Target:
-    """What such frames hold, in sound ones, so that the server reads all of many: the first byte says which kind."""
+    """Yield the payloads in valid frames, so that the server reads all of them; the first byte selects the kind."""
     server = _server()
     now = SimpleNamespace(client=Client(server.port), sent=0)
 
     def read(data: bytes) -> None:
-        kind, said = 0x82, data[1:]
+        kind, output = 0x82, data[1:]
         if data[:1] < b"\x80":  # a text that is no UTF-8 ends the connection: `websocket` tries those
-            kind, said = 0x81, said.decode(errors="replace").encode()
-        now.client.send(bytes([kind, 0xFE]) + len(said).to_bytes(2, "big") + bytes(4) + said)
+            kind, output = 0x81, output.decode(errors="replace").encode()
+        now.client.send(bytes([kind, 0xFE]) + len(output).to_bytes(2, "big") + bytes(4) + output)
         now.sent += 1
         if now.sent % UNANSWERED == 0 and not now.client.outlives(b""):
             raise ConnectionError("the server does not answer")

@@ -1,4 +1,4 @@
-"""What is tried with damaged bytes."""
+"""Fuzz target: a reader of damaged bytes."""
 
 from collections.abc import Callable
 from typing import NamedTuple

@@ -1,20 +1,22 @@
-"""What reads bytes from outside: each target takes any bytes, and refuses them with a ValueError or not at all."""
+"""Readers of external bytes: each accepts any bytes, or rejects them with a ValueError."""
 
-import os
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from lapwing.cosim.config import serialise
 from lapwing.cosim.config.serialise import from_json, to_json
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.log import LogReader, LogWriter
-from lapwing.cosim.transport.packets import pack_batch, unpack_batch
+from lapwing.cosim.transport.packets import pack_log_packet, unpack_log_packet
 from lapwing.messages import PoseStamped, attachment
 from lapwing.messages.topics import POSE
 from lapwing.messages.types import TYPES
 from lapwing.services import scene_resolver
 from lapwing.services.common import flight_plan_file, parameter_file
+from lapwing.services.foxglove.origin_gate import refusal
+from tests.fuzz.flights import csv, dataflash, tlog, ulog, usd
+from tests.fuzz.memory_file import memory_file
 from tests.fuzz.sockets import frames, link, page, requests, websocket
 from tests.fuzz.target import Target
 
@@ -50,19 +52,6 @@ initial_rate = [0.0, 1e-3, 0.1]
 )
 
 
-@cache
-def _memory(name: str) -> int:
-    return os.memfd_create(name)
-
-
-def _file(data: bytes, name: str) -> Path:
-    """A file in memory, which is ten times as fast as one on a disk."""
-    file = _memory(name)
-    os.ftruncate(file, 0)
-    os.pwrite(file, data, 0)
-    return Path(f"/proc/self/fd/{file}")
-
-
 def cdr() -> Target:
     classes = list(TYPES.values())
 
@@ -74,7 +63,10 @@ def cdr() -> Target:
 
 def batches() -> Target:
     poses = np.frombuffer(2 * PoseStamped().encode(), np.uint8).reshape(2, -1)
-    return Target(unpack_batch, (pack_batch([RecordBatch(POSE, np.array([0, 5]), poses)], 0, 7), pack_batch([], 0, 3)))
+    return Target(
+        unpack_log_packet,
+        (pack_log_packet([RecordBatch(POSE, np.array([0, 5]), poses)], 0, 7), pack_log_packet([], 0, 3)),
+    )
 
 
 def attachments() -> Target:
@@ -100,32 +92,61 @@ def scenes() -> Target:
 def plans() -> Target:
     seeds = tuple(path.read_bytes() for path in sorted((SCENES / "plans").glob("*.plan")))
     waypoints = b"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t5.0\t1\n1\t0\t3\t22\t0\t0\t0\t0\t47.0\t8.0\t9.0\t1\n"
-    return Target(lambda data: flight_plan_file.read(_file(data, "a.plan")), (*seeds, waypoints))
+    return Target(lambda data: flight_plan_file.read(memory_file(data, "a.plan")), (*seeds, waypoints))
 
 
 def parameters() -> Target:
     text = b"# Onboard parameters\n1\t1\tMPC_XY_VEL_MAX\t3.5\t9\nMIS_TAKEOFF_ALT 2.5\n"
-    return Target(lambda data: parameter_file.read(_file(data, "a.params")), (text,))
+    return Target(lambda data: parameter_file.read(memory_file(data, "a.params")), (text,))
 
 
 def logs() -> Target:
-    path = _file(b"", "seed.mcap")
+    path = memory_file(b"", "seed.mcap")
     with LogWriter(path, {"scene": "none"}, {"a.txt": b"text"}) as writer:
         for k in range(3):
             writer.write("/drone1/pose", PoseStamped, PoseStamped().encode(), k * 1_000_000)
 
     def read(data: bytes) -> None:
-        with LogReader(_file(data, "a.mcap")) as log:
+        with LogReader(memory_file(data, "a.mcap")) as log:
             for _ in log.messages():
                 pass
 
     return Target(read, (path.read_bytes(),))
 
 
+def overrides() -> Target:
+    texts = (
+        b"airframe.mass.total=2.5",
+        b'sensors.imu.preset="bmi088"',
+        b"sensors.imu={preset='mpu6000'}",
+        b"trajectory.phase.0.duration=3.0",
+        b"effects.random_wind_force={mean=[1.0, 2, 0]}",
+        b"run.duration=1e1",
+    )
+    scene = SMALL_SCENES[1].decode()
+
+    def read(data: bytes) -> None:
+        scene_resolver.parse(SCENES / "fuzz.toml", scene, [data.decode()])
+
+    return Target(read, texts)
+
+
+def set_up_messages() -> Target:
+    setup = scene_resolver.resolve(scene_resolver.load("gyrostat_blocked"))
+    return Target(serialise.decompress, (serialise.compress(setup),))
+
+
+def origins() -> Target:
+    """Requests to the gate before the Foxglove server."""
+    request = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://app.foxglove.dev\r\n\r\n"
+    return Target(lambda data: refusal(data, "127.0.0.1"), (request,))
+
+
 TARGETS = {
     make.__name__: make
     for make in (
         *(cdr, batches, attachments, set_ups, scenes, plans, parameters, logs),
-        *(link, frames, page, requests, websocket),
+        *(overrides, set_up_messages, csv, ulog, dataflash, tlog, usd),
+        *(link, frames, page, origins, requests, websocket),
     )
 }

@@ -33,6 +33,6 @@ def test_damaged_bytes_are_refused_or_read(name):
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_sound_bytes_are_read(name):
+def test_valid_bytes_are_read(name):
     for seed in made(name).seeds:
         made(name).read(seed)

@@ -20,7 +20,7 @@ def fly(case: Case) -> tuple[MemoryLog, str]:
     for stop in sorted(stops):
         first = graph.tick
         graph.advance(min(stop, setup.last_tick + 1))
-        log.write(graph.pages(first, graph.tick), graph.tick - 1)
+        log.write(graph.record_batches(first, graph.tick), graph.tick - 1)
         if stop == stops[0]:
             beginning = log.digest
         if graph.ended:
@@ -34,15 +34,15 @@ def main() -> int:
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help=f"one of {', '.join(CASES)}; all if none is named")
     parser.add_argument("--update", action="store_true", help="write down what they are now")
     parser.add_argument("--reason", default="", help="why they change, for the file")
-    given = parser.parse_args()
-    for name in given.scenes:
+    values = parser.parse_args()
+    for name in values.scenes:
         if name not in CASES:
             parser.error(f"unknown scene {name}; expected one of {', '.join(CASES)}")
-    if given.update and not given.reason:
+    if values.update and not values.reason:
         parser.error("--update needs a --reason")
-    changed = [name for name in given.scenes or CASES if not _check(name, given.update, given.reason)]
+    changed = [name for name in values.scenes or CASES if not _check(name, values.update, values.reason)]
     print(f"{len(changed)} changed" if changed else "all as they were")
-    return 1 if changed and not given.update else 0
+    return 1 if changed and not values.update else 0
 
 
 def _check(name: str, update: bool, reason: str) -> bool:

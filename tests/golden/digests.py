@@ -11,7 +11,7 @@ HEAD = "# Digests of the shipped scenes; `python -m tests.golden` checks them, `
 
 
 class Golden(NamedTuple):
-    """What a case's flight must come to."""
+    """Expected digest of a case's flight."""
 
     digest: str  # of the whole flight
     beginning: str  # of the first BEGINNING s
@@ -33,7 +33,7 @@ def write(known: dict[str, Golden]) -> None:
 
 
 def sample_file(name: str) -> Path:
-    """Where the sample of a case's flight is."""
+    """Return the path of the sample of a case's flight."""
     return FOLDER / "samples" / f"{name}.mcap"
 
 

@@ -1,5 +1,7 @@
 """Shipped scenes fly to the digests that are kept: a few of them whole, all the others at their beginning."""
 
+import math
+
 import pytest
 
 from tests.cosim.memory_log import fly
@@ -10,16 +12,16 @@ WHOLE = {"gyrostat_blocked", "os4_motors", "cooperative_load", "hover"}
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_a_scene_flies_to_its_digest(name):
+def test_scene_flies_to_its_digest(name):
     golden, setup = digests.read()[name], CASES[name].resolve()
     whole = name in WHOLE
     log = fly(setup, last=None if whole else round(digests.BEGINNING * setup.rate))
     if log.digest != (golden.digest if whole else golden.beginning):
-        found = thinned_log.first_difference(thinned_log.read(digests.sample_file(name)), log, whole)
-        pytest.fail("\n".join(["not the digest that is kept; `python -m tests.golden` tells more", *found]))
+        result = thinned_log.first_difference(thinned_log.read(digests.sample_file(name)), log, whole)
+        pytest.fail("\n".join(["not the digest that is kept; `python -m tests.golden` tells more", *result]))
 
 
-def test_every_case_is_kept_and_says_why():
+def test_every_golden_case_has_reason():
     known = digests.read()
     assert known.keys() == CASES.keys()
     for name, golden in known.items():
@@ -42,11 +44,12 @@ class Changed:
         return [(t, self._changes.get((name, i), p)) for i, (t, p) in enumerate(self._flown.payloads(name))]
 
 
-def test_the_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
+def test_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
     thinned_log.write(tmp_path / "sample.mcap", thinned_log.take(flown))
     kept = thinned_log.read(tmp_path / "sample.mcap")
     assert thinned_log.first_difference(kept, flown) == []
-    truth, number = flown.messages("ground_truth"), 156  # one of those that are kept
+    truth = flown.messages("ground_truth")
+    number = 8 * math.ceil(len(truth) / thinned_log.KEPT)  # one of those that are kept
     speed = tuple(w + 0.25 for w in truth[number].rotor_speed)
     later = {("ground_truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
     began, field = thinned_log.first_difference(kept, Changed(flown, later))
@@ -58,14 +61,14 @@ def test_the_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
     assert f"rotor_speed.0 was {old!r}, is {old + 0.25!r}, by 0.25" in field
 
 
-def test_a_flight_cut_short_differs_nowhere(flown):
+def test_flight_cut_short_differs_nowhere(flown):
     kept = thinned_log.take(flown)
     short = fly(flown.setup, last=217)
     assert thinned_log.first_difference(kept, short, whole=False) == []
     assert any("differs first" in line for line in thinned_log.first_difference(kept, short))
 
 
-def test_a_single_message_between_those_kept_is_found_too(flown):
+def test_single_message_between_those_kept_is_found_too(flown):
     message = flown.messages("ground_truth")[151]._replace(air_density=7.0).encode()
     (began,) = thinned_log.first_difference(thinned_log.take(flown), Changed(flown, {("ground_truth", 151): message}))
     assert "ground_truth: differs first" in began

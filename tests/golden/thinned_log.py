@@ -5,6 +5,7 @@ import json
 import math
 import zlib
 from collections.abc import Iterator
+from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,12 +14,13 @@ from lapwing.messages import message_class
 from lapwing.messages.message_diff import first_difference as first_field
 from tests.cosim.memory_log import MemoryLog
 
-FINGERPRINTS, KEPT = 200, 12  # of a topic, about
+FINGERPRINTS, KEPT = 200, 10  # of a topic, about
+LARGE = 2000  # [bytes] of a message; of larger ones the first alone is kept
 HASHES_FILE = "fingerprints.json.zlib"
 
 
 class TopicSample(NamedTuple):
-    """What is kept of a topic."""
+    """Sampled messages of a topic."""
 
     every: int  # messages between two fingerprints
     fingerprints: list[str]  # of the first `every` messages, of the first 2 `every`, ..., of all
@@ -31,15 +33,20 @@ Sample = dict[str, TopicSample]  # by name in the log
 
 def take(log: MemoryLog) -> Sample:
     """The sample of a flight."""
-    found = {}
+    result = {}
     for name, topic in log.topics.items():
         messages = [(tick * log.setup.interval_ns, payload) for tick, payload in log.payloads(name)]
         every = math.ceil(len(messages) / FINGERPRINTS)
         fingerprints, instants = _fingerprints(messages, every)
-        places = sorted({0, 1, *range(0, len(messages), math.ceil(len(messages) / KEPT)), len(messages) - 1})
+        large = bool(messages) and len(messages[0][1]) > LARGE
+        places = (
+            [0]
+            if large
+            else sorted({0, 1, *range(0, len(messages), math.ceil(len(messages) / KEPT)), len(messages) - 1})
+        )
         kept = [(messages[i][0], topic.message.type_name, messages[i][1]) for i in places if i < len(messages)]
-        found[topic.key(log.setup.vehicle)] = TopicSample(every, fingerprints, instants, kept)
-    return found
+        result[topic.key(log.setup.vehicle)] = TopicSample(every, fingerprints, instants, kept)
+    return result
 
 
 def _fingerprints(messages: list[tuple[int, bytes]], every: int) -> tuple[list[str], list[int]]:
@@ -52,9 +59,14 @@ def _fingerprints(messages: list[tuple[int, bytes]], every: int) -> tuple[list[s
     return fingerprints, instants
 
 
+def _steps(instants: list[int]) -> list[int]:
+    """Return the differences of instants, which compress better; the first is itself."""
+    return [b - a for a, b in pairwise([0, *instants])]
+
+
 def write(path: Path, sample: Sample) -> None:
     """Keep a sample as a log of the messages kept; the fingerprints go along as an attachment."""
-    table = {name: [topic.every, topic.fingerprints, topic.instants] for name, topic in sample.items()}
+    table = {name: [topic.every, topic.fingerprints, _steps(topic.instants)] for name, topic in sample.items()}
     with LogWriter(path, {}, {HASHES_FILE: zlib.compress(json.dumps(table).encode(), 9)}) as log:
         messages = [(time_ns, name, kind, payload) for name, t in sample.items() for time_ns, kind, payload in t.kept]
         for time_ns, name, kind, payload in sorted(messages, key=lambda message: message[0]):
@@ -66,19 +78,21 @@ def read(path: Path) -> Sample:
     with LogReader(path) as log:
         table = json.loads(zlib.decompress(log.attachments[HASHES_FILE]))
         current = {recorded: name for name, recorded in log.recorded_names.items()}
-        found = {current[name]: TopicSample(row[0], row[1], row[2], []) for name, row in table.items()}
+        result = {
+            current[name]: TopicSample(row[0], row[1], list(accumulate(row[2])), []) for name, row in table.items()
+        }
         for name, kind, time_ns, payload in log.messages():
-            found[name].kept.append((time_ns, kind, payload))
-    return found
+            result[name].kept.append((time_ns, kind, payload))
+    return result
 
 
 def first_difference(old: Sample, new: MemoryLog, whole: bool = True) -> list[str]:
-    """When a flight began to differ from a sample, and in what; a line each, none where nothing kept differs.
+    """Return the lines of the first difference between a flight and a sample; empty without one.
 
     Args:
-        old: the sample.
-        new: the flight.
-        whole: whether it was flown to its end, or is only to be like the beginning.
+        old: sample.
+        new: flight.
+        whole: True if it was flown to its end; otherwise only its beginning is compared.
     """
     names = {topic.key(new.setup.vehicle): name for name, topic in new.topics.items()}
     lines = [f"{name}: this topic is new" for name in sorted(names.keys() - old.keys())]
@@ -126,8 +140,8 @@ def _fields(name: str, old: TopicSample, new: dict[int, bytes], end_ns: float) -
         if now is None:
             yield time_ns, where + "there is no such message any more"
             return
-        found = first_field(message_class(kind), was, now)
-        assert found
-        by = f", by {found.by:.3g}" if found.by is not None else ""
-        yield time_ns, where + f"{found.field or 'length'} was {found.one!r}, is {found.other!r}{by}"
+        result = first_field(message_class(kind), was, now)
+        assert result
+        by = f", by {result.by:.3g}" if result.by is not None else ""
+        yield time_ns, where + f"{result.field or 'length'} was {result.one!r}, is {result.other!r}{by}"
         return

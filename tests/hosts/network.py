@@ -27,7 +27,7 @@ _networks = itertools.count()  # of this process, several of which may be there 
 
 
 def why_not() -> str:
-    """Why there can be no such network here; "" where there can."""
+    """Return the reason why this machine has no such network; "" if it has."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if not shutil.which("ip") or not os.access(_TUN, os.W_OK):

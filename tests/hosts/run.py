@@ -19,7 +19,7 @@ class Run:
     """
 
     def __init__(self, network, places, overrides, keys, folder):
-        """Of the scene `delivery_mission`: `places` is the host of each participant, `keys` their certificates."""
+        """Create a run of `delivery_mission`; `places` has the host of each participant, `keys` their certificates."""
         peers = {name: f"tls/{network.addresses[host]}:{7447 + k}" for k, (name, host) in enumerate(places.items())}
         table = ",".join(f"{name}={endpoint}" for name, endpoint in peers.items())
         sets = [word for override in overrides for word in ("--set", override)]
@@ -60,12 +60,12 @@ class Run:
 
     def ends(self):
         """Exit code and last words of everybody; who does not end is killed."""
-        found = {}
+        result = {}
         for name, process in self.participants.items():
             try:
-                _, said = process.communicate(timeout=SLOWEST)
+                _, output = process.communicate(timeout=SLOWEST)
             except subprocess.TimeoutExpired:
                 process.kill()
-                said = process.communicate()[1] + f"still there after {SLOWEST:g} s"
-            found[name] = process.returncode, said
-        return found
+                output = process.communicate()[1] + f"still there after {SLOWEST:g} s"
+            result[name] = process.returncode, output
+        return result

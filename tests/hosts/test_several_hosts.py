@@ -33,7 +33,7 @@ def keys(tmp_path_factory):
     return folder
 
 
-def test_the_digest_is_the_local_one_over_a_slow_network_that_loses_packets_and_is_cut_for_a_while(keys, tmp_path):
+def test_digest_is_equal_over_slow_lossy_network(keys, tmp_path):
     short = "run.duration=0.4"
     fly_single(resolve(load("delivery_mission", [short])), tmp_path / "here.mcap")
     with (
@@ -53,14 +53,14 @@ def test_the_digest_is_the_local_one_over_a_slow_network_that_loses_packets_and_
         assert there.digest() == here.digest()
 
 
-def test_a_host_that_is_lost_is_named_and_everybody_ends(keys, tmp_path):
+def test_lost_host_is_named_and_run_ends(keys, tmp_path):
     with Network(sorted(set(HOSTS.values()))) as network, Run(network, HOSTS, [], keys, tmp_path) as run:
         run.flies()
         network.cut_off = {"flight"}
         ends = run.ends()
-    said = {name: words for name, (_, words) in ends.items()}
-    assert {name: code for name, (code, _) in ends.items()} == dict.fromkeys(ends, 1), said
-    assert said.pop(MONITOR).startswith("lapwing: autopilot, sensors, trajectory: no answer for 6 s, at t = ")
-    assert said == {name: f"lapwing: {name}: {MONITOR} is gone before the run has ended\n" for name in said}
+    output = {name: words for name, (_, words) in ends.items()}
+    assert {name: code for name, (code, _) in ends.items()} == dict.fromkeys(ends, 1), output
+    assert output.pop(MONITOR).startswith("lapwing: autopilot, sensors, trajectory: no answer for 6 s, at t = ")
+    assert output == {name: f"lapwing: {name}: {MONITOR} is gone before the run has ended\n" for name in output}
     with LogReader(run.log) as read:
         assert list(read.messages())

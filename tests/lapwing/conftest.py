@@ -25,8 +25,8 @@ def lapwing(monkeypatch, tmp_path, capfd):
             code = 0
         except SystemExit as end:
             code = end.code
-        said = capfd.readouterr()
-        return code, said.out, said.err
+        output = capfd.readouterr()
+        return code, output.out, output.err
 
     yield call
     for number, handler in handlers.items():

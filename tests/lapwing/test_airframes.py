@@ -14,20 +14,20 @@ SCENES = {"quad_x": 0.03, "racer_250": 0.3, "os4_hover": 0.05, "hexacopter": 0.0
 
 
 @pytest.mark.parametrize("path", sorted((SHIPPED / "vehicles").glob("*.toml")), ids=lambda path: path.stem)
-def test_every_airframe_is_sound_and_says_where_its_figures_are_from(path):
+def test_airframe_is_valid_and_names_its_sources(path):
     assert load_airframe(path).mass.total > 0.0
     text = path.read_text()
     assert '"chosen"' in text or "All figures are chosen" in text
 
 
 @pytest.mark.parametrize("scene", SCENES)
-def test_its_gains_are_stable(scene):
+def test_airframe_gains_are_stable(scene):
     assert not unstable_loops(load(scene))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("scene", SCENES)
-def test_it_flies_and_lands(scene):
+def test_airframe_flies_and_lands(scene):
     flight = lapwing.fly(scene)
     assert flight.landed
     assert max(flight.rmse["x"], flight.rmse["y"]) < SCENES[scene]
@@ -35,7 +35,7 @@ def test_it_flies_and_lands(scene):
 
 
 @pytest.mark.long
-def test_a_hexacopter_without_a_rotor_holds_height_and_heading():
+def test_hexacopter_without_rotor_holds_height_and_heading():
     flight = lapwing.fly("hexacopter", {"effects.rotor_damage.time": 7.0, "run.duration": 10.0})
     after = flight.truth.times > 7.5
     assert np.abs(flight.truth.position[after, 2] - flight.truth.position[after, 2].mean()).max() < 0.1

@@ -39,7 +39,7 @@ def altitude(tmp_path, monkeypatch):
     del sys.modules["given_altitude"]
 
 
-def test_a_class_a_copy_and_a_name_fly_like_the_scene_that_names_it(altitude):
+def test_class_copy_and_name_of_controller_fly_alike(altitude):
     named = lapwing.fly("hover", {**SHORT, "autopilot.controller": "given_altitude:Altitude"})
     vehicle = named.setup.services["autopilot"].parameters.vehicle
     flights = [
@@ -53,13 +53,13 @@ def test_a_class_a_copy_and_a_name_fly_like_the_scene_that_names_it(altitude):
     assert named.digest != lapwing.fly("hover", SHORT, controller=altitude, controller_options={"extra": 9.0}).digest
 
 
-def test_an_edited_class_is_flown_as_it_was_handed_over(altitude, tmp_path):
+def test_edited_class_flies_with_its_passed_source(altitude, tmp_path):
     before = lapwing.fly("hover", SHORT, controller=altitude)
     (tmp_path / "given_altitude.py").write_text(MODULE.replace("60.0", "30.0"))
     assert lapwing.fly("hover", SHORT, controller=altitude).digest == before.digest
 
 
-def test_an_estimator_is_handed_over_in_the_same_way():
+def test_estimator_is_handed_over_in_same_way():
     class Blind:
         rate = 250
 
@@ -80,7 +80,7 @@ class Faulty(NamedTuple):
     rate: float = 250.0
 
     def step(self, time, estimate, setpoint):
-        """What it is told to."""
+        """Raise or return as configured."""
         if isinstance(self.output, BaseException):
             raise self.output
         return self.output
@@ -102,7 +102,7 @@ class Faulty(NamedTuple):
         ("nowhere", "expected \"module:Name\", got 'nowhere'"),
     ],
 )
-def test_a_controller_that_cannot_be_flown_is_a_scene_error_of_one_line(controller, said):
+def test_invalid_controller_is_one_line_scene_error(controller, said):
     with pytest.raises(lapwing.SceneError) as caught:
         lapwing.fly("hover", controller=controller)
     line = str(caught.value)
@@ -111,14 +111,14 @@ def test_a_controller_that_cannot_be_flown_is_a_scene_error_of_one_line(controll
     assert "\n" not in line
 
 
-def test_options_belong_to_a_class_and_a_controller_to_a_scene_with_an_autopilot():
+def test_controller_options_need_class_and_autopilot():
     with pytest.raises(lapwing.SceneError, match="controller_options: a Faulty object takes no options"):
         lapwing.fly("hover", controller=Faulty(None), controller_options={"gain": 1.0})
     with pytest.raises(lapwing.SceneError, match="the model gyrostat knows no such table"):
         lapwing.fly("gyrostat_chaotic", controller=Faulty(None))
 
 
-def test_a_loaded_scene_takes_more_overrides_and_the_later_ones_hold():
+def test_loaded_scene_takes_more_overrides_and_later_ones_hold():
     scene = lapwing.load_scene("hover", {"run.duration": 1.5, "run.seed": 3})
     again = lapwing.load_scene(scene, ["run.duration=0.5"])
     assert (again.lookup("run.duration"), again.lookup("run.seed")) == (0.5, 3)
@@ -129,7 +129,7 @@ def test_a_loaded_scene_takes_more_overrides_and_the_later_ones_hold():
     assert repr(flight).startswith("<Flight of hover: Completed at 0.50 s: ")
 
 
-def test_a_campaign_varies_a_loaded_scene_by_seed_and_run():
+def test_campaign_varies_loaded_scene_by_seed_and_run():
     scene = lapwing.load_scene("hover", {"run.duration": 0.5})
     vary = {"vehicle.mass": lapwing.normal(10.4, 0.2)}
     flights = lapwing.campaign(scene, (5, 6, 7), vary, seed=4)
@@ -151,7 +151,7 @@ def test_a_campaign_varies_a_loaded_scene_by_seed_and_run():
         (lambda: lapwing.fly("hoverr"), "unknown scene 'hoverr'; did you mean hover?"),
         (lambda: lapwing.load_scene("hover", "run.seed=1"), "a list: [\"KEY=VALUE\"], got 'run.seed=1'"),
         (lambda: lapwing.load_scene("hover", {3: 1}), "expected the keys of overrides as texts, got 3"),
-        (lambda: lapwing.Simulator("gyrostat_chaotic"), "autopilot: nobody steers there"),
+        (lambda: lapwing.Simulator("gyrostat_chaotic"), "autopilot: the scene has no autopilot"),
     ],
 )
 def test_mistakes_are_scene_errors_of_one_line(wrong, said):
@@ -162,12 +162,12 @@ def test_mistakes_are_scene_errors_of_one_line(wrong, said):
 
 
 @pytest.mark.parametrize("wrong", [lambda: lapwing.normal(1.0, -1.0), lapwing.choice, lambda: lapwing.uniform(2, 1)])
-def test_a_distribution_that_cannot_be_drawn_from_is_refused_where_it_is_made(wrong):
+def test_invalid_distribution_is_rejected_at_construction(wrong):
     with pytest.raises(ValueError, match="expected"):
         wrong()
 
 
-def test_a_plot_is_a_figure_and_a_file(tmp_path):
+def test_plot_is_figure_and_file(tmp_path):
     flight = lapwing.fly("hover", {"run.duration": 0.5})
     figure = flight.plot(tmp_path / "flight.png")
     assert len(figure.axes) == 4

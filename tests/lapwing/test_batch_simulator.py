@@ -34,8 +34,8 @@ def alone(k, volts, ticks, start=None):
     """The numbers of the motion of member k after so many ticks, stepped by itself."""
     from lapwing.studies.campaign.plan import plan
 
-    given = plan(MISSION, (), N, 5, VARY).given(k)
-    plant = resolve(load(MISSION, given)).services["plant"].parameters
+    values = plan(MISSION, (), N, 5, VARY).given(k)
+    plant = resolve(load(MISSION, values)).services["plant"].parameters
     core, state = plant.core, plant.start.vehicle
     if start is not None:
         state = state._replace(motion=state.motion._replace(position_world=start))
@@ -50,10 +50,10 @@ def test_members_are_stepped_side_by_side_in_vector_registers(batch):
 
 
 def rows(state):
-    return np.column_stack(state[1:])
+    return np.column_stack(state[1:6])
 
 
-def test_every_member_has_the_bits_of_one_vehicle_alone(batch):
+def test_every_member_has_bits_of_one_vehicle_alone(batch):
     batch.reset()
     volts = np.linspace(31.0, 35.0, 4 * N).reshape(N, 4)  # some stay on the ground, some take off
     end = batch.step(motor_voltages=volts, ticks=125)
@@ -77,14 +77,44 @@ def test_members_are_reset_alone(batch):
     assert np.array_equal(rows(batch.reset()), rows(first))
 
 
-def test_body_rates_are_followed_and_thrust_holds_the_weight():
+def test_body_rates_are_followed_and_thrust_holds_weight():
     batch = lapwing.BatchSimulator("hover", 4)
     batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=np.full(4, 330.0))
-    wanted = np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, 0.0]])
+    expected = np.array([[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.3], [0.0, 0.0, 0.0]])
     weight = load("hover").lookup("airframe.mass").total * 9.80665
-    end = batch.step(thrust=np.full(4, weight), body_rates=wanted, ticks=150)
-    assert end.omega_body == pytest.approx(wanted, abs=0.02)
+    end = batch.step(thrust=np.full(4, weight), body_rates=expected, ticks=150)
+    assert end.omega_body == pytest.approx(expected, abs=0.02)
     assert abs(end.velocity_world[3, 2]) < 0.5
+
+
+def test_body_rate_control_is_that_of_voltages_computed_in_numpy():
+    """The controller in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
+    one, other = (lapwing.BatchSimulator("hover", 3) for _ in range(2))
+    for batch in (one, other):
+        batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=one.hover_speed, omega_body=(0.4, -0.3, 0.2))
+    a = one._steered
+    inertia, x, y, z = np.array(a.inertia_body), a.rotor_x, a.rotor_y, np.array(a.reaction_sign) * a.torque_per_thrust
+    effect = np.array([np.ones(4), y, -np.array(x), z])  # of a rotor's thrust on thrust and torques
+    thrust, rates = (
+        one.weight * np.array([0.9, 1.0, 1.1]),
+        np.array([[0.5, 0.0, 0.1], [0.0, 0.5, 0.0], [1.0, 1.0, 0.0]]),
+    )
+    for _ in range(10):
+        one.step(thrust=thrust, body_rates=rates)
+        omega = other.state.omega_body
+        torque = inertia * 15.0 * (rates - omega) + np.cross(omega, inertia * omega)
+        each = np.linalg.solve(effect, np.column_stack([thrust, torque]).T).T
+        speed = np.sqrt(each / a.motor.thrust_coefficient)
+        volts = speed * 60.0 / (2.0 * np.pi) / (a.motor.gear_ratio * a.motor.speed_constant)
+        other.step(motor_voltages=np.clip(volts, 0.0, a.voltage_max))
+    assert rows(one.state) == pytest.approx(rows(other.state), rel=1e-9, abs=1e-9)
+
+
+def test_elements_that_fill_last_block_repeat_last_member():
+    batch = lapwing.BatchSimulator("hover", 3)
+    batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=batch.hover_speed)
+    batch.step(motor_voltages=np.array([[31.0] * 4, [32.0] * 4, [33.0, 31.0, 33.0, 31.0]]), ticks=5)
+    assert (batch._blocks[-1, :, 3:] == batch._blocks[-1, :, 2:3]).all()
 
 
 @pytest.mark.parametrize(
@@ -105,9 +135,39 @@ def test_body_rates_are_followed_and_thrust_holds_the_weight():
         (lambda b: b.step(np.full((N, 4), np.nan)), "motor_voltages: expected finite numbers"),
         (lambda b: b.step(np.zeros((N, 4)), ticks=0), "step: expected ticks = 1, 2"),
         (lambda b: b.reset([19]), "members: expected numbers from 0 to 18"),
+        (lambda b: b.reset(attitude=(0.0, 0.0, 0.0, 0.0)), "attitude: expected unit quaternions"),
+        (lambda b: b.reset(position_world=(0.0, 0.0, -5.0)), "position_world: expected a centre of mass above the"),
+        (lambda b: b.reset(rotor_speed=np.full(4, -300.0)), "rotor_speed: expected speeds of at least 0 rad/s"),
+        (lambda b: b.reset(velocity_world=(np.nan, 0.0, 0.0)), "velocity_world: expected finite numbers"),
+        (
+            lambda b: lapwing.BatchSimulator("hover", 1, overrides={"environment.terrain.slope": [0.1, 0.0]}),
+            "environment: batches step over level ground",
+        ),
+        (
+            lambda b: lapwing.BatchSimulator("hover", 1, overrides={"effects.rotor_interference": {}}),
+            "effects.rotor_interference: batches step effects without tables of numbers",
+        ),
         (lambda b: b.reset([1], speed=1.0), "speed: unknown; expected one of position_world, attitude"),
     ],
 )
-def test_mistakes_are_told_in_one_line(batch, wrong, said):
+def test_batch_errors_are_one_line(batch, wrong, said):
     with pytest.raises(ValueError, match=said):
         wrong(batch)
+
+
+def test_member_that_turns_too_fast_is_marked():
+    batch = lapwing.BatchSimulator("hover", 3)
+    batch.reset(position_world=(0.0, 0.0, 50.0))
+    batch.reset([1], position_world=(0.0, 0.0, 50.0), omega_body=(1e4, 0.0, 0.0))
+    assert batch.step(motor_voltages=np.zeros((3, 4))).valid.tolist() == [True, False, True]
+    with pytest.raises(ValueError, match="step: members 1 are not finite or turn too fast"):
+        batch.step(motor_voltages=np.zeros((3, 4)), strict=True)
+    assert batch.reset([1]).valid.all()
+
+
+@pytest.mark.long
+def test_accuracy_alone_selects_solver():
+    batch = lapwing.BatchSimulator("hover", 1, overrides={"solver.accuracy": 1e-4})
+    assert batch.step(motor_voltages=np.zeros((1, 4))).valid.all()
+    with pytest.raises(ValueError, match=r"solver.accuracy: expected a number at least 1e-12"):
+        lapwing.BatchSimulator("hover", 1, overrides={"solver.accuracy": 1e-20})

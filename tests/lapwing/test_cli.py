@@ -74,17 +74,17 @@ BAD = {
     ),
     "viewers": (
         [HOVER, "--foxglove", "0.0.0.0:8799"],
-        "--foxglove 0.0.0.0:8799: anybody could look on there: expected",
+        "--foxglove 0.0.0.0:8799: any program there could read the run; expected",
     ),
     "view alone": ([HOVER, "--mode", "single-process", "--view"], "--view: needs --mode multi-process"),
     "ROS 2 alone": ([HOVER, "--mode", "single-process", "--ros2", "0"], "--ros2: needs --mode multi-process"),
     "ROS 2 in a scene": (
-        [HOVER, "--mode", "single-process", "--set", "bus.ros2=true"],
+        [HOVER, "--mode", "single-process", "--set", "ros2.enabled=true"],
         "--ros2: needs --mode multi-process",
     ),
     "ROS 2 domain": ([HOVER, "--ros2", "233"], "'--ros2': Input should be less than or equal to 232"),
     "router alone": ([HOVER, "--ros2-router", "127.0.0.1:7447"], "--ros2-router 127.0.0.1:7447: expected with --ros2"),
-    "router elsewhere": ([HOVER, "--ros2", "0", "--ros2-router", "robot:7447"], "robot:7447: is not this machine"),
+    "router elsewhere": ([HOVER, "--ros2", "0", "--ros2-router", "robot:7447"], "robot:7447: programs of that host"),
     "program": ([HOVER, "--external", "autopilot=tcp/[::1]:1"], "use unixsock-stream/PATH in a folder of your"),
     "real time": (
         [HOVER, "--realtime", "--speed", "max"],
@@ -98,7 +98,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("arguments", "expected"), BAD.values(), ids=BAD)
-def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
+def test_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
     code, out, err = lapwing("run", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith("lapwing: ")
@@ -126,8 +126,14 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["replay", "none.mcap", "--listen", "tcp/localhost:7999"], "none.mcap: cannot read the log"),
         (["replay", "none.mcap", "--listen", "unixsock-stream/x"], "none.mcap: cannot read the log"),
         (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999", "--insecure"], "none.mcap: cannot read the log"),
-        (["replay", "none.mcap", "--foxglove", "[::]:8799"], "--foxglove [::]:8799: anybody could look on there"),
-        (["service", "foxglove", HOVER, *OPEN, "--foxglove", "0.0.0.0:8765"], "anybody could look on there: expected"),
+        (
+            ["replay", "none.mcap", "--foxglove", "[::]:8799"],
+            "--foxglove [::]:8799: any program there could read the run",
+        ),
+        (
+            ["service", "foxglove", HOVER, *OPEN, "--foxglove", "0.0.0.0:8765"],
+            "any program there could read the run; expected",
+        ),
         (["service", "plnt", HOVER, "--endpoints", PEERS], "unknown service plnt; expected one of"),
         (["service", "sensors", HOVER, "--endpoints", PEERS], "no endpoint for sensors itself"),
         (
@@ -137,7 +143,7 @@ def test_a_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["fly"], "No such command 'fly'"),
     ],
 )
-def test_other_commands_do_the_same(lapwing, arguments, expected):
+def test_other_commands_do_same(lapwing, arguments, expected):
     code, out, err = lapwing(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("lapwing: ")
@@ -147,19 +153,19 @@ def test_other_commands_do_the_same(lapwing, arguments, expected):
 
 
 @pytest.mark.parametrize("key_prefix", ["", "a b", "a/*", "/a", "a/", "$x", "ä"])
-def test_what_cannot_be_part_of_a_zenoh_key_is_no_key_prefix(key_prefix):
+def test_invalid_key_prefix_is_rejected(key_prefix):
     with pytest.raises(ValueError, match="--key-prefix"):
         check_key_prefix(key_prefix)
 
 
-def test_a_refused_run_takes_the_folder_of_recordings_away_again(lapwing):
+def test_refused_run_takes_folder_of_recordings_away_again(lapwing):
     code, _, err = lapwing("run", HOVER, "--key-prefix", "a b")
     assert code == 2
     assert err.startswith("lapwing: --key-prefix a b: expected letters")
     assert os.listdir() == ["scenes"]
 
 
-def test_a_signal_while_kernels_compile_ends_the_run_at_once(lapwing, monkeypatch):
+def test_signal_while_kernels_compile_ends_run_at_once(lapwing, monkeypatch):
     monkeypatch.setattr(single_process_run, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
     code, out, err = lapwing("run", HOVER, "--mode", "single-process")
     assert (code, out, err) == (143, "", "lapwing: ended by SIGTERM\n")
@@ -186,7 +192,7 @@ def test_help_lists_commands_in_groups_on_single_lines():
     assert without.stdout == result.stdout
 
 
-def test_scenes_are_listed_a_line_each_broken_ones_too(lapwing, tmp_path):
+def test_scenes_are_listed_line_each_broken_ones_too(lapwing, tmp_path):
     (tmp_path / "broken.toml").write_text("[run\n")
     code, out, _ = lapwing("scenes")
     assert code == 0
@@ -198,7 +204,7 @@ def test_scenes_are_listed_a_line_each_broken_ones_too(lapwing, tmp_path):
     assert out.startswith("broken.toml  (broken: broken.toml: not valid TOML: Expected ']'")
 
 
-def test_check_tells_what_flies(lapwing):
+def test_check_prints_configuration(lapwing):
     code, out, _ = lapwing("check", HOVER)
     assert code == 0
     assert out.splitlines() == [
@@ -211,7 +217,7 @@ def test_check_tells_what_flies(lapwing):
     ]
 
 
-def test_the_command_itself_shows_no_traceback():
+def test_command_shows_no_traceback():
     command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
     assert result.returncode == 2
@@ -224,7 +230,7 @@ FULL = Path("/dev/full")
 
 @pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
 @pytest.mark.parametrize("arguments", [["scenes"], ["--help"], ["check", "hover"]])
-def test_output_to_a_full_device_is_one_line_and_no_traceback(arguments):
+def test_output_to_full_device_is_one_line_and_no_traceback(arguments):
     with FULL.open("w") as full:
         command = [sys.executable, "-m", "lapwing", *arguments]
         result = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
@@ -232,7 +238,7 @@ def test_output_to_a_full_device_is_one_line_and_no_traceback(arguments):
     assert result.stderr == "lapwing: standard output: cannot be written: no space left on device\n"
 
 
-def test_a_flight_whose_output_is_full_leaves_its_log(tmp_path):
+def test_full_output_device_leaves_log(tmp_path):
     lapwing.fly("hover", {"run.duration": 0.1})  # compiles: a notice of that would be the first that cannot be said
     log = tmp_path / "log.mcap"
     command = [sys.executable, "-m", "lapwing", "run", "hover", "--set", "run.duration=1", "--mode", "single-process"]
@@ -247,7 +253,7 @@ def test_a_flight_whose_output_is_full_leaves_its_log(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
-def test_a_flight_in_processes_whose_standard_files_are_closed_is_flown(tmp_path, closed):
+def test_processes_fly_with_closed_standard_files(tmp_path, closed):
     lapwing.fly("hover", {"run.duration": 0.1})
     log, report = tmp_path / "log.mcap", tmp_path / "report.html"
     words = f"-m lapwing run hover --set run.duration=1 --log {log} --report {report} {closed}"
@@ -258,13 +264,13 @@ def test_a_flight_in_processes_whose_standard_files_are_closed_is_flown(tmp_path
 
 
 @pytest.mark.long
-def test_a_study_whose_output_is_closed_has_its_exit_code():
+def test_study_with_closed_output_keeps_exit_code():
     command = f"{sys.executable} -m lapwing stability exact_time"
     result = subprocess.run(f"{command} >&-", shell=True, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")
 
 
-def test_whoever_stops_reading_ends_the_command_quietly():
+def test_closed_pipe_ends_command_quietly():
     read, write = os.pipe()
     os.close(read)
     command = [sys.executable, "-m", "lapwing", "scenes"]
@@ -274,7 +280,7 @@ def test_whoever_stops_reading_ends_the_command_quietly():
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
-def test_an_error_that_cannot_be_said_keeps_its_exit_code():
+def test_exit_code_survives_closed_error_stream():
     with FULL.open("w") as full:
         result = subprocess.run([sys.executable, "-m", "lapwing", "nonsense"], stderr=full, check=False)
     assert result.returncode == 2

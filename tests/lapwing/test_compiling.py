@@ -28,6 +28,7 @@ def setup():
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setattr(compile_notice, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(compile_notice, "slowness", lambda: 1.0)
     return tmp_path
 
 
@@ -52,40 +53,57 @@ class Compiling:
         pass
 
 
-def test_it_is_said_once_and_only_where_something_compiles(setup, folder):
-    said = []
-    with notify_on_compile(setup, said.append):
+def test_compile_notice_appears_once_and_only_when_needed(setup, folder):
+    output = []
+    with notify_on_compile(setup, output.append):
         pass
-    assert said == []
+    assert output == []
     assert not (folder / FILE).exists()
-    with notify_on_compile(setup, said.append):
+    with notify_on_compile(setup, output.append):
         compile_something()
-    assert said == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
+    assert output == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
 
 
-def test_the_guess_is_the_time_that_it_took_before(setup, folder):
+def test_compile_notice_estimates_from_earlier_time(setup, folder):
     with notify_on_compile(setup, lambda _: None):
         compile_something()
     (key,) = known = json.loads((folder / FILE).read_text())
     assert 0.0 <= known[key] < EACH
     (folder / FILE).write_text(json.dumps({key: 81.5}))
-    said = []
-    with notify_on_compile(setup, said.append):
+    output = []
+    with notify_on_compile(setup, output.append):
         compile_something()
-    assert [what.seconds for what in said] == [81.5]
+    assert [what.seconds for what in output] == [81.5]
     assert json.loads((folder / FILE).read_text()) == {key: 81.5}
 
 
-@pytest.mark.parametrize("content", ["", "[]", '{"a": []}'])
-def test_a_damaged_memory_is_none(setup, folder, content):
-    (folder / FILE).write_text(content)
-    said = []
-    with notify_on_compile(setup, said.append):
+def test_estimate_follows_present_speed_of_machine(setup, folder, monkeypatch):
+    with notify_on_compile(setup, lambda _: None):
         compile_something()
-    assert said == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
+    (key,) = json.loads((folder / FILE).read_text())
+    (folder / FILE).write_text(json.dumps({key: 20.0}))
+    monkeypatch.setattr(compile_notice, "slowness", lambda: 7.0)
+    output = []
+    with notify_on_compile(setup, output.append):
+        compile_something()
+    assert [what.seconds for what in output] == [140.0]
+    assert json.loads((folder / FILE).read_text()) == {key: 20.0}
 
 
-def test_a_terminal_has_a_bar_and_anything_else_a_line():
+def test_slowness_is_positive_measurement():
+    assert compile_notice.slowness() > 0.0
+
+
+@pytest.mark.parametrize("content", ["", "[]", '{"a": []}'])
+def test_damaged_memory_is_none(setup, folder, content):
+    (folder / FILE).write_text(content)
+    output = []
+    with notify_on_compile(setup, output.append):
+        compile_something()
+    assert output == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
+
+
+def test_terminal_has_bar_and_anything_else_line():
     for terminal, expected in (
         (True, "of about 40 s"),
         (False, "hover: compiling kernels of plant, sensors, about 40 s"),
@@ -95,23 +113,23 @@ def test_a_terminal_has_a_bar_and_anything_else_a_line():
             display.compiling(Compilation("hover", ("plant", "sensors"), 40.0))
             if display._bar:
                 display._bar.refresh()
-            said = console.file.getvalue()
+            output = console.file.getvalue()
             display.begin()
-        assert expected in said
+        assert expected in output
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_scenes_are_compiled_ahead_with_a_bar_or_a_line_each(setup, folder, monkeypatch, terminal):
+def test_scenes_are_compiled_ahead_with_bar_or_line_each(setup, folder, monkeypatch, terminal):
     monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     compile_ahead({"one": setup, "two": setup}, console)
-    said = console.file.getvalue()
-    assert said.count("ready after") == 2
-    assert ("of about 30 s  " in said) == terminal
-    assert ("hover: compiling kernels of plant, autopilot, trajectory, about 15 s" in said) == (not terminal)
+    output = console.file.getvalue()
+    assert output.count("ready after") == 2
+    assert ("of about 42 s  " in output) == terminal
+    assert ("hover: compiling kernels of plant, autopilot, trajectory, about 21 s" in output) == (not terminal)
 
 
-def test_one_broken_scene_of_a_folder_stops_no_other(tmp_path, monkeypatch):
+def test_broken_scene_of_folder_does_not_stop_others(tmp_path, monkeypatch):
     compiled = []
     monkeypatch.setattr("lapwing.runs.precompile.compile_ahead", lambda setups, console: compiled.extend(setups))
     for name in ("a", "c"):

@@ -27,9 +27,9 @@ def test_landing_summary_has_speed_place_events_degrees(lapwing):
     assert "Landed at 8.52 s: upright on its feet, touched down at 0.95 m/s; ends at (0.00," in out
     assert "0.10  contact  leaves the ground" in out
     assert "roll [°]" in out
-    told = json.loads(Path("a.json").read_text())
-    assert (told["outcome"]["kind"], told["landed"]) == ("landed", True)
-    assert {"time": 6.0, "kind": "phase", "text": "descend"} in told["events"]
+    reported = json.loads(Path("a.json").read_text())
+    assert (reported["outcome"]["kind"], reported["landed"]) == ("landed", True)
+    assert {"time": 6.0, "kind": "phase", "text": "descend"} in reported["events"]
     page = Path("a.html").read_text()
     assert "Landed at 8.52 s" in page
     assert "<td>leaves the ground</td>" in page
@@ -40,17 +40,17 @@ def test_crash_has_its_own_exit_code(lapwing):
     assert (code, err.count("\n")) == (4, 1)
     assert "crashed; success.require: outcome in" in err
     assert "hit the ground at 4.4 m/s" in out
-    told = json.loads(Path("a.json").read_text())
-    assert (told["outcome"]["kind"], told["landed"]) == ("crashed", False)
+    reported = json.loads(Path("a.json").read_text())
+    assert (reported["outcome"]["kind"], reported["landed"]) == ("crashed", False)
     assert "Crashed at " in Path("a.html").read_text()
 
 
 @pytest.mark.parametrize(
     ("require", "code"), [("outcome == 'landed'", 4), ("rmse.z < 0.1 and abs(time - 2) < 1e-6", 0), ("energy < 9", 4)]
 )
-def test_success_criteria_decide_the_exit_code(lapwing, require, code):
-    found, out, _ = lapwing(*HOVER, *sets("run.duration=2.0", f'success.require=["{require}"]'))
-    assert found == code
+def test_success_criteria_decide_exit_code(lapwing, require, code):
+    result, out, _ = lapwing(*HOVER, *sets("run.duration=2.0", f'success.require=["{require}"]'))
+    assert result == code
     assert "Completed at 2.00 s: the run ends before its trajectory" in out
 
 
@@ -66,7 +66,7 @@ def test_divergence_is_reported_in_both_modes(lapwing, mode):
     assert FlightData.read("a.mcap").outcome.kind == "diverged"
 
 
-def test_interrupted_run_is_aborted_with_a_report(lapwing, monkeypatch):
+def test_interrupted_run_is_aborted_with_report(lapwing, monkeypatch):
     advance = single_process_run.run_single
 
     def interrupted(graph, recording, speed, observe, last):
@@ -80,7 +80,7 @@ def test_interrupted_run_is_aborted_with_a_report(lapwing, monkeypatch):
     assert Path("a.html").exists()
 
 
-def test_run_that_fails_early_ignores_an_older_log(lapwing, monkeypatch):
+def test_run_that_fails_early_ignores_older_log(lapwing, monkeypatch):
     lapwing(*HOVER)
     monkeypatch.setattr(single_process_run, "create_all", lambda *_: signal.raise_signal(signal.SIGTERM))
     assert lapwing(*HOVER)[1:] == ("", "lapwing: ended by SIGTERM\n")
@@ -88,7 +88,7 @@ def test_run_that_fails_early_ignores_an_older_log(lapwing, monkeypatch):
 
 @pytest.mark.parametrize("scene", ["delivery_mission", "cooperative_load"])
 def test_end_of_run_reads_all_topics_that_it_shows(tmp_path, scene):
-    """Of a log with every sensor only the topics that page, figures and events are made of."""
+    """Page, metrics and events need only some topics of a log with every sensor."""
     log = package.fly(package.load_scene(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
     (part,), whole = FlightData.read_all(log, SHOWN), FlightData.read(log)
     assert set(part.topics) < set(whole.topics)

@@ -25,7 +25,7 @@ def check_rejected(result, message, code=2):
     assert message in result.stderr
 
 
-def test_log_that_is_a_device_is_rejected(tmp_path):
+def test_log_that_is_device_is_rejected(tmp_path):
     result = lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "/dev/null", "--report", "a.html")
     check_rejected(result, "/dev/null: is not a regular file")
     assert not list(tmp_path.iterdir())
@@ -33,7 +33,7 @@ def test_log_that_is_a_device_is_rejected(tmp_path):
 
 @pytest.mark.parametrize("device", ["fifo", "/dev/zero"])
 @pytest.mark.parametrize("command", ["check", "run"])
-def test_scene_that_is_a_device_is_rejected(tmp_path, command, device):
+def test_scene_that_is_device_is_rejected(tmp_path, command, device):
     os.mkfifo(tmp_path / "fifo")
     check_rejected(lapwing(tmp_path, command, device), f"{device}: is not a regular file")
 
@@ -72,6 +72,6 @@ def test_run_prints_in_ascii(tmp_path):
 
 
 @pytest.mark.skipif(os.geteuid() == 0 and not Path("/proc/self/fd").exists(), reason="needs /proc")
-def test_log_in_a_folder_without_write_access_is_rejected(tmp_path):
+def test_log_in_folder_without_write_access_is_rejected(tmp_path):
     check_rejected(lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "/proc/a.mcap"), "/proc/a.mcap: cannot be written")
     check_rejected(lapwing("/proc/self/fd", "run", HOVER, *SHORT), "cannot be written")

@@ -19,13 +19,13 @@ def many(task, n=8):
 def steered(observed):
     """A proportional controller on what is observed: towards the target, upright, quiet."""
     way, past, R, omega = observed[:, 0:3], observed[:, 6:9], observed[:, 9:18].reshape(-1, 3, 3), observed[:, 18:21]
-    wanted = np.clip(1.2 * way, -3.0, 3.0) - 1.8 * past  # [m/s^2]
-    tilt = np.clip(wanted[:, :2] / 9.81, -0.5, 0.5)
+    expected = np.clip(1.2 * way, -3.0, 3.0) - 1.8 * past  # [m/s^2]
+    tilt = np.clip(expected[:, :2] / 9.81, -0.5, 0.5)
     up = np.column_stack([tilt, np.ones(len(tilt))])
     up /= np.linalg.norm(up, axis=1)[:, None]
     off = np.cross(R[:, :, 2], up)  # in the world: the axis to turn about
     turn = 6.0 * np.einsum("nij,ni->nj", R, off) - 0.1 * omega
-    thrust = wanted[:, 2] / 9.81 + 1.0 / np.clip(R[:, 2, 2], 0.5, 1.0) - 1.0
+    thrust = expected[:, 2] / 9.81 + 1.0 / np.clip(R[:, 2, 2], 0.5, 1.0) - 1.0
     return np.clip(np.column_stack([thrust, turn[:, :2] / 6.0, -0.3 * omega[:, 2]]), -1.0, 1.0)
 
 
@@ -41,12 +41,63 @@ def flown(task, n=8, seconds=8.0):
 
 
 @pytest.mark.parametrize("task", TASKS)
-@pytest.mark.filterwarnings("ignore::UserWarning")
-def test_gymnasiums_checker_passes(task):
-    check_env(gymnasium.make(f"lapwing/{task}-v0").unwrapped, skip_render_check=True)
+@pytest.mark.filterwarnings("error")
+def test_env_checker_passes_without_warning(task):
+    environment = gymnasium.make(f"lapwing/{task}-v0").unwrapped
+    check_env(environment, skip_render_check=True)
+    space = environment.observation_space
+    assert np.isfinite([space.low, space.high]).all()
 
 
-def test_one_is_the_first_of_many():
+@pytest.mark.parametrize("task", TASKS)
+def test_observations_stay_within_bounds_under_random_actions(task):
+    environments, random = many(task, 20), np.random.default_rng(4)
+    environments.reset(seed=4)
+    ends = 0
+    for _ in range(300):
+        actions = random.uniform(-1.0, 1.0, (20, 4)) * [0.5, 3.0, 3.0, 3.0]  # clipped
+        observed, _, terminated, truncated, _ = environments.step(actions)
+        assert environments.observation_space.contains(observed)
+        ends += terminated.sum() + truncated.sum()
+    assert ends > 0
+
+
+def test_invalid_vehicle_is_lost_and_observed_within_bounds():
+    environments = many("Hover", 2)
+    environments.reset(seed=1)
+    environments.unwrapped.batch.restart([1], position_world=(0.0, 0.0, 5.0), omega_body=(1e4, 0.0, 0.0))
+    observed, reward, terminated, *_ = environments.step(np.zeros((2, 4)))
+    assert (terminated.tolist(), reward[1]) == ([False, True], -10.0)
+    assert environments.observation_space.contains(observed)
+
+
+def test_actions_that_are_not_finite_are_rejected():
+    environments = many("Hover", 2)
+    environments.reset(seed=1)
+    with pytest.raises(ValueError, match="actions: expected finite numbers"):
+        environments.step(np.array([[0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0]]))
+
+
+@pytest.mark.parametrize("task", ["Hover", "Track"])
+def test_reward_is_that_of_closed_form(task):
+    environments, n = many(task, 20), 20
+    environments.reset(seed=6)
+    for _ in range(30):
+        _, reward, terminated, *_ = environments.step(np.full((n, 4), [0.1, 0.05, 0.0, 0.1]))
+    state = environments.unwrapped.batch.state
+    a, height = 2.0 * np.pi / 12.0 * state.time, environments.unwrapped._ground + 5.0
+    still = task == "Hover"
+    place = np.stack([4.0 * np.sin(a) * (not still), 2.0 * np.sin(2 * a) * (not still), np.full(n, height)], axis=1)
+    speed = np.stack([4.0 * np.cos(a), 4.0 * np.cos(2 * a), np.zeros(n)], axis=1) * (0.0 if still else np.pi / 6.0)
+    away, slip, spin = (
+        np.linalg.norm(v, axis=1)
+        for v in (place - state.position_world, state.velocity_world - speed, state.omega_body)
+    )
+    assert not terminated.any()
+    assert reward == pytest.approx(np.exp(-away) - 0.05 * np.tanh(slip) - 0.02 * np.tanh(spin), abs=1e-12)
+
+
+def test_single_environment_equals_first_of_vector():
     environments, one = many("Hover"), gymnasium.make("lapwing/Hover-v0")
     together, _ = environments.reset(seed=9)
     alone, _ = one.reset(seed=9)
@@ -59,14 +110,14 @@ def test_one_is_the_first_of_many():
     assert reward[0] == worth
 
 
-def test_a_controller_hovers():
+def test_controller_hovers():
     _, observed, total, ended = flown("Hover")
     assert not ended.any()
     assert np.abs(observed[:, :3]).max() < 0.1
     assert total.min() > 250.0  # of 400
 
 
-def test_it_lands_softly():
+def test_trained_policy_lands_softly():
     environments = many("Land")
     observed, _ = environments.reset(seed=3)
     last = np.zeros(8)
@@ -77,14 +128,14 @@ def test_it_lands_softly():
     assert last.min() > 5.0
 
 
-def test_it_flies_through_gates():
+def test_trained_policy_flies_through_gates():
     environments, _, total, ended = flown("Race", seconds=12.0)
     assert not ended.any()
-    assert environments.unwrapped._memory[:, 0].min() >= 2
+    assert environments.unwrapped._episodes.gates.min() >= 2
     assert total.min() > 20.0
 
 
-def test_an_episode_that_is_over_begins_anew_alone():
+def test_episode_that_is_over_begins_anew_alone():
     environments = many("Hover", 2)
     environments.reset(seed=1)
     for _ in range(500):

@@ -31,16 +31,16 @@ def struck(module, number, said=subprocess.PIPE):
 @pytest.mark.parametrize(
     "module", ["lapwing.cosim.processes.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.study_commands"]
 )
-def test_ctrl_c_at_an_import(module):
+def test_ctrl_c_at_import(module):
     done = struck(module, signal.SIGINT)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
 
 
-def test_termination_at_an_import():
+def test_termination_at_import():
     done = struck("typer", signal.SIGTERM)
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
 
 
-def test_the_exit_code_is_the_same_where_nothing_can_be_said():
+def test_exit_code_is_equal_with_closed_streams():
     with open("/dev/full", "w") as full:
         assert struck("typer", signal.SIGINT, full).returncode == 130

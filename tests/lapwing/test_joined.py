@@ -12,7 +12,7 @@ import pytest
 
 from lapwing.cosim.log import LogReader
 from lapwing.messages import Log
-from lapwing.services.process_table import FOXGLOVE, needed
+from lapwing.services.process_table import FOXGLOVE, required_processes
 from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import patient
@@ -35,7 +35,7 @@ def compiled():
 
 
 def flies(log):
-    """Whether the log has come to 3 s, so that everybody has long seen everybody."""
+    """Return True if the log has reached 3 s, when all participants have joined."""
     try:
         with LogReader(log) as read:
             return any(True for _ in read.messages(start_ns=3_000_000_000))
@@ -43,8 +43,8 @@ def flies(log):
         return False
 
 
-def test_dead_service_is_named_and_the_outcome_is_aborted(tmp_path):
-    names = needed(resolve(load("hover", SETS[1:])))
+def test_dead_service_is_named_and_outcome_is_aborted(tmp_path):
+    names = required_processes(resolve(load("hover", SETS[1:])))
     table = ",".join(f"{name}={at}" for name, at in loopback_endpoints([*names, "mission"]).items())
     log, figures = tmp_path / "log.mcap", tmp_path / "figures.json"
 
@@ -57,19 +57,19 @@ def test_dead_service_is_named_and_the_outcome_is_aborted(tmp_path):
         while not flies(log) and time.monotonic() < deadline:
             time.sleep(0.1)
         services["plant"].kill()
-        _, said = mission.communicate(timeout=PATIENCE)
+        _, output = mission.communicate(timeout=PATIENCE)
     finally:
         for process in (*services.values(), mission):
             process.kill()
             process.communicate()
-    assert mission.returncode == 1, said
-    assert "plant: gone at t = " in said
+    assert mission.returncode == 1, output
+    assert "plant: gone at t = " in output
     assert json.loads(figures.read_text())["outcome"]["kind"] == "aborted"
 
 
-def test_viewers_are_told_of_events_while_it_flies(tmp_path):
+def test_viewers_receive_events_during_flight(tmp_path):
     pytest.importorskip("foxglove", reason="needs the extra `foxglove`")
-    names = needed(resolve(load("hover")))
+    names = required_processes(resolve(load("hover")))
     ends = loopback_endpoints([*names, FOXGLOVE, "mission", "door"])
     port = int(ends.pop("door").rpartition(":")[2])
     table, log = ",".join(f"{name}={at}" for name, at in ends.items()), tmp_path / "log.mcap"
@@ -83,23 +83,22 @@ def test_viewers_are_told_of_events_while_it_flies(tmp_path):
         mission = start("run", "hover", *common, "--log", str(log), "--view")
         started.append(mission)
         address = mission.stdout.readline().removeprefix("live: ").strip()
-        page = urllib.request.urlopen(address + "steps", timeout=PATIENCE)
+        with urllib.request.urlopen(address, timeout=PATIENCE) as page:  # its pictures: tests/lapwing/test_live.py
+            assert page.status == 200
         client.subscribe("/drone1/events")
-        told = []
+        reported = []
         while (message := client.next()) is not None:
             if isinstance(message, bytes) and message[0] == 1:
-                told.append((struct.unpack_from("<BIQ", message)[2], message[13:]))
-        shown = [json.loads(line[6:]) for line in page.read().decode().splitlines() if line.startswith("data: {")]
-        _, said = mission.communicate(timeout=PATIENCE)
+                reported.append((struct.unpack_from("<BIQ", message)[2], message[13:]))
+        _, output = mission.communicate(timeout=PATIENCE)
     finally:
         for process in started:
             process.kill()
             process.communicate()
-    assert mission.returncode == 0, said
+    assert mission.returncode == 0, output
     with LogReader(log) as read:
         kept = [(time_ns, payload) for _, _, time_ns, payload in read.messages(["/drone1/events"])]
-    assert told
-    assert set(told) <= set(kept)
-    kinds = [Log.decode(payload).name for _, payload in told]
+    assert reported
+    assert set(reported) <= set(kept)
+    kinds = [Log.decode(payload).name for _, payload in reported]
     assert "arming" in kinds
-    assert [kind for step in shown for _, _, kind, _ in step["events"]][: len(kinds)] == kinds

@@ -26,13 +26,13 @@ def faults(kind, tree):
 
 
 @pytest.mark.parametrize("kind", SCHEMAS)
-def test_it_is_a_schema_and_there_is_something_to_try_it_on(kind):
+def test_schema_is_valid_and_has_examples(kind):
     jsonschema.Draft7Validator.check_schema(VALIDATORS[kind].schema)
     assert FILES[kind]
 
 
 @pytest.mark.parametrize(("kind", "path"), [(k, p) for k, ps in FILES.items() for p in ps], ids=lambda x: Path(x).stem)
-def test_what_ships_is_valid(kind, path):
+def test_shipped_files_match_schema(kind, path):
     assert faults(kind, tomllib.loads(path.read_text())) == []
 
 
@@ -73,7 +73,7 @@ def changed(key, value):
 
 
 @pytest.mark.parametrize(("key", "value"), WRONG.values(), ids=WRONG)
-def test_what_the_loader_refuses_is_invalid(key, value):
+def test_schema_rejects_same_input_as_loader(key, value):
     with pytest.raises(SceneError):
         load("delivery_mission", {key: value})
     assert faults("scene", changed(key, value))
@@ -90,11 +90,11 @@ RIGHT = {
 
 
 @pytest.mark.parametrize(("key", "value"), RIGHT.values(), ids=RIGHT)
-def test_what_a_scene_may_write_is_valid(key, value):
+def test_schema_accepts_alternative_forms(key, value):
     assert faults("scene", changed(key, value)) == []
 
 
-def test_a_misspelt_key_of_an_airframe_or_gain_set_is_invalid():
+def test_misspelt_key_of_airframe_or_gain_set_is_invalid():
     frame = tomllib.loads(FILES["airframe"][0].read_text())
     frame["mass"]["totl"] = frame["mass"].pop("total")
     assert len(faults("airframe", frame)) == 2  # one that is unknown, one that is missing
@@ -109,7 +109,7 @@ def test_keys_are_explained():
 
 
 @pytest.mark.parametrize("kind", ["effects", "sensors"])
-def test_what_is_the_users_own_names_a_module_and_has_keys_of_its_own(kind):
+def test_schema_of_user_effect_needs_module_and_allows_keys(kind):
     own = {**MISSION, kind: {**MISSION[kind], "my_own": {"module": "my_module", "strength": 2.0}}}
     assert faults("scene", own) == []
     del own[kind]["my_own"]["module"]

@@ -1,4 +1,4 @@
-"""What the code says of keys: types, bounds, defaults, and the comments behind fields."""
+"""Documentation of keys from the code: types, bounds, defaults, comments behind fields."""
 
 from typing import Annotated, Literal, NamedTuple, get_args
 
@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field
 from lapwing.dynamics.field_comments import comments, split
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.file_schemas.annotations import schema_of
-from lapwing.file_schemas.catalogue import effect_tables, sensor_tables
+from lapwing.file_schemas.json_schema import effect_tables, sensor_tables
 from lapwing.file_schemas.key_docs import REQUIRED, keys
 from lapwing.services.scene_resolver import vocabulary
 from lapwing.services.sensors.fault_schedule import FaultTable
@@ -18,7 +18,7 @@ from lapwing.services.trajectory.segments import KINDS
 
 
 class Base(BaseModel):
-    """Of a base class."""
+    """Base class."""
 
     first: float = Field(gt=0.0)  # [m/s] how fast
 
@@ -31,12 +31,12 @@ class Sample(Base):
 
 
 class Plain(NamedTuple):
-    """As effects have."""
+    """Class without pydantic, like those of effects."""
 
     size: Annotated[float, Gt(0), Le(5)] = 1.0  # [kg]
 
 
-def test_comments_are_those_behind_the_fields_and_of_base_classes():
+def test_comments_are_those_behind_fields_and_of_base_classes():
     assert comments(Sample) == {"first": "[m/s] how fast", "second": "[m], [rad] both"}
 
 
@@ -49,7 +49,7 @@ def test_comments_are_those_behind_the_fields_and_of_base_classes():
         ("follow the scene's [trajectory]", ("", "follow the scene's [trajectory]")),
     ],
 )
-def test_a_comment_begins_with_the_unit(comment, expected):
+def test_comment_begins_with_unit(comment, expected):
     assert split(comment) == expected
 
 
@@ -65,20 +65,22 @@ def test_keys_have_bounds_defaults_units_and_meanings():
 
 def _tables():
     """Every table that people write, with those within it."""
-    found = [*vocabulary().sections.values(), *KINDS.values(), Airframe, Phase, FaultTable]
-    found += [settings for _, settings in effect_tables().values()] + [cls for _, cls in sensor_tables().values()]
-    for table in found:
-        found += [cls for key in keys(table) if key.name != "faults" for cls in _classes(key.hint) if cls not in found]
-    return found
+    result = [*vocabulary().sections.values(), *KINDS.values(), Airframe, Phase, FaultTable]
+    result += [settings for _, settings in effect_tables().values()] + [cls for _, cls in sensor_tables().values()]
+    for table in result:
+        result += [
+            cls for key in keys(table) if key.name != "faults" for cls in _classes(key.hint) if cls not in result
+        ]
+    return result
 
 
 def _classes(hint):
     if isinstance(hint, type) and (issubclass(hint, BaseModel) or hasattr(hint, "_fields")):
         return [hint]
-    return [found for part in get_args(hint) for found in _classes(part)]
+    return [result for part in get_args(hint) for result in _classes(part)]
 
 
 @pytest.mark.parametrize("table", _tables(), ids=lambda cls: f"{cls.__module__}.{cls.__name__}")
-def test_every_key_says_its_unit_or_what_it_means(table):
+def test_every_key_has_unit_or_description(table):
     silent = [key.name for key in keys(table) if not (key.unit or key.meaning)]
     assert silent == (["kind"] if table in KINDS.values() else []), f"complete the comments in {table.__module__}"

@@ -38,7 +38,7 @@ def write(path, ticks=500, from_tick=500, by=0.0, without=range(0), **about):
     return path
 
 
-def test_info_tells_the_making_the_topics_and_the_gaps(lapwing, tmp_path):
+def test_info_prints_provenance_topics_and_gaps(lapwing, tmp_path):
     write(tmp_path / "a.mcap", without=range(100, 110))
     code, out, _ = lapwing("info", "a.mcap")
     lines = {line.split()[0]: " ".join(line.split()[1:]) for line in out.splitlines()}
@@ -53,7 +53,7 @@ def test_info_tells_the_making_the_topics_and_the_gaps(lapwing, tmp_path):
     assert lines["no"] == "resimulate lacks an attachment setup.json"
 
 
-def test_verify_recomputes_the_digest(lapwing, tmp_path):
+def test_verify_recomputes_digest(lapwing, tmp_path):
     path = write(tmp_path / "a.mcap")
     code, out, _ = lapwing("verify", path)
     assert code == 0
@@ -66,7 +66,7 @@ def test_verify_recomputes_the_digest(lapwing, tmp_path):
     assert f"recorded {'0' * 32}" in err
 
 
-def test_verify_finds_the_first_message_that_differs_and_how_it_grows(lapwing, tmp_path):
+def test_verify_finds_first_difference_and_growth(lapwing, tmp_path):
     a, b = write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap", from_tick=200, by=0.001, seed="8")
     code, out, err = lapwing("verify", a, b)
     assert (code, err.count("\n")) == (3, 1)
@@ -79,7 +79,7 @@ def test_verify_finds_the_first_message_that_differs_and_how_it_grows(lapwing, t
     assert [row[1] for row in rows] == [row[2] for row in rows]
 
 
-def test_logs_with_the_same_messages_are_the_same_whatever_their_chunks(lapwing, tmp_path):
+def test_logs_of_equal_messages_are_equal_for_any_chunks(lapwing, tmp_path):
     path = write(tmp_path / "a.mcap")
     with LogReader(path) as log, LogWriter(tmp_path / "b.mcap", ABOUT, {}) as other:
         for topic, kind, time_ns, payload in log.messages():
@@ -88,7 +88,7 @@ def test_logs_with_the_same_messages_are_the_same_whatever_their_chunks(lapwing,
     assert (code, out) == (0, f"{path} and b.mcap: identical messages\n")
 
 
-def test_a_message_that_one_log_lacks_is_a_difference(lapwing, tmp_path):
+def test_message_that_one_log_lacks_is_difference(lapwing, tmp_path):
     write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap", without=[300])
     code, out, _ = lapwing("verify", "a.mcap", "b.mcap")
     assert code == 3
@@ -98,7 +98,7 @@ def test_a_message_that_one_log_lacks_is_a_difference(lapwing, tmp_path):
     assert "/drone1/ground_truth at t = 1.6 s" in out
 
 
-def test_what_a_killed_writer_has_flushed_is_recovered(lapwing, tmp_path):
+def test_recover_restores_flushed_messages(lapwing, tmp_path):
     code = textwrap.dedent(
         """
         import os, signal, time
@@ -126,7 +126,7 @@ def test_what_a_killed_writer_has_flushed_is_recovered(lapwing, tmp_path):
     assert lapwing("verify", "killed_recovered.mcap")[0] == 0
 
 
-def test_a_damaged_chunk_is_left_out_and_named(lapwing, tmp_path):
+def test_damaged_chunk_is_left_out_and_named(lapwing, tmp_path):
     path = write(tmp_path / "a.mcap")
     data = bytearray(path.read_bytes())
     data[data.index(b"\x28\xb5\x2f\xfd", len(data) // 2) + 200] ^= 0xFF  # in a compressed chunk
@@ -145,7 +145,7 @@ def test_a_damaged_chunk_is_left_out_and_named(lapwing, tmp_path):
     assert times == sorted(times)
 
 
-def test_export_writes_a_table_a_topic_with_units(lapwing, tmp_path):
+def test_export_writes_table_topic_with_units(lapwing, tmp_path):
     write(tmp_path / "a.mcap")
     code, out, _ = lapwing(
         "export", "a.mcap", "--csv", "csv", "--mat", "a.mat", "--topics", "/drone1/ground_truth,/drone1/status"
@@ -161,10 +161,10 @@ def test_export_writes_a_table_a_topic_with_units(lapwing, tmp_path):
     assert float(rows[7]["time [s]"]) == 7 * 0.004
     assert float(rows[7]["pose.position.z [m]"]) == 0.01 * 7
     assert float(rows[7]["rotor_speed.1 [rad/s]"]) == 14.0
-    found = loadmat("a.mat", simplify_cells=True)
-    assert np.array_equal(found["drone1_ground_truth"]["rotor_speed_1"], 2.0 * np.arange(500))
-    assert found["drone1_ground_truth"]["units"]["rotor_speed_1"] == "rad/s"
-    assert found["drone1_status"]["mode"] == "a;b"
+    result = loadmat("a.mat", simplify_cells=True)
+    assert np.array_equal(result["drone1_ground_truth"]["rotor_speed_1"], 2.0 * np.arange(500))
+    assert result["drone1_ground_truth"]["units"]["rotor_speed_1"] == "rad/s"
+    assert result["drone1_status"]["mode"] == "a;b"
     with open("csv/drone1.status.csv", newline="") as file:
         assert next(csv.DictReader(file))["mode"] == "a;b"
 
@@ -194,7 +194,7 @@ def foreign(tmp_path):
     return path
 
 
-def test_a_foreign_log_is_told_and_what_it_lacks(lapwing, foreign):
+def test_foreign_log_is_reported_with_missing_parts(lapwing, foreign):
     code, out, _ = lapwing("info", foreign)
     assert code == 0
     assert "no report lacks a topic /NAME/ground_truth" in " ".join(out.split())
@@ -217,7 +217,7 @@ def old(tmp_path, monkeypatch):
     return tmp_path / "old.mcap"
 
 
-def test_a_log_of_another_version_is_told_with_what_is_otherwise_and_its_bytes_are_verified(lapwing, old):
+def test_log_of_other_version_reports_types_and_verifies_bytes(lapwing, old):
     code, out, err = lapwing("info", old)
     assert (code, err) == (0, "")
     assert f"no report lacks messages of this version: {OLD}" in " ".join(out.split())
@@ -237,7 +237,7 @@ def test_a_log_of_another_version_is_told_with_what_is_otherwise_and_its_bytes_a
         ["export", "old.mcap", "--csv", "csv"],
     ],
 )
-def test_a_log_of_another_version_is_refused_where_its_messages_would_be_read_wrongly(lapwing, old, arguments):
+def test_log_of_other_version_with_changed_types_is_rejected(lapwing, old, arguments):
     before = sorted(os.listdir())
     code, out, err = lapwing(*arguments)
     assert (code, out, err.count("\n")) == (2, "", 1)
@@ -246,7 +246,7 @@ def test_a_log_of_another_version_is_refused_where_its_messages_would_be_read_wr
     assert sorted(os.listdir()) == before
 
 
-def test_what_is_not_otherwise_is_still_replayed_and_exported(lapwing, old):
+def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
     assert lapwing("export", old, "--csv", "csv", "--topics", "/clock")[0] == 0
     assert lapwing("replay", old, "--topics", "/clock", "--speed", "max")[0] == 0
 

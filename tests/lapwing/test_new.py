@@ -38,7 +38,7 @@ def run(folder, *command):
     )
 
 
-@pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator"])
+@pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
 def test_created_module_passes_its_test(tmp_path, kind):
     created = run(tmp_path, "lapwing", "new", kind, f"my_{kind}")
     assert (created.returncode, created.stderr) == (0, "")
@@ -69,22 +69,22 @@ def test_other_names_are_refused(tmp_path, name):
     assert not any(tmp_path.iterdir())
 
 
-def test_it_flies_to_the_same_bits_in_processes_and_from_the_log_alone(scene, tmp_path):
+def test_template_digest_is_equal_in_processes_and_resimulation(scene, tmp_path):
     own, log = scene(f"effects.{NAME}.coefficient=3.0"), tmp_path / "log.mcap"
     without = fly(scene(f"effects.{NAME}.coefficient=0.0")).digest
-    given = ProcessSpec("mission", resolve(own), {}, "test-own-effect", log=str(log))
+    values = ProcessSpec("mission", resolve(own), {}, "test-own-effect", log=str(log))
     (tmp_path / f"{NAME}.py").unlink()
-    fly_processes(given, Silent())
+    fly_processes(values, Silent())
     with LogReader(log) as read:
         assert read.digest() == fly(from_resolved(own.resolved, "hover")).digest
-    with pytest.raises(ValueError, match="carries code of its author"):
+    with pytest.raises(ValueError, match="contains code of its author"):
         resimulate(log)
     before, after = resimulate(log, allow_code=True)
     assert before == after
     assert without != before
 
 
-def test_what_is_wrong_is_one_line(scene, tmp_path):
+def test_template_errors_are_one_line(scene, tmp_path):
     with pytest.raises(ConfigError, match=r"effects.tether_drag.coefficient: expected a number at least 0"):
         scene(f"effects.{NAME}.coefficient=-1.0")
     with pytest.raises(ConfigError, match=r"effects.other.module: tether_drag has no class Other"):

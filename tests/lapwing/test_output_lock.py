@@ -17,7 +17,7 @@ def start(folder, *arguments):
     return subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
-def test_open_locked_rejects_a_second_writer_and_keeps_the_content(tmp_path):
+def test_open_locked_rejects_second_writer_and_keeps_content(tmp_path):
     path = tmp_path / "log"
     with open_locked(path) as file:
         file.write(b"first")
@@ -40,7 +40,7 @@ def test_shared_locks_exclude_exclusive_locks_only(tmp_path):
 
 
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
-def test_run_rejects_a_log_that_is_being_written(tmp_path, mode):
+def test_run_rejects_log_that_is_being_written(tmp_path, mode):
     log = tmp_path / "a.mcap"
     with LogWriter(log, {}, {}):
         size = log.stat().st_size
@@ -78,7 +78,7 @@ def test_claimed_report_json_and_export_are_rejected_by_name(tmp_path):
     lock.close()
 
 
-def test_campaign_rejects_a_folder_that_another_campaign_writes(tmp_path):
+def test_campaign_rejects_folder_that_another_campaign_writes(tmp_path):
     arguments = ["campaign", SCENE, "--runs", "2", "--workers", "1", "--out", "c", "--set", "run.duration=1.0"]
     first = start(tmp_path, *arguments)
     assert first.communicate()[1] == ""

@@ -23,23 +23,23 @@ def test_one_vehicle_needs_no_name():
 
 
 def test_of_several_those_that_are_named_are_operated():
-    given = [f"right={PLAN}"]
-    assert plan_options.overrides(given, Path("fleet"), []) == [
+    values = [f"right={PLAN}"]
+    assert plan_options.overrides(values, Path("fleet"), []) == [
         "vehicle.1.autopilot.accept_commands=true",
         "vehicle.1.autopilot.follow_trajectory=false",
     ]
 
 
 @pytest.mark.parametrize("given", [[PLAN], [f"nobody={PLAN}"], [f"left={PLAN}", f"left={PLAN}"]])
-def test_refuses_a_plan_of_nobody(given):
+def test_plan_of_unknown_vehicle_is_rejected(given):
     with pytest.raises(ValueError, match=r"the scene has several vehicles; expected NAME=FILE, .*left, right, scout"):
         plan_options.files(given, load("fleet"))
 
 
-def test_the_others_fly_as_they_would_without_it():
-    given, only = [f"right={PLAN}"], ["run.duration=8.0"]
-    scene = load("fleet", [*only, *plan_options.overrides(given, Path("fleet"), only)])
-    flown = fly(resolve(scene, plan_options.commands(given, scene)))
+def test_plan_of_one_vehicle_does_not_change_others():
+    values, only = [f"right={PLAN}"], ["run.duration=8.0"]
+    scene = load("fleet", [*only, *plan_options.overrides(values, Path("fleet"), only)])
+    flown = fly(resolve(scene, plan_options.commands(values, scene)))
     assert flown.messages("right/status")[-1].mode == "mission"
     assert flown.view("right/ground_truth").position[-1, 2] > 1.0
     without = fly(resolve(load("fleet", only)))

@@ -3,7 +3,7 @@
 import json
 
 
-def test_it_tells_the_services_their_ports_and_columns(lapwing):
+def test_protocol_lists_services_ports_and_columns(lapwing):
     code, out, _ = lapwing("protocol", "hover")
     assert code == 0
     assert "\nplant\n" in out
@@ -16,7 +16,7 @@ def test_json_and_picture_are_written(lapwing, tmp_path):
     assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_folder_that_is_not_there_is_one_line(lapwing):
+def test_missing_folder_is_one_line(lapwing):
     code, _, err = lapwing("protocol", "hover", "--plot", "none/p.png")
     assert code == 2
     assert err.count("\n") == 1

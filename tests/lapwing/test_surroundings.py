@@ -53,5 +53,5 @@ def digest(folder, before, environment):
 
 
 @pytest.mark.parametrize("surroundings", [without_home, nothing_to_write, clock_that_jumps])
-def test_it_flies_to_the_same_digest(tmp_path, usual, surroundings):
+def test_digest_is_equal_in_broken_environment(tmp_path, usual, surroundings):
     assert digest(tmp_path, *surroundings(tmp_path)) == usual

@@ -17,20 +17,20 @@ def log(tmp_path_factory):
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_the_page_is_written_and_opened(lapwing, log, monkeypatch, there):
+def test_page_is_written_and_opened(lapwing, log, monkeypatch, there):
     opened = []
     monkeypatch.setattr(webbrowser, "open", lambda address: opened.append(address) or there)
     code, out, err = lapwing("view", log)
     page = log.with_suffix(".html")
     assert (code, err, opened) == (0, "", [page.as_uri()])
     assert out.splitlines() == [*([] if there else ["no browser found; open this page:"]), str(page)]
-    assert 'id="motion"' in page.read_text(encoding="utf-8")
+    assert 'id="space"' in page.read_text(encoding="utf-8")
 
 
-def test_what_cannot_be_viewed_is_told_in_one_line(lapwing, log, monkeypatch, tmp_path):
+def test_invalid_log_is_rejected_in_one_line(lapwing, log, monkeypatch, tmp_path):
     monkeypatch.setattr(rerun, "program", lambda: None)
     (tmp_path / "text.mcap").write_text("no log")
-    for arguments, said in (
+    for arguments, output in (
         (["none.mcap"], "none.mcap: cannot read the log"),
         (["none.mcap", "--rerun"], "none.mcap: cannot read the log"),
         (["text.mcap"], "text.mcap: not an MCAP file"),
@@ -38,20 +38,20 @@ def test_what_cannot_be_viewed_is_told_in_one_line(lapwing, log, monkeypatch, tm
     ):
         code, _, err = lapwing("view", *arguments)
         assert (code, err.count("\n")) == (2, 1)
-        assert said in err
+        assert output in err
 
 
 @pytest.mark.skipif(rerun.program() is None, reason="needs Rerun (pip install rerun-sdk)")
-def test_rerun_converts_a_log_without_a_warning(log, tmp_path):
+def test_rerun_converts_log_without_warning(log, tmp_path):
     command = [rerun.program(), "mcap", "convert", str(log), "-o", str(tmp_path / "mission.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     # Rerun makes the recording's name of the file's, and tells so of any with a dot in it.
-    said = [line for line in done.stderr.splitlines() if "WARN" in line and "Application ID" not in line]
-    assert said == []
+    output = [line for line in done.stderr.splitlines() if "WARN" in line and "Application ID" not in line]
+    assert output == []
 
 
 @pytest.mark.skipif(rerun.program() is None, reason="needs Rerun (pip install lapwing[view])")
-def test_rerun_opens_a_recording_that_begins_with_a_blueprint(lapwing, log, monkeypatch):
+def test_rerun_opens_recording_that_begins_with_blueprint(lapwing, log, monkeypatch):
     pytest.importorskip("rerun")
     started = []
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: started.append(command))
@@ -61,8 +61,8 @@ def test_rerun_opens_a_recording_that_begins_with_a_blueprint(lapwing, log, monk
     assert started == [[rerun.program(), "--bind", "127.0.0.1", str(recording)]]
     monkeypatch.undo()
     command = [rerun.program(), "rrd", "print", "-vv", str(recording)]
-    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert told.index("Blueprint,") < told.index("Recording,")
-    assert told.count(f'"{rerun.APPLICATION}"') >= 2
+    reported = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert reported.index("Blueprint,") < reported.index("Recording,")
+    assert reported.count(f'"{rerun.APPLICATION}"') >= 2
     for topic in ("/tf", "/drone1/pose", "/drone1/battery", "/drone1/gps/fix", "/drone1/sonar"):
-        assert f" - {topic} - " in told
+        assert f" - {topic} - " in reported

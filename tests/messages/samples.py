@@ -40,7 +40,7 @@ def _element(base, rng):
 
 
 def varied(message: Any, rng: random.Random) -> Any:
-    """The same message with other numbers: strings and lengths of sequences stay."""
+    """Return the message with other numbers; strings and lengths of sequences are kept."""
     fields = DEFINITIONS[message.type_name].fields
     return type(message)(*(_varied(field.base, getattr(message, field.name), rng) for field in fields))
 

@@ -32,7 +32,7 @@ def payloads(records):
 @pytest.mark.parametrize("name", TYPES)
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32))
-def test_a_page_has_the_bytes_of_its_messages_encoded_one_by_one(name, seed):
+def test_batch_bytes_equal_single_encodings(name, seed):
     rng = random.Random(seed)
     base = sample(name, rng)
     messages = [varied(base, rng) for _ in range(N)]
@@ -48,7 +48,7 @@ def test_a_page_has_the_bytes_of_its_messages_encoded_one_by_one(name, seed):
         assert payloads(record.encode(N, columns)) == [message.encode() for message in messages]
 
 
-def test_without_columns_the_sample_is_repeated():
+def test_without_columns_sample_is_repeated():
     records = Record.of(TWO_ROTORS).encode(3, {})
     assert payloads(records) == [TWO_ROTORS.encode()] * 3
     assert records.dtype.itemsize == len(TWO_ROTORS.encode())
@@ -63,7 +63,7 @@ def test_copies_keep_strings_and_padding():
     assert payloads(np.ascontiguousarray(records[::2])) == expected[::2]
 
 
-def test_nested_messages_of_float64_are_one_field_in_the_order_of_the_message():
+def test_nested_float64_messages_are_one_field():
     dtype = Record.of(TWO_ROTORS).dtype
     assert dtype["pose"].shape == (7,)
     assert dtype["pose.position"].shape == (3,)
@@ -73,7 +73,7 @@ def test_nested_messages_of_float64_are_one_field_in_the_order_of_the_message():
     assert records["pose.orientation.w"] == 4.0
 
 
-def test_elements_of_sequences_have_their_number_in_the_name():
+def test_elements_of_sequences_have_their_number_in_name():
     bodies = BodyStates(name=("a", "b"), pose=(Pose(),) * 2, velocity=(Vector3(),) * 2)
     record = Record.of(bodies)
     decoded = BodyStates.decode(record.encode(1, {"pose.1.position": (1.0, 2.0, 3.0)}).tobytes())

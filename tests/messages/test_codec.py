@@ -52,7 +52,7 @@ def samples(name):
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_bytes_equal_those_of_the_rosbags_library(name):
+def test_bytes_equal_those_of_rosbags_library(name):
     for message in samples(name):
         assert message.encode() == bytes(STORE.serialize_cdr(foreign(message), name))
 
@@ -79,7 +79,7 @@ def test_every_shorter_and_longer_payload_is_refused(name):
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_damaged_bytes_give_a_message_or_a_value_error(name):
+def test_damaged_bytes_give_message_or_value_error(name):
     rng = random.Random(name)
     faults = []
     for message in samples(name)[:10]:
@@ -92,7 +92,7 @@ def test_damaged_bytes_give_a_message_or_a_value_error(name):
     assert not any("\n" in fault for fault in faults)
 
 
-def test_a_huge_length_is_refused_without_allocating():
+def test_huge_length_is_refused_without_allocating():
     payload = bytearray(TFMessage().encode())
     payload[4:8] = b"\xff\xff\xff\xff"
     with pytest.raises(ValueError, match="runs past the end"):
@@ -112,7 +112,7 @@ def test_same_size_and_other_shape_is_not_mistaken():
         assert Status.decode(message.encode()) == message
 
 
-def test_a_string_of_length_zero_without_nul_is_the_empty_string():
+def test_string_of_length_zero_without_nul_is_empty_string():
     payload = Imu.decode(Imu().encode()).encode()
     assert payload[12:16] == b"\1\0\0\0"
     assert Imu.decode(payload[:12] + b"\0\0\0\0" + payload[16:]) == Imu()
@@ -141,7 +141,7 @@ def test_numpy_arrays_and_plain_tuples_encode_as_well():
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_schema_text_defines_the_same_fields_as_the_published_type(name):
+def test_schema_text_defines_same_fields_as_published_type(name):
     store = get_typestore(Stores.EMPTY)
     store.register(get_types_from_msg(TYPES[name].schema_text, name))
     reference = STORE.fielddefs[name]
@@ -150,13 +150,13 @@ def test_schema_text_defines_the_same_fields_as_the_published_type(name):
         assert sorted(store.fielddefs[name][0]) == sorted(reference[0])  # constants
 
 
-def test_types_are_the_files():
+def test_types_are_files():
     files = {f"{path.parent.name}/msg/{path.stem}" for path in FOLDER.glob("*/*.msg")}
     assert set(TYPES) == files
     assert all(getattr(lapwing.messages, cls.__name__) is cls for cls in TYPES.values())
 
 
-def test_defaults_are_zero_but_for_the_identity_quaternion():
+def test_defaults_are_zero_but_for_identity_quaternion():
     assert Quaternion() == (0.0, 0.0, 0.0, 1.0)
     assert Imu().header.frame_id == ""
     assert Imu().orientation_covariance == (0.0,) * 9

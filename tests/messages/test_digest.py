@@ -41,7 +41,7 @@ def test_order_times_names_and_contents_count(other):
     assert digest(other) != digest(A)
 
 
-def test_reading_it_changes_nothing():
+def test_reading_digest_does_not_change_it():
     one, other = Digest(), Digest()
     for entry in A[:10]:
         one.update(*entry)
@@ -51,7 +51,7 @@ def test_reading_it_changes_nothing():
 
 
 @pytest.mark.parametrize("n", [0, 1, 300])
-def test_a_page_counts_as_its_messages_one_by_one(n):
+def test_batch_digest_equals_message_digests(n):
     rng = np.random.default_rng(n)
     times = rng.integers(-5, 1 << 60, n)
     payloads = rng.integers(0, 256, (n, 37), dtype=np.uint8)
@@ -68,6 +68,6 @@ def test_a_page_counts_as_its_messages_one_by_one(n):
     assert one.hexdigest() == page.hexdigest()
 
 
-def test_a_page_needs_a_time_for_each_payload():
+def test_page_needs_time_for_each_payload():
     with pytest.raises(ValueError, match="/a: 2 times for 3 payloads"):
         Digest().update_page("/a", np.zeros(2, np.int64), np.zeros((3, 8), np.uint8))

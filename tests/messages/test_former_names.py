@@ -18,7 +18,7 @@ def test_renamed_topics_of_mission_are_read_by_current_names():
     with LogReader(FORMER / "delivery.plan.mcap") as log:
         names = log.topics()
         columns = log.histories()
-        assert log.of_other_versions() == {}
+        assert log.incompatible_types() == {}
         commands = [OperatorInput.decode(m) for *_, m in log.messages(["/drone1/vehicle_command"])]
     assert {"/drone1/ground_truth", "/drone1/vehicle_command", "/drone1/vehicle_command_ack"} <= set(names)
     assert not {"/drone1/truth", "/drone1/operator", "/drone1/answers"} & set(names)

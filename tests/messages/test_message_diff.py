@@ -7,17 +7,17 @@ from lapwing.messages.message_diff import first_difference
 from lapwing.messages.units import unit
 
 
-def test_the_first_field_that_differs_is_named_with_both_values():
+def test_first_field_that_differs_is_named_with_both_values():
     one = Imu(header(5, "base"))
     other = one._replace(linear_acceleration=(0.0, 9.81, 1.0))
-    found = first_difference(Imu, one.encode(), other.encode())
-    assert (found.field, found.one, found.other, found.by) == ("linear_acceleration.y", 0.0, 9.81, 9.81)
+    result = first_difference(Imu, one.encode(), other.encode())
+    assert (result.field, result.one, result.other, result.by) == ("linear_acceleration.y", 0.0, 9.81, 9.81)
     assert first_difference(Imu, one.encode(), one.encode()) is None
     text = first_difference(Status, Status(mode="a").encode(), Status(mode="b").encode())
     assert (text.field, text.by) == ("mode", None)
 
 
-def test_a_negative_zero_is_not_zero():
+def test_negative_zero_is_not_zero():
     one, other = (Imu(linear_acceleration=(x, 0.0, 0.0)).encode() for x in (0.0, -0.0))
     assert first_difference(Imu, one, other).field == "linear_acceleration.x"
 
@@ -41,5 +41,5 @@ def test_sequences_of_other_lengths_differ():
         ("lapwing_msgs/msg/Status", "mode", ""),
     ],
 )
-def test_units_are_those_of_the_definitions(kind, field, expected):
+def test_units_are_those_of_definitions(kind, field, expected):
     assert unit(kind, field) == expected

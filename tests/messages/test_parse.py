@@ -43,24 +43,24 @@ def write(folder, **texts):
     return read_folder(folder)
 
 
-def test_contained_types_come_first_and_outer_ones_lead_the_schema(tmp_path):
-    found = write(tmp_path, A="B b\nC c\n", B="C c\n", C="int8 x\n")
-    assert list(found) == ["p/msg/C", "p/msg/B", "p/msg/A"]
-    assert dependencies("p/msg/A", found) == ["p/msg/B", "p/msg/C"]
+def test_contained_types_come_first_and_outer_ones_lead_schema(tmp_path):
+    result = write(tmp_path, A="B b\nC c\n", B="C c\n", C="int8 x\n")
+    assert list(result) == ["p/msg/C", "p/msg/B", "p/msg/A"]
+    assert dependencies("p/msg/A", result) == ["p/msg/B", "p/msg/C"]
     bar = "=" * 80
-    assert schema_text("p/msg/A", found) == f"B b\nC c\n{bar}\nMSG: p/B\nC c\n{bar}\nMSG: p/C\nint8 x\n"
+    assert schema_text("p/msg/A", result) == f"B b\nC c\n{bar}\nMSG: p/B\nC c\n{bar}\nMSG: p/C\nint8 x\n"
 
 
-def test_a_missing_type_is_named(tmp_path):
+def test_missing_type_is_named(tmp_path):
     with pytest.raises(ValueError, match=r"p/msg/A: field b has type p/msg/B, which has no \.msg file"):
         write(tmp_path, A="B b\n")
 
 
-def test_a_class_made_from_new_text_works(tmp_path):
-    found = write(tmp_path, A="int8 x\nint64 big\nB[] many\nuint16[] words\nint8 last\n", B="string s\nfloat64[] v\n")
+def test_class_made_from_new_text_works(tmp_path):
+    result = write(tmp_path, A="int8 x\nint64 big\nB[] many\nuint16[] words\nint8 last\n", B="string s\nfloat64[] v\n")
     classes: dict = {}
-    for name, definition in found.items():
-        classes[name] = make_class(definition, found, classes)
+    for name, definition in result.items():
+        classes[name] = make_class(definition, result, classes)
     A, B = classes["p/msg/A"], classes["p/msg/B"]
     message = A(1, -2, (B("one", (1.0,)), B("", ()), B("three", (1.0, 2.0, 3.0))), (1, 2, 3), -4)
     assert A.decode(message.encode()) == message

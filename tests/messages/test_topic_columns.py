@@ -16,19 +16,19 @@ from lapwing.messages.topic_columns import ColumnBuilder, history, history_of_pa
 @pytest.mark.parametrize("name", TYPES)
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 2**32))
-def test_columns_are_the_fields_of_the_decoded_messages(name, seed):
+def test_columns_are_fields_of_decoded_messages(name, seed):
     rng = random.Random(seed)
     shapes = [sample(name, rng) for _ in range(rng.randint(1, 3))]
     messages = [varied(rng.choice(shapes), rng) for _ in range(9)]
     columns = history(TYPES[name], [message.encode() for message in messages])
     for field, column in columns.items():
         assert len(column) == len(messages)
-        for message, found in zip(messages, column, strict=True):
-            found = tuple(np.ravel(found).tolist()) if isinstance(found, np.ndarray | np.generic) else found
-            assert flat(found if isinstance(found, tuple) else (found,)) == flat((value(message, field),)), field
+        for message, result in zip(messages, column, strict=True):
+            result = tuple(np.ravel(result).tolist()) if isinstance(result, np.ndarray | np.generic) else result
+            assert flat(result if isinstance(result, tuple) else (result,)) == flat((value(message, field),)), field
 
 
-def test_a_topic_of_one_shape_gives_plain_arrays():
+def test_topic_of_one_shape_returns_arrays():
     times = [k * 4_000_000 for k in range(500)]
     messages = [Imu(header(t, "body"), angular_velocity=Vector3(t, 1.0, -t)) for t in times]
     columns = history(Imu, [message.encode() for message in messages])
@@ -41,7 +41,7 @@ def test_a_topic_of_one_shape_gives_plain_arrays():
     assert columns.keys() >= {"header.frame_id", "angular_velocity", "angular_velocity.z"}
 
 
-def test_strings_of_the_same_total_length_are_told_apart():
+def test_strings_of_equal_total_length_are_distinguished():
     words = [("abc", "de"), ("ab", "cde"), ("", "é鳥"), ("ab", "cde")]
     messages = [Status(mode=mode, phase=phase) for mode, phase in words]
     columns = history(Status, [message.encode() for message in messages])
@@ -57,7 +57,7 @@ def test_sequences_of_varying_length():
     assert [cell.tolist() for cell in cells] == [[], [1.5], [2.5, 3.5], [4.5]]
 
 
-def test_what_not_every_message_has_is_no_column():
+def test_field_missing_in_message_is_no_column():
     messages = [RotorWrench(moment=(Vector3(),) * count) for count in (1, 2)]
     columns = history(RotorWrench, [message.encode() for message in messages])
     assert "moment.0" in columns
@@ -84,7 +84,7 @@ def test_damaged_messages_are_refused():
         columns["mode"]
 
 
-def test_pages_are_the_same_as_payloads():
+def test_pages_are_same_as_payloads():
     messages = [
         Status(mode=mode, arming_blockers=why) for mode, why in [("a", ()), ("b", ("x",)), ("c", ()), ("d", ("y",))]
     ]
@@ -94,39 +94,39 @@ def test_pages_are_the_same_as_payloads():
     def page(*places):
         return np.array(places), np.stack([np.frombuffer(payloads[k], np.uint8) for k in places])
 
-    found = history_of_pages(Status, [page(0, 2), page(3), page(1)])
-    assert list(found) == list(expected)
+    result = history_of_pages(Status, [page(0, 2), page(3), page(1)])
+    assert list(result) == list(expected)
     for name, column in expected.items():
-        assert found[name] == column if isinstance(column, list) else np.array_equal(found[name], column), name
-    assert found.payloads() == expected.payloads() == payloads
+        assert result[name] == column if isinstance(column, list) else np.array_equal(result[name], column), name
+    assert result.payloads() == expected.payloads() == payloads
     assert list(history_of_pages(Status, [])) == list(history(Status, []))
 
 
-def test_a_history_can_be_pickled():
+def test_history_can_be_pickled():
     columns = history(RotorWrench, [RotorWrench(moment=(Vector3(k, 0.0, 0.0),)).encode() for k in range(3)])
     assert pickle.loads(pickle.dumps(columns))["moment.0.x"].tolist() == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 30])
-def test_messages_as_they_come_are_the_same_as_all_at_once(monkeypatch, count):
-    """Of pages of eight, with two shapes and texts."""
+def test_incremental_columns_equal_complete_columns(monkeypatch, count):
+    """Pages of eight messages, with two shapes and texts."""
     monkeypatch.setattr(module, "PAGE", 8)
-    said = [Status(header(k, "body"), phase="up" if k % 5 else "over there", armed=k > 3) for k in range(count)]
-    payloads, gathered = [message.encode() for message in said], ColumnBuilder(Status)
+    output = [Status(header(k, "body"), phase="up" if k % 5 else "over there", armed=k > 3) for k in range(count)]
+    payloads, gathered = [message.encode() for message in output], ColumnBuilder(Status)
     for k, payload in enumerate(payloads):
         gathered.add(1000 * k, payload)
-    times, found = gathered.history()
+    times, result = gathered.history()
     assert times.dtype == np.int64
     assert times.tolist() == [1000 * k for k in range(count)]
     whole = history(Status, payloads)
-    assert list(found) == list(whole)
-    assert found.payloads() == payloads
+    assert list(result) == list(whole)
+    assert result.payloads() == payloads
     for name in whole:
-        assert np.array_equal(found[name], whole[name]), name
-        assert type(found[name]) is type(whole[name])
+        assert np.array_equal(result[name], whole[name]), name
+        assert type(result[name]) is type(whole[name])
 
 
-def test_messages_as_they_come_are_in_memory_once():
+def test_incremental_columns_store_messages_once():
     payload, count = Imu(header(0, "body")).encode(), 20_000
     gathered = ColumnBuilder(Imu)
     tracemalloc.start()

@@ -10,7 +10,7 @@ EXPECTED = {
 }  # fmt: skip
 
 
-def test_the_promised_topics_are_there():
+def test_documented_topics_exist():
     assert {topic.key("drone1") for topic in TOPICS} >= EXPECTED
     assert len({topic.name for topic in TOPICS}) == len(TOPICS)
 
@@ -22,7 +22,7 @@ def test_keys():
     assert CLOCK.zenoh_key("drone1", "lapwing") == "lapwing/clock"
 
 
-def test_every_topic_holds_a_message_class_and_what_stays_out_of_the_digest():
+def test_every_topic_has_message_class_and_digest_flag():
     assert all(topic.message().encode() for topic in TOPICS)
     assert [topic for topic in TOPICS if not topic.deterministic] == [WALL_TIME, EVENTS]
     assert all(getattr(topics, name) in TOPICS for name in ("TRUTH", "IMU", "TF"))

@@ -16,7 +16,7 @@ def test_every_type_is_its_own(name):
     assert otherwise(name, "# of another program\n" + text.replace("\n", "\r\n").replace("uint8 ", "char ")) == ""
 
 
-def test_the_types_that_one_contains_may_stand_in_any_order_and_what_is_not_ours_is_not_judged():
+def test_nested_types_may_have_any_order():
     bar = "=" * 80 + "\n"
     own, *others = TEXT.split(bar)
     ended = [part if part.endswith("\n") else part + "\n" for part in reversed(others)]
@@ -41,6 +41,6 @@ def test_the_types_that_one_contains_may_stand_in_any_order_and_what_is_not_ours
         ("float64 air_density", "wide<=3 air_density", "has a definition that cannot be read"),
     ],
 )
-def test_what_is_otherwise_is_named(there, here, said):
+def test_first_type_difference_is_named(there, here, said):
     assert there in TEXT
     assert otherwise(STATE, TEXT.replace(there, here)).startswith(said)

@@ -15,13 +15,13 @@ PUBLISHED = {  # in the keys of rmw_zenoh's own documentation, and of ROS 2 node
 
 
 @pytest.mark.parametrize(("name", "published"), PUBLISHED.items())
-def test_the_hash_is_the_published_one(name, published):
+def test_hash_is_published_one(name, published):
     assert known_type_hash(name) == published
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_the_hash_is_that_of_the_rosbags_library(name):
-    """Of a standard type by the library's own definition of it; only of ours by our text."""
+def test_hash_is_that_of_rosbags_library(name):
+    """Standard types use the library's own definition, others our text."""
     store = STANDARD
     if name not in STANDARD.fielddefs:
         store = get_typestore(Stores.EMPTY)

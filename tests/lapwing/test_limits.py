@@ -1,0 +1,151 @@
+"""Limits of the environment and killed processes, through the real command: one line that names the cause."""
+
+import os
+import signal
+import stat
+import subprocess
+import sys
+import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+
+from lapwing.cosim.log import LogReader
+from tests.participants import participants
+
+pytestmark = pytest.mark.long
+
+HOVER = Path.cwd() / "lapwing/scenes/hover.toml"
+SHORT = ["--set", "run.duration=0.2", "--set", "success.require=[]"]
+CGROUP = Path("/sys/fs/cgroup/memory")  # version 1
+UNSHARE = ["unshare", "--mount"]
+PATIENCE = 300.0  # [s]
+
+
+def shell(folder, script, *arguments):
+    """Run a script, in which "$@" is the command with its arguments."""
+    command = ["sh", "-c", script, "sh", sys.executable, "-m", "lapwing", *map(str, arguments)]
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd()), "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+
+
+def check_one_line(result, *messages, codes=(1, 2)):
+    assert result.returncode in codes, (result.stdout, result.stderr)
+    assert result.stderr.count("\n") == 1, result.stderr
+    assert result.stderr.startswith("lapwing: ")
+    assert any(message in result.stderr for message in messages), result.stderr
+
+
+def permitted(command):
+    with suppress(OSError):
+        return subprocess.run(command, capture_output=True).returncode == 0
+    return False
+
+
+@pytest.mark.parametrize("files", [12, 20])
+def test_run_reports_open_file_limit(tmp_path, files):
+    result = shell(tmp_path, f'ulimit -n {files}; exec "$@"', "run", HOVER, *SHORT, "--log", "a.mcap")
+    check_one_line(result, "too many open files")
+
+
+def test_run_reports_address_space_limit(tmp_path):
+    result = shell(tmp_path, 'ulimit -v 900000; exec "$@"', "run", HOVER, *SHORT, "--log", "a.mcap")
+    if result.returncode != 0 or result.stderr:  # it may be enough
+        check_one_line(result, "not enough memory", "ended unexpectedly")
+
+
+@pytest.mark.skipif(not permitted([*UNSHARE, "true"]), reason="needs the right to make mount namespaces")
+@pytest.mark.parametrize("place", ["log", "folder"])
+def test_read_only_mount_is_named(tmp_path, place):
+    arguments = ["--log", "disk/a.mcap"] if place == "log" else []
+    enter = "" if place == "log" else "cd disk;"
+    mount = f'mount -t tmpfs -o ro,size=1M none "{tmp_path}/disk"'
+    (tmp_path / "disk").mkdir()
+    script = f'exec {" ".join(UNSHARE)} sh -c \'{mount}; {enter} exec "$@"\' sh "$@"'
+    result = shell(tmp_path, script, "run", HOVER, *SHORT, *arguments)
+    check_one_line(result, "cannot be written: read-only file system", codes=(2,))
+
+
+def test_run_reports_deleted_folder(tmp_path):
+    (tmp_path / "gone").mkdir()
+    result = shell(tmp_path, f'cd gone; rmdir "{tmp_path}/gone"; exec "$@"', "run", HOVER, *SHORT)
+    check_one_line(result, "working directory: does not exist", codes=(2,))
+
+
+@pytest.mark.parametrize(("umask", "mode"), [("077", 0o600), ("022", 0o644), ("027", 0o640)])
+def test_files_follow_umask(tmp_path, umask, mode):
+    words = ["--mode", "single-process", "--log", "a.mcap", "--json", "a.json"]
+    result = shell(tmp_path, f'umask {umask}; exec "$@"', "run", HOVER, *SHORT, *words)
+    assert result.returncode == 0, result.stderr
+    modes = {path.name: stat.S_IMODE(path.stat().st_mode) for path in tmp_path.iterdir()}
+    assert modes == dict.fromkeys(("a.mcap", "a.json", "a.html"), mode)
+
+
+@contextmanager
+def flight(tmp_path, *prefix):
+    """A run at speed 1, started by a command before it."""
+    words = ["run", HOVER, "--speed", "1", "--set", "run.duration=60", "--log", tmp_path / "a.mcap"]
+    command = [*map(str, prefix), sys.executable, "-m", "lapwing", *map(str, words), "--key-prefix", "test-limits"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
+        try:
+            yield process
+        finally:
+            with suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+
+
+def await_flight(log, process):
+    deadline = time.monotonic() + PATIENCE
+    while process.poll() is None and time.monotonic() < deadline:
+        with suppress(ValueError), LogReader(log) as read:
+            if any(True for _ in read.messages(start_ns=1_000_000_000)):
+                return
+        time.sleep(0.1)
+    raise AssertionError(process.communicate())
+
+
+def test_killed_recorder_leaves_advice_to_recover(tmp_path):
+    with flight(tmp_path) as process:
+        await_flight(tmp_path / "a.mcap", process)
+        os.kill(participants(process.pid)["recorder"], signal.SIGKILL)
+        out, error = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 1
+    assert error.startswith("lapwing: recorder ended unexpectedly (signal 9)")
+    assert error.count("\n") == 1
+    advice = f"lapwing recover {tmp_path / 'a.mcap'}"
+    assert f"`{advice}`" in out
+    done = subprocess.run([sys.executable, "-m", *advice.split()], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    with LogReader(tmp_path / "a_recovered.mcap") as read:
+        assert max(time_ns for *_, time_ns, _ in read.messages()) >= 1_000_000_000
+
+
+@pytest.mark.skipif(not os.access(CGROUP / "memory.limit_in_bytes", os.R_OK), reason="needs a memory cgroup")
+@pytest.mark.parametrize("megabytes", [150, 240, 330])
+def test_process_killed_for_memory_is_named(tmp_path, megabytes):
+    group = CGROUP / f"lapwing-test-{os.getpid()}"
+    try:
+        group.mkdir()
+    except OSError:
+        pytest.skip("needs the right to make cgroups")
+    try:
+        (group / "memory.limit_in_bytes").write_text(str(megabytes << 20))
+        enter = ["sh", "-c", f'echo $$ > "{group}/cgroup.procs"; exec "$@"', "sh"]
+        with flight(tmp_path, *enter) as process:
+            out, error = process.communicate(timeout=PATIENCE)
+        deadline = time.monotonic() + PATIENCE  # processes notice that their launcher is gone
+        while (left := (group / "cgroup.procs").read_text()) and time.monotonic() < deadline:
+            time.sleep(0.2)
+        assert not left
+    finally:
+        group.rmdir()
+    if process.returncode == -signal.SIGKILL:  # the launcher itself: the shell reports it
+        assert error == ""
+        return
+    assert process.returncode in (0, 1, 2, 4), (out, error)
+    if process.returncode in (1, 2):
+        assert error.count("\n") == 1, error
+        assert "Traceback" not in error
+        assert "ended unexpectedly (signal 9)" in error or "not enough memory" in error or "cannot start" in error

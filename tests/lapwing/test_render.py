@@ -1,0 +1,85 @@
+"""`lapwing render`: films and pictures of the 3D view, from the command as a process."""
+
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import lapwing as package
+from lapwing.studies.view3d import headless
+
+pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
+SMALL = ("--size", "160x120")
+
+
+def run(folder, *words):
+    command = [sys.executable, "-m", "lapwing", "render", *map(str, words)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Three seconds of hover."""
+    scene = package.load_scene("hover", {"run.duration": 3.0})
+    return package.fly(scene).save(tmp_path_factory.mktemp("render") / "hover.mcap")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--out", "a.avi"), "--out a.avi: expected a name that ends in .mp4, .webp, .gif or .png"),
+        (("--out", "a.png", "--camera", "back"), "--camera back: expected follow, orbit, top or onboard"),
+        (("--out", "a.png", "--size", "big"), "--size big: expected WIDTHxHEIGHT"),
+        (("--out", "a.png", "--size", "161x120"), "--size 161x120: expected even numbers"),
+        (("--out", "a.mp4", "--fps", "0"), "--fps and --speed: expected above 0"),
+        (("--out", "a.png", "--from", "9"), "expected times of the flight, 0 to 3 s"),
+    ],
+)
+def test_render_rejects_wrong_options_in_one_line(log, words, message):
+    done = run(log.parent, log, *words)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
+    assert message in done.stderr
+    assert not (log.parent / words[1]).exists()
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+def test_picture_shows_vehicle_on_ground_under_sky(log):
+    from PIL import Image
+
+    other = shutil.copy(log, log.with_name("other.mcap"))
+    done = run(log.parent, log, "--out", "a.png", *SMALL, "--from", "2", "--camera", "orbit", "--with", other)
+    assert done.returncode == 0, done.stderr
+    pixels = np.asarray(Image.open(log.parent / "a.png"), float)
+    assert pixels.shape == (120, 160, 3)
+    sky, ground, middle = pixels[2, 80], pixels[115, 80], pixels[40:80, 60:100].reshape(-1, 3)
+    assert sky[2] - sky[0] > 40.0  # blue
+    assert abs(ground[2] - ground[0]) < 20.0  # grey
+    assert np.ptp(middle.mean(axis=1)) > 60.0  # the vehicle
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+def test_webp_film_has_its_pictures(log):
+    from PIL import Image
+
+    done = run(log.parent, log, "--out", "a.webp", *SMALL, "--from", "1", "--to", "2", "--fps", "2")
+    assert done.returncode == 0, done.stderr
+    film = Image.open(log.parent / "a.webp")
+    assert (film.n_frames, film.size) == (3, (160, 120))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+@pytest.mark.parametrize("name", ["a.gif", "a.mp4"])
+def test_film_has_its_pictures_and_length(log, name):
+    imageio = pytest.importorskip("imageio")
+    span = ("--from", "1", "--to", "2", "--fps", "2", "--speed", "0.5")
+    done = run(log.parent, log, "--out", name, *SMALL, *span)
+    assert done.returncode == 0, done.stderr
+    film = imageio.get_reader(log.parent / name)
+    assert sum(1 for _ in film) == 5
+    if name.endswith("mp4"):
+        assert film.get_meta_data()["duration"] == pytest.approx(2.5, abs=0.05)

@@ -1,0 +1,83 @@
+"""Pages of real flights, written by the commands as processes and opened in a browser."""
+
+import subprocess
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+from lapwing.studies.view3d import headless
+
+LAPWING = Path(sysconfig.get_path("scripts")) / "lapwing"
+SMALL, WITH_VIEW = 2_000_000, 5_000_000  # [byte] of a page
+UNTIL = """
+    const until = async (holds) => {
+      for (let k = 0; k < 2400 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+      if (!holds()) throw new Error(`never: ${holds}`);
+    };
+    await until(() => document.readyState === "complete");
+"""
+pytestmark = pytest.mark.long
+needs_chromium = pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium (apt-get install chromium)")
+
+
+def run(folder, *arguments):
+    """Run a command of Lapwing in a folder; return what it prints."""
+    done = subprocess.run([LAPWING, *map(str, arguments)], cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Two flights of the delivery mission, a.mcap and b.mcap, with the report a.html of the first."""
+    made = tmp_path_factory.mktemp("pages")
+    for name, gains in (("a", "tuned"), ("b", "paper")):
+        sets = ("--set", f"autopilot.gains={gains}")
+        run(made, "run", "delivery_mission", "--mode", "single-process", "--log", f"{name}.mcap", *sets)
+    return made
+
+
+def test_report_of_run_is_small(folder):
+    assert (folder / "a.html").stat().st_size < SMALL
+
+
+def test_comparison_is_small_and_has_every_plot(folder):
+    run(folder, "report", "a.mcap", "b.mcap", "--out", "both.html", "--names", "tuned,paper")
+    text = (folder / "both.html").read_text(encoding="utf-8")
+    view = text.partition('id="space"')[2].partition("</section>")[0]
+    assert len(text) - len(view) < SMALL
+    assert len(text) < WITH_VIEW
+    assert 'id="motors"' in text
+
+
+def test_report_of_modelled_battery_has_its_margin(folder):
+    battery = ("--set", "effects.battery={initial_charge=0.3}", "--log", "battery.mcap")
+    run(folder, "run", "delivery_mission", "--mode", "single-process", *battery)
+    written = (folder / "battery.html").read_text(encoding="utf-8")
+    run(folder, "report", "battery.mcap", "--out", "again.html")
+    again = (folder / "again.html").read_text(encoding="utf-8")
+    for text in (written, again):
+        assert "energy drawn [W h]" in text
+        assert "% of the charge is left" in text
+        assert "above 15 % (warning)" in text
+    assert "the scene models no battery" in (folder / "a.html").read_text(encoding="utf-8")
+
+
+@needs_chromium
+def test_browser_draws_every_plot(folder):
+    with headless.Browser(folder / "a.html") as browser:
+        count = browser.run(
+            UNTIL
+            + """
+            const figures = [...document.querySelectorAll("figure.plot")];
+            for (const figure of figures) {
+              for (let e = figure.parentElement; e; e = e.parentElement) if (e.tagName === "DETAILS") e.open = true;
+              figure.scrollIntoView();
+              await until(() => figure.querySelector(".main-svg .trace, .main-svg .point"));
+            }
+            return figures.length;
+            """
+        )
+        assert browser.errors == []
+    assert count >= 8
