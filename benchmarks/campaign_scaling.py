@@ -26,12 +26,12 @@ def main(most=10000):
     each = [(cost[b][0] - cost[a][0]) / (b - a) for a, b in pairwise(counts)]  # [s] of every further run
     for runs, further in zip(counts[1:], each, strict=True):
         print(f"up to {runs:9} runs: {1e3 * further:.2f} ms for every further one")
-    found = [
+    result = [
         Row(f"campaign: a further run up to {most} runs to one up to 1000", each[-1] / each[0], "", 1.1),
         Row(f"campaign: peak memory, {most} runs to 1000", cost[most][1] / cost[1000][1], "", 1.1),
     ]
-    show(found)
-    return found
+    show(result)
+    return result
 
 
 def taken(command):

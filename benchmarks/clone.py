@@ -40,13 +40,13 @@ def peak_mb(said: str) -> float:
 
 
 def main():
-    found = []
+    result = []
     try:
         for row in rows():
-            found.append(row)
+            result.append(row)
     finally:
-        show(found)
-    return found
+        show(result)
+    return result
 
 
 if __name__ == "__main__":

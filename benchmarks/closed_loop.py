@@ -70,13 +70,13 @@ class Simulator(NamedTuple):
 
 def simulators():
     """Return the installed simulators by name."""
-    found = {"lapwing": Simulator(ours, RUNS, our_error)}
+    result = {"lapwing": Simulator(ours, RUNS, our_error)}
     if find_spec("rotorpy"):
-        found["RotorPy"] = Simulator(rotorpy, 1, lambda: apart(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12)))
+        result["RotorPy"] = Simulator(rotorpy, 1, lambda: apart(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12)))
     if find_spec("jsbsim"):
         for step in (STEP, CONTROL):
-            found[f"JSBSim, steps of {1e3 * step:g} ms"] = in_jsbsim(step)
-    return found
+            result[f"JSBSim, steps of {1e3 * step:g} ms"] = in_jsbsim(step)
+    return result
 
 
 def in_jsbsim(step):
@@ -99,23 +99,23 @@ def apart(one, other):
 
 
 def main():
-    found = simulators()
-    rates = {name: [] for name in found}
-    for each in found.values():
+    result = simulators()
+    rates = {name: [] for name in result}
+    for each in result.values():
         each.fly()  # loads what is compiled
     for _ in range(REPEATS):
-        for name, each in found.items():
+        for name, each in result.items():
             began = time.process_time()
             each.fly()
             rates[name].append(each.flights * SECONDS / (time.process_time() - began))
-    for name, each in found.items():
+    for name, each in result.items():
         rate = f"{median(rates[name]):10.1f} times real time"
         print(f"{name:22}{rate}, error of the last position {each.error():.1e} m")
     rows = []
-    for name in list(found)[1:]:
+    for name in list(result)[1:]:
         ratio = median(a / b for a, b in zip(rates["lapwing"], rates[name], strict=True))
         rows.append(Row(f"closed-loop flights to {name}, one core", ratio, "", 3.0, True))
-    if len(found) < 4:
+    if len(result) < 4:
         print("not all are installed: pip install 'lapwing[bench]'")
     show(rows)
     return rows

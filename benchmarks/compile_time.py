@@ -37,9 +37,9 @@ def rows():
 
 
 def main():
-    found = list(rows())
-    show(found)
-    return found
+    result = list(rows())
+    show(result)
+    return result
 
 
 if __name__ == "__main__":

@@ -58,12 +58,12 @@ def main(most=32):
             )
             print(f"{n:3} vehicles: {1e3 * single[n]:7.1f} ms/s in one process, {1e3 * apart[n]:7.1f} in processes;"
                   f" of each {1e3 * single[n] / n:6.1f} and {1e3 * apart[n] / n:6.1f}", flush=True)  # fmt: skip
-    found = [
+    result = [
         Row(f"fleet of {most}, one process: a vehicle to one alone", single[most] / most / single[1], "", 1.1),
         Row(f"fleet of {most}, processes: a vehicle to one alone", apart[most] / most / apart[1], "", 1.1),
     ]
-    show(found)
-    return found
+    show(result)
+    return result
 
 
 def scene(n, path):

@@ -26,7 +26,7 @@ from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common import ports
-from lapwing.services.common.ports import MotorCommand, Reference, TrueState
+from lapwing.services.common.ports import MotorCommand, Setpoint, TrueState
 from lapwing.services.plant.encoders import PlantWiring
 from lapwing.services.plant.encoders import wires as plant_wires
 from lapwing.services.trajectory.resolve import LEAD
@@ -43,7 +43,7 @@ PARTS = {  # inputs and ports of the mission's services
         (InputPort(ports.IMU), InputPort(ports.TRAJECTORY)),
         (Port(ports.ACTUATORS, MotorCommand((1.0,) * 4, True, (1.0,) * 4, (0.0,) * 3)),),
     ),
-    "trajectory": ((InputPort(ports.TRUTH, round(250 * LEAD)),), (Port(ports.TRAJECTORY, Reference()),)),
+    "trajectory": ((InputPort(ports.TRUTH, round(250 * LEAD)),), (Port(ports.TRAJECTORY, Setpoint()),)),
 }
 
 
@@ -58,7 +58,7 @@ class Constant:
     def bind(self, graph):
         self.graph = graph
 
-    def act(self, tick):
+    def on_tick(self, tick):
         for name, row in self.rows:
             self.graph.put_row(name, tick, row)
         if self.name == "plant":
@@ -74,7 +74,7 @@ def lockstep_process(name, peers, cycles, core):
     part = Constant(name, cycles)
     wires = plant_wires(setup, NONE) if name == "plant" else []
     participants = PublisherIds("bench")
-    with ZenohBus(*mesh(name, peers), mark=participants.mark(name)) as bus:
+    with ZenohBus(*mesh(name, peers), gid=participants.gid(name)) as bus:
         run_lockstep(
             Participant(name, setup, bus, participants, list(peers), core=core),
             Service(name, [part], wires),
@@ -153,7 +153,7 @@ def compare(cycles, repeats, core):
 
 
 def main(cycles=5000, repeats=5):
-    found = []
+    result = []
     for placing, core in (("one core", 0), ("free", None)):
         figures = compare(cycles, repeats, core)
         for kind in KINDS:
@@ -162,9 +162,9 @@ def main(cycles=5000, repeats=5):
                 f"{kind:8} ({placing:8}): p50 {f['p50_us']:6.1f} us  p99 {f['p99_us']:6.1f} us  "
                 f"{f['cycles_per_s']:6.0f} cycles/s  {HOPS} hops"
             )
-        found.append(Row(f"cycle of the lock step to the bare ping, {placing}", figures["ratio_of_medians"], "", 1.5))
-    show(found)
-    return found
+        result.append(Row(f"cycle of the lock step to the bare ping, {placing}", figures["ratio_of_medians"], "", 1.5))
+    show(result)
+    return result
 
 
 if __name__ == "__main__":

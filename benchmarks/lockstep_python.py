@@ -13,7 +13,7 @@ from benchmarks.lockstep import NONE, PARTS, Constant
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
-from lapwing.cosim.transport.packet_exchange import PAGE, PacketSender, sources
+from lapwing.cosim.transport.packet_exchange import PAGE, PacketSender, packet_receivers
 from lapwing.services.plant.encoders import wires as plant_wires
 
 
@@ -47,17 +47,17 @@ def own(name, cycles):
     bus = Idle()
     process = SimpleNamespace(
         setup=setup, name=name, bus=bus, participants=PublisherIds("bench"), key_prefix="bench",
-        tell_of_refused=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"), bundles_ahead=True,
+        report_rejected=lambda: None, key=lambda topic: topic.zenoh_key("drone1", "bench"), packs_ticks=True,
     )  # fmt: skip
     service = Service(name, [Constant(name, 2 * cycles)], plant_wires(setup, NONE) if name == "plant" else [])
     graph = BlockDiagram(setup, [service], 2 * PAGE)
-    givers, outlets = sources(process, graph), PacketSender(process, service, graph)
+    givers, outlets = packet_receivers(process, graph), PacketSender(process, service, graph)
     taken = [0.0, 0.0, 0.0]
     for tick in range(cycles):
         for giver in givers:
             prepare(bus, giver, giver._newest + 1, setup.interval_ns)
             began = time.thread_time()
-            giver.take(tick)
+            giver.receive(tick)
             taken[0] += time.thread_time() - began
         began = time.thread_time()
         graph.advance(tick + 1)

@@ -26,7 +26,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.cosim.log.mcap_writer import Container
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.cosim.transport.bus_keys import BATCH_KEY
-from lapwing.cosim.transport.packets import pack_batch
+from lapwing.cosim.transport.packets import pack_log_packet
 from lapwing.messages import Imu, Odometry, PoseStamped, VehicleState, header
 from lapwing.messages.cdr_arrays import Record, stamp_columns
 from lapwing.messages.topics import IMU, ODOM, POSE, TRUTH
@@ -69,13 +69,13 @@ def batch(given, first, stop):
             if record.dtype.names and name in record.dtype.names:
                 columns[name] = noise.normal(size=(len(ticks), *record.dtype[name].shape))
         pages.append(RecordBatch(topic, ticks, record.encode(len(ticks), columns)))
-    return pack_batch(pages, first, stop)
+    return pack_log_packet(pages, first, stop)
 
 
 def hand_over(given, endpoints, seconds):
     """At the rate of the set-up, ten times a second; messages handed over, and seconds it took."""
     listen, connect = mesh(SOURCE, endpoints)
-    with ZenohBus(listen, connect, mark=PARTICIPANTS.mark(SOURCE)) as bus:
+    with ZenohBus(listen, connect, gid=PARTICIPANTS.gid(SOURCE)) as bus:
         process = Participant(SOURCE, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
         backlog, put = (
             LogBackpressure(process, RECORDER),
@@ -87,7 +87,7 @@ def hand_over(given, endpoints, seconds):
         while first < end:
             stop = min(first + step, end)
             for tick in range(first, stop):
-                backlog.hold(tick)
+                backlog.wait_for_log(tick)
             payload = batch(given, first, stop)
             time.sleep(max(0.0, started + stop / given.rate - time.perf_counter()))
             put(payload, (stop - 1) * given.interval_ns)
@@ -109,7 +109,7 @@ def record(given, endpoints, log, disk):
 
         Container._write = slow
     listen, connect = mesh(RECORDER, endpoints)
-    with ZenohBus(listen, connect, mark=PARTICIPANTS.mark(RECORDER)) as bus:
+    with ZenohBus(listen, connect, gid=PARTICIPANTS.gid(RECORDER)) as bus:
         process = Participant(RECORDER, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
         recorder.run(process, SimpleNamespace(log=log, mode="bench", external=None, sources=None))
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)

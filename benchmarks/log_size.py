@@ -67,12 +67,12 @@ def contents(log):
 
 def split(chunk):
     """The records of a chunk by channel; what it declares under 0."""
-    found, place = {}, 0
+    result, place = {}, 0
     while place < len(chunk):
         opcode, length, channel = RECORD.unpack_from(chunk, place)
-        found.setdefault(channel if opcode == 5 else 0, []).append(chunk[place : place + 9 + length])
+        result.setdefault(channel if opcode == 5 else 0, []).append(chunk[place : place + 9 + length])
         place += 9 + length
-    return {channel: b"".join(records) for channel, records in sorted(found.items())}
+    return {channel: b"".join(records) for channel, records in sorted(result.items())}
 
 
 def floor(log):

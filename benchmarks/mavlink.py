@@ -56,14 +56,14 @@ def first_news(folder):
     """Time from the start of a run to its first heartbeat and to its first position [s]."""
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-    began, found = time.perf_counter(), []
+    began, result = time.perf_counter(), []
     with start(GROUND, folder, "--mavlink", f"udpout:127.0.0.1:{port}", "--set", "run.duration=1") as run:
         for kind in ("HEARTBEAT", "GLOBAL_POSITION_INT"):
             station.recv_match(type=kind, blocking=True, timeout=300)
-            found.append(time.perf_counter() - began)
+            result.append(time.perf_counter() - began)
         run.communicate(timeout=120)
     station.close()
-    return found
+    return result
 
 
 def percentile(values, share):
@@ -167,9 +167,9 @@ def main():
             Row("link: from the command to the first position, warm", position, "s", 2.0),
             Row("link: one client in real time", 100.0 * share, "% of a core", 3.0),
         ]
-        for name, found in factors.items():
-            change = 100.0 * (max(found) / best - 1.0)
-            print(f"lock step at top speed, {name}: {max(found):.2f} x real time, {change:+.1f} %")
+        for name, result in factors.items():
+            change = 100.0 * (max(result) / best - 1.0)
+            print(f"lock step at top speed, {name}: {max(result):.2f} x real time, {change:+.1f} %")
         show(rows)
         return rows
 

@@ -33,13 +33,13 @@ def main(repeats=3):
         assert len({run["digest"] for mode in runs.values() for run in mode}) == 1, "the digests differ"
         size = size_mb(Path(folder, "log.mcap"))
     factor = {mode: median(run["real_time_factor"] for run in figures) for mode, figures in runs.items()}
-    found = [
+    result = [
         Row("mission, one process, to real time", factor["single-process"], "", 150.0, True),
         Row("mission, a process for each service, to real time", factor["multi-process"], "", 18.6, True),
         Row("log of the mission", size, "MB", 5.0),
     ]
-    show(found)
-    return found
+    show(result)
+    return result
 
 
 if __name__ == "__main__":

@@ -41,10 +41,11 @@ MISSION = BARE | {
     "ground_contact": {},
 }
 EXCLUDED = (  # another one of their kind is among the rest, or the drone cannot have them
-    "battery_thevenin", "coaxial_interference", "gravity", "dynamic_inflow", "rotor_quadratic", "rotor_table",
-    "wind_dryden_rates", "wind_von_karman",
+    "battery_thevenin", "coaxial_interference", "gravity", "dynamic_inflow", "multirotor_ground_effect",
+    "rotor_quadratic", "rotor_table", "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
 ALL = {name: {} for name in effects.names() if name not in EXCLUDED} | {
+    "ceiling_effect": {"height": 12.0},
     "shared_slung_load": {"mass": 2.0, "length": 3.0},
     "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
     "wind_boundary_layer": {"speed": 5.0},

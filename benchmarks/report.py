@@ -42,8 +42,8 @@ def main(repeats=5):
             size = runs[0]["size"] / 1e6
             print(f"report as {ending:4}: {wall:.2f} s, {busy:.2f} s of processor time, {size:.1f} MB")
             if ending == "html":
-                found = [Row("report of the mission, a page", wall, "s", 0.3)]
-    return found
+                result = [Row("report of the mission, a page", wall, "s", 0.3)]
+    return result
 
 
 if __name__ == "__main__":

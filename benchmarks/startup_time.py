@@ -22,9 +22,9 @@ def rows(repeats=5):
 
 
 def main(repeats=5):
-    found = list(rows(repeats))
-    show(found)
-    return found
+    result = list(rows(repeats))
+    show(result)
+    return result
 
 
 if __name__ == "__main__":

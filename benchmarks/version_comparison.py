@@ -128,9 +128,9 @@ def rows(repeats=3):
 
 
 def main(repeats=3):
-    found = list(rows(repeats))
-    show(found)
-    return found
+    result = list(rows(repeats))
+    show(result)
+    return result
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ def intrude(endpoint: str, name: str) -> str:
         read += ["lock step"] if steps.get(timeout=2.0) else []
         for _ in range(10):
             for key, author in WRONG:
-                bus.publisher(f"{RUN.key_prefix}/{key}/{author}", mark=RUN.mark(author))(FORGED, 0)
+                bus.publisher(f"{RUN.key_prefix}/{key}/{author}", gid=RUN.gid(author))(FORGED, 0)
             time.sleep(0.05)
     return " and ".join(read) or "nothing"
 

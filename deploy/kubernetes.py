@@ -22,9 +22,9 @@ LABELS = {"app.kubernetes.io/part-of": NAMESPACE}
 
 def manifests(scene: str, image: str) -> list[dict[str, Any]]:
     """All objects of a run of a scene."""
-    names = [*process_table.needed(resolve(load(scene))), MONITOR]
+    names = [*process_table.required_processes(resolve(load(scene))), MONITOR]
     table = ",".join(f"{name}=tls/{name}:{PORT}" for name in names)
-    found: list[dict[str, Any]] = [
+    result: list[dict[str, Any]] = [
         {
             "apiVersion": "v1",
             "kind": "Namespace",
@@ -39,8 +39,8 @@ def manifests(scene: str, image: str) -> list[dict[str, Any]]:
         _policy(),
     ]
     for name in names:
-        found += [_service(name), _pod(name, scene, table, image)]
-    return found
+        result += [_service(name), _pod(name, scene, table, image)]
+    return result
 
 
 def _metadata(name: str) -> dict[str, Any]:

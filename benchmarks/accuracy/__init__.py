@@ -77,13 +77,13 @@ def main() -> None:
 
     others = installed(accuracy.__name__)
     print("versions: " + ", ".join(f"{p.NAME} {version(p.MODULE)}" for p in others))
-    found: dict[str, list[Point]] = {}
+    result: dict[str, list[Point]] = {}
     for case in CASES:
         problem = problems()[case]
         points = measure(problem)
         for module in others:
             points += measure(problem._replace(ways=module.ways(case), invariants={}), LONGEST)
-        found[problem.title] = points
+        result[problem.title] = points
         table(f"{problem.title}, {problem.duration:g} {problem.unit}", points)
-    draw(found)
+    draw(result)
     ten_hours.main()

@@ -25,7 +25,7 @@ PATIENCE = 120.0  # [s]
 
 
 def main(cycles=1000, repeats=1):
-    found, others = [], [name for name, package in OTHERS.items() if find_spec(package)]
+    result, others = [], [name for name, package in OTHERS.items() if find_spec(package)]
     for name in OTHERS.keys() - others:
         print(f"{name} is not installed: pip install 'lapwing[bench]'")
     for placing, core in (("one core", 0), ("free", None)):
@@ -38,9 +38,9 @@ def main(cycles=1000, repeats=1):
             print(f"{name:10} ({placing:8}): {1e6 * median(seconds):8.0f} us a cycle")
         for name in others:
             ratio = median(b / a for a, b in zip(times["lock step"], times[name], strict=True))
-            found.append(Row(f"cycle of {name} to one of the lock step, {placing}", ratio, "", 3.0, True))
-    show(found)
-    return found
+            result.append(Row(f"cycle of {name} to one of the lock step, {placing}", ratio, "", 3.0, True))
+    show(result)
+    return result
 
 
 def measure(package, cycles, core):

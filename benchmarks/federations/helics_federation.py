@@ -40,8 +40,8 @@ def federate(name, cycles, port):
     for tick in range(1, cycles + 1):
         helics.helicsFederateRequestTime(fed, tick + OFFSET[name])
         for subscription, size in taken:
-            found = helics.helicsInputGetBytes(subscription)
-            assert tick < 3 or len(found) == size
+            result = helics.helicsInputGetBytes(subscription)
+            assert tick < 3 or len(result) == size
         for publication, payload in given:
             helics.helicsPublicationPublishBytes(publication, payload)
         stamps.append(time.perf_counter())

@@ -67,8 +67,8 @@ def main() -> int:
         runs.append((name, shlex.split(command), {}))
     failed = not expected
     for name, command, variables in runs:
-        found = _digests(command, variables, words)
-        different = sorted(scene for scene, digest in expected.items() if found.get(scene) != digest)
+        result = _digests(command, variables, words)
+        different = sorted(scene for scene, digest in expected.items() if result.get(scene) != digest)
         failed |= bool(different)
         print(f"{name}: {'different: ' + ', '.join(different) if different else 'equal'}", flush=True)
     return 1 if failed else 0

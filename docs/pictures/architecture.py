@@ -1,4 +1,4 @@
-"""Draws docs/pictures/architecture.png from the set-up of the delivery mission and the process table.
+"""Draw docs/pictures/architecture.png from the run configuration of the delivery mission and the process table.
 
 python docs/pictures/architecture.py
 """
@@ -37,7 +37,7 @@ SERVICES = {
     "trajectory": Box(4.95, 2.75, 6.9, 3.6),
     "autopilot": Box(9.6, 1.0, 12.4, 7.0),
 }
-BESIDE = {
+AUXILIARY = {
     "recorder": Box(0.0, -1.6, 2.0, -0.8),
     "router": Box(4.6, -1.6, 6.9, -0.8),
     "foxglove": Box(2.3, -1.6, 4.3, -0.8),
@@ -45,16 +45,16 @@ BESIDE = {
     "mavlink": Box(9.6, -1.6, 12.4, -0.8),
 }
 LANES = {"battery": 2.35, "actuators": 1.8, "status": 1.35}  # height of arrows that pass under the boxes between
-BUS = 0.25  # height of the line of batches
+BUS = 0.25  # height of the line of log packets
 
 
-def rate(setup: RunConfig, port: str) -> str:
-    """How often a port is given, in words."""
-    return f"{setup.rate / setup.port(port).period:g} Hz"
+def rate(config: RunConfig, port: str) -> str:
+    """Return the rate of a port as text."""
+    return f"{config.rate / config.port(port).period:g} Hz"
 
 
 def process(axes: Axes, box: Box, name: str, lines: list[tuple[str, str]], dashed: bool = False) -> None:
-    """A box with a name, and lines of (text, colour) below it."""
+    """Draw a process: a box with a name, and lines of (text, colour) below it."""
     size = box.right - box.left, box.top - box.bottom
     style = {"fc": PALE, "ec": GREY if dashed else BLUE, "lw": 1.6, "ls": "--" if dashed else "-", "zorder": 3}
     axes.add_patch(FancyBboxPatch(box[:2], *size, boxstyle="round,pad=0,rounding_size=0.12", **style))
@@ -67,7 +67,7 @@ def process(axes: Axes, box: Box, name: str, lines: list[tuple[str, str]], dashe
 
 
 def arrow(axes: Axes, x0: float, x1: float, y: float, text: str) -> None:
-    """A port from one service to another."""
+    """Draw a port from one service to another."""
     style = {"arrowstyle": "-|>", "color": BLUE, "lw": 1.5, "shrinkA": 0, "shrinkB": 0}
     axes.annotate("", (x1, y), (x0, y), arrowprops=style, zorder=2)
     blank = {"boxstyle": "square,pad=0.1", "fc": "white", "ec": "none"}
@@ -76,42 +76,42 @@ def arrow(axes: Axes, x0: float, x1: float, y: float, text: str) -> None:
     )
 
 
-def ports(axes: Axes, setup: RunConfig) -> None:
-    """One arrow for each port that somebody takes."""
-    for consumer, service in setup.services.items():
-        taken: dict[str, list[InputPort]] = {}
+def ports(axes: Axes, config: RunConfig) -> None:
+    """Draw an arrow for each port that another service reads."""
+    for consumer, service in config.services.items():
+        read: dict[str, list[InputPort]] = {}
         for needed in service.inputs:
-            taken.setdefault(setup.producers[needed.port], []).append(needed)
-        for producer, inputs in taken.items():
+            read.setdefault(config.producers[needed.port], []).append(needed)
+        for producer, inputs in read.items():
             a, b = SERVICES[producer], SERVICES[consumer]
             x0, x1 = (a.right, b.left) if a.right < b.left else (a.left, b.right)
             low, high = max(a.bottom, b.bottom), min(a.top, b.top)
             free = [i for i in inputs if i.port not in LANES]
             heights = {i.port: high - (high - low) * (k + 0.75) / (len(free) + 0.5) for k, i in enumerate(free)}
             for needed in inputs:
-                later = f", {needed.delay} tick{'s' * (needed.delay > 1)} later" if needed.delay else ""
-                text = f"{needed.port}, {rate(setup, needed.port)}{later}"
+                delay = f", delay {needed.delay} tick{'s' * (needed.delay > 1)}" if needed.delay else ""
+                text = f"{needed.port}, {rate(config, needed.port)}{delay}"
                 arrow(axes, x0, x1, {**heights, **LANES}[needed.port], text)
 
 
-def batches(axes: Axes, setup: RunConfig) -> None:
-    """What every service hands to the processes beside the lock step, and what comes from outside."""
+def log_packets(axes: Axes, config: RunConfig) -> None:
+    """Draw the log packets to the auxiliary processes, and the commands from outside."""
     style = {"color": GREY, "lw": 1.1, "ls": ":", "zorder": 1}
     for name, x in {"plant": 1.0, "sensors": 4.75, "trajectory": 6.7, "autopilot": 10.4}.items():
         axes.plot([x, x], [SERVICES[name].bottom, BUS], **style)
     axes.plot([1.0, 10.4], [BUS, BUS], **{**style, "ls": "-"})
-    axes.text(8.5, BUS + 0.07, "batches of encoded messages", ha="center", fontsize=8.5, color=GREY)
+    axes.text(8.5, BUS + 0.07, "log packets: encoded messages", ha="center", fontsize=8.5, color=GREY)
     down = {"arrowstyle": "-|>", "color": GREY, "lw": 1.1}
     for name, x in {"recorder": 1.0, "foxglove": 3.3, "mavlink": 10.4}.items():
-        axes.annotate("", (x, BESIDE[name].top), (x, BUS), arrowprops=down)
+        axes.annotate("", (x, AUXILIARY[name].top), (x, BUS), arrowprops=down)
     up = {"arrowstyle": "-|>", "color": ORANGE, "lw": 1.4}
-    axes.annotate("", (11.6, SERVICES["autopilot"].bottom), (11.6, BESIDE["mavlink"].top), arrowprops=up)
-    axes.text(11.7, 0.05, "operator\ncommands", fontsize=8.5, color=ORANGE, va="center")
-    taken = {needed.port for service in setup.services.values() for needed in service.inputs}
-    for name, service in setup.services.items():
-        box, others = SERVICES[name], [port.name for port in service.ports if port.name not in taken]
+    axes.annotate("", (11.6, SERVICES["autopilot"].bottom), (11.6, AUXILIARY["mavlink"].top), arrowprops=up)
+    axes.text(11.7, 0.05, "vehicle\ncommands", fontsize=8.5, color=ORANGE, va="center")
+    read = {needed.port for service in config.services.values() for needed in service.inputs}
+    for name, service in config.services.items():
+        box, others = SERVICES[name], [port.name for port in service.ports if port.name not in read]
         if others:
-            text = f"also given: {', '.join(others)}"
+            text = f"other outputs: {', '.join(others)}"
             axes.text(
                 0.5 * (box.left + box.right), box.bottom + 0.3, text, ha="center", fontsize=8, color=GREY, zorder=4
             )
@@ -119,26 +119,26 @@ def batches(axes: Axes, setup: RunConfig) -> None:
 
 def draw(path: Path) -> None:
     """Write the picture."""
-    setup = resolve(load("delivery_mission"))
+    config = resolve(load("delivery_mission"))
     figure, axes = plt.subplots(figsize=(12.0, 8.2))
-    for number, service in enumerate(create_all(setup), 1):
+    for number, service in enumerate(create_all(config), 1):
         lines = []
         for part in service.parts:
             name = part.name.removeprefix(f"{service.name}.")
             python = not isinstance(part, Block)
             lines.append((f"{name} (Python)", ORANGE) if python else (name, DARK))
         process(axes, SERVICES[service.name], f"{number}  {service.name}", lines if len(lines) > 1 else [])
-    what = {"recorder": "log.mcap", "router": "--listen: topics for clients", "mavlink": "--mavlink"}
-    what |= {"foxglove": "--foxglove", "ros2": "--ros2"}
+    options = {"recorder": "log.mcap", "router": "--listen: topics for clients", "mavlink": "--mavlink"}
+    options |= {"foxglove": "--foxglove", "ros2": "--ros2"}
     for entry in PROCESSES:
         if not entry.lock_step:
-            process(axes, BESIDE[entry.name], entry.name, [(what[entry.name], GREY)], dashed=True)
-    ports(axes, setup)
-    batches(axes, setup)
-    text = f"{setup.scene}: a tick is {1000 / setup.rate:g} ms; numbers give the order within a tick"
+            process(axes, AUXILIARY[entry.name], entry.name, [(options[entry.name], GREY)], dashed=True)
+    ports(axes, config)
+    log_packets(axes, config)
+    text = f"{config.scene}: a tick is {1000 / config.rate:g} ms; numbers give the order within a tick"
     axes.text(0.0, 7.3, text, fontsize=10, color=DARK)
-    axes.text(12.4, 7.3, "compiled part", fontsize=9, color=DARK, ha="right")
-    axes.text(10.9, 7.3, "part in Python", fontsize=9, color=ORANGE, ha="right")
+    axes.text(12.4, 7.3, "compiled block", fontsize=9, color=DARK, ha="right")
+    axes.text(10.9, 7.3, "Python block", fontsize=9, color=ORANGE, ha="right")
     axes.set_xlim(-0.15, 12.75)
     axes.set_ylim(-1.75, 7.6)
     axes.axis("off")

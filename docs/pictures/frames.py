@@ -1,4 +1,4 @@
-"""Draws docs/pictures/frames.png: the frames inside and on a MAVLink link, and when messages of each rate are due.
+"""Draw docs/pictures/frames.png: the frames inside and on a MAVLink link, and when messages of each rate are due.
 
 python docs/pictures/frames.py
 """
@@ -28,12 +28,12 @@ PLACE = np.array([0.9, 1.5, 0.9])  # [m] of the vehicle
 
 
 def seen(point_world: np.ndarray) -> np.ndarray:
-    """Where a point of the world is in the picture."""
+    """Return the place of a world point in the picture."""
     return point_world[0] * EAST + point_world[1] * NORTH + point_world[2] * UP
 
 
 def arrow(axes: Axes, start: np.ndarray, along: np.ndarray, colour: str, text: str) -> None:
-    """An axis of a frame, both ends in the world."""
+    """Draw an axis of a frame; both ends in world coordinates."""
     a, b = seen(start), seen(start + along)
     axes.annotate("", b, a, arrowprops={"arrowstyle": "-|>", "color": colour, "lw": 2.0, "shrinkA": 0, "shrinkB": 0})
     x, y = (b - a) / np.linalg.norm(b - a)
@@ -44,7 +44,7 @@ def arrow(axes: Axes, start: np.ndarray, along: np.ndarray, colour: str, text: s
 
 
 def frames(axes: Axes, title: str, world: dict[str, tuple], body: dict[str, tuple]) -> None:
-    """The world's axes and those of the vehicle, each by name as a vector in ENU or FLU."""
+    """Draw the axes of world and vehicle, each by name as a vector in ENU or FLU."""
     origin = np.zeros(3)
     for colour, (name, along) in zip((RED, GREEN, BLUE), world.items(), strict=True):
         arrow(axes, origin, np.array(along, float), colour, name)

@@ -16,12 +16,12 @@ Errors = Mapping[str, Mapping[str, float]]  # by row, by method
 
 def errors(case: str) -> dict[str, dict[str, float]]:
     """Return the errors of the installed simulators on a case: by row, by simulator and method."""
-    found: dict[str, dict[str, float]] = {}
+    result: dict[str, dict[str, float]] = {}
     for simulator in installed(__name__):
         if case in simulator.CASES:
             for row, measured in simulator.CASES[case]().items():
-                found.setdefault(row, {}).update(measured)
-    return found
+                result.setdefault(row, {}).update(measured)
+    return result
 
 
 def main(names: Sequence[str] = ()) -> None:

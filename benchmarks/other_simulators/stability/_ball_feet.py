@@ -27,9 +27,9 @@ def error(falls: Callable[[int, float], bool]) -> float:
 
     A ball touches under its middle: the edge is that of the balls' middles.
     """
-    found = []
+    result = []
     for axis in toppling.AXES:
         exact = math.atan(toppling.base(axis) / (landing.HEIGHT - RADIUS))
         at = toppling.threshold(partial(falls, axis), exact - 0.1, exact + 0.1, 34)
-        found.append(abs(at - exact))
-    return max(found)
+        result.append(abs(at - exact))
+    return max(result)

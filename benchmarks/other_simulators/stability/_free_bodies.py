@@ -18,12 +18,12 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
 
     def tumbling() -> Errors:
         c = intermediate_axis
-        found: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
+        result: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
         for name, march in methods.items():
             y = march(c.INERTIA, c.start(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
-            for row, values in zip(found, c.compared(y, c.EPSILON), strict=True):
-                found[row][name] = float(values.max())
-        return found
+            for row, values in zip(result, c.compared(y, c.EPSILON), strict=True):
+                result[row][name] = float(values.max())
+        return result
 
     def loops() -> Errors:
         c = looping

@@ -76,13 +76,13 @@ def free(scheme: str | None, inertia: Any, start: Any, duration: float, steps: i
     model.finish()
     model.joint.SetQuaternion(model.context, Quaternion(np.array(start.attitude)))
     model.joint.set_angular_velocity(model.context, model.attitude_matrix() @ start.omega_body)
-    found = []
+    result = []
     for t in np.linspace(0.0, duration, samples + 1):
         model.simulator.AdvanceTo(t)
         R = model.attitude_matrix()
         omega_world = model.plant.EvalBodySpatialVelocityInWorld(model.context, body).rotational()
-        found.append(np.append(R, R.T @ omega_world))
-    return np.array(found)
+        result.append(np.append(R, R.T @ omega_world))
+    return np.array(result)
 
 
 def vehicle(angle: float, friction: float) -> Model:

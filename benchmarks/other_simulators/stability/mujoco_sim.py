@@ -105,7 +105,7 @@ def four_bars(n: int = 2) -> Errors:
     for k in range(n):
         ties += f'<connect body1="coupler{k}" body2="crank{k + 1}" anchor="1 0 0"/>'
     step = c.END / c.STEPS
-    found = {}
+    result = {}
     for name, stiff in (("MuJoCo RK4", "0.02"), ("MuJoCo RK4, solref of two steps", f"{2.0 * step:g}")):
         model = mujoco.MjModel.from_xml_string(f"""<mujoco>
           <option timestep="{step}" integrator="RK4" gravity="0 {-c.GRAVITY} 0"/>
@@ -119,8 +119,8 @@ def four_bars(n: int = 2) -> Errors:
             mujoco.mj_kinematics(model, data)
             tip.append(2.0 * data.body("crank0").xipos)
         t = np.linspace(0.0, c.END, len(tip) + 1)
-        found[name] = float(np.abs(np.array(tip) - c.tips(t, n)[1:]).max())
-    return {"four_bar": found}
+        result[name] = float(np.abs(np.array(tip) - c.tips(t, n)[1:]).max())
+    return {"four_bar": result}
 
 
 CASES = {

@@ -1,0 +1,101 @@
+"""Steps a second of the Gymnasium environments beside `Simulator` and `BatchSimulator`, in one process.
+
+    python -m benchmarks.environments [VEHICLES...]
+
+A step is 20 ms of flight: five ticks of scene hover, each of four RK4 steps of 1 ms. All hover; `Simulator` under motor
+voltages, with the scene's sensors; `BatchSimulator` under thrust and body rates, as the environments. The contestants
+alternate in short rounds. The best round is the one that other work on the machine disturbed least, and is what the
+targets are compared with; the median shows how busy the machine was.
+"""
+
+import sys
+import time
+from collections.abc import Callable
+from statistics import median
+
+import gymnasium
+import numpy as np
+
+import lapwing
+import lapwing.gym
+from benchmarks._targets import Row, show
+
+TICKS, ROUNDS, SECONDS = 5, 120, 0.02  # of a round of each contestant
+SINGLE, SHARE = 20_000.0, 0.6  # steps/s; of the speed of a batch
+
+
+def simulator() -> Callable[[], None]:
+    """Return a step of one vehicle by `Simulator`, begun anew at the end of its run."""
+    sim = lapwing.Simulator("hover")
+
+    def step() -> None:
+        if sim.step(motor_voltages=(33.5,) * 4, ticks=TICKS).done:
+            sim.reset()
+
+    return step
+
+
+def batch(n: int) -> Callable[[], None]:
+    """Return a step of n vehicles by `BatchSimulator`."""
+    vehicles = lapwing.BatchSimulator("hover", n)
+    vehicles.reset(position_world=(0.0, 0.0, 5.0), rotor_speed=vehicles.hover_speed)
+    thrust, rates = np.full(n, vehicles.weight), np.zeros((n, 3))
+    return lambda: vehicles.step(thrust=thrust, body_rates=rates, ticks=TICKS) and None
+
+
+def single() -> Callable[[], None]:
+    """Return a step of `gymnasium.make`."""
+    environment, action = gymnasium.make("lapwing/Hover-v0"), np.zeros(4, np.float32)
+    environment.reset(seed=1)
+
+    def step() -> None:
+        *_, terminated, truncated, _ = environment.step(action)
+        if terminated or truncated:
+            environment.reset()
+
+    return step
+
+
+def vector(n: int) -> Callable[[], None]:
+    """Return a step of `gymnasium.make_vec`."""
+    environments = gymnasium.make_vec("lapwing/Hover-v0", num_envs=n, vectorization_mode="vector_entry_point")
+    environments.reset(seed=1)
+    actions = np.zeros((n, 4), np.float32)
+    return lambda: environments.step(actions) and None
+
+
+def rates(contestants: dict[str, tuple[int, Callable[[], None]]]) -> dict[str, list[float]]:
+    """Return vehicle steps per second of each contestant in each round, given (vehicles, step)."""
+    measured: dict[str, list[float]] = {name: [] for name in contestants}
+    for _, step in contestants.values():
+        step()
+    for _ in range(ROUNDS):
+        for name, (n, step) in contestants.items():
+            began, count = time.perf_counter(), 0
+            while (took := time.perf_counter() - began) < SECONDS:
+                step()
+                count += n
+            measured[name].append(count / took)
+    return measured
+
+
+def main(*vehicles: int) -> list[Row]:
+    many = vehicles or (64, 1024)
+    contestants = {"Simulator": (1, simulator()), "BatchSimulator, 1": (1, batch(1)), "gymnasium.make": (1, single())}
+    for n in many:
+        contestants |= {f"BatchSimulator, {n}": (n, batch(n)), f"gymnasium.make_vec, {n}": (n, vector(n))}
+    rounds = rates(contestants)
+    print(f"{'steps/s':28}{'best round':>12}{'median':>12}{'ticks/s, best':>16}")
+    for name, each in rounds.items():
+        print(f"{name:28}{max(each):12,.0f}{median(each):12,.0f}{max(each) * TICKS:16,.0f}")
+    found = {name: max(each) for name, each in rounds.items()}
+    rows = [Row("gymnasium.make, steps", found["gymnasium.make"], "1/s", SINGLE, True)]
+    for n in many:
+        share = found[f"gymnasium.make_vec, {n}"] / found[f"BatchSimulator, {n}"]
+        rows.append(Row(f"gymnasium.make_vec to BatchSimulator, {n} vehicles", share, "1", SHARE, True))
+    show(rows)
+    return rows
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

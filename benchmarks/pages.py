@@ -1,0 +1,142 @@
+"""Size of the mission's report and time until it answers, first live picture, frames a second of the 3D view.
+
+    python -m benchmarks.pages [LOG]      (of the delivery mission, where none is named)
+
+In headless Chromium with software rendering, which is the slow case: a laptop has a graphics processor.
+"""
+
+import copy
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks._targets import LAPWING, Row, show
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.executors.single_process import PAGE
+from lapwing.runs.live_feed import LiveFeed
+from lapwing.runs.live_page import LivePage
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.flight_data import SHOWN, FlightData
+from lapwing.studies.report import write
+from lapwing.studies.topic_view import TopicView
+from lapwing.studies.view3d.headless import Browser
+from lapwing.studies.view3d.recording import page
+
+VEHICLES, APART = 8, 3.0  # [m] between neighbours
+SECONDS = 10.0  # of which frames are counted
+SIZE = (1280, 720)  # [pixel]
+DRAWN = """
+for (;;) {
+  if (document.querySelector(".js-plotly-plot .main-svg")) return performance.now();
+  await new Promise((done) => setTimeout(done, 5));
+}
+"""
+READY = "while (!window.lapwingView?.ready) await new Promise((done) => setTimeout(done, 5));"
+RATE = f"""
+{READY}
+const begin = lapwingView.frames(), start = performance.now();
+await new Promise((done) => setTimeout(done, {1000 * SECONDS}));
+return 1000 * (lapwingView.frames() - begin) / (performance.now() - start);
+"""
+
+
+def rows(log):
+    with tempfile.TemporaryDirectory() as folder:
+        if log is None:
+            log = str(Path(folder, "log.mcap"))
+            words = ["run", "delivery_mission", "--mode", "single-process", "--speed", "max", "--log", log]
+            subprocess.run([*LAPWING, *words], check=True, stdout=subprocess.DEVNULL)
+        flight = FlightData.read(log, only=SHOWN)
+        for view3d, bar in ((False, 2.0), (True, 5.0)):
+            report = write(flight, Path(folder, "report.html"), view3d)
+            name = "with" if view3d else "without"
+            yield Row(f"report of the mission {name} 3D view", report.stat().st_size / 1e6, "MB", bar)
+            wall, cpu = drawn(report)
+            yield Row(f"first plot of that report {name} 3D view", wall, "s", 1.0)
+            yield Row(f"the same {name} 3D view, processor time of its thread", cpu, "s", 1.0)
+        yield Row("first picture of --view after the first tick", first_picture(), "s", 1.0)
+        for count in (1, VEHICLES):
+            view = Path(folder, "view.html")
+            view.write_text(page([fleet(flight, count)], [flight.vehicle]), encoding="utf-8")
+            with Browser(view, size=SIZE) as browser:
+                yield Row(f"frames of the 3D view, {count} vehicles", browser.run(RATE), "1/s", 30.0, True)
+
+
+def drawn(report):
+    """[s] from the request of a page to its first plot: by the clock, and processor time of its thread; best of 3."""
+    times = []
+    for _ in range(3):
+        with Browser("data:text/html,empty", size=SIZE) as browser:
+            browser.call("Performance.enable", timeDomain="threadTicks")
+            browser.call("Page.navigate", url=report.resolve().as_uri())
+            wall = 1e-3 * browser.run(DRAWN)
+            metrics = {entry["name"]: entry["value"] for entry in browser.call("Performance.getMetrics")["metrics"]}
+            times.append((wall, metrics["TaskDuration"]))
+    return tuple(map(min, zip(*times, strict=True)))
+
+
+class Watch:
+    """Hover in this process, seen as by the launcher."""
+
+    def __init__(self):
+        self.setup = resolve(load("hover"))
+        self._diagram = BlockDiagram(self.setup, create_all(self.setup), PAGE)
+        self.reporting_services, self.listen, self.time_ns = set(self.setup.services), None, 0
+        self.complete = False
+
+    def publish(self, *_):
+        pass
+
+    def step(self, seconds):
+        before = self._diagram.tick
+        stop = before + round(seconds * self.setup.rate)
+        self._diagram.advance(stop)
+        self.listen(self._diagram.record_batches(before, stop))
+        self.time_ns = (stop - 1) * self.setup.interval_ns
+
+
+def first_picture():
+    """[s] from the first step of a flight to the first picture with the vehicle, in a page that is open."""
+    watch = Watch()
+    with LivePage(watch.setup) as live:
+        feed = LiveFeed(watch.setup, [live.show])
+        feed.observe(watch)
+        with Browser(live.address, size=SIZE) as browser:
+            browser.run("while (!document.querySelector('canvas')) await new Promise((done) => setTimeout(done, 50));")
+            time.sleep(3.0)
+            start = time.monotonic()
+            for _ in range(3):  # ten steps a second, as of a run
+                watch.step(0.1)
+                feed.observe(watch)
+            browser.run(READY)
+            return time.monotonic() - start
+
+
+def fleet(flight, count):
+    """The flight with copies of itself beside it."""
+    first = copy.copy(flight)
+    others = []
+    for k in range(1, count):
+        truth = {name: flight.truth[name] for name in flight.truth.fields}
+        truth["pose.position"] = flight.truth.position + np.array([0.0, APART * k, 0.0])
+        views = {"ground_truth": TopicView(flight.truth._times_ns, truth)}
+        others.append(FlightData(views, copy.copy(flight.origin)))
+        others[-1].vehicle = f"vehicle {k + 1}"
+    first.others = tuple(others)
+    first.fleet = {other.vehicle: other.truth for other in (flight, *others)}
+    return first
+
+
+def main(log=None):
+    result = list(rows(log))
+    show(result)
+    return result
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])
