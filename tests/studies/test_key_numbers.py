@@ -71,7 +71,7 @@ def test_flights_of_comparison_have_their_names():
     assert labels([one, other]) == ("PID", "Lee")
 
 
-@pytest.mark.parametrize(("share", "text"), [(-1.0, "-100 %"), (0.123, "+12 %"), (0.0123, "+1.2 %"), (0.0, "+0 %")])
+@pytest.mark.parametrize(("share", "text"), [(-1.0, "-100 %"), (0.123, "+12 %"), (0.0123, "+1.2 %"), (0.0, "0 %")])
 def test_percent_has_no_exponent(share, text):
     assert percent(share) == text
 

@@ -65,7 +65,7 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
         points = measure(problem)
         chosen = None if goal is None else cheapest(points, goal)
         parts = error_budget.errors(scene) if scene else []
-        cost = costs(scene, [scene[Effects].tables])[0] if scene and error_budget.touches(scene) else None
+        cost = costs(scene, [scene[Effects].tables])[0][:2] if scene and error_budget.touches(scene) else None
         return Study(target, problem, points, chosen, parts, cost)
     finally:
         notice.cancel()

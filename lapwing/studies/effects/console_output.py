@@ -29,6 +29,7 @@ def show(console: Console, found: Study) -> None:
         f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} standing)",
         highlight=False,
     )
+    console.print('Costs after "<" are below what this measurement resolves.', highlight=False)
     names = ", ".join(row.name for row in found.missing)
     console.print(f"Left out, and worth more than {found.within:g} m: {names or 'none'}", highlight=False)
 
@@ -42,12 +43,17 @@ def _table(console: Console, title: str, found: Study, active: bool) -> None:
     for row in _of(found, active):
         if row.influence is None:
             continue
-        share = f"{row.airborne / found.airborne:.0%}"
-        table.add_row(row.name, f"{row.airborne:.1f}", share, f"{row.standing:.0f}", *_changes(row.influence))
+        share = f"{row.airborne / found.airborne:.0%}" if row.airborne > found.noise[0] else ""
+        airborne, standing = _cost(row.airborne, found.noise[0]), _cost(row.standing, found.noise[1])
+        table.add_row(row.name, airborne, share, standing, *_changes(row.influence))
     console.print(table)
     for row in _of(found, active):
         if row.remark:
             console.print(f"  not flown: {row.remark}", highlight=False, soft_wrap=True)
+
+
+def _cost(difference: float, noise: float) -> str:
+    return f"{difference:.3g}" if abs(difference) > noise else f"< {noise:.2g}"
 
 
 def _changes(i: Influence) -> tuple[str, str, str]:
@@ -59,6 +65,8 @@ def _changes(i: Influence) -> tuple[str, str, str]:
 def percent(share: float) -> str:
     """Return a relative change in per cent with two significant digits, without an exponent up to 1000 %."""
     value = 100.0 * share
+    if not value:
+        return "0 %"
     return f"{value:+.0f} %" if 9.95 <= abs(value) < 1e4 else f"{value:+.2g} %"
 
 

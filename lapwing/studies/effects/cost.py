@@ -2,7 +2,7 @@
 
 import math
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,6 +22,15 @@ HEIGHT = 10.0  # [m]
 STANDARD_GRAVITY = 9.81  # [m/s^2]
 
 
+class Cost(NamedTuple):
+    """Time that a plant step takes [ns], and by how much two halves of the measurement differ."""
+
+    airborne: float  # hovering at 10 m
+    standing: float  # on the ground with the motors off
+    airborne_noise: float
+    standing_noise: float
+
+
 @kernel
 def exchanges(method: Any, p: Any, s: Any, key: Key, command: tuple[float, ...], h: float, n: int, ticks: int) -> None:
     """Advance the state in the cell `s` by `ticks` exchanges of n steps of h [s]."""
@@ -29,8 +38,8 @@ def exchanges(method: Any, p: Any, s: Any, key: Key, command: tuple[float, ...],
         s.value = multirotor.advance(method, p.value, key, tick, s.value, command, h, n)
 
 
-def costs(scene: Scene, variants: list[Tables]) -> list[tuple[float, float]]:
-    """Return the time [ns] of a plant step of each variant: (hovering at 10 m, on the ground with the motors off)."""
+def costs(scene: Scene, variants: list[Tables]) -> list[Cost]:
+    """Return the cost of a plant step of each variant."""
     calls = [_calls(variant(scene, tables)) for tables in variants]
     taken = np.empty((ROUNDS, len(variants), 2))
     for row in taken:
@@ -38,7 +47,8 @@ def costs(scene: Scene, variants: list[Tables]) -> list[tuple[float, float]]:
             for j, call in enumerate(pair):
                 row[i, j] = call()
     # interruptions only add: the least is nearest to what the work itself takes
-    return [tuple(pair) for pair in taken[1:].min(axis=0) / STEPS * 1e9]
+    odd, even = (taken[begin::2].min(axis=0) / STEPS * 1e9 for begin in (1, 2))
+    return [Cost(*np.minimum(a, b), *np.abs(a - b)) for a, b in zip(odd, even, strict=True)]
 
 
 def _calls(scene: Scene) -> tuple[Any, Any]:

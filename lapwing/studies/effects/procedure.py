@@ -38,6 +38,7 @@ class Study(NamedTuple):
     apart: float  # [m] largest distance of the flight with these only
     smallest_airborne: float  # [ns] of a plant step with these
     smallest_standing: float  # [ns]
+    noise: tuple[float, float]  # [ns] differences of cost below these are not significant: hovering, on the ground
 
     @property
     def missing(self) -> list[Row]:
@@ -81,16 +82,17 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
         kept, apart = _smallest(crew, tables, flown, out, within, lambda text: say(text, count, count + 1))
     say("timing the plant's steps", count + 1, count + 1)
     names = list(flying)
-    full, least, *each = costs(scene, [tables, kept, *flying.values()])
+    full, least, *each = measured = costs(scene, [tables, kept, *flying.values()])
     rows = []
     for name in sorted(fewer) + sorted(more):
         sign = 1.0 if name in fewer else -1.0
         taken = each[names.index(name)] if name in flying else (math.nan, math.nan)
-        airborne, standing = (sign * (a - b) for a, b in zip(full, taken, strict=True))
+        airborne, standing = (sign * (a - b) for a, b in zip(full[:2], taken[:2], strict=True))
         rows.append(Row(name, name in fewer, result.get(name), airborne, standing, refused.get(name, "")))
     unknown = math.nan, math.nan
     rows += [Row(name, False, None, *unknown, f"effects.{name}: needs other vehicles") for name in among]
-    return Study(scene.name, within, *full, tuple(rows), tuple(kept), apart, *least)
+    noise = max(cost.airborne_noise for cost in measured), max(cost.standing_noise for cost in measured)
+    return Study(scene.name, within, *full[:2], tuple(rows), tuple(kept), apart, *least[:2], noise)
 
 
 def _without(tables: Tables, *names: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from lapwing.dynamics import effects
 from lapwing.services.common.vehicle_schema import Effects
 from lapwing.services.scene_resolver import load
 from lapwing.studies.effects import console_output, procedure
+from lapwing.studies.effects.cost import Cost
 from lapwing.studies.effects.influence import Influence, influence
 from lapwing.studies.effects.procedure import Row, Study, _smallest
 from lapwing.studies.effects.procedure import study as run_study
@@ -87,7 +88,7 @@ def test_every_effect_of_catalogue_is_listed(monkeypatch):
             return (moved([0.0, 1.0]) for _ in variants)
 
     monkeypatch.setattr(procedure, "hangar", lambda scene: contextlib.nullcontext(Same()))
-    monkeypatch.setattr(procedure, "costs", lambda scene, variants: [(1.0, 1.0)] * len(variants))
+    monkeypatch.setattr(procedure, "costs", lambda scene, variants: [Cost(1.0, 1.0, 0.1, 0.1)] * len(variants))
     result = run_study(load(HOVER), 0.01, lambda *_: None)
     rows = {row.name: row for row in result.rows}
     assert sorted(rows) == effects.names()
@@ -105,7 +106,7 @@ def study():
         Row("gyroscopic_torque", False, Influence(0.00012, 0.00011, -0.0123), -1234.5, -1234.0),
         Row("gust", False, None, math.nan, math.nan, "gust.peak: field required"),
     )
-    return Study("hover", 0.01, 80.0, 500.0, rows, ("gravity",), 0.0, 80.0, 500.0)
+    return Study("hover", 0.01, 80.0, 500.0, rows, ("gravity",), 0.0, 80.0, 500.0, (1.5, 3.0))
 
 
 def test_table_json_and_plot(tmp_path, capsys):
@@ -117,6 +118,7 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert "…" not in text  # no digit is cut
     assert "path [m]" in text
     assert "ends early" in text
+    assert "< 1.5" in text  # cost of gravity, below what the measurement resolves
     assert "not flown: gust.peak: field required" in text
     assert "Left out, and worth more than 0.01 m: wind" in text
     console_output.write_json(tmp_path / "study.json", result)
