@@ -60,7 +60,7 @@ def step_in_run(setup: RunConfig) -> float:
         services = [s for s in create_all(setup) if s.name == "plant"]
         diagram = BlockDiagram(setup, services, 1)  # owns the memory of the group
         in_the_air(diagram)
-        (group,) = diagram._turns
+        (group,) = diagram._groups
         run(group._cell, 0, 0, 10)
         began = time.perf_counter()
         run(group._cell, 10, 0, 10 + STEPS)

@@ -94,8 +94,8 @@ def ping_process(name, peers, cycles, core):
         handler = zenoh.handlers.Callback(arrived.put, indirect=False)
         subscriber = session.declare_subscriber(f"ping/{name}", handler)
         publisher = session.declare_publisher(f"ping/{following}", congestion_control=zenoh.CongestionControl.BLOCK)
-        bus.declare_alive(f"ping/_alive/{name}")
-        missing = bus.wait_alive([f"ping/_alive/{n}" for n in names], 30.0)
+        bus.declare_liveliness(f"ping/_alive/{name}")
+        missing = bus.wait_for_liveliness([f"ping/_alive/{n}" for n in names], 30.0)
         assert not missing
         if core is not None:
             pin(core)

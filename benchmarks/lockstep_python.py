@@ -31,13 +31,13 @@ class Idle:
     def publisher(self, key, drops=False):
         return lambda payload, time_ns: None
 
-    def has_audience(self, keys):
+    def has_subscribers(self, keys):
         return False
 
 
 def prepare(bus, giver, tick, interval_ns):
     """Let the bundle be there that `giver` takes next, if it takes one up to this tick."""
-    bus.next = (tick * interval_ns, bytes(giver._bundles.size(tick)))
+    bus.next = (tick * interval_ns, bytes(giver._codec.size(tick)))
 
 
 def own(name, cycles):

@@ -86,7 +86,7 @@ class Watch:
     def __init__(self):
         self.setup = resolve(load("hover"))
         self._diagram = BlockDiagram(self.setup, create_all(self.setup), PAGE)
-        self.reporting_services, self.listen, self.time_ns = set(self.setup.services), None, 0
+        self.reporting_services, self.on_batches, self.time_ns = set(self.setup.services), None, 0
         self.complete = False
 
     def publish(self, *_):
@@ -96,7 +96,7 @@ class Watch:
         before = self._diagram.tick
         stop = before + round(seconds * self.setup.rate)
         self._diagram.advance(stop)
-        self.listen(self._diagram.record_batches(before, stop))
+        self.on_batches(self._diagram.record_batches(before, stop))
         self.time_ns = (stop - 1) * self.setup.interval_ns
 
 

@@ -8,10 +8,10 @@ flight = lapwing.fly(scene, seed=7)
 flight.rmse, flight.truth.position, flight.report("flight.html")
 ```
 
-What is named here is the public interface; everything is imported when it is first asked for.
+The names here are the public interface; each is imported at its first use.
 """
 
-TYPE_CHECKING = False  # what type checkers take for true: nothing is imported before `lapwing` answers Ctrl-C
+TYPE_CHECKING = False  # True for type checkers: `lapwing` imports nothing before it handles Ctrl-C
 if TYPE_CHECKING:
     from lapwing.api import campaign, fly, load_scene, read_log
     from lapwing.batch_simulator import BatchSimulator, BatchState

@@ -1,4 +1,4 @@
-"""The functions of `import lapwing`."""
+"""Functions of `import lapwing`."""
 
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -16,21 +16,21 @@ from lapwing.runs.work_progress import WorkProgress
 from lapwing.services import scene_resolver
 from lapwing.services.common.user_code import registered
 from lapwing.services.scene_resolver import reseed, resolve
-from lapwing.studies import simulate as studied
+from lapwing.studies import simulate
 from lapwing.studies.campaign.distributions import Distribution
 from lapwing.studies.campaign.plan import plan
 
 
 def load_scene(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
-    """Read a scene and all that it names, override, and validate.
+    """Read a scene and the files that it names, apply overrides, and validate it.
 
     Args:
-        scene: path of its TOML file, or the name of one that ships: "hover"; or a loaded one, to override more of it.
-        overrides: values by dotted key, {"effects.random_wind_force.mean": (3.0, 1.0, 0.0)}, or texts "KEY=VALUE"; of
-            any key that the scene resolves to, "airframe.rotors.inertia" too. Units: SI.
+        scene: path of its TOML file, name of a shipped scene ("hover"), or a loaded scene.
+        overrides: values [SI] by dotted key, {"effects.random_wind_force.mean": (3.0, 1.0, 0.0)}, or texts "KEY=VALUE";
+            keys of the files that it names are allowed, for example "airframe.rotors.inertia".
 
     Raises:
-        SceneError: what is wrong with which key, and what would be right.
+        SceneError: names the key, the fault and the expected value.
     """
     return scene_resolver.load(scene, overrides)
 
@@ -45,45 +45,44 @@ def fly(
     estimator: Any = None,
     estimator_options: Mapping[str, Any] | None = None,
 ) -> Flight:
-    """Fly a scene in this process, as fast as it goes; the flight stays in memory.
+    """Fly a scene in this process as fast as possible. Return the flight, which stays in memory.
 
-    Where a state ceases to be sound, or the controller fails in the air, the flight ends there; its `outcome` says so,
-    and `failure` why.
+    The flight ends early if a state becomes invalid or the controller raises an error; see `outcome` and `failure`.
 
     Args:
-        scene: what to fly: a path, a name, or a loaded one.
+        scene: path or name of a scene, or a loaded scene.
         overrides: see `load_scene`.
-        seed: of all randomness, 0 to 2^63 - 1; None: the scene's.
-        controller: one's own in the place of the scene's: a class, an object of one (each take-off begins with a copy
-            of it), or "module:Class", as in a scene. It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
-            `lapwing.services.common.controller_api`. A class in a separate module becomes part of the flight's
-            set-up, so that
-            `lapwing resimulate` can fly a saved log again; one that was typed at a prompt or in a script cannot be.
-        controller_options: of the constructor of the class: numbers, texts, lists of numbers, by name.
-        estimator: the same of an estimator, with `step(time, readings)`; see `lapwing.services.common.estimator_api`.
-        estimator_options: the same.
+        seed: seed of all random numbers, 0 to 2^63 - 1; None for that of the scene.
+        controller: replaces the controller of the scene: a class, an object (copied at each take-off), or
+            "module:Class". It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
+            `lapwing.services.common.controller_api`. A class in a separate module becomes part of the run
+            configuration, so that `lapwing resimulate` can repeat a saved log; a class of a script or prompt does not.
+        controller_options: arguments of the constructor by name: numbers, texts, lists of numbers.
+        estimator: replaces the estimator of the scene; it has a `rate` [Hz] and `step(time, readings)`; see
+            `lapwing.services.common.estimator_api`.
+        estimator_options: arguments of the constructor by name.
 
     Raises:
         SceneError: the scene is invalid, or the controller does not fit it; names the key and the fault.
     """
-    given = {"controller": (controller, controller_options), "estimator": (estimator, estimator_options)}
+    user_code = {"controller": (controller, controller_options), "estimator": (estimator, estimator_options)}
     folder = Path(scene.path if isinstance(scene, Scene) else scene).parent
     with ExitStack() as stack:
         own: dict[str, Any] = {} if seed is None else {"run.seed": seed}
-        for key, (thing, options) in given.items():
-            if thing is not None:
-                own[f"autopilot.{key}"] = stack.enter_context(registered(thing, folder))
+        for key, (code, options) in user_code.items():
+            if code is not None:
+                own[f"autopilot.{key}"] = stack.enter_context(registered(code, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        chosen = with_solver(scene_resolver.load_one(scene, overrides))
-        return _flown_with_bar(resolve(load_scene(chosen, own)))
+        base = with_solver(scene_resolver.load_one(scene, overrides))
+        return _fly_with_bar(resolve(load_scene(base, own)))
 
 
 def read_log(log: str | Path) -> Flight:
     """Return the flight of an MCAP log.
 
     Raises:
-        ValueError: no such file, no MCAP log, or no flight in it.
+        ValueError: the file is missing, not an MCAP log, or has no flight.
     """
     return Flight.read(log)
 
@@ -97,18 +96,18 @@ def campaign(
     seed: int = 1,
     design: str = "random",
 ) -> list[Flight]:
-    """Fly a scene many times, on all processors; the flights stay in memory. For many, see `lapwing campaign`.
+    """Fly a scene many times, on all processors; the flights stay in memory. See `lapwing campaign` for large numbers.
 
     Args:
-        scene: what to fly: a path, a name, or a loaded one.
-        seeds: of each run's own randomness; as many runs as there are.
-        vary: how keys of the scene vary from run to run: {"vehicle.mass": lapwing.normal(10.4, 0.2)}.
+        scene: path or name of a scene, or a loaded scene.
+        seeds: seed of the random numbers of each run.
+        vary: distributions of scene keys: {"vehicle.mass": lapwing.normal(10.4, 0.2)}.
         overrides: see `load_scene`.
-        seed: of the campaign. What a run draws depends on this, on its number and on the key alone.
-        design: how the runs fill the space of what varies: "random", "lhs", "sobol" or "grid".
+        seed: seed of the campaign. A drawn value depends on it, on the number of the run and on the key only.
+        design: sampling of the varied keys: "random", "lhs", "sobol" or "grid".
 
     Returns:
-        A flight for each run, in their order; with the seeds 1 to n and this `seed` = 1, those of
+        The flight of each run, in order. With the seeds 1 to n and `seed` = 1, they equal those of
         `lapwing campaign --runs n`.
 
     Raises:
@@ -121,22 +120,22 @@ def campaign(
             raise SceneError(key, f"got {distribution!r}", "a distribution, for example lapwing.normal(10.4, 0.2)")
     seeds = list(seeds)
     if not seeds:
-        raise SceneError("seeds", "there are none", "at least one")
-    drawn = plan(base.name, (), len(seeds), seed, vary, design=design)
-    fixed = None if drawn.keys else resolve(base)
+        raise SceneError("seeds", "got none", "at least one")
+    campaign_plan = plan(base.name, (), len(seeds), seed, vary, design=design)
+    fixed = None if campaign_plan.keys else resolve(base)
 
     def setup(run: int) -> RunConfig:
         if fixed is not None:
             return reseed(fixed, seeds[run])
-        return resolve(load_scene(base, {**drawn.values(run), "run.seed": seeds[run]}))
+        return resolve(load_scene(base, {**campaign_plan.values(run), "run.seed": seeds[run]}))
 
     def one(run: int) -> Flight:
-        return _flown(setup(run))
+        return _fly(setup(run))
 
     with WorkProgress(f"campaign {base.name}", len(seeds), "flights") as bar:
         first = setup(0)
         with notify_on_compile(first, bar.compiling, alone=False):
-            flights = [_flown(first)]  # alone: it compiles
+            flights = [_fly(first)]  # alone: it compiles
         bar.show(1)
         with ThreadPoolExecutor(cpu_count()) as pool:
             for flight in pool.map(one, range(1, len(seeds))):
@@ -145,19 +144,19 @@ def campaign(
     return flights
 
 
-def _flown(setup: RunConfig) -> Flight:
-    return studied.fly(setup, kind=Flight)
+def _fly(setup: RunConfig) -> Flight:
+    return simulate.fly(setup, kind=Flight)
 
 
-def _flown_with_bar(setup: RunConfig) -> Flight:
-    """Fly with a progress bar, if it takes long and somebody looks."""
+def _fly_with_bar(setup: RunConfig) -> Flight:
+    """Fly with a progress bar, which appears if the flight takes long."""
     with (
         WorkProgress(setup.scene, setup.last_tick * setup.interval, "s") as bar,
         notify_on_compile(setup, bar.compiling, alone=False) as compiling,
     ):
 
         def observe(tick: int) -> None:
-            compiling.ended()
+            compiling.stop()
             bar.show(tick * setup.interval)
 
-        return studied.fly(setup, kind=Flight, observe=observe)
+        return simulate.fly(setup, kind=Flight, observe=observe)

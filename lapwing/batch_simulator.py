@@ -1,4 +1,4 @@
-"""Many vehicles of a scene stepped together, with numpy arrays."""
+"""Batch simulator: many vehicles of a scene, stepped together with numpy arrays."""
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -29,13 +29,13 @@ from lapwing.services.scene_resolver import load, load_one, resolve
 from lapwing.studies.campaign.distributions import Distribution
 from lapwing.studies.campaign.plan import plan
 
-RATE_BANDWIDTH = 15.0  # [rad/s] with which body rates are followed
+RATE_BANDWIDTH = 15.0  # [rad/s] of the body-rate controller
 UNIT = 1e-6  # largest difference of the norm of an attitude from 1
-DEEPEST = 1e-3  # [m] of a centre of mass under the ground
+DEEPEST = 1e-3  # [m] largest depth of a centre of mass below the ground
 
 
 class BatchState(NamedTuple):
-    """The states of n vehicles as arrays; world ENU, body FLU."""
+    """States of n vehicles as arrays; world ENU, body FLU."""
 
     time: np.ndarray  # [s] of each since its reset, shape (n,)
     position_world: np.ndarray  # [m], shape (n, 3)
@@ -47,7 +47,7 @@ class BatchState(NamedTuple):
 
 
 class BatchSimulator:
-    """n vehicles of a scene, without sensors and autopilot, stepped together.
+    """Simulation of n vehicles of a scene, without sensors and autopilot.
 
     ```python
     batch = BatchSimulator("hover", 4096, vary={"vehicle.mass": lapwing.normal(10.4, 0.2)})
@@ -56,7 +56,7 @@ class BatchSimulator:
     batch.reset([3, 17], position_world=(0.0, 0.0, 5.0))
     ```
 
-    Under motor voltages every member has the bits of one vehicle alone; it is the plant of `lapwing.fly`.
+    With motor voltages, every member is bit-for-bit identical to the plant of `lapwing.fly`.
     """
 
     def __init__(
@@ -71,22 +71,22 @@ class BatchSimulator:
         """Place n vehicles at rest at the start of the scene.
 
         Args:
-            scene: what to simulate: a path, a name, or a loaded one; its model is "rigid_body".
-            n: how many.
-            vary: how keys of the scene vary from member to member; member k draws what run k of a campaign draws. Each
-                costs the resolving of a scene, about 6 ms.
+            scene: path or name of a scene, or a loaded scene; its model is "rigid_body".
+            n: number of vehicles.
+            vary: distributions of scene keys; member k has the values of run k of a campaign. Each member resolves a
+                scene, which takes about 6 ms.
             overrides: see `lapwing.load_scene`.
-            seed: of the draws, and of the members' randomness.
+            seed: seed of the drawn values and of the members' random numbers.
 
         Raises:
             SceneError: the scene is invalid, or has another model.
-            ValueError: n is below 1, or members would differ in more than numbers.
+            ValueError: n is below 1, or the members have different effects or solvers.
         """
         if n < 1:
             raise ValueError(f"n: expected at least 1 member, got {n}")
         base = with_solver(load_one(scene, overrides))
-        drawn = plan(base.name, (), n, seed, vary)
-        first = _plant(load(base, drawn.given(0)))
+        batch_plan = plan(base.name, (), n, seed, vary)
+        first = _plant(load(base, batch_plan.given(0)))
         self._core, self.n, self.interval = first.core, n, first.core.interval
         self._like = simd_batch.member(first.core.vehicle, first.start.vehicle)
         self._motion = row_width(self._like.motion)
@@ -94,19 +94,19 @@ class BatchSimulator:
         self._flat = self._blocks.reshape(-1)
         members = len(self._blocks) * simd_batch.WIDTH  # those beyond n fill the last block
         name = base[Vehicle].name
-        self._keys = np.array([noise_key(drawn.seed_of(min(k, n - 1)), name) for k in range(members)], np.int64)
+        self._keys = np.array([noise_key(batch_plan.seed_of(min(k, n - 1)), name) for k in range(members)], np.int64)
         self._ticks = np.zeros(members, np.int64)
         self._valid = np.ones(members, bool)
         self._on_ground = any(hasattr(e, "terrain") for e in first.core.vehicle.effects)
-        self._fresh = np.empty((members, row_width(self._like)))  # rows of the members before their first step
-        self._fresh[:] = pack_row(self._like)
+        self._initial_rows = np.empty((members, row_width(self._like)))  # rows of the members before their first step
+        self._initial_rows[:] = pack_row(self._like)
         self._commands = np.zeros((members, len(self._like.voltage)))  # [V]
         self.setpoints = np.zeros((members, 4))  # thrust [N], body rates [rad/s]
-        for k in range(1, n) if drawn.keys else ():
-            plant = _plant(load(base, drawn.given(k)))
+        for k in range(1, n) if batch_plan.keys else ():
+            plant = _plant(load(base, batch_plan.given(k)))
             if _kinds(plant.core) != _kinds(first.core):
                 raise ValueError(f"member {k}: has other effects or another solver than member 0")
-            self._fresh[k] = pack_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))
+            self._initial_rows[k] = pack_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))
         self._place(np.arange(n))
         self._fill()
         self._pool = ThreadPoolExecutor(cpu_count())
@@ -115,27 +115,27 @@ class BatchSimulator:
     @property
     def weight(self) -> float:
         """Weight of the nominal vehicle [N]."""
-        return self._steered.mass * self._steered.gravity
+        return self._nominal_airframe.mass * self._nominal_airframe.gravity
 
     @property
     def hover_speed(self) -> np.ndarray:
-        """Speed of each rotor [rad/s] at which all carry equal parts of the nominal weight; shape (rotors,)."""
-        thrust = self.weight / controller_parameters.lift(self._steered)
-        return np.full(len(self._like.voltage), np.sqrt(thrust / self._steered.motor.thrust_coefficient))
+        """Rotor speeds [rad/s] at which each rotor carries the same part of the nominal weight; shape (rotors,)."""
+        thrust = self.weight / controller_parameters.lift(self._nominal_airframe)
+        return np.full(len(self._like.voltage), np.sqrt(thrust / self._nominal_airframe.motor.thrust_coefficient))
 
     @property
     def memory(self) -> tuple[np.ndarray, int, np.ndarray, np.ndarray]:
-        """Memory for compiled code: that of `simd_batch.blocks`, flat; columns of a block; ticks; which are valid."""
+        """Memory for compiled code: flat `simd_batch.blocks`, number of columns of a block, ticks, validity."""
         return self._flat, self._blocks.shape[1], self._ticks, self._valid
 
     @property
     def state(self) -> BatchState:
-        """The present states, copied."""
+        """Copy of the current states."""
         rows = self._rows(self._motion)[: self.n]
-        parts, at = [], 0
+        parts, column = [], 0
         for part in self._like.motion:
-            parts.append(rows[:, at : at + len(part)].copy())
-            at += len(part)
+            parts.append(rows[:, column : column + len(part)].copy())
+            column += len(part)
         return BatchState._make([self._ticks[: self.n] * self.interval, *parts, self._valid[: self.n].copy()])
 
     def step(
@@ -146,29 +146,28 @@ class BatchSimulator:
         ticks: int = 1,
         strict: bool = False,
     ) -> BatchState:
-        """Go on for some ticks under one command.
+        """Advance by `ticks` under one command.
 
         Args:
             motor_voltages: [V] of each motor, shape (n, rotors); or
-            thrust: [N] of all rotors together, shape (n,), with
-            body_rates: [rad/s] to be followed, shape (n, 3): by a proportional controller of 15 rad/s at every tick,
-                on the nominal airframe.
-            ticks: how many; one is `interval` seconds.
-            strict: raise an error if a member is no longer valid.
+            thrust: [N] total thrust, shape (n,), and
+            body_rates: [rad/s] desired body rates, shape (n, 3), for a proportional controller with a bandwidth of
+                15 rad/s that runs at every tick with the nominal airframe.
+            ticks: number of ticks; a tick is `interval` [s].
+            strict: True to raise an error if a member is no longer valid.
 
         Raises:
-            ValueError: another command, shape, or number that is not finite; with `strict` the members that are not
-                `valid` after the step.
+            ValueError: invalid command, shape or value; with `strict`, names the members that are not `valid`.
         """
         if (motor_voltages is None) == (thrust is None) or (thrust is None) != (body_rates is None):
             raise ValueError("step: expected motor_voltages, or thrust and body_rates")
         if not isinstance(ticks, int) or ticks < 1:
             raise ValueError(f"step: expected ticks = 1, 2, ..., got {ticks!r}")
         if motor_voltages is not None:
-            self._advance(_sound("motor_voltages", motor_voltages, (self.n, len(self._like.voltage))), ticks)
+            self._advance(_finite_array("motor_voltages", motor_voltages, (self.n, len(self._like.voltage))), ticks)
         else:
-            self.setpoints[: self.n, 0] = _sound("thrust", thrust, (self.n,))
-            self.setpoints[: self.n, 1:] = _sound("body_rates", body_rates, (self.n, 3))
+            self.setpoints[: self.n, 0] = _finite_array("thrust", thrust, (self.n,))
+            self.setpoints[: self.n, 1:] = _finite_array("body_rates", body_rates, (self.n, 3))
             self.setpoints[self.n :] = self.setpoints[self.n - 1]
             self.run_blocks(lambda first, last: self.advance_under_rates(first, last, ticks))
         if strict and not self._valid[: self.n].all():
@@ -177,35 +176,35 @@ class BatchSimulator:
         return self.state
 
     def reset(self, members: Sequence[int] | np.ndarray | None = None, **state: ArrayLike) -> BatchState:
-        """Begin anew: the same vehicles under the same random numbers, at the scene's start or in another state.
+        """Restart members with the same random numbers, at the start of the scene or in another state.
 
         Args:
-            members: which; None: all.
-            state: fields of `BatchState` but the time, one value for all or one for each of the members.
+            members: numbers of the members; None for all.
+            state: fields of `BatchState` except the time, one value for all members or one for each.
 
         Raises:
-            ValueError: no such member or field, or another shape.
+            ValueError: unknown member or field, or another shape.
         """
         self.restart(members, **state)
         return self.state
 
     def restart(self, members: Sequence[int] | np.ndarray | None = None, **state: ArrayLike) -> None:
-        """Begin anew as `reset` does, without copying the states."""
-        chosen = np.arange(self.n) if members is None else np.atleast_1d(np.asarray(members))
-        if chosen.dtype == bool:
-            chosen = np.flatnonzero(chosen)
-        if chosen.size and not (chosen.dtype.kind in "iu" and chosen.min() >= 0 and chosen.max() < self.n):
+        """Restart members as `reset` does, without copying the states."""
+        selected = np.arange(self.n) if members is None else np.atleast_1d(np.asarray(members))
+        if selected.dtype == bool:
+            selected = np.flatnonzero(selected)
+        if selected.size and not (selected.dtype.kind in "iu" and selected.min() >= 0 and selected.max() < self.n):
             raise ValueError(f"members: expected numbers from 0 to {self.n - 1}")
         self._check_start(state)
-        self._place(chosen)
-        at = 0
+        self._place(selected)
+        column = 0
         for name, part in zip(Motion._fields, self._like.motion, strict=True):
             if name in state:
-                shape, given = (len(chosen), len(part)), state.pop(name)
-                value = _sound(name, np.broadcast_to(given, shape) if np.ndim(given) == 1 else given, shape)
+                shape, start = (len(selected), len(part)), state.pop(name)
+                value = _finite_array(name, np.broadcast_to(start, shape) if np.ndim(start) == 1 else start, shape)
                 for k in range(len(part)):
-                    self._blocks[chosen // simd_batch.WIDTH, at + k, chosen % simd_batch.WIDTH] = value[:, k]
-            at += len(part)
+                    self._blocks[selected // simd_batch.WIDTH, column + k, selected % simd_batch.WIDTH] = value[:, k]
+            column += len(part)
         if state:
             raise ValueError(f"{next(iter(state))}: unknown; expected one of {', '.join(Motion._fields)}")
         self._fill()
@@ -221,26 +220,26 @@ class BatchSimulator:
         list(self._pool.map(work, edges[:-1], edges[1:]))
 
     def advance_under_rates(self, first: int, last: int, ticks: int) -> None:
-        """Advance the blocks `first` to before `last` under the rows of `setpoints`."""
-        simd_batch.advance(*self._advanced, first, last, ticks, self._controller, self.setpoints)
+        """Advance the blocks [first, last) under the rows of `setpoints`."""
+        simd_batch.advance(*self._advance_arguments, first, last, ticks, self._controller, self.setpoints)
         self._mark_invalid(first, last)
 
     @cached_property
-    def _advanced(self) -> tuple[Any, Any, np.ndarray, int, np.ndarray, np.ndarray, np.ndarray, float, int]:
+    def _advance_arguments(self) -> tuple[Any, Any, np.ndarray, int, np.ndarray, np.ndarray, np.ndarray, float, int]:
         """First arguments of `simd_batch.advance`."""
         memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands)
         return (self._core.method, *memory, self._core.step, self._core.steps)
 
     @cached_property
     def _controller(self) -> RateController:
-        a, motor = self._steered, self._steered.motor
+        a, motor = self._nominal_airframe, self._nominal_airframe.motor
         unit = np.array([controller_parameters.lift(a), *controller_parameters.moments(a)])
         mixer = np.array(controller_parameters.shares(a)[0]) / unit
         speed = RPM / (motor.gear_ratio * motor.speed_constant)
         return RateController(RATE_BANDWIDTH, a.inertia_body, mixer, motor.thrust_coefficient, speed, a.voltage_max)
 
     @cached_property
-    def _steered(self) -> Airframe:
+    def _nominal_airframe(self) -> Airframe:
         return known_airframe(self._scene)
 
     def _rows(self, columns: int) -> np.ndarray:
@@ -248,12 +247,12 @@ class BatchSimulator:
         return self._blocks[:, :columns].transpose(0, 2, 1).reshape(-1, columns)
 
     def _place(self, members: np.ndarray) -> None:
-        self._blocks[members // simd_batch.WIDTH, :, members % simd_batch.WIDTH] = self._fresh[members]
+        self._blocks[members // simd_batch.WIDTH, :, members % simd_batch.WIDTH] = self._initial_rows[members]
         self._ticks[members] = 0
         self._valid[members] = True
 
     def _fill(self) -> None:
-        """Copy the last member to the rest of its block: what stands on the ground would slow the others down."""
+        """Copy the last member to the rest of its block, since vehicles on the ground would slow the others down."""
         last = (self.n - 1) % simd_batch.WIDTH
         self._blocks[-1, :, last + 1 :] = self._blocks[-1, :, last, None]
         self._ticks[self.n :] = self._ticks[self.n - 1]
@@ -267,17 +266,17 @@ class BatchSimulator:
         }
         if self._on_ground:
             checks["position_world"] = ("a centre of mass above the ground", lambda v: v[:, 2] >= -DEEPEST)
-        for name, (expected, holds) in checks.items():
+        for name, (expected, is_valid) in checks.items():
             if name in state:
                 value = np.atleast_2d(np.asarray(state[name], float))
-                if not holds(value).all():
-                    raise ValueError(f"{name}: expected {expected}, got {value[~holds(value)][0].tolist()}")
+                if not is_valid(value).all():
+                    raise ValueError(f"{name}: expected {expected}, got {value[~is_valid(value)][0].tolist()}")
 
     def _advance(self, voltages: np.ndarray, ticks: int) -> None:
         self._commands[: self.n], self._commands[self.n :] = voltages, voltages[-1]
 
         def work(first: int, last: int) -> None:
-            simd_batch.advance(*self._advanced, first, last, ticks)
+            simd_batch.advance(*self._advance_arguments, first, last, ticks)
             self._mark_invalid(first, last)
 
         self.run_blocks(work)
@@ -308,14 +307,14 @@ def _kinds(core: MultirotorPlant) -> tuple:
     return (type(core.method), core.step, core.steps, *map(type, core.vehicle.effects))
 
 
-def _sound(name: str, given: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:
+def _finite_array(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:
     """Return an array of finite numbers of a shape."""
     try:
-        result = np.asarray(given, float)
+        result = np.asarray(values, float)
     except (TypeError, ValueError):
         result = np.empty(0)
     if result.shape != shape:
-        raise ValueError(f"{name}: expected numbers of shape {shape}, got {np.shape(given)}")  # type: ignore[arg-type]
+        raise ValueError(f"{name}: expected numbers of shape {shape}, got {np.shape(values)}")  # type: ignore[arg-type]
     if not np.isfinite(result).all():
         raise ValueError(f"{name}: expected finite numbers")
     return result

@@ -1,4 +1,4 @@
-"""A flight with the ways out of memory: a log, a page."""
+"""Flight with its exports: log, report, 3D view and plot."""
 
 import shutil
 from pathlib import Path
@@ -29,14 +29,13 @@ class Flight(studied.FlightData):
     [s]; `flight.topic("gps/fix")` is any topic.
 
     Attributes:
-        vehicle: its name.
-        failure: reason of an early end: an invalid state, or an error in a user's controller; ""
-            where it did not, or where a log does not say.
-        origin: where it comes from: a log or a set-up.
+        vehicle: name of the vehicle.
+        failure: reason of an early end: an invalid state, or an error in a user's controller; "" otherwise.
+        origin: log or run configuration of the flight.
     """
 
     def save(self, path: str | Path) -> Path:
-        """Write the flight as an MCAP log, which Foxglove, PlotJuggler and `lapwing` open; its path.
+        """Write the flight as an MCAP log, which Foxglove, PlotJuggler and `lapwing` open. Return its path.
 
         Raises:
             ValueError: the log cannot be written.
@@ -45,17 +44,17 @@ class Flight(studied.FlightData):
         if self.origin.recorded:
             try:
                 shutil.copyfile(self.origin.source, target)
-            except OSError as fault:
-                raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
+            except OSError as error:
+                raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
             return target
-        setup, said = self.setup, []
+        setup, messages = self.setup, []
         for name in self.topics:
             topic = topic_of(name)
-            said += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
-        pages = to_record_batches(said)
+            messages += [(topic, time // setup.interval_ns, payload) for time, payload in self.topic(name).payloads()]
+        pages = to_record_batches(messages)
         last = max((int(np.max(page.ticks)) for page in pages), default=0)
-        about = metadata(setup, "memory") | (failure(self.failure, self.diverged) if self.failure else {})
-        with LogWriter(target, about, attachments(setup, {})) as writer:
+        log_metadata = metadata(setup, "memory") | (failure(self.failure, self.diverged) if self.failure else {})
+        with LogWriter(target, log_metadata, attachments(setup, {})) as writer:
             recording = Recording(writer, setup)
             recording.write(pages, last)
             recording.finish()
@@ -66,18 +65,18 @@ class Flight(studied.FlightData):
     def report(
         self, path: str | Path | None = None, compare_with: studied.FlightData | None = None, view3d: bool = True
     ) -> Path:
-        """Write the report: a page for a browser (.html), or its plots on paper (.pdf, .png).
+        """Write the report: a page for a browser (.html), or its plots (.pdf, .png).
 
         Args:
-            path: of the report; by default an .html beside the log, or SCENE.html here for a flight in memory.
+            path: path of the report; by default .html beside the log, or SCENE.html here for a flight in memory.
             compare_with: second flight, drawn over this one in every plot.
-            view3d: put the 3D view into the page, if viser is installed (`pip install lapwing[view3d]`).
+            view3d: True to include the 3D view if viser is installed (`pip install lapwing[view3d]`).
 
         Returns:
             The report's path.
 
         Raises:
-            ValueError: it cannot be written, or the name has another ending.
+            ValueError: the file cannot be written, or has another extension.
         """
         source = Path(self.origin.source)
         flights = [self] if compare_with is None else [self, compare_with]
@@ -103,7 +102,7 @@ class Flight(studied.FlightData):
         """Plot displacements and references over time, and the path in space.
 
         Args:
-            path: where to write the picture, too: .png, .svg or .pdf.
+            path: also write the picture to this file: .png, .svg or .pdf.
 
         Returns:
             The matplotlib figure; a notebook shows it.
@@ -114,10 +113,10 @@ class Flight(studied.FlightData):
         from lapwing.studies.report.matplotlib_figure import figure, styled  # matplotlib takes half a second to import
 
         with styled():
-            drawn = figure(overview(self))
+            plot_figure = figure(overview(self))
             if path is not None:
                 try:
-                    drawn.savefig(path)
-                except OSError as fault:
-                    raise ValueError(f"{path}: cannot be written: {fault.strerror or fault}") from None
-        return drawn
+                    plot_figure.savefig(path)
+                except OSError as error:
+                    raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
+        return plot_figure

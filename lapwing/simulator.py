@@ -21,7 +21,7 @@ from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoin
 from lapwing.services.process_table import create, foreign_firmware
 from lapwing.services.scene_resolver import load, load_one, resolve
 
-KEEP = 64  # ticks that can be looked at
+KEEP = 64  # [ticks] whose values are kept
 LOOK = 250  # [ticks] between two updates of the progress bar
 
 
@@ -31,7 +31,7 @@ class Observation(NamedTuple):
     time: float  # [s] simulation time
     truth: TrueState  # SI, world ENU, body FLU
     sensors: dict[str, Any]  # the newest reading of each sensor, by its name
-    estimate: StateEstimate | None  # of the autopilot; None where motor voltages are given, which need none
+    estimate: StateEstimate | None  # of the autopilot; None with motor voltages
     done: bool  # the run has reached its duration, or its state is invalid
 
 
@@ -44,14 +44,14 @@ class UserCommandBlock:
         self.outputs = outputs
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Nothing to be known."""
+        """Do nothing."""
 
     def on_tick(self, tick: int) -> int:
         """Do nothing: the simulator writes the values."""
         return NEVER
 
 
-def _sound(setpoint: Setpoint) -> Setpoint:
+def _checked_setpoint(setpoint: Setpoint) -> Setpoint:
     """Return a valid setpoint; raise ValueError if a field is not a number."""
     try:
         result = Setpoint(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in setpoint))  # type: ignore[arg-type]
@@ -64,16 +64,16 @@ def _sound(setpoint: Setpoint) -> Setpoint:
 
 
 class Simulator:
-    """One vehicle of a scene, from tick to tick.
+    """Simulation of one vehicle of a scene, step by step.
 
     ```python
     sim = Simulator("hover", seed=1)
-    seen = sim.step(motor_voltages=(33.5, 33.5, 33.5, 33.5))
-    seen = sim.reset().step(setpoint=Setpoint(position_world=(0.0, 0.0, 2.0)), ticks=250)
+    observation = sim.step(motor_voltages=(33.5, 33.5, 33.5, 33.5))
+    observation = sim.reset().step(setpoint=Setpoint(position_world=(0.0, 0.0, 2.0)), ticks=250)
     ```
 
-    The first step after a reset decides what is given from then on: motor voltages, which go to the plant, or setpoints
-    that the scene's autopilot follows.
+    The first step after a reset selects the kind of command: motor voltages for the plant, or setpoints for the
+    autopilot of the scene.
     """
 
     def __init__(self, scene: Scene | str | Path, overrides: Overrides = (), seed: int | None = None):
@@ -82,7 +82,7 @@ class Simulator:
         Args:
             scene: path or name of a scene with an autopilot, or a loaded one.
             overrides: values by dotted key, or texts KEY=VALUE.
-            seed: of all randomness; None: the scene's.
+            seed: seed of all random numbers; None for that of the scene.
 
         Raises:
             SceneError: the scene is invalid, or has no autopilot.
@@ -98,7 +98,7 @@ class Simulator:
         return self._setup
 
     def reset(self, seed: int | None = None) -> "Simulator":
-        """Begin anew, with another seed where one is given; the simulator itself."""
+        """Start again at tick 0, with another `seed` unless it is None. Return this simulator."""
         if seed is not None:
             self._set_up(seed)
         self._graph = None
@@ -107,15 +107,15 @@ class Simulator:
     def step(
         self, motor_voltages: Sequence[float] | None = None, setpoint: Setpoint | None = None, ticks: int = 1
     ) -> Observation:
-        """Go on for some ticks under one command.
+        """Advance by `ticks` under one command.
 
         Args:
             motor_voltages: [V] of each motor, in the order of the airframe; shape (4,) of a quadrotor.
-            setpoint: where the vehicle ought to be, a `lapwing.Setpoint`; exactly one of both.
-            ticks: how many, at least 1; one is `setup.interval` seconds.
+            setpoint: desired state, a `lapwing.Setpoint`; exactly one of the two commands is required.
+            ticks: number of ticks, at least 1; a tick is `setup.interval` [s].
 
         Raises:
-            ValueError: none or both are given, the other than before, other than a finite number for each.
+            ValueError: not exactly one command, another kind than before, or invalid values.
             LockStepError: the state is no longer finite.
         """
         if (motor_voltages is None) == (setpoint is None):
@@ -127,10 +127,10 @@ class Simulator:
             with WorkProgress(self._setup.scene, 1.0, "s") as bar, notify_on_compile(self._setup, bar.compiling):
                 self._graph, self._kind = self._begin(kind), kind
         if kind != self._kind:
-            raise ValueError(f"step: expected {self._kind} as before; reset() to go over to {kind}")
+            raise ValueError(f"step: expected {self._kind} as before; call reset() to change to {kind}")
         graph = self._graph
         if setpoint is not None:
-            graph.put(ORDER, graph.tick, ControllerInput(False, _sound(setpoint), armed=True))
+            graph.put(ORDER, graph.tick, ControllerInput(False, _checked_setpoint(setpoint), armed=True))
         voltages = () if motor_voltages is None else self._voltages(motor_voltages)
         stop = min(graph.tick + ticks, self._setup.last_tick + 1)
         if stop - graph.tick > LOOK:
@@ -173,20 +173,22 @@ class Simulator:
             services.append(Service("simulator", [UserCommandBlock(*outputs)], []))
             return BlockDiagram(setup, services, KEEP)
         autopilot = create(setup, "autopilot")
-        given = UserCommandBlock(Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Setpoint(), LATCHED))
-        autopilot.parts = [given if part.name == "autopilot.commander" else part for part in autopilot.parts]
+        command_block = UserCommandBlock(
+            Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Setpoint(), LATCHED)
+        )
+        autopilot.parts = [command_block if part.name == "autopilot.commander" else part for part in autopilot.parts]
         if ports.TRAJECTORY in setup.ports:
             services.append(Service("trajectory", [UserCommandBlock(setup.port(ports.TRAJECTORY))], []))
         return BlockDiagram(setup, [*services, autopilot], KEEP)
 
-    def _voltages(self, given: Sequence[float]) -> tuple[float, ...]:
+    def _voltages(self, values: Sequence[float]) -> tuple[float, ...]:
         n = len(self._setup.port(ports.ACTUATORS).like.motor_voltage)
         try:
-            result = tuple(map(float, given))
+            result = tuple(map(float, values))
         except (TypeError, ValueError):
             result = ()
         if len(result) != n:
-            raise ValueError(f"motor_voltages: expected {n} numbers [V], got {given!r}")
+            raise ValueError(f"motor_voltages: expected {n} numbers [V], got {values!r}")
         return result
 
     def _command(self, graph: BlockDiagram, voltages: tuple[float, ...]) -> None:

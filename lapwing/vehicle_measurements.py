@@ -16,15 +16,15 @@ class Figure(NamedTuple):
 
     name: str
     unit: str
-    guess: Callable[[Values], float]  # from those before it
+    guess: Callable[[Values], float]  # estimate from the previous figures
     how: str
     least: float = 0.0
     most: float = math.inf
-    zero: bool = False  # whether the least itself will do
-    far: float = 8.0  # factor from the guess beyond which the unit may be another one: rpm are 9.5 times as many
+    zero: bool = False  # True if the least value itself is valid
+    far: float = 8.0  # ratio to the guess beyond which the unit may be wrong: rpm are 9.5 times rad/s
 
     def check(self, value: float) -> None:
-        """KeyedError for a value that cannot be."""
+        """Raise ConfigError for an impossible value."""
         if self.unit == "count" and not float(value).is_integer():
             raise ConfigError(self.name, f"got {value:g}", "a whole number")
         if self.name == "rotors" and value not in ROTORS:
@@ -34,7 +34,7 @@ class Figure(NamedTuple):
             high = f" and below {self.most:g}" if self.most < math.inf else ""
             raise ConfigError(self.name, f"got {value:g}", f"a number {low}{high}, in {self.unit}")
 
-    def doubt(self, value: float, guess: float) -> str:
+    def plausibility_question(self, value: float, guess: float) -> str:
         """Return a question about a value that is far from its guess; "" for a plausible value."""
         if not (value > 0.0 and guess > 0.0) or 1.0 / self.far <= value / guess <= self.far:
             return ""

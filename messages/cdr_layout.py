@@ -158,7 +158,7 @@ def walk(definition: Definition, definitions: dict[str, Definition], length_at: 
     entries: list[Entry] = []
     end = _HEADER
 
-    def put(name: str, kind: str, base: str, count: int, alignment: int) -> None:
+    def add(name: str, kind: str, base: str, count: int, alignment: int) -> None:
         nonlocal end
         entry = Entry(name, kind, base, count, end + (_HEADER - end) % alignment)
         entries.append(entry)
@@ -166,14 +166,14 @@ def walk(definition: Definition, definitions: dict[str, Definition], length_at: 
 
     def put_length(name: str, base: str) -> int:
         length = length_at(end + -end % 4)
-        put(name, "length", base, length, 4)
+        add(name, "length", base, length, 4)
         return length
 
     def put_element(base: str, name: str) -> None:
         if base == "string":
-            put(name, "string", base, put_length(name, base), 1)
+            add(name, "string", base, put_length(name, base), 1)
         elif base in PRIMITIVES:
-            put(name, "value", base, 1, struct.calcsize(PRIMITIVES[base]))
+            add(name, "value", base, 1, struct.calcsize(PRIMITIVES[base]))
         else:
             put_fields(definitions[base], name + ".")
 
@@ -185,7 +185,7 @@ def walk(definition: Definition, definitions: dict[str, Definition], length_at: 
                 continue
             count = field.length or put_length(name, field.base + "[]")
             if field.base in PRIMITIVES:
-                put(name, "array", field.base, count, struct.calcsize(PRIMITIVES[field.base]) if count else 1)
+                add(name, "array", field.base, count, struct.calcsize(PRIMITIVES[field.base]) if count else 1)
             else:
                 for number in range(count):
                     put_element(field.base, f"{name}.{number}")

@@ -1,7 +1,7 @@
 """Message classes generated from their definitions: named tuples that encode to and decode from ROS 2 CDR.
 
-For each type Python source is written and compiled: `encode` takes the nested tuples apart into one flat argument
-list for the layout's `pack`, `decode` puts the flat values together again. No field is looked up by name.
+Python source is generated and compiled for each type: `encode` flattens the nested tuples into the arguments of the
+layout's `pack`, `decode` builds them from the flat values. No field is looked up by name.
 """
 
 import struct
@@ -108,7 +108,7 @@ class _Writer:
 
 
 class _Encoder(_Writer):
-    """Source of `encode`: each step gives the lengths (shape) and the flat values (arguments) of its part."""
+    """Source of `encode`: each method returns the lengths (shape) and the flat values (arguments) of its part."""
 
     def source(self, definition: Definition) -> str:
         shape, arguments = self.fields(definition, "self")
@@ -163,9 +163,9 @@ class _Encoder(_Writer):
 
 
 class _Decoder(_Writer):
-    """Source of `decode`: each step gives the expression of its part and moves on in the flat values `v`.
+    """Source of `decode`: each method returns the expression of its part and advances in the flat values `v`.
 
-    The place is a number as long as all counts before it are fixed, then a variable plus a number.
+    The index is a number while all previous counts are fixed, then a variable plus a number.
     """
 
     def source(self, definition: Definition) -> str:
@@ -173,18 +173,18 @@ class _Decoder(_Writer):
         result = self.element(definition.type_name)
         return _DECODE.format(body=self.body() or "        pass", result=result, type_name=definition.type_name)
 
-    def place(self, ahead: int = 0) -> str:
-        return f"{self.start}{self.offset + ahead}"
+    def index(self, offset: int = 0) -> str:
+        return f"{self.start}{self.offset + offset}"
 
     def take(self, count: int) -> str:
-        first = self.place()
+        first = self.index()
         self.offset += count
-        return f"v[{first}:{self.place()}]"
+        return f"v[{first}:{self.index()}]"
 
     def element(self, base: str) -> str:
         if base in PRIMITIVES or base == "string":
             self.offset += 1 if base in PRIMITIVES else 2
-            return f"v[{self.place(-1)}]" + (".decode()" if base == "string" else "")
+            return f"v[{self.index(-1)}]" + (".decode()" if base == "string" else "")
         fields = self.definitions[base].fields
         if all(field.base in PRIMITIVES and field.length is None for field in fields):
             return f"new({_identifier(base)}, {self.take(len(fields))})"
@@ -196,8 +196,8 @@ class _Decoder(_Writer):
         if field.length:
             return self.take(field.length)
         begin, end = self.fresh("begin"), self.fresh("end")
-        count = f"v[{self.place()}]"
-        self.line(f"{begin} = {self.place(1)}")
+        count = f"v[{self.index()}]"
+        self.line(f"{begin} = {self.index(1)}")
         if field.base in PRIMITIVES:
             self.line(f"{end} = {begin} + {count}")
             self.start, self.offset = f"{end} + ", 0
@@ -208,7 +208,7 @@ class _Decoder(_Writer):
         self.depth += 1
         self.start, self.offset = f"{end} + ", 0
         self.line(f"{items}.append({self.element(field.base)})")
-        self.line(f"{end} = {self.place()}")
+        self.line(f"{end} = {self.index()}")
         self.depth -= 1
         self.start, self.offset = f"{end} + ", 0
         return f"tuple({items})"

@@ -5,15 +5,15 @@ from typing import Any, NamedTuple
 
 
 class FieldDifference(NamedTuple):
-    """The first field in which two messages differ."""
+    """First field in which two messages differ."""
 
-    field: str  # dotted; "" where all fields that both have are the same, and the lengths differ
+    field: str  # dotted name; "" if only the lengths differ
     one: Any
     other: Any
 
     @property
-    def by(self) -> float | None:
-        """The other value minus the one, None where they are no numbers."""
+    def delta(self) -> float | None:
+        """Value of `other` minus value of `one`; None if they are not numbers."""
         numbers = isinstance(self.one, int | float) and isinstance(self.other, int | float)
         return self.other - self.one if numbers else None
 
@@ -22,7 +22,7 @@ def first_difference(message: Any, one: bytes, other: bytes) -> FieldDifference 
     """Return the first different field of two encoded messages of a class. Return None if the bytes are equal.
 
     Raises:
-        ValueError: one of them is no message of the class.
+        ValueError: one of them is not a message of the class.
     """
     if one == other:
         return None

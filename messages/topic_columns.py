@@ -1,4 +1,4 @@
-"""All messages of a topic as columns, by dotted field name."""
+"""Messages of a topic as columns, by dotted field name."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -10,45 +10,45 @@ from lapwing.messages.cdr_layout import ENCAPSULATION, Layout
 
 Column = np.ndarray | list[Any]
 
-PAGE = 4096  # messages
+PAGE = 4096  # [messages] that are converted together
 
 
 class _Group(NamedTuple):
-    """The messages of one shape."""
+    """Messages of one shape."""
 
-    places: np.ndarray  # among all messages, int64, shape (m,)
+    indices: np.ndarray  # indices among all messages, int64, shape (m,)
     layout: Layout
     records: np.ndarray  # shape (m,)
 
 
 class TopicColumns(Mapping[str, Column]):
-    """The columns of n messages; each is put together when it is asked for.
+    """Columns of n messages; each is assembled when it is read.
 
     - A number: shape (n,). An array, a sequence of numbers, or a message within the message that holds float64 only:
       shape (n, k); a sequence whose length varies: object array of n arrays. A sequence of k such messages: (n, k, 3).
     - A string: list of n str. A sequence of strings: list of n tuples.
     - An element of a sequence has its number in the name: "pose.0.position".
 
-    What not every message has, "pose.2" where some have two poses, is no column: KeyError says so.
+    A field that some messages lack, for example "pose.2" if some have two poses, has no column and raises KeyError.
     """
 
     def __init__(self, message: Any, groups: Sequence[_Group]) -> None:
         """Store messages of a class, grouped by shape; see `history` and `history_of_pages`."""
         self.message = message
-        self.count = sum(len(group.places) for group in groups)
+        self.count = sum(len(group.indices) for group in groups)
         self._groups = groups
         tables = [_columns(group) for group in self._groups]
         self._names = [name for name in tables[0] if all(name in table for table in tables[1:])]
-        self._partly = {name for table in tables for name in table}.difference(self._names)
+        self._partial = {name for table in tables for name in table}.difference(self._names)
 
     def __getitem__(self, name: str) -> Column:
         """Return a column.
 
         Raises:
-            KeyError: there is no such field, or not in every message.
+            KeyError: the field is unknown, or not in every message.
             ValueError: a string is not UTF-8.
         """
-        if name in self._partly:
+        if name in self._partial:
             raise KeyError(f"{self.message.type_name}: field {name} is not in every message")
         if name not in self._names:
             raise KeyError(f"{self.message.type_name}: {unknown_field(name, tuple(self._names))}")
@@ -56,8 +56,8 @@ class TopicColumns(Mapping[str, Column]):
             return self._numbers(name)
         texts: list[Any] = [None] * self.count
         for group in self._groups:
-            for place, text in zip(group.places.tolist(), _texts(group, name), strict=True):
-                texts[place] = text
+            for index, text in zip(group.indices.tolist(), _texts(group, name), strict=True):
+                texts[index] = text
         return texts
 
     def __iter__(self) -> Iterator[str]:
@@ -76,8 +76,8 @@ class TopicColumns(Mapping[str, Column]):
         """Return the messages in their order, as CDR."""
         result = [b""] * self.count
         for group in self._groups:
-            for place, row in zip(group.places.tolist(), _bytes(group.records), strict=True):
-                result[place] = row.tobytes()
+            for index, row in zip(group.indices.tolist(), _bytes(group.records), strict=True):
+                result[index] = row.tobytes()
         return result
 
     def _numbers(self, name: str) -> np.ndarray:
@@ -87,12 +87,12 @@ class TopicColumns(Mapping[str, Column]):
         if not shapes:
             column = np.empty((self.count, *shape), parts[0].dtype.newbyteorder("="))
             for group, part in zip(self._groups, parts, strict=True):
-                column[group.places] = part
+                column[group.indices] = part
             return column
         column = np.empty(self.count, object)
         for group, part in zip(self._groups, parts, strict=True):
-            for place, value in zip(group.places.tolist(), part.copy(), strict=True):
-                column[place] = value
+            for index, value in zip(group.indices.tolist(), part.copy(), strict=True):
+                column[index] = value
         return column
 
 
@@ -110,34 +110,34 @@ def history(message: Any, payloads: Sequence[bytes]) -> TopicColumns:
 
 
 class ColumnBuilder:
-    """Messages of one type as they come, put together page by page: so that no more than a page is there twice."""
+    """Builder of columns from single messages, page by page, so that at most one page is in memory twice."""
 
     def __init__(self, message: Any) -> None:
         self._message, self._groups = message, list[_Group]()
         self._times: list[np.ndarray] = []
-        self._waiting: list[tuple[int, bytes]] = []
+        self._pending: list[tuple[int, bytes]] = []
         self._count = 0
 
     def add(self, time_ns: int, payload: bytes) -> None:
-        """Add an encoded message. Raise ValueError if a message of its page is none of the class."""
-        self._waiting.append((time_ns, payload))
-        if len(self._waiting) == PAGE:
-            self._put_together()
+        """Add an encoded message. Raise ValueError if a message of its page is not one of the class."""
+        self._pending.append((time_ns, payload))
+        if len(self._pending) == PAGE:
+            self._convert_page()
 
     def history(self) -> tuple[np.ndarray, TopicColumns]:
         """Return times [ns], int64, shape (n,), and columns of all messages. See `history`."""
-        if self._waiting or not self._groups:
-            self._put_together()
+        if self._pending or not self._groups:
+            self._convert_page()
         return np.concatenate(self._times), TopicColumns(self._message, self._groups)
 
-    def _put_together(self) -> None:
-        times, payloads = zip(*self._waiting, strict=True) if self._waiting else ((), ())
+    def _convert_page(self) -> None:
+        times, payloads = zip(*self._pending, strict=True) if self._pending else ((), ())
         self._times.append(np.array(times, np.int64))
         self._groups += [
-            group._replace(places=group.places + self._count) for group in _groups(self._message, payloads)
+            group._replace(indices=group.indices + self._count) for group in _groups(self._message, payloads)
         ]
         self._count += len(times)
-        self._waiting.clear()
+        self._pending.clear()
 
 
 def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> TopicColumns:
@@ -207,6 +207,6 @@ def _texts(group: _Group, name: str) -> list[Any]:
     raw = np.ascontiguousarray(rows[:, entry.offset : entry.offset + size]).view(f"V{size}")[:, 0].tolist()
     try:
         decoded = {text: text.decode() for text in set(raw)}
-    except UnicodeDecodeError as fault:
-        raise ValueError(f"field {name}: a string is not UTF-8: {fault}") from None
+    except UnicodeDecodeError as error:
+        raise ValueError(f"field {name}: a string is not UTF-8: {error}") from None
     return [decoded[text] for text in raw]

@@ -1,4 +1,4 @@
-"""The topic table: every topic, its type, its rate, and whether it is recorded and reproducible. Declared only here."""
+"""Topic table: name, type and rate of every topic, and whether it is recorded and reproducible."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -39,14 +39,14 @@ from lapwing.messages.types import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Topic:
-    """One topic, for all vehicles where its name has the place `{vehicle}`."""
+    """Topic; of all vehicles if its name contains `{vehicle}`."""
 
     name: str  # "{vehicle}/imu" or "clock", without a leading slash
     message: Any  # message class
     rate: str | None = None  # scene key of its rate; None: every exchange tick
     recorded: bool = True
-    deterministic: bool = True  # same scene and seed, same bytes; only such topics enter the digest
-    vehicle: str = ""  # of a fleet, whose own topic it is: its name then has no place `{vehicle}`
+    deterministic: bool = True  # equal bytes for equal scene and seed; only these topics enter the digest
+    vehicle: str = ""  # vehicle of a fleet that it belongs to; its name then contains no `{vehicle}`
 
     def key(self, vehicle: str = "") -> str:
         """Return ROS name and name in the log: "/drone1/imu"."""
@@ -80,7 +80,7 @@ LASER_SCAN = Topic("{vehicle}/scan", LaserScan, rate="sensors.lidar.rate")
 POINT_CLOUD = Topic("{vehicle}/points", PointCloud2, rate="sensors.lidar.rate")
 DEPTH_IMAGE = Topic("{vehicle}/depth/image_rect", Image, rate="sensors.depth_camera.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
-TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # what of it is flown is in SETPOINT
+TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # SETPOINT has the setpoints that are flown
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
 ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
 ESTIMATE_COVARIANCE = Topic("{vehicle}/estimate/covariance", EstimateCovariance, rate="rates.covariance")
@@ -89,10 +89,10 @@ ACTUATORS = Topic("{vehicle}/actuators", Actuators)
 STATUS = Topic("{vehicle}/status", Status, rate="rates.status")
 OPERATOR = Topic("{vehicle}/vehicle_command", OperatorInput, rate="rates.commands")
 COMMAND_ACKS = Topic("{vehicle}/vehicle_command_ack", CommandAcks, rate="rates.commands")
-EVENTS = Topic("{vehicle}/events", Log, deterministic=False)  # found in the other topics after the flight
+EVENTS = Topic("{vehicle}/events", Log, deterministic=False)  # computed from the other topics after the flight
 
 TOPICS = tuple(value for value in list(globals().values()) if isinstance(value, Topic))
-_PLACES = {topic: place for place, topic in enumerate(TOPICS)}
+_RANKS = {topic: rank for rank, topic in enumerate(TOPICS)}
 _NAMED = {topic.name: topic for topic in TOPICS}
 _VEHICLE = "{vehicle}"
 _CUSTOM_SENSOR = f"{_VEHICLE}/custom_sensor/"
@@ -110,11 +110,11 @@ def of_vehicle(topic: Topic, vehicle: str) -> Topic:
     if _VEHICLE not in topic.name:
         return topic
     result = replace(topic, name=topic.name.replace(_VEHICLE, vehicle), vehicle=vehicle)
-    _PLACES[result] = place(topic)
+    _RANKS[result] = topic_rank(topic)
     return result
 
 
-def of_all(topic: Topic) -> Topic:
+def template_topic(topic: Topic) -> Topic:
     """Return the template "{vehicle}/imu" of a vehicle's topic "left/imu"."""
     return topic_named(f"{_VEHICLE}/{topic.name.removeprefix(f'{topic.vehicle}/')}") if topic.vehicle else topic
 
@@ -123,7 +123,7 @@ def topic_named(name: str) -> Topic:
     """Return the topic of a name, "{vehicle}/imu", "left/imu" or "clock".
 
     Raises:
-        ValueError: there is none.
+        ValueError: unknown topic.
     """
     if name.startswith(_CUSTOM_SENSOR):
         return custom_sensor(name.removeprefix(_CUSTOM_SENSOR))
@@ -135,6 +135,6 @@ def topic_named(name: str) -> Topic:
     return of_vehicle(topic_named(f"{_VEHICLE}/{rest}"), vehicle)
 
 
-def place(topic: Topic) -> int:
+def topic_rank(topic: Topic) -> int:
     """Return the rank among the messages of a tick: the order of the table, then custom sensors."""
-    return _PLACES.get(topic, len(TOPICS))
+    return _RANKS.get(topic, len(TOPICS))

@@ -1,4 +1,4 @@
-"""Comparison of a message type in a log with that of this version."""
+"""Comparison of a message type in a log with the type of this version."""
 
 from lapwing.messages.former_names import with_current_fields
 from lapwing.messages.parse import PRIMITIVES, Definition, parse
@@ -8,10 +8,10 @@ _BAR = "=" * 80  # between the types of a schema, as ROS 2 writes it
 _HEAD = "MSG: "
 
 
-def otherwise(type_name: str, text: str) -> str:
-    """Return the first difference between a recorded definition and ours as a text; "" if both decode alike.
+def first_type_difference(type_name: str, text: str) -> str:
+    """Return the first difference between a recorded and the current definition as text; "" if both decode alike.
 
-    Comments, constants and defaults are not part of a message. A type that is not ours has no difference.
+    Comments, constants and defaults are not part of a message. An unknown type has no difference.
 
     Args:
         type_name: full name, "sensor_msgs/msg/Imu".
@@ -20,14 +20,16 @@ def otherwise(type_name: str, text: str) -> str:
     if type_name not in TYPES or not text.strip() or text == TYPES[type_name].schema_text:
         return ""
     try:
-        theirs = _fields(type_name, _definitions(type_name, text))
+        recorded = _fields(type_name, _definitions(type_name, text))
     except (ValueError, LookupError):
         return "has a definition that cannot be read"
-    ours = _fields(type_name, DEFINITIONS)
-    for here, there in zip([*ours, ("", "")], [*theirs, ("", "")], strict=False):
-        if here != there:
-            wanted, result = (" ".join(field).strip() or "no more fields" for field in (here, there))
-            return f"has {result} where this version has {wanted}"
+    current = _fields(type_name, DEFINITIONS)
+    for current_field, recorded_field in zip([*current, ("", "")], [*recorded, ("", "")], strict=False):
+        if current_field != recorded_field:
+            expected, result = (
+                " ".join(field).strip() or "no more fields" for field in (current_field, recorded_field)
+            )
+            return f"has {result} where this version has {expected}"
     return ""
 
 

@@ -1,4 +1,4 @@
-"""The process table: every process of a run, and when it is required.
+"""Process table: every process of a run, and when it is required.
 
 A service of the lock step has `resolve(scene)` in `resolve.py`, which returns its `ServiceConfig`, or None if the scene
 does not need it, and `create(config)` in `service.py`. Any other process has `run(participant, spec)` in `service.py`,
@@ -11,21 +11,21 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.diagram.multi_vehicle import joined_service, members
+from lapwing.cosim.diagram.multi_vehicle import members, merge_services
 from lapwing.cosim.transport.bus_keys import ENCODER
 
 
 class ProcessEntry(NamedTuple):
-    """A process of a run."""
+    """Process of a run."""
 
     name: str
     service: Callable[[], ModuleType]  # imports its module `service`, so that a process loads only its own
-    lock_step: bool  # steps with the others; required if the run configuration has it
+    lock_step: bool  # part of the lock step; required if the run configuration has it
     resolves: bool = False  # has a `resolve.py` although it is not part of the lock step
     needs: tuple[str, ...] = ()  # fields of the process specification that it reads besides the run configuration
     optional: bool = False  # started only if its option is given; the run continues without it
-    mode: str = "peer"  # of its Zenoh session
-    foreign: bool = False  # flies a foreign firmware, in the autopilot's place
+    mode: str = "peer"  # mode of its Zenoh session
+    foreign: bool = False  # flies a foreign firmware instead of the autopilot
 
 
 def _plant() -> ModuleType:
@@ -130,7 +130,7 @@ PROCESSES = (
 )
 AUTOPILOT, FMU = "autopilot", "fmu"
 RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"
-CLOCK_OWNER = "plant"  # keeps the pace, and says which tick is the last
+CLOCK_OWNER = "plant"  # sets the pace, and decides which tick is the last
 
 
 def entry(name: str) -> ProcessEntry:
@@ -157,7 +157,7 @@ def always_required() -> list[str]:
 
 
 def optional() -> list[str]:
-    """Return the names of the auxiliary processes, which a run has if an option asks for them."""
+    """Return the names of the auxiliary processes, which options add to a run."""
     return [p.name for p in PROCESSES if p.optional]
 
 
@@ -203,8 +203,8 @@ def create(
 
     if setup.vehicle:
         return of(setup)
-    having = [member for member in members(setup) if name in member.services]
-    return joined_service(name, [(member, of(member)) for member in having])
+    users = [member for member in members(setup) if name in member.services]
+    return merge_services(name, [(member, of(member)) for member in users])
 
 
 def create_all(

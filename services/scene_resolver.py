@@ -1,4 +1,4 @@
-"""From a scene to a run: what a scene may say, and the set-up that all services of a run are given."""
+"""Resolution of a scene: its vocabulary of tables, and the run configuration for all services."""
 
 import importlib
 import importlib.util
@@ -27,7 +27,7 @@ from lapwing.services.process_table import AUTOPILOT, FMU, PROCESSES
 
 
 def _resolvers() -> dict[str, ModuleType]:
-    """Return the module `resolve` of each process that has one; imported only once a scene is resolved."""
+    """Return the module `resolve` of each process that has one; imported when a scene is resolved."""
     from lapwing.services.ardupilot import resolve as ardupilot
     from lapwing.services.autopilot import resolve as autopilot
     from lapwing.services.betaflight import resolve as betaflight
@@ -69,16 +69,15 @@ def vocabulary() -> Vocabulary:
 
 
 def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
-    """Read a scene and all that it names, override, and validate.
+    """Read a scene and the files that it names, apply overrides, and validate it.
 
     Args:
-        scene: path of its TOML file or SSP package, or the name of one that ships; or one that is loaded, to which more
-            is to be done.
-        overrides: "dotted.key=value" with a TOML value (a bare word counts as a text), or values by dotted key; of any
-            key that the scene resolves to: "airframe.mass.total=9.5".
+        scene: path of its TOML file or SSP package, name of a shipped scene, or a loaded scene.
+        overrides: "dotted.key=value" with a TOML value (a bare word counts as a text), or values by dotted key. Keys of
+            the files that it names are allowed: "airframe.mass.total=9.5".
 
     Raises:
-        SceneError: what is wrong with which key, and what would be right.
+        SceneError: names the key, the fault and the expected value.
     """
     if isinstance(scene, Scene):
         return scenes.with_overrides(scene, overrides, vocabulary()) if overrides else scene
@@ -97,7 +96,7 @@ def _load_package(path: Path, overrides: Overrides) -> Scene:
 def load_one(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     """Load a scene with a single vehicle. Raise SceneError if it has several."""
     loaded = load(scene, overrides)
-    loaded[Vehicle]  # refused there
+    loaded[Vehicle]  # raises SceneError for several vehicles
     return loaded
 
 
@@ -124,10 +123,10 @@ def reseed(setup: RunConfig, seed: int) -> RunConfig:
         resolved = {**setup.resolved, Run.TABLE: {**setup.resolved[Run.TABLE], "seed": seed}}
         return multi_vehicle.merge_configs([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
     services_of = dict(setup.services)
-    for name, given in services_of.items():
+    for name, config in services_of.items():
         module = _resolvers()[name]
         if hasattr(module, "reseed"):
-            services_of[name] = module.reseed(given, seed, setup.vehicle)
+            services_of[name] = module.reseed(config, seed, setup.vehicle)
     run = {**setup.resolved[Run.TABLE], "seed": seed}
     return setup._replace(seed=seed, services=services_of, resolved={**setup.resolved, Run.TABLE: run})
 
@@ -148,13 +147,13 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
             with vehicle.located():
                 members.append(_resolve(vehicle, plans))
         with scene.located():
-            return multi_vehicle.merge_configs(_acquainted(members, "vehicle.{}."), dict(scene.resolved))
+            return multi_vehicle.merge_configs(_with_fleet_coupling(members, "vehicle.{}."), dict(scene.resolved))
     with scene.located():
-        (setup,) = _acquainted([_resolve(scene, plans)], "")
+        (setup,) = _with_fleet_coupling([_resolve(scene, plans)], "")
         return setup
 
 
-def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
+def _with_fleet_coupling(members: list[RunConfig], key: str) -> list[RunConfig]:
     """Return the configurations of all vehicles, combined by the services whose `resolve.py` has `fleet`.
 
     `key` is the prefix of a vehicle's keys, with {} for its number.
@@ -177,12 +176,12 @@ def _acquainted(members: list[RunConfig], key: str) -> list[RunConfig]:
 def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
     exchange, run = scene[Communication], scene[Run]
     result: dict[str, Any] = {}
-    beside: dict[str, Any] = {}
+    auxiliary: dict[str, Any] = {}
     for process in PROCESSES:
         if process.name != FMU and (process.lock_step or process.resolves):
-            given = _resolvers()[process.name].resolve(scene)
-            if given is not None:
-                (result if process.lock_step else beside)[process.name] = given
+            config = _resolvers()[process.name].resolve(scene)
+            if config is not None:
+                (result if process.lock_step else auxiliary)[process.name] = config
     result = _resolvers()[FMU].connect(scene, result)
     if plan := plans.get(scene[Vehicle].name):
         name = next(name for name in (AUTOPILOT, *FIRMWARES) if name in result)
@@ -197,6 +196,6 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
         exchange.coupling,
         scene[Vehicle].name,
         result,
-        beside,
+        auxiliary,
         dict(scene.resolved),
     )

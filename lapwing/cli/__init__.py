@@ -1,1 +1,1 @@
-"""The commands of `lapwing`: thin functions that call what they are named after, a file for each group of them."""
+"""Commands of `lapwing`: thin functions, one file for each group of commands."""

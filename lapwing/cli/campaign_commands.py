@@ -92,21 +92,21 @@ def campaign(
         claim_report("--report", report)
         screen, varied = console(), {}
         for text in vary or []:
-            key, equals, drawn = (part.strip() for part in text.partition("="))
-            if not equals or not key:
+            key, separator, distribution = (part.strip() for part in text.partition("="))
+            if not separator or not key:
                 raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
             if key in varied:
                 raise ValueError(f"--vary {text}: {key} already has a distribution; use one for each key")
             try:
-                varied[key] = parse(drawn)
-            except ValueError as fault:
-                raise ValueError(f"--vary {text}: {fault}") from None
+                varied[key] = parse(distribution)
+            except ValueError as error:
+                raise ValueError(f"--vary {text}: {error}") from None
         selected = with_solver_selected(scene, set_ or [])
         check_firmware_program(selected)
         campaign_plan = plan(str(scene), selected.overrides, runs, seed, varied, sweep, design)
         first = _reference(screen, campaign_plan)
-        about = manifest(campaign_plan, first)
-        folder = begin(out or default_path(about), campaign_plan, about)
+        campaign_manifest = manifest(campaign_plan, first)
+        folder = begin(out or default_path(campaign_manifest), campaign_plan, campaign_manifest)
         claim_folder(folder.path, shared=shard is not None)
         part = _part(shard, len(folder.shards))
         _fly(screen, folder, first, _workers(screen, cluster, workers, folder), ci_half_width, part)
@@ -142,11 +142,11 @@ def compare(
             study.write_json(json, result)
 
 
-def _reference(screen: "Console", given: "Plan") -> "Reference":
+def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.studies.campaign.runs import first_setup, reference
 
-    run, setup = first_setup(given)
+    run, setup = first_setup(campaign_plan)
     with notify_on_compile(setup, lambda what: screen.print(what.notice, soft_wrap=True)):
         return reference(run, setup)
 
@@ -188,16 +188,16 @@ def _fly(
     from lapwing.studies.campaign.shard_loop import Count
     from lapwing.studies.campaign.shard_loop import campaign as study
 
-    began, before = time.monotonic(), -1
-    mine = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
+    start, previous = time.monotonic(), -1
+    own_runs = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
     with Countdown(screen, LINES) as countdown:
 
         def say(count: Count) -> None:
-            nonlocal before
-            before = count.runs if before < 0 else before
-            flown, rate = count.runs - before, (count.runs - before) / max(time.monotonic() - began, 1e-9)
+            nonlocal previous
+            previous = count.runs if previous < 0 else previous
+            finished, rate = count.runs - previous, (count.runs - previous) / max(time.monotonic() - start, 1e-9)
             p = count.failure
             text = f"{rate:.1f} runs/s, {count.failures} failures, {p.low:.1%} to {p.high:.1%}"
-            countdown.say(text, flown, mine)
+            countdown.say(text, finished, own_runs)
 
         study(folder, first, workers, say, until, part)

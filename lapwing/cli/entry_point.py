@@ -6,17 +6,17 @@ FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # by their numbers
 def main() -> None:
     """Run the command `lapwing`."""
     try:
-        from lapwing.cosim.processes.interrupt import Interrupted, end_at_once, report_interrupt
+        from lapwing.cosim.processes.interrupt import Interrupted, raise_on_interrupt, report_interrupt
 
         try:
-            end_at_once()
+            raise_on_interrupt()
             prepare_streams()
             from lapwing.cli.main import main as carry_out
 
             carry_out()
         except Interrupted as interrupted:
             raise SystemExit(report_interrupt(interrupted)) from None
-    except KeyboardInterrupt:  # what Python makes of SIGINT up to `end_at_once`
+    except KeyboardInterrupt:  # Python raises it for SIGINT before `raise_on_interrupt`
         from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, report_interrupt
 
         raise SystemExit(report_interrupt(Interrupted(SIGINT))) from None

@@ -12,18 +12,18 @@ class Keyboard:
         """Read keys of a file descriptor, by default standard input."""
         self._descriptor = descriptor
         self._before: Any = None
-        self.there = os.isatty(descriptor) and _in_foreground(descriptor)
+        self.available = os.isatty(descriptor) and _in_foreground(descriptor)
 
     def keys(self) -> str:
         """Return the keys that were typed since the last call."""
-        if not self.there or not select.select([self._descriptor], [], [], 0.0)[0]:
+        if not self.available or not select.select([self._descriptor], [], [], 0.0)[0]:
             return ""
         typed = os.read(self._descriptor, 64)
-        self.there = bool(typed)  # else the terminal is gone
+        self.available = bool(typed)  # empty if the terminal was closed
         return typed.decode(errors="replace")
 
     def __enter__(self) -> "Keyboard":
-        if self.there:
+        if self.available:
             import termios
             import tty
 

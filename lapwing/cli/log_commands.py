@@ -66,19 +66,19 @@ def verify(
             typer.echo(f"{log} and {other}: identical messages")
             return
         with LogReader(log) as read:
-            stated, computed, about = read.metadata.get("digest"), read.digest(), read.metadata
+            recorded, computed, metadata = read.metadata.get("digest"), read.digest(), read.metadata
         if explain:
             from lapwing.studies.logs.reproduction import expectation, facts
 
-            for fact in facts(about):
-                same = "same" if fact.recorded == fact.here else f"here {fact.here}"
-                typer.echo(f"  {fact.name:<10} {fact.recorded} ({same})")
-            typer.echo(f"  {'expected':<10} {expectation(about)}")
-        if stated is None:
+            for fact in facts(metadata):
+                note = "same" if fact.recorded == fact.here else f"here {fact.here}"
+                typer.echo(f"  {fact.name:<10} {fact.recorded} ({note})")
+            typer.echo(f"  {'expected':<10} {expectation(metadata)}")
+        if recorded is None:
             raise ValueError(f"{log}: has no digest; expected a complete log (lapwing recover completes one)")
-        if stated != computed:
-            fail(f"{log}: digests differ: recorded {stated}, computed {computed}", DIFFERENT)
-        typer.echo(f"{log}: digest {stated} is correct")
+        if recorded != computed:
+            fail(f"{log}: digests differ: recorded {recorded}, computed {computed}", DIFFERENT)
+        typer.echo(f"{log}: digest {recorded} is correct")
 
 
 @app.command()
@@ -131,63 +131,68 @@ def export(
                     claim_folder(folder)
                 for path in write(result, folder):
                     typer.echo(path)
-            except OSError as fault:
-                raise ValueError(f"{folder}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
+            except OSError as error:
+                raise ValueError(f"{folder}: cannot be written: {(error.strerror or str(error)).lower()}") from None
 
 
-def _about(found: "Info") -> dict[str, str]:
+def _about(info: "Info") -> dict[str, str]:
     """Return the header lines of `info` by label."""
-    said = found.metadata
-    solver = f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else ""
-    exchange = f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else ""
-    count = sum(topic.messages for topic in found.topics)
+    metadata = info.metadata
+    solver = (
+        f"{metadata['solver_integrator']}, step {metadata['solver_step']} s" if "solver_integrator" in metadata else ""
+    )
+    exchange = f"{metadata['exchange_rate']} Hz, {metadata.get('coupling', '')}" if "exchange_rate" in metadata else ""
+    count = sum(topic.messages for topic in info.topics)
     lines = {
-        "scene": said.get("scene", ""),
-        "vehicle": said.get("vehicle", ""),
-        "seed": said.get("seed", ""),
-        "mode": said.get("mode", ""),
-        "version": " ".join(filter(None, (said.get("version", ""), said.get("commit", "")))),
+        "scene": metadata.get("scene", ""),
+        "vehicle": metadata.get("vehicle", ""),
+        "seed": metadata.get("seed", ""),
+        "mode": metadata.get("mode", ""),
+        "version": " ".join(filter(None, (metadata.get("version", ""), metadata.get("commit", "")))),
         "solver": solver,
         "exchange": exchange,
-        "duration": f"{found.end - found.start:g} s, from {found.start:g} to {found.end:g} s",
-        "size": f"{found.size / 1e6:.2f} MB, {count} messages",
-        "files": ", ".join(found.files),
-        "digest": said.get("digest", ""),
-        "failure": said.get("failure", ""),
-        "waited": f"{said['waited_for_disk']} for the disk" if "waited_for_disk" in said else "",
-        "recovered": said.get("recovered", ""),
-        "end": "" if found.complete else "none, the recorder was ended; use lapwing recover",
+        "duration": f"{info.end - info.start:g} s, from {info.start:g} to {info.end:g} s",
+        "size": f"{info.size / 1e6:.2f} MB, {count} messages",
+        "files": ", ".join(info.files),
+        "digest": metadata.get("digest", ""),
+        "failure": metadata.get("failure", ""),
+        "waited": f"{metadata['waited_for_disk']} for the disk" if "waited_for_disk" in metadata else "",
+        "recovered": metadata.get("recovered", ""),
+        "end": "" if info.complete else "none, the recorder was ended; use lapwing recover",
     }
-    lines |= {f"no {command}": f"lacks {what}" for command, what in found.missing.items()}
+    lines |= {f"no {command}": f"lacks {needed}" for command, needed in info.missing.items()}
     return {label: line for label, line in lines.items() if line}
 
 
-def _topics(found: "Info") -> list[str]:
+def _topics(info: "Info") -> list[str]:
     """Return the topic table of `info` as lines."""
     rows = [("topic", "messages", "rate [Hz]", "kB", "type", "gaps")]
-    for topic in found.topics:
+    for topic in info.topics:
         rate = f"{topic.rate:g}" if topic.rate else ""
         gaps = f"{topic.gaps}, longest {topic.longest:g} s" if topic.gaps else ""
         rows.append((topic.name, str(topic.messages), rate, f"{topic.size / 1000:.1f}", topic.kind, gaps))
-    wide = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    left = (True, False, False, False, True, True)
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    left_aligned = (True, False, False, False, True, True)
     return [
         "  ".join(
-            f"{cell:{'<' if at_left else '>'}{width}}" for cell, at_left, width in zip(row, left, wide, strict=True)
+            f"{cell:{'<' if is_left else '>'}{width}}"
+            for cell, is_left, width in zip(row, left_aligned, widths, strict=True)
         )
         for row in rows
     ]
 
 
-def _differences(found: "Comparison") -> list[str]:
+def _differences(comparison: "Comparison") -> list[str]:
     """Return the lines that `verify` prints for two different logs."""
-    lines = [f"{key}: {one or 'none'} | {other or 'none'}" for key, (one, other) in found.about.items()]
+    lines = [f"{key}: {one or 'none'} | {other or 'none'}" for key, (one, other) in comparison.about.items()]
     lines += [
-        f"only in the {where}: {', '.join(o)}" for where, o in zip(("first", "second"), found.only, strict=True) if o
+        f"only in the {file}: {', '.join(topics)}"
+        for file, topics in zip(("first", "second"), comparison.only, strict=True)
+        if topics
     ]
-    if found.first is None:
+    if comparison.first is None:
         return lines
-    first = found.first
+    first = comparison.first
     values = " | ".join(map(str, first.values))
     lines.append(
         f"first difference: {first.topic} at t = {first.time_ns * 1e-9:g} s, {first.field or 'messages'}: {values}"

@@ -1,4 +1,4 @@
-"""The command line. The other modules of this package register the commands, which import what they need."""
+"""Command line. The other modules of this package register the commands, which import their dependencies late."""
 
 import os
 import resource

@@ -1,4 +1,4 @@
-"""`lapwing new vehicle`: asks for what must be measured, and writes an airframe."""
+"""`lapwing new vehicle`: an interview about the measurements of a vehicle, and the airframe file from the answers."""
 
 import sys
 from collections.abc import Callable
@@ -15,55 +15,56 @@ from lapwing.dynamics.config_error import ConfigError
 if TYPE_CHECKING:
     from lapwing.vehicle_measurements import Figure
 
-WEAK = 1.4  # thrust over weight below which too little is left for control
+WEAK = 1.4  # ratio of thrust to weight below which control authority is small
 
 
 @new.command()
 def vehicle(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="of the vehicle and of its file: my_quad")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="name of the vehicle and of its file: my_quad")],
     measured: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="FIGURE=VALUE", help="a figure instead of a question: mass=2.0 (repeatable)"),
+        typer.Option(
+            "--set", metavar="FIGURE=VALUE", help="measured value, e.g. mass=2.0; not asked for again (repeatable)"
+        ),
     ] = None,
 ) -> None:
-    """Create an airframe, vehicles/NAME.toml in this folder, from figures that a workshop can measure.
+    """Create an airframe: vehicles/NAME.toml, from measurements.
 
-    In a terminal it asks for each figure and says how to measure it (docs/guides/new_airframe.md has more);
-    elsewhere, figures
-    that are not given with --set are guessed from the others, and marked so in the file.
+    In a terminal, the command asks for each measurement and explains it (see docs/guides/new_airframe.md). Elsewhere,
+    measurements without --set are estimated from the others and marked as estimates in the file.
     """
     with user_errors():
-        given = _given(measured or [])
-        interview = Interview(name, given) if sys.stdin.isatty() else None
+        values = _parse_values(measured or [])
+        interview = Interview(name, values) if sys.stdin.isatty() else None
         try:
-            path, remarks = write_vehicle(name, given, Path(), interview.ask if interview else None)
+            path, remarks = write_vehicle(name, values, Path(), interview.ask if interview else None)
         except (ValueError, Interrupted):
             if interview:
-                interview.tell()
+                interview.print_answers()
             raise
         typer.echo(path)
         for remark in remarks:
             typer.echo(f"lapwing: warning: {remark}", err=True)
-        here = f"--set vehicle.airframe={path.resolve()}"
+        airframe_option = f"--set vehicle.airframe={path.resolve()}"
         typer.echo(
-            f"next: lapwing performance {path}; lapwing tune excitation {here} --out gains.toml; "
-            f"lapwing run hover {here} --set autopilot.gains={Path('gains.toml').resolve()}"
+            f"next: lapwing performance {path}; lapwing tune excitation {airframe_option} --out gains.toml; "
+            f"lapwing run hover {airframe_option} --set autopilot.gains={Path('gains.toml').resolve()}"
         )
 
 
 def write_vehicle(
-    name: str, given: dict[str, float], folder: Path, ask: Callable[["Figure", float], float | None] | None = None
+    name: str, measured: dict[str, float], folder: Path, ask: Callable[["Figure", float], float | None] | None = None
 ) -> tuple[Path, list[str]]:
-    """Write an airframe; (its path, what is to be said of it).
+    """Write an airframe. Return its path, and warnings about it.
 
     Args:
-        name: of the vehicle.
-        given: figures of `lapwing.vehicle_measurements.FIGURES` by name.
-        folder: in whose folder `vehicles` it is written.
-        ask: (figure, guess) -> what was measured, None where the guess will do; None: guesses are taken.
+        name: name of the vehicle.
+        measured: values of `lapwing.vehicle_measurements.FIGURES` by name.
+        folder: folder that contains `vehicles`.
+        ask: (figure, guess) -> measured value, None to accept the guess; without `ask`, all guesses are accepted.
 
     Raises:
-        ValueError: not a name, one that is taken, a figure that cannot be, or a vehicle that cannot hover.
+        ValueError: an invalid or used name, an impossible value, or a vehicle that cannot hover.
     """
     from lapwing.airframe_writer import airframe_of, written
     from lapwing.dynamics.vehicles.performance import thrust_over_weight
@@ -76,31 +77,33 @@ def write_vehicle(
     if path.exists() or (SHIPPED / "vehicles" / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: a vehicle has this name; choose another")
     values: dict[str, float] = {}
-    known = set(given)
+    known = set(measured)
     remarks: list[str] = []
     for figure in FIGURES:
         guess = figure.guess(values)
-        if figure.name in given:
-            value: float | None = given[figure.name]
-            remarks += filter(None, [figure.doubt(given[figure.name], guess)])
+        if figure.name in measured:
+            value: float | None = measured[figure.name]
+            remarks += filter(None, [figure.plausibility_question(measured[figure.name], guess)])
         elif (value := ask(figure, guess) if ask else None) is not None:
             known.add(figure.name)
         values[figure.name] = guess if value is None else value
         figure.check(values[figure.name])
-    reserve = thrust_over_weight(airframe_of(values))
-    if reserve <= 1.0:
-        raise ValueError(f"{name} cannot hover: its thrust is {reserve:.2f} times its weight; expected more than 1")
+    thrust_to_weight = thrust_over_weight(airframe_of(values))
+    if thrust_to_weight <= 1.0:
+        raise ValueError(
+            f"{name} cannot hover: its thrust is {thrust_to_weight:.2f} times its weight; expected more than 1"
+        )
     path.parent.mkdir(exist_ok=True)
     path.write_text(written(name, values, known), encoding="utf-8")
-    weak = f"its thrust is {reserve:.2f} times its weight; below {WEAK:g} too little is left for control"
-    return path, [*remarks, weak] if reserve < WEAK else remarks
+    warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"
+    return path, [*remarks, warning] if thrust_to_weight < WEAK else remarks
 
 
 class Interview:
-    """Asks in a terminal for one figure after the other; what was answered is not lost when it ends early."""
+    """Interview in a terminal. If it ends early, it prints a command that continues with the answers so far."""
 
-    def __init__(self, name: str, given: dict[str, float]):
-        self._name, self._answers, self._begun = name, dict(given), False
+    def __init__(self, name: str, values: dict[str, float]):
+        self._name, self._answers, self._started = name, dict(values), False
 
     def ask(self, figure: "Figure", guess: float) -> float | None:
         """Return the measured value of a figure; None to accept the guess.
@@ -108,9 +111,9 @@ class Interview:
         Raises:
             ValueError: no user answers.
         """
-        if not self._begun:
-            typer.echo("Enter takes the value in brackets, a guess from the figures before it; Ctrl-C ends.")
-            self._begun = True
+        if not self._started:
+            typer.echo("Enter accepts the value in brackets, an estimate from the previous answers; Ctrl-C ends.")
+            self._started = True
         typer.echo(f"\n{figure.how}")
         while text := _answer(f"{figure.name}, {figure.unit} [{guess:.4g}]: "):
             try:
@@ -123,17 +126,17 @@ class Interview:
             except ValueError as error:
                 typer.echo(error)
                 continue
-            doubt = figure.doubt(value, guess)
-            if not doubt or _answer(f"{doubt} [y/N] ").lower() in ("y", "yes"):
+            question = figure.plausibility_question(value, guess)
+            if not question or _answer(f"{question} [y/N] ").lower() in ("y", "yes"):
                 self._answers[figure.name] = value
                 return value
         return None
 
-    def tell(self) -> None:
-        """Return the answers so far as the start of the next interview."""
-        if self._begun and self._answers:
-            given = " ".join(f"--set {name}={value:.9g}" for name, value in self._answers.items())
-            typer.echo(f"\nnothing is written; with these answers: lapwing new vehicle {self._name} {given}")
+    def print_answers(self) -> None:
+        """Print the command that continues the interview with the answers so far."""
+        if self._started and self._answers:
+            options = " ".join(f"--set {name}={value:.9g}" for name, value in self._answers.items())
+            typer.echo(f"\nnothing is written; with these answers: lapwing new vehicle {self._name} {options}")
 
 
 def _answer(question: str) -> str:
@@ -143,7 +146,7 @@ def _answer(question: str) -> str:
         raise ValueError("standard input has ended; run the interview in a terminal") from None
 
 
-def _given(measured: list[str]) -> dict[str, float]:
+def _parse_values(measured: list[str]) -> dict[str, float]:
     """Return figures by name from texts FIGURE=VALUE."""
     from lapwing.vehicle_measurements import FIGURES
 

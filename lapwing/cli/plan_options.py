@@ -1,4 +1,4 @@
-"""Missions from files: `--plan FILE`, or for a scene of several vehicles `--plan NAME=FILE` for each that flies one."""
+"""Missions from files: `--plan FILE`, or `--plan NAME=FILE` for a vehicle of a scene with several vehicles."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -8,28 +8,28 @@ if TYPE_CHECKING:
     from lapwing.cosim.scene import Scene
 
 
-def overrides(given: list[str], scene: Path, set_: list[str]) -> list[str]:
+def overrides(plans: list[str], scene: Path, set_: list[str]) -> list[str]:
     """Return the overrides for vehicles with plans: they accept commands and do not follow the trajectory.
 
     Raises:
-        ValueError: it is not said which vehicle flies which, or one that is not there.
+        ValueError: a plan without the name of a vehicle, or with an unknown name.
         SceneError: the scene is invalid.
     """
     from lapwing.services.common.flight_plan_file import OPERATED
     from lapwing.services.scene_resolver import load
 
-    if not given:
+    if not plans:
         return []
-    loaded = load(scene, set_)
-    if not loaded.vehicles:
-        files(given, loaded)
+    base = load(scene, set_)
+    if not base.vehicles:
+        files(plans, base)
         return OPERATED
-    names = [vehicle.lookup("vehicle.name") for vehicle in loaded.vehicles]
-    return [f"vehicle.{names.index(name)}.{text}" for name in files(given, loaded) for text in OPERATED]
+    names = [vehicle.lookup("vehicle.name") for vehicle in base.vehicles]
+    return [f"vehicle.{names.index(name)}.{text}" for name in files(plans, base) for text in OPERATED]
 
 
-def commands(given: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]:
-    """Return the commands of each vehicle that flies a plan, by name. ValueError: see `overrides`, or no such plan."""
+def commands(plans: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]:
+    """Return the commands of each vehicle that flies a plan, by name. See `overrides` for errors."""
     from lapwing.services.common.environment_schema import environment
     from lapwing.services.common.flight_plan_file import read
     from lapwing.services.common.vehicle_schema import start_height
@@ -37,19 +37,19 @@ def commands(given: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]
     scenes = {scene.lookup("vehicle.name"): scene for scene in loaded.vehicles or (loaded,)}
     return {
         name: tuple(read(path, start_height(scenes[name]), environment(scenes[name]).home))
-        for name, path in files(given, loaded).items()
+        for name, path in files(plans, loaded).items()
     }
 
 
-def files(given: list[str], loaded: "Scene") -> dict[str, Path]:
+def files(plans: list[str], loaded: "Scene") -> dict[str, Path]:
     """Return the plan of each vehicle that flies one, by name. See `overrides` for errors."""
     if not loaded.vehicles:
-        if len(given) > 1:
-            raise ValueError(f"--plan {given[1]}: expected one plan, the scene has one vehicle")
-        return {loaded.lookup("vehicle.name"): Path(path) for path in given}
+        if len(plans) > 1:
+            raise ValueError(f"--plan {plans[1]}: expected one plan, the scene has one vehicle")
+        return {loaded.lookup("vehicle.name"): Path(path) for path in plans}
     names = [vehicle.lookup("vehicle.name") for vehicle in loaded.vehicles]
     result: dict[str, Path] = {}
-    for text in given:
+    for text in plans:
         name, equals, path = text.partition("=")
         if not equals or name not in names or name in result:
             expected = f"NAME=FILE, a plan for each of {', '.join(names)} that flies one"

@@ -19,12 +19,12 @@ def with_solver_selected(path: Path, overrides: list[str]) -> "Scene":
     scene = load(path, overrides)
     for vehicle in scene.vehicles or (scene,):
         check_success(vehicle)
-    if scene.vehicles or not scene[Solver].undecided:  # each vehicle of several would select its own
+    if scene.vehicles or not scene[Solver].undecided:  # the vehicles of a fleet would select different ones
         return scene
     from lapwing.studies.accuracy import solver_selection
 
     chosen = solver_selection.overrides(scene, typer.echo)
-    typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: chosen {', '.join(chosen)}")
+    typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: selected {', '.join(chosen)}")
     return load(path, [*overrides, *chosen])
 
 
@@ -33,9 +33,9 @@ def warn_of_gains(scene: "Scene") -> None:
     from lapwing.services.autopilot.stability_check import unstable_loops
 
     for vehicle in scene.vehicles or (scene,):
-        of = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
+        prefix = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
         for line in unstable_loops(vehicle):
-            typer.echo(f"lapwing: warning: {of}{line}", err=True)
+            typer.echo(f"lapwing: warning: {prefix}{line}", err=True)
 
 
 def check_firmware_program(scene: "Scene") -> None:

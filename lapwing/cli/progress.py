@@ -10,8 +10,8 @@ from rich.text import Text
 from lapwing.messages import PoseStamped, Status
 from lapwing.runs.compile_notice import Compilation
 
-NEARLY = 0.97  # of a guess that was too low, where the bar waits
-LINE_PERIOD = 2.0  # [s] of wall time between two lines where the output is no terminal
+NEARLY = 0.97  # share of an estimate that was too low at which the bar waits
+LINE_PERIOD = 2.0  # [s] of wall time between two lines if the output is not a terminal
 
 
 class _Factor(ProgressColumn):
@@ -31,7 +31,7 @@ class _Done(ProgressColumn):
 
 
 class _Bar(BarColumn):
-    """The bar of the flight, or of the guess; that one waits before its end."""
+    """Bar of the flight, or of the estimate, which waits before its end."""
 
     def render(self, task: Task) -> ProgressBar:
         if guess := task.fields.get("guess"):
@@ -71,19 +71,19 @@ class Display:
             self._bar.stop()
 
     def begin(self) -> None:
-        """Start the clock: the first message has arrived."""
+        """Start the bar of the flight, at the first message."""
         self._started = time.monotonic()
         self._next_line = self._started + LINE_PERIOD
         if self._bar:
             self._bar.reset(self._task, total=self._duration, description="", guess=None)
 
-    def compiling(self, what: Compilation) -> None:
+    def compiling(self, compilation: Compilation) -> None:
         """Show that kernels are being compiled."""
         if self._bar:
-            said = f"compiling {what.scene}, once"
-            self._bar.reset(self._task, total=self._duration, description=said, guess=what.seconds)
+            description = f"compiling {compilation.scene}, once"
+            self._bar.reset(self._task, total=self._duration, description=description, guess=compilation.seconds)
         else:
-            self.say(what.notice)
+            self.say(compilation.notice)
 
     def say(self, line: str) -> None:
         """Print a line."""

@@ -32,13 +32,13 @@ def report(
     with user_errors():
         check_distinct({"FILE": log, "the second FILE": other, "--out": out})
         claim_report("--out", out or log.with_suffix(".html"))
-        called = _names(names, other)
-        beside = Flight.read(other, vehicle, SHOWN) if other else None
+        labels = _names(names, other)
+        second = Flight.read(other, vehicle, SHOWN) if other else None
         flight = Flight.read(log, vehicle, SHOWN)
-        for each, name in zip((flight, beside), called, strict=False):
+        for each, name in zip((flight, second), labels, strict=False):
             if each is not None:
                 each.name = name
-        typer.echo(flight.report(out, beside))
+        typer.echo(flight.report(out, second))
 
 
 @app.command()

@@ -56,7 +56,7 @@ def run(options: RunOptions) -> None:
 
 @contextmanager
 def _started_early(options: RunOptions) -> Iterator[dict[str, Child]]:
-    """Start the processes of a run before the scene is read, so that they import meanwhile."""
+    """Start the processes of a run before the scene is read, so that they import their modules at the same time."""
     if options.mode != MULTI_PROCESS or options.endpoints is not None:
         yield {}
         return
@@ -103,7 +103,7 @@ def _with_ros2_of_scene(options: RunOptions, scene: "Scene") -> RunOptions:
 
 def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     """Return the specification of the run; raise ValueError for files that cannot be written."""
-    from lapwing.cosim.executors.realtime import why_not
+    from lapwing.cosim.executors.realtime import unavailable_reason
     from lapwing.cosim.processes.run_monitor import MONITOR
     from lapwing.runs.distributed_run import check_complete, external_services, parse_external
     from lapwing.services.common import foreign_code
@@ -131,7 +131,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
         check_log(log)
     claim_report("--report", report)
     claim(options.json)
-    if realtime and (reason := why_not()):
+    if realtime and (reason := unavailable_reason()):
         realtime = False
         typer.echo(f"lapwing: --realtime: no real-time class: {reason}", err=True)
     return ProcessSpec(
@@ -159,7 +159,7 @@ def _fly_and_report(
     before = modification_time(log)
 
     def report(elapsed: "Elapsed | None") -> "list[Flight]":
-        from lapwing.cli import run_summary  # imported after the flight: its start would wait for it
+        from lapwing.cli import run_summary  # imported after the flight, whose start it would delay
         from lapwing.runs.log_events import add_events
 
         if elapsed is None and modification_time(log) == before:
@@ -184,7 +184,7 @@ def _fly_and_report(
 
 
 def _advise_recovery(log: Path) -> None:
-    """Print the command that completes a log whose recorder was killed: readers that seek reject it."""
+    """Print the command that completes a log without an end, which some programs reject."""
     from lapwing.cosim.log.mcap_contents import has_footer
 
     if log.is_file() and not has_footer(log):
@@ -213,7 +213,7 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
             from lapwing.runs.multi_process_run import fly_processes
 
             fly = partial(fly_processes, spec, display, auxiliary, early=early)
-        shows = []
+        displays = []
         if options.view:
             import webbrowser
 
@@ -222,12 +222,12 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
             page = stack.enter_context(LivePage(setup))
             display.say(f"live: {page.address}")
             webbrowser.open(page.address)
-            shows.append(page.show)
-        if not (shows or FOXGLOVE in auxiliary or ROS2 in auxiliary):
+            displays.append(page.show)
+        if not (displays or FOXGLOVE in auxiliary or ROS2 in auxiliary):
             return fly()
         from lapwing.runs.live_feed import LiveFeed
 
-        return fly(live=LiveFeed(setup, shows).observe)
+        return fly(live=LiveFeed(setup, displays).observe)
 
 
 def _compare_with_campaign(options: RunOptions, flights: "Sequence[Flight]") -> None:
@@ -240,7 +240,7 @@ def _compare_with_campaign(options: RunOptions, flights: "Sequence[Flight]") -> 
     recorded = single_run.end_state_of(options.run_, options.campaign)
     name = f"run {options.run_} of {options.campaign}"
     if not recorded:
-        typer.echo(f"{name}: not flown there yet")
+        typer.echo(f"{name}: not recorded in the campaign yet")
     elif recorded == joint_end_state(flights):
         typer.echo(f"{name}: final state bit-for-bit identical")
     elif options.set_:
@@ -255,5 +255,8 @@ def _check_success(scene: "Scene", flights: "Sequence[Flight]") -> None:
 
     for flight, vehicle in zip(flights, scene.vehicles or (scene,), strict=False):
         if unmet := vehicle[Success].unmet(metrics(flight)):
-            of = f" of {flight.vehicle}" if scene.vehicles else ""
-            fail(f"flight{of} failed: {flight.outcome.kind}; success.require: {'; '.join(unmet)}", FLIGHT_FAILED)
+            vehicle_text = f" of {flight.vehicle}" if scene.vehicles else ""
+            fail(
+                f"flight{vehicle_text} failed: {flight.outcome.kind}; success.require: {'; '.join(unmet)}",
+                FLIGHT_FAILED,
+            )

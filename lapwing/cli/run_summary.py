@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lapwing.runs.observer import Elapsed
     from lapwing.services.process_main import ProcessSpec
 
-MOST = 60  # events that are printed
+MAX_EVENTS = 60  # events that are printed
 COLOURS = {"landed": "green", "completed": "green", "landed elsewhere": "yellow", "timed out": "yellow"}  # default: red
 
 
@@ -35,27 +35,27 @@ def fleet(log: Path) -> list[Flight]:
 
 def report_results(
     scene: Scene,
-    given: "ProcessSpec",
+    spec: "ProcessSpec",
     flights: Sequence[Flight],
     elapsed: "Elapsed | None",
     write_to: Path | None,
     report: Path | None,
 ) -> None:
-    """Write report and figures, and print them.
+    """Write the report and the JSON file, and print the summary.
 
     Args:
-        scene: that was flown.
-        given: how.
-        flights: of each vehicle, as the log has them.
-        elapsed: how long it took; None where it was ended before its time.
-        write_to: the JSON file, if any.
-        report: the report's path, None for the log's with another ending.
+        scene: scene of the run.
+        spec: specification of the run.
+        flights: recorded flight of each vehicle.
+        elapsed: simulated and wall time; None if the run ended early.
+        write_to: JSON file to write.
+        report: path of the report; None for the path of the log with another extension.
     """
     first, several = flights[0], bool(scene.vehicles)
     result = {
         "scene": scene.name,
-        "seed": given.setup.seed,
-        "mode": given.mode,
+        "seed": spec.setup.seed,
+        "mode": spec.mode,
         "digest": first.digest,
         **(_of_fleet(flights) if several else _of_vehicle(first)),
         "sim_time_s": elapsed.simulated if elapsed else float(first.truth.times[-1]),
@@ -91,12 +91,12 @@ def _of_fleet(flights: Sequence[Flight]) -> dict[str, Any]:
 
 
 def write_json(path: Path, result: dict[str, Any]) -> None:
-    """Write `result` for other programs."""
+    """Write `result` as JSON."""
     path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
 
 
 def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
-    """Print `result` for people."""
+    """Print the summary of a run."""
     show_events(console, result["events"])
     _errors(console, scene[Published], result["rmse"])
     _outcome(console, result["outcome"])
@@ -104,16 +104,16 @@ def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
 
 
 def show_fleet(console: Console, result: dict[str, Any]) -> None:
-    """Print `result` of several vehicles for people."""
-    for name, one in result["vehicles"].items():
-        _outcome(console, one["outcome"], f"{name}: ")
+    """Print the summary of a run with several vehicles."""
+    for name, vehicle in result["vehicles"].items():
+        _outcome(console, vehicle["outcome"], f"{name}: ")
     if result["separation"]:
         console.print(str(Separation(**result["separation"])), highlight=False)
     _ending(console, result)
 
 
-def _outcome(console: Console, outcome: dict[str, Any], of: str = "") -> None:
-    console.print(f"{of}{outcome['text']}", style=f"bold {COLOURS.get(outcome['kind'], 'red')}")
+def _outcome(console: Console, outcome: dict[str, Any], prefix: str = "") -> None:
+    console.print(f"{prefix}{outcome['text']}", style=f"bold {COLOURS.get(outcome['kind'], 'red')}")
 
 
 def _ending(console: Console, result: dict[str, Any]) -> None:
@@ -131,16 +131,16 @@ def _ending(console: Console, result: dict[str, Any]) -> None:
 
 
 def show_events(console: Console, events: list[dict[str, Any]]) -> None:
-    """Print what happened, the first of many."""
+    """Print the first `MAX_EVENTS` events."""
     if not events:
         return
     table = Table("time [s]", "event", "", box=None, pad_edge=False, header_style="dim")
     table.columns[0].justify = "right"
-    for event in events[:MOST]:
+    for event in events[:MAX_EVENTS]:
         table.add_row(f"{event['time']:.2f}", event["kind"], event["text"])
     console.print(table)
-    if len(events) > MOST:
-        console.print(f"and {len(events) - MOST} more events: the report and --json have all of them")
+    if len(events) > MAX_EVENTS:
+        console.print(f"{len(events) - MAX_EVENTS} more events not shown (see the report or --json)")
 
 
 def _errors(console: Console, published: Published, rmse: dict[str, float]) -> None:

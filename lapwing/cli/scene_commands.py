@@ -77,7 +77,7 @@ def precompile(
     from lapwing.studies.terminal import console
 
     with user_errors():
-        paths = [each for given in scenes or [Path("delivery_mission")] for each in _scenes_of(given)]
+        paths = [each for items in scenes or [Path("delivery_mission")] for each in _scenes_of(items)]
         sound: dict[str, Any] = {}
         faults: list[ValueError] = []
         for path in paths:
@@ -111,7 +111,7 @@ def parameters(
 ) -> None:
     """List the autopilot parameters of a scene or at the end of a log."""
     from lapwing.cosim.log import LogReader
-    from lapwing.runs.resimulate import given_commands, recorded_setup
+    from lapwing.runs.resimulate import recorded_commands, recorded_setup
     from lapwing.services.common import parameter_file
     from lapwing.services.common.autopilot_parameters import changed
     from lapwing.services.scene_resolver import resolve
@@ -123,7 +123,7 @@ def parameters(
         else:
             with LogReader(file) as read:
                 setup = recorded_setup(read)
-                commands = [command for _, given in given_commands(read, setup) for command in given]
+                commands = [command for _, items in recorded_commands(read, setup) for command in items]
         if not setup.vehicle:
             raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or log with one vehicle")
         if "autopilot" not in setup.services:

@@ -40,7 +40,7 @@ def schema(
 @app.command()
 def certificates(
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="folder to create")],
-    days: Annotated[int, typer.Option(metavar="N", min=1, max=3650, help="validity")] = 365,
+    days: Annotated[int, typer.Option(metavar="N", min=1, max=3650, help="validity [days]")] = 365,
 ) -> None:
     """Create TLS certificates for runs on several hosts.
 

@@ -23,7 +23,7 @@ class _Raw(io.FileIO):
     _lost = False
 
     def write(self, data: Any) -> int:
-        """Write, or say once what hinders it; what is left in buffers goes nowhere."""
+        """Write. Raise OutputError at the first failure, and discard all later data."""
         if self._lost:
             return len(data)
         try:
@@ -35,11 +35,11 @@ class _Raw(io.FileIO):
 
 @contextmanager
 def checked_output() -> Iterator[None]:
-    """Let standard output raise `OutputError` where it cannot be written, at the latest at the end of the context."""
+    """Let standard output raise `OutputError` if it cannot be written, at the latest at the end of the context."""
     before = sys.stdout
     try:
         raw = _Raw(before.fileno(), "w", closefd=False)
-    except (AttributeError, OSError):  # there is none, or it is no file
+    except (AttributeError, OSError):  # no standard output, or not a file
         yield
         return
     before.flush()
@@ -52,7 +52,7 @@ def checked_output() -> Iterator[None]:
     )
     try:
         yield
-    except BaseException:  # which says more than that it could not all be said
+    except BaseException:  # the first error is reported, not that of the output
         with suppress(OutputError):
             sys.stdout.flush()
         raise

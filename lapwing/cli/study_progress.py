@@ -12,11 +12,13 @@ class Countdown:
     """A bar in a terminal, lines elsewhere; a context manager."""
 
     def __init__(self, console: Console, every: float = 0.0):
-        """Between two lines are `every` seconds at least."""
-        self._console, self._left, self._every, self._said = console, TimeLeft(), every, -every
+        """Create the display; outside a terminal it prints at most one line per `every` [s]."""
+        self._console, self._left, self._every, self._printed = console, TimeLeft(), every, -every
         columns = (BarColumn(bar_width=24), TextColumn("{task.completed} of {task.total} flights  {task.fields[left]}"))
-        said = TextColumn("{task.description}", markup=False)
-        self._bar = Progress(*columns, said, console=console, transient=True) if console.is_terminal else None
+        description_column = TextColumn("{task.description}", markup=False)
+        self._bar = (
+            Progress(*columns, description_column, console=console, transient=True) if console.is_terminal else None
+        )
         self._task = self._bar.add_task("", total=1, left="") if self._bar else None
 
     def __enter__(self) -> "Countdown":
@@ -29,13 +31,13 @@ class Countdown:
             self._bar.stop()
 
     def say(self, text: str, done: int, total: int) -> None:
-        """Show what is being done, and that `done` of `total` flights are."""
+        """Show that `done` of `total` flights are finished, and the current work."""
         self._left.done(done)
-        told = self._left.text(total)
+        remaining = self._left.text(total)
         if self._bar and self._task is not None:
-            self._bar.update(self._task, description=text, completed=done, total=total, left=told)
+            self._bar.update(self._task, description=text, completed=done, total=total, left=remaining)
             return
-        if (now := time.monotonic()) - self._said < self._every and done < total:
+        if (now := time.monotonic()) - self._printed < self._every and done < total:
             return
-        self._said = now
-        self._console.print(f"{done} of {total} flights{f', {told}' if told else ''}: {text}", soft_wrap=True)
+        self._printed = now
+        self._console.print(f"{done} of {total} flights{f', {remaining}' if remaining else ''}: {text}", soft_wrap=True)

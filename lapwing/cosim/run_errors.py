@@ -14,7 +14,7 @@ class ExitCode(IntEnum):
 
     COMPLETED = 0  # the run has reached its end
     FAILED = 1
-    REJECTED = 2  # for a reason that the user can fix
+    REJECTED = 2  # invalid configuration, which the user can correct
     DIVERGED = 3
     CUT_SHORT = 4  # another participant ended before the run did
     TERMINATED = 128 + signal.SIGTERM
@@ -25,11 +25,11 @@ class BusError(RuntimeError):
 
 
 class RunFailed(RuntimeError):
-    """A run that did not reach its end; the text names the process at fault."""
+    """The run did not reach its end; the text names the process at fault."""
 
 
 class LockStepError(RuntimeError):
-    """The lock step cannot continue; the text names the process that waits, and what it waits for."""
+    """The lock step cannot continue; the text names the waiting process and the missing data."""
 
     EXIT_CODE = ExitCode.FAILED
 

@@ -1,1 +1,1 @@
-"""Reference pages and editor schemas, made from the code: types, bounds, defaults, and the comments behind fields."""
+"""Reference pages and editor schemas, generated from types, bounds, defaults and comments in the code."""

@@ -1,4 +1,4 @@
-"""From an annotation with its bounds to a JSON schema (draft 7, which TOML editors read)."""
+"""JSON schema (draft 7, which TOML editors read) of an annotation with its bounds."""
 
 import math
 import types
@@ -62,7 +62,7 @@ def _plain(default: Any) -> Any:
 
 
 def schema_of(hint: Any) -> Schema:
-    """Return the schema of an annotation; None in a union is a key that is left out."""
+    """Return the schema of an annotation; None in a union marks an optional key."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
         return _bounded(schema_of(arguments[0]), arguments[1:])
@@ -80,15 +80,15 @@ def schema_of(hint: Any) -> Schema:
     return {"type": PLAIN[hint]}
 
 
-def _bounded(found: Schema, metadata: Iterable[Any]) -> Schema:
+def _bounded(schema: Schema, metadata: Iterable[Any]) -> Schema:
     flat = [part for m in metadata for part in (m.metadata if isinstance(m, FieldInfo) else [m])]
     for part in flat:
         for attribute, word in BOUNDS.items():
             value = getattr(part, attribute, None)
             if value is not None:
-                text = word.endswith("Items") and found.get("type") == "string"
-                found[word.replace("Items", "Length") if text else word] = value
-    return found
+                text = word.endswith("Items") and schema.get("type") == "string"
+                schema[word.replace("Items", "Length") if text else word] = value
+    return schema
 
 
 def _mapping(name: Any, value: Any) -> Schema:

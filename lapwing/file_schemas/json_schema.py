@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Any
 
 from lapwing.cosim.scene import SceneTable
-from lapwing.cosim.scene.vehicle_scenes import MOST
+from lapwing.cosim.scene.vehicle_scenes import MAX_VEHICLES
 from lapwing.dynamics import effects, integrators
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.file_schemas.annotations import Schema, closed, required, table_schema
@@ -26,7 +26,7 @@ TEXT: Schema = {"type": "string"}
 OWN: Schema = {
     "type": "object",
     "description": "user-defined, with its own parameters",
-    "properties": {"module": {**TEXT, "description": "that declares it"}},
+    "properties": {"module": {**TEXT, "description": "name of the module that declares it"}},
     "required": ["module"],
 }
 USER_SEGMENT: Schema = {
@@ -66,7 +66,9 @@ def flight_parameters() -> tuple[list[Parameter], list[Parameter]]:
 def scene_schema() -> Schema:
     """Return the JSON schema of a scene file, without the content of the files that it names."""
     known = vocabulary().sections
-    sections = {name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE}  # not what is only resolved
+    sections = {
+        name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE
+    }  # omits tables without keys of their own
     tables = {name: _section(section) for name, section in sections.items()}
     tables["effects"] |= _or_own({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
     tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
@@ -76,7 +78,7 @@ def scene_schema() -> Schema:
     own_autopilot = {"properties": {"firmware": {"const": OWN_FIRMWARE}}}
     tables["autopilot"] |= {"if": own_autopilot, "then": {"properties": {"parameters": _parameters()}}}
     for name, section in sections.items():
-        if section.FROM_FILE:  # what a scene says of it is laid over the file's content
+        if section.FROM_FILE:  # the keys of a scene override those of the file
             tables[name] = _optional(tables[name])
     phase = tables["trajectory"]["properties"]["phase"]["items"]["properties"]
     segment = {"$ref": "#/definitions/segment"}
@@ -118,14 +120,14 @@ def _section(section: type[SceneTable]) -> Schema:
 
 
 def _fleet(tables: Schema, sections: dict[str, type[SceneTable]]) -> Schema:
-    """Several vehicles: each has the keys of a vehicle, and what it says of the tables that it need not share."""
+    """Return the schema of a list of vehicles, each with the keys of a vehicle and the tables that are not shared."""
     names = [name for name, section in sections.items() if name != "vehicle" and not section.SHARED]
     own = {name: _partial(tables[name], f"#/properties/{name}") for name in names}
     properties = dict(tables["vehicle"]["properties"])
     properties["airframe"] = {"anyOf": [properties["airframe"], own.pop("airframe")]}
     items = closed({**properties, **own})
-    text = "several vehicles: the tables of each are laid over those of the scene"
-    return {"type": "array", "minItems": 1, "maxItems": MOST, "items": items, "description": text}
+    text = "several vehicles: the tables of each override those of the scene"
+    return {"type": "array", "minItems": 1, "maxItems": MAX_VEHICLES, "items": items, "description": text}
 
 
 def _partial(schema: Schema, place: str) -> Schema:
@@ -140,7 +142,7 @@ def _partial(schema: Schema, place: str) -> Schema:
 
 
 def _or_own(tables: dict[str, Schema]) -> Schema:
-    """These tables, and others that name a module."""
+    """Return the schema of these tables and of user-defined ones, which name a module."""
     return {**closed(tables), "additionalProperties": OWN}
 
 
@@ -157,7 +159,7 @@ def _sensor(module: Any, cls: type) -> Schema:
 
 
 def _parameters() -> Schema:
-    """Values of the autopilot's parameters, or the name of a file of them."""
+    """Return the schema of the autopilot's parameters: values by name, or the name of a file."""
     fixed, by_gains = flight_parameters()
     properties = {p.name: _parameter(p) for p in fixed} | {p.name: {"type": "number"} for p in by_gains}
     return {"description": "values by name, or the name of a file of them", "anyOf": [closed(properties), TEXT]}

@@ -1,4 +1,4 @@
-"""The keys of a table: what the class that declares it says of each, its comment included."""
+"""Keys of a table: types, bounds, defaults and comments from the class that declares it."""
 
 import inspect
 import re
@@ -17,15 +17,18 @@ class Key(NamedTuple):
 
     name: str
     hint: Any  # annotation with its bounds
-    default: Any  # REQUIRED where there is none
-    unit: str  # "m/s"; of several values "s, m"; empty for texts and ratios
+    default: Any  # REQUIRED without a default
+    unit: str  # "m/s"; "s, m" for several values; empty for texts and ratios
     meaning: str
 
 
 def keys(cls: type) -> list[Key]:
     """Return the keys of a table, a pydantic model or NamedTuple, in their order."""
-    said = {name: split(comment) for name, comment in comments(cls).items()}
-    return [Key(name, hint, default, *said.get(name, ("", _purpose(hint)))) for name, hint, default in _fields(cls)]
+    comments_by_key = {name: split(comment) for name, comment in comments(cls).items()}
+    return [
+        Key(name, hint, default, *comments_by_key.get(name, ("", _purpose(hint))))
+        for name, hint, default in _fields(cls)
+    ]
 
 
 def _purpose(hint: Any) -> str:

@@ -7,21 +7,21 @@ from typing import Any
 from lapwing.file_schemas.json_schema import SCHEMAS
 
 UNIT = re.compile(r"\[([^\]]+)\]")
-FILES = ("airframe", "gains")  # files that a scene names, whose keys begin with their name
+FILES = ("airframe", "gains")  # files that a scene names; their name is the first part of their keys
 
 
 def key_units(keys: Iterable[str]) -> dict[str, str]:
     """Return the unit of each dotted key that has one: {"vehicle.mass": "kg"}."""
     schemas = {name: SCHEMAS[name]() for name in ("scene", *FILES)}
-    found = {}
+    units = {}
     for key in keys:
         first, _, rest = key.partition(".")
         name, path = (first, rest) if first in FILES else ("scene", key)
         for node in _nodes(schemas[name], schemas[name], path.split(".")):
             if (unit := UNIT.match(node.get("description", ""))) and "," not in unit[1]:
-                found[key] = unit[1]
+                units[key] = unit[1]
                 break
-    return found
+    return units
 
 
 def _nodes(whole: dict[str, Any], node: dict[str, Any], path: list[str]) -> Iterator[dict[str, Any]]:

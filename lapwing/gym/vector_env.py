@@ -1,4 +1,4 @@
-"""The environments: a `lapwing.BatchSimulator` under thrust and body rates, with a task."""
+"""Gymnasium environments: a `lapwing.BatchSimulator` under thrust and body rates, with a task."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -26,13 +26,13 @@ RATE = 50.0  # [Hz] of the actions
 
 
 class DroneVectorEnv(VectorEnv):
-    """n vehicles of a scene with one task.
+    """Vector environment: n vehicles of a scene with one task.
 
     An action is (thrust, rates about body x, y, z), each from -1 to 1: no thrust to twice the weight; 6, 6 and 2 rad/s.
-    An observation is the way to the target and to the one after it [m], the velocity past the target [m/s], all in the
-    world frame; the rotation matrix body to world, row by row; and the body rates [rad/s]. Ways, velocities and
-    rates saturate at 50, the bounds of the observation space. A vehicle whose state becomes invalid is lost. An episode
-    that is over begins anew with the next step.
+    An observation is the displacement to the target and to the next target [m], the velocity relative to the target
+    [m/s], all in the world frame; the rotation matrix body to world, row by row; and the body rates [rad/s].
+    Displacements, velocities and rates saturate at 50, the bounds of the observation space. An episode ends if the
+    state becomes invalid. An episode that has ended restarts with the next step.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012
@@ -46,15 +46,15 @@ class DroneVectorEnv(VectorEnv):
         vary: Mapping[str, Distribution] | None = None,
         render_mode: None = None,
     ):
-        """Environments.
+        """Create the environments.
 
         Args:
-            num_envs: how many.
+            num_envs: number of vehicles.
             task: one of `TASKS`.
-            scene: whose vehicle and physics.
+            scene: path or name of a scene, or a loaded scene.
             overrides: see `lapwing.load_scene`.
-            vary: how keys of the scene vary from vehicle to vehicle.
-            render_mode: none is known.
+            vary: distributions of scene keys over the vehicles.
+            render_mode: not supported.
 
         Raises:
             ValueError: unknown task.
@@ -83,7 +83,7 @@ class DroneVectorEnv(VectorEnv):
         return observations, {}
 
     def step(self, actions: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict]:
-        """Go on by 20 ms; episodes that were over begin anew instead.
+        """Advance by 20 ms; episodes that have ended restart instead.
 
         Raises:
             ValueError: actions of another shape, or not finite.
@@ -107,32 +107,32 @@ class DroneVectorEnv(VectorEnv):
 
     def _begin(self, members: np.ndarray, observations: np.ndarray) -> None:
         """Begin episodes of these vehicles, and observe them."""
-        place = starts(self.np_random, self._ground, len(members))
-        self.batch.restart(members, position_world=place, rotor_speed=self._hover_speed)
+        positions = starts(self.np_random, self._ground, len(members))
+        self.batch.restart(members, position_world=positions, rotor_speed=self._hover_speed)
         self._episodes.gates[members], self._episodes.over[members] = 0, False
         step_kernels.observe_members(self.task, self._vehicles, self._episodes, observations, members)
 
 
 class DroneEnv(gymnasium.Env):
-    """One vehicle; otherwise as `DroneVectorEnv`, whose arguments but the first it takes."""
+    """Environment with one vehicle; see `DroneVectorEnv` for its arguments, except `num_envs`."""
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012
 
-    def __init__(self, render_mode: None = None, **given: Any):
-        self.render_mode, self._all = render_mode, DroneVectorEnv(1, **given)
-        self.action_space = self._all.single_action_space
-        self.observation_space = self._all.single_observation_space
+    def __init__(self, render_mode: None = None, **arguments: Any):
+        self.render_mode, self._vector_env = render_mode, DroneVectorEnv(1, **arguments)
+        self.action_space = self._vector_env.single_action_space
+        self.observation_space = self._vector_env.single_observation_space
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
         """Begin an episode."""
         super().reset(seed=seed)
-        observed, _ = self._all.reset(seed=seed)
-        return observed[0], {}
+        observations, _ = self._vector_env.reset(seed=seed)
+        return observations[0], {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict]:
-        """Go on by 20 ms."""
-        observed, reward, terminated, truncated, _ = self._all.step(np.asarray(action)[None])
-        return observed[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), {}
+        """Advance by 20 ms."""
+        observations, reward, terminated, truncated, _ = self._vector_env.step(np.asarray(action)[None])
+        return observations[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), {}
 
 
 for _task in TASKS:

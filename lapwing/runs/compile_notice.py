@@ -15,8 +15,8 @@ from typing import NamedTuple
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.kernels import cache_folder, on_compile
 
-EACH = 7.0  # [s] for one service at a slowness of 1, where none of this machine is known; measured with scene hover
-PROBE = 250_000  # turns of the loop that measures the slowness
+EACH = 7.0  # [s] default for one service at a slowness of 1; measured with scene hover
+PROBE = 250_000  # iterations of the loop that measures the slowness
 PROBE_SECONDS = 0.033  # [s] of that loop on the idle core of EACH
 FILE = "compile_effort.json"  # seconds at a slowness of 1, by kind of run
 ONE = "one process"
@@ -26,9 +26,9 @@ class Compilation(NamedTuple):
     """Compile-time notice for the kernels of a run.
 
     Attributes:
-        scene: its name.
-        services: that are compiled, as far as they are not kept.
-        seconds: about how long that takes.
+        scene: name of the scene.
+        services: names of the services, of which some kernels may be in the cache.
+        seconds: estimated time [s].
     """
 
     scene: str
@@ -38,65 +38,65 @@ class Compilation(NamedTuple):
     @property
     def notice(self) -> str:
         """Text of the notice for output without a progress bar."""
-        about = f"about {self.seconds:.0f} s (kept for later runs)"
+        about = f"about {self.seconds:.0f} s (cached for later runs)"
         return f"{self.scene}: compiling kernels of {', '.join(self.services)}, {about} ..."
 
 
 class Stopwatch:
     """Stopwatch of the compilation of a run: an estimate before, the measured time after.
 
-    `began` marks the first compilation, `ended` the end; a run that finds all kernels on the
-    disk triggers neither, and no notice is printed.
+    Call `start` at the first compilation and `stop` at the end. If all kernels are in the cache, neither is called and
+    no notice is printed.
     """
 
-    def __init__(self, mode: str, setup: RunConfig, say: Callable[[Compilation], None]):
-        """Prepare a notice; `say` is called once, when the first kernel compiles."""
-        self._key, self._say, self._started = _key(mode, setup), say, 0.0
+    def __init__(self, mode: str, setup: RunConfig, show: Callable[[Compilation], None]):
+        """Prepare a notice; `show` is called once, when the first kernel compiles."""
+        self._key, self._show, self._started = _key(mode, setup), show, 0.0
         self._setup, self._mode, self._slowness = setup, mode, 1.0
 
-    def began(self) -> None:
-        """Something compiles; said once."""
+    def start(self) -> None:
+        """Note the first compilation; later calls have no effect."""
         if not self._started:
             self._started, self._slowness = time.monotonic(), slowness()
-            self._say(_guessed(self._setup, self._mode, self._slowness))
+            self._show(_estimate(self._setup, self._mode, self._slowness))
 
-    def ended(self) -> None:
-        """Everything is compiled."""
+    def stop(self) -> None:
+        """Note that everything is compiled, and store the measured time."""
         if self._started:
             mean = 0.5 * (self._slowness + slowness())
-            known, taken = _known(), round((time.monotonic() - self._started) / mean, 1)
-            _keep({**known, self._key: max(taken, known.get(self._key, 0.0))})
+            known, seconds = _known(), round((time.monotonic() - self._started) / mean, 1)
+            _store({**known, self._key: max(seconds, known.get(self._key, 0.0))})
             self._started = 0.0
 
 
 @contextmanager
-def notify_on_compile(setup: RunConfig, say: Callable[[Compilation], None], alone: bool = True) -> Iterator[Stopwatch]:
-    """Say so once, as soon as a kernel is compiled within the context for a run in this process.
+def notify_on_compile(setup: RunConfig, show: Callable[[Compilation], None], alone: bool = True) -> Iterator[Stopwatch]:
+    """Show a notice once when a kernel is compiled within the context, for a run in this process.
 
     Args:
-        setup: of the run.
-        say: shows the notice.
-        alone: True if the context does nothing else, so that its time is the next guess; otherwise the caller calls
-            `ended` of the yielded stopwatch.
+        setup: run configuration.
+        show: shows the notice.
+        alone: True if the context does nothing else, so that its duration is the next estimate; otherwise the caller
+            calls `stop` of the yielded stopwatch.
     """
-    watch, waiting = Stopwatch(ONE, setup, say), True
+    watch, active = Stopwatch(ONE, setup, show), True
 
     def listener(_: str) -> None:
-        if waiting:
-            watch.began()
+        if active:
+            watch.start()
 
     on_compile(listener)
     try:
         yield watch
         if alone:
-            watch.ended()
+            watch.stop()
     finally:
-        waiting = False
+        active = False
 
 
-def guessed(setup: RunConfig, mode: str = ONE) -> Compilation:
-    """Return what a run compiles with an empty cache, and the time that it takes at present."""
-    return _guessed(setup, mode, slowness())
+def estimate(setup: RunConfig, mode: str = ONE) -> Compilation:
+    """Return the notice for a run with an empty cache, at the present load of the machine."""
+    return _estimate(setup, mode, slowness())
 
 
 def slowness() -> float:
@@ -107,7 +107,7 @@ def slowness() -> float:
     return (time.perf_counter() - started) / PROBE_SECONDS
 
 
-def _guessed(setup: RunConfig, mode: str, slow: float) -> Compilation:
+def _estimate(setup: RunConfig, mode: str, slow: float) -> Compilation:
     seconds = _known().get(_key(mode, setup), EACH * len(setup.services))
     return Compilation(setup.scene, tuple(setup.services), slow * seconds)
 
@@ -130,7 +130,7 @@ def _known() -> dict[str, float]:
     return {}
 
 
-def _keep(known: dict[str, float]) -> None:
+def _store(known: dict[str, float]) -> None:
     path = _file()
     with contextlib.suppress(OSError):
         if path is not None:

@@ -1,4 +1,4 @@
-"""Monitoring of a run whose services are started separately."""
+"""Run whose services are started separately."""
 
 import re
 import time
@@ -18,36 +18,36 @@ from lapwing.services import process_table
 from lapwing.services.process_main import ProcessSpec
 from lapwing.services.security import settings
 
-LOST = 6.0  # [s] without news after which a run counts as lost: after a cut of 2 s, TCP takes up to 4 s to send again
-GRACE = 2.0  # [s] that links of one run may differ by
-JOIN_TIMEOUT = 120.0  # [s] the services elsewhere get to appear
-CLOSE_TIMEOUT = 5.0  # [s] the recorder gets to close its log when a run has failed
+LOST = 6.0  # [s] without a message after which a run counts as lost: TCP retries up to 4 s after a 2 s interruption
+GRACE = 2.0  # [s] largest difference of the delays of two links
+JOIN_TIMEOUT = 120.0  # [s] until all services have joined
+CLOSE_TIMEOUT = 5.0  # [s] for the recorder to close its log after a failure
 
 
 def monitor_run(
-    given: ProcessSpec, observer: Observer, live: Callable[[RunMonitor], None] = lambda watch: None
+    spec: ProcessSpec, observer: Observer, live: Callable[[RunMonitor], None] = lambda watch: None
 ) -> Elapsed:
     """Monitor a run whose services are started separately to its end; `live` is called about five times a second.
 
     Raises:
-        RunFailed: a service does not come, or is gone before the end.
-        ValueError: not a key prefix, or its certificate cannot be used.
+        RunFailed: a service does not join, or leaves before the end.
+        ValueError: invalid key prefix, or the certificate cannot be used.
         Interrupted: ended by a signal.
     """
-    setup, peers, key_prefix = given.setup, given.peers, given.key_prefix
+    setup, peers, key_prefix = spec.setup, spec.peers, spec.key_prefix
     check_key_prefix(key_prefix)
-    external = given.external or {}
+    external = spec.external or {}
     clock, participants = Clock(observer, setup), PublisherIds(key_prefix, external=tuple(external))
     names = set(process_table.required_processes(setup, external))
     listen, connect = mesh(MONITOR, peers)
-    gid, security = participants.gid(MONITOR), settings(setup, MONITOR, key_prefix, given.keys)
+    gid, security = participants.gid(MONITOR), settings(setup, MONITOR, key_prefix, spec.keys)
     with Stop() as stop, ZenohBus(listen, connect, gid=gid, security=security) as bus:
         watch = RunMonitor(bus, participants, peers, LOST, setup.services)
-        leave = bus.declare_alive(f"{key_prefix}/{ALIVE_KEY}/{MONITOR}")
+        leave = bus.declare_liveliness(f"{key_prefix}/{ALIVE_KEY}/{MONITOR}")
         try:
             _follow(watch, clock, stop, names, live)
         except RunFailed:
-            leave()  # at which the others end
+            leave()  # makes the other participants end
             deadline = time.monotonic() + CLOSE_TIMEOUT
             while names <= watch.present and process_table.RECORDER not in watch.gone and time.monotonic() < deadline:
                 watch.poll(0.2)
@@ -67,33 +67,33 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
             watch.last_news = time.monotonic()
             if time.monotonic() > deadline:
                 raise RunFailed(f"no participant {', '.join(sorted(names - watch.present))} within {JOIN_TIMEOUT:g} s")
-        elif not watch.ended and watch.gone & names and not _comes(watch, lambda: watch.ended, GRACE):
+        elif not watch.ended and watch.gone & names and not _becomes_true(watch, lambda: watch.ended, GRACE):
             raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
-        elif watch.began is None and time.monotonic() < deadline:
-            watch.last_news = time.monotonic()  # set-ups are compared, which takes a while over a slow network
+        elif watch.start is None and time.monotonic() < deadline:
+            watch.last_news = time.monotonic()  # comparing run configurations takes time over a slow network
         elif culprit := watch.stall_message(names):
             raise RunFailed(culprit)
     # After a cut, links recover one by one; the clock owner stays until its outcome is confirmed
     others = names - {process_table.RECORDER}
-    _comes(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
+    _becomes_true(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
     live(watch)
     if early := watch.abort_message():
         raise RunFailed(early)
 
 
-def _comes(watch: RunMonitor, news: Callable[[], bool], seconds: float) -> bool:
-    """Return True if `news` becomes true within `seconds`; the loss of a participant may arrive earlier."""
+def _becomes_true(watch: RunMonitor, condition: Callable[[], bool], seconds: float) -> bool:
+    """Poll until `condition` is true, at most `seconds`. Return its value."""
     deadline = time.monotonic() + seconds
-    while not news() and time.monotonic() < deadline:
+    while not condition() and time.monotonic() < deadline:
         watch.poll(0.2)
-    return news()
+    return condition()
 
 
 def parse_endpoints(text: str) -> dict[str, str]:
     """Return "name=endpoint,..." as a table, external services first: all others connect to them.
 
     Raises:
-        ValueError: not of this form, or no endpoint.
+        ValueError: the text does not have this form, or an endpoint is invalid.
     """
     peers = dict(pair.split("=", 1) for pair in text.split(",") if "=" in pair)
     if not peers or len(peers) != len(text.split(",")):
@@ -103,13 +103,9 @@ def parse_endpoints(text: str) -> dict[str, str]:
     return {**external_services(peers), **peers}
 
 
-def check_complete(peers: Mapping[str, str], needed: Iterable[str]) -> None:
-    """Refuse a table of participants that lacks one.
-
-    Raises:
-        ValueError: names those that are missing.
-    """
-    if missing := [name for name in needed if name not in peers]:
+def check_complete(peers: Mapping[str, str], required: Iterable[str]) -> None:
+    """Raise ValueError, with the missing names, if a required participant has no endpoint."""
+    if missing := [name for name in required if name not in peers]:
         raise ValueError(f"--endpoints: no endpoint for {', '.join(missing)}")
 
 
@@ -122,7 +118,7 @@ def parse_external(texts: Iterable[str], setup: RunConfig) -> dict[str, str]:
     """Return each "name=endpoint" as a table.
 
     Raises:
-        ValueError: not of this form, no endpoint, or no service of the lock step that could be elsewhere.
+        ValueError: a text does not have this form, or names a service that cannot be external.
     """
     result = {}
     for text in texts:
@@ -136,10 +132,6 @@ def parse_external(texts: Iterable[str], setup: RunConfig) -> dict[str, str]:
 
 
 def check_endpoint(option: str, text: str) -> None:
-    """Refuse what is no Zenoh endpoint.
-
-    Raises:
-        ValueError: not of the form protocol/address:port, and no path of a Unix-domain socket.
-    """
+    """Raise ValueError unless the text is protocol/address:port, or the path of a Unix-domain socket."""
     if not re.fullmatch(r"(tcp|udp|tls|quic|ws)/[^/\s]+:\d+|unixsock-stream/\S+", text):
         raise ValueError(f"{option} {text}: expected an endpoint protocol/address:port, for example tcp/127.0.0.1:7447")

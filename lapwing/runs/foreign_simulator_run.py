@@ -1,4 +1,4 @@
-"""Lapwing's autopilot on a foreign simulator that speaks PX4's simulator interface: no plant, no sensors of our own."""
+"""Run of Lapwing's autopilot on another simulator, over PX4's simulator interface, without own plant and sensors."""
 
 from typing import Any
 
@@ -20,14 +20,14 @@ from lapwing.services.px4.simulator_readings import PROVIDED
 from lapwing.services.sensors import encoders, error_models, triad
 
 TRAJECTORY = "trajectory"
-REPLACED = ("plant", "sensors")  # services whose place the simulator takes
+REPLACED = ("plant", "sensors")  # services that the simulator replaces
 _variance = python_function(error_models.sample_variance)
 _deviation = python_function(error_models.white_deviation)
 _NANO = 1e-9  # [T] in nT
 
 
 def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunConfig:
-    """Return the configuration of a run in which a simulator takes the place of plant and sensors.
+    """Return the configuration of a run in which a simulator replaces plant and sensors.
 
     Raises:
         ConfigError: the scene needs something that the simulator's interface does not have.
@@ -39,22 +39,22 @@ def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunCon
     if "sensors" not in setup.services:
         raise ConfigError("sensors", "missing", "the sensors of the simulator, [sensors.imu] and others")
     sensors = setup.services["sensors"]
-    kept = {name: service for name, service in setup.services.items() if name not in REPLACED}
-    if TRAJECTORY in kept:  # the truth only holds it back to the plant's pace
-        kept[TRAJECTORY] = kept[TRAJECTORY]._replace(inputs=())
-    wanted = {i.port for service in kept.values() for i in service.inputs} - {
-        p.name for service in kept.values() for p in service.ports
+    services = {name: service for name, service in setup.services.items() if name not in REPLACED}
+    if TRAJECTORY in services:  # the truth only holds it back to the plant's pace
+        services[TRAJECTORY] = services[TRAJECTORY]._replace(inputs=())
+    needed = {i.port for service in services.values() for i in service.inputs} - {
+        p.name for service in services.values() for p in service.ports
     }
-    if ports.TRUTH in wanted:
+    if ports.TRUTH in needed:
         raise ConfigError("autopilot.estimator", "ground_truth is not in the simulator's interface", '"kalman"')
-    if missing := sorted(wanted - {*PROVIDED, ports.BATTERY}):
+    if missing := sorted(needed - {*PROVIDED, ports.BATTERY}):
         message = f"the simulator's interface has no {', '.join(missing)}"
         raise ConfigError(f"sensors.{missing[0]}", message, f"one of {', '.join(PROVIDED)}")
     instruments = dict(zip((p.name for p in sensors.ports), sensors.parameters.instruments, strict=True))
-    given = [p for p in sensors.ports if p.name in PROVIDED]
-    nominal = {p.name: _nominal(p, instruments[p.name].sensor) for p in given}
+    sensor_ports = [p for p in sensors.ports if p.name in PROVIDED]
+    nominal = {p.name: _nominal(p, instruments[p.name].sensor) for p in sensor_ports}
     frame = airframe(scene)
-    own = SimulatorSetup(
+    simulator = SimulatorSetup(
         host,
         port,
         nominal,
@@ -62,13 +62,13 @@ def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunCon
         frame.motor.max_voltage,
         environment(scene).home,
         setup.interval_ns,
-        next(p.period for p in given if p.name == ports.IMU),
+        next(p.period for p in sensor_ports if p.name == ports.IMU),
         scene.lookup("autopilot.start_timeout"),
         scene.lookup("autopilot.step_timeout"),
     )
     battery = Port(ports.BATTERY, ports.BatteryReading())
-    kept[NAME] = ServiceConfig(own, (InputPort(ports.ACTUATORS, 1),), (*given, battery))
-    return setup._replace(services=kept)
+    services[NAME] = ServiceConfig(simulator, (InputPort(ports.ACTUATORS, 1),), (*sensor_ports, battery))
+    return setup._replace(services=services)
 
 
 def _nominal(port: Port, p: Any) -> Any:

@@ -21,13 +21,13 @@ from lapwing.studies.view3d.stage import Vehicle
 from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
 
-FRAMES = 8  # of a step, shown evenly until the next
-PIECES = 1200  # of all trails, of which the oldest go
-LINES = 200  # of events
+FRAMES = 8  # [frames] of a step, shown evenly until the next step
+PIECES = 1200  # [pieces] of all trails; the oldest are removed
+LINES = 200  # [lines] of events
 LAG = (0.02, 0.5)  # [s] shortest and longest time over which a step is spread
 ERROR = 0.25  # [m] at the end of the trail's colours
 SIZE = 1.0  # [m] from which the camera takes its distance
-FAREWELL = 0.3  # [s] that browsers have to receive the last frame
+FAREWELL = 0.3  # [s] for browsers to receive the last frame
 
 
 class LivePage:
@@ -56,7 +56,7 @@ class LivePage:
         self._player.start()
 
     def show(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
-        """Show what is new of every vehicle, and what happened to it."""
+        """Show the new steps and events of every vehicle."""
         if not self._vehicles:
             add_surroundings(self._server.scene, steps[0])
             for k, (step, colour) in enumerate(zip(steps, self._colours, strict=True)):

@@ -20,83 +20,83 @@ from lapwing.services.process_main import ProcessSpec, write_spec
 
 
 def fly_processes(
-    given: ProcessSpec,
+    spec: ProcessSpec,
     observer: Observer,
-    beside: Iterable[str] = (),
+    auxiliary: Iterable[str] = (),
     live: Callable[[RunMonitor], None] = lambda watch: None,
     early: dict[str, Child] | None = None,
 ) -> Elapsed:
     """Fly with every service in a separate process.
 
     Args:
-        given: what every process is given, but for its name and the endpoints.
+        spec: specification of the processes, without names and endpoints.
         observer: shows the progress, and at the end the output of the auxiliary processes.
-        beside: auxiliary processes, without which the run continues.
+        auxiliary: names of the processes without which the run continues.
         live: called about five times a second with the run monitor.
         early: processes that are already started.
 
     Raises:
-        RunFailed: a service died or froze, or the run ended before its time.
+        RunFailed: a service died or stalled, or the run ended early.
         ValueError: invalid key prefix, or a service rejected its configuration.
         Interrupted: ended by a signal.
     """
-    check_key_prefix(given.key_prefix)
-    setup, given = given.setup, given._replace(secret=new_secret())
+    check_key_prefix(spec.key_prefix)
+    setup, spec = spec.setup, spec._replace(secret=new_secret())
     clock = Clock(observer, setup)
-    external = given.external or {}
-    names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if given.open else [])]
+    external = spec.external or {}
+    names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if spec.open else [])]
     core = shared_core(setup)
 
-    def give(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
-        own = given._replace(
+    def send_spec(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
+        own_spec = spec._replace(
             name=name,
             peers=endpoints,
             core=core if name in setup.services else None,
-            open=given.open if name == process_table.ROUTER else (),
+            open=spec.open if name == process_table.ROUTER else (),
             with_parent=True,
         )
-        write_spec(own, stream)
+        write_spec(own_spec, stream)
 
-    participants = PublisherIds(given.key_prefix, given.secret, tuple(external))
+    participants = PublisherIds(spec.key_prefix, spec.secret, tuple(external))
     with Stop() as stop:
 
-        def ended(watch: RunMonitor) -> bool:
+        def observe(watch: RunMonitor) -> bool:
             live(watch)
             return clock.observe(watch) or stop.number is not None
 
-        said = launch(names, give, participants, ended, beside, external, early, setup.services)
-        for name, words in said.items():
-            for line in words.splitlines():
+        outputs = launch(names, send_spec, participants, observe, auxiliary, external, early, setup.services)
+        for name, output in outputs.items():
+            for line in output.splitlines():
                 observer.say(f"{name}: {line}")
         stop.check()
-    if clock.refused:
-        observer.say(f"rejected: {clock.refused} messages from outside the run")
+    if clock.rejected:
+        observer.say(f"rejected: {clock.rejected} messages from outside the run")
     return clock.elapsed
 
 
 class Clock:
-    """Follows a run for the observer, and measures it from its first batch to its last."""
+    """Passes the progress of a run to the observer, and measures it from the first to the last log packet."""
 
     def __init__(self, observer: Observer, setup: RunConfig):
-        self._observer, self._began, self._slow_disk = observer, False, False
+        self._observer, self._started, self._slow_disk = observer, False, False
         self._pose, self._status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
         self._compiling = Stopwatch("multi-process", setup, observer.compiling)
-        self.elapsed, self.refused = Elapsed(0.0, 0.0), 0
+        self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
 
     def observe(self, watch: RunMonitor) -> bool:
-        """Show what is new; never asks to stop."""
-        self.refused = watch.refused
-        if watch.began is None:
+        """Show the progress. Return False: the run continues."""
+        self.rejected = watch.rejected
+        if watch.start is None:
             if watch.compiling:
-                self._compiling.began()
+                self._compiling.start()
             return False
-        if not self._began:
-            self._began = True
-            self._compiling.ended()
+        if not self._started:
+            self._started = True
+            self._compiling.stop()
             self._observer.begin()
         if watch.slow_disk and not self._slow_disk:
             self._slow_disk = True
-            self._observer.say("the disk is slow: the run waits for its log to be written")
+            self._observer.say("the disk is slow: the run waits until its log is written")
         self.elapsed = Elapsed(watch.time_ns * 1e-9, watch.wall)
         self._observer.show(watch.time_ns, watch.newest.get(self._pose), watch.newest.get(self._status))
         return False

@@ -23,7 +23,7 @@ class Observer(Protocol):
         """Show the progress at `time_ns`, with the newest payloads of the pose and status topics."""
         ...
 
-    def compiling(self, what: Compilation) -> None:
+    def compiling(self, compilation: Compilation) -> None:
         """Show that kernels are being compiled, until `begin`."""
         ...
 
@@ -36,13 +36,13 @@ class Silent:
     """Observer that shows nothing."""
 
     def begin(self) -> None:
-        """Say nothing."""
+        """Do nothing."""
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
-        """Say nothing."""
+        """Do nothing."""
 
-    def compiling(self, what: Compilation) -> None:
-        """Say nothing."""
+    def compiling(self, compilation: Compilation) -> None:
+        """Do nothing."""
 
     def say(self, line: str) -> None:
-        """Say nothing."""
+        """Do nothing."""

@@ -1,4 +1,4 @@
-"""A recorded run flown again from its log alone: its set-up, and the commands at the ticks at which they applied."""
+"""Resimulation of a run from its log: its run configuration, and its commands at the ticks of their execution."""
 
 import json
 import tempfile
@@ -26,16 +26,20 @@ def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> RunConfig:
     """Return the run configuration of a log, which may have classes of these modules.
 
     Raises:
-        ValueError: it carries none, or one of another version.
+        ValueError: the log has no run configuration, or one of another version.
     """
     if SETUP_FILE not in read.attachments:
-        raise ValueError(f"{read.path}: carries no set-up; expected a log that `lapwing run` has written")
+        raise ValueError(f"{read.path}: has no run configuration; expected a log of `lapwing run`")
     try:
         result = from_json(read.attachments[SETUP_FILE].decode(), modules)
     except ValueError as error:
-        raise ValueError(f"{read.path}: its set-up cannot be read: {error}; expected {read.versions}") from None
+        raise ValueError(
+            f"{read.path}: its run configuration cannot be read: {error}; expected {read.versions}"
+        ) from None
     if not isinstance(result, RunConfig):
-        raise ValueError(f"{read.path}: its attachment {SETUP_FILE} is no set-up")
+        raise ValueError(
+            f"{read.path}: its attachment {SETUP_FILE} is not a run configuration; expected a log of `lapwing run`"
+        )
     return present_config(result)
 
 
@@ -47,16 +51,16 @@ def carried_modules(read: LogReader) -> dict[str, str]:
         return {}
 
 
-def given_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
+def recorded_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> Iterator[tuple[int, tuple[Any, ...]]]:
     """Yield the operator commands with the ticks at which they applied; none if the vehicle accepts no commands.
 
     Args:
-        read: a log.
-        setup: its own.
+        read: log.
+        setup: run configuration of the log.
         vehicle: name; "" for the first.
 
     Raises:
-        ValueError: they are of another version.
+        ValueError: the commands have the types of another version.
     """
     topic = OPERATOR.key(vehicle or setup.vehicles[0])
     if topic not in read.topics():
@@ -70,13 +74,12 @@ def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = F
     """Return the digests of the log, and of the run resimulated up to the log's last tick.
 
     Args:
-        log: of a run.
+        log: log of a run.
         observer: shows the progress.
-        allow_code: whether Python modules that the log carries may be run.
+        allow_code: True to run Python modules and FMUs of the log.
 
     Raises:
-        ValueError: no log, or none of a run, it carries modules that must not be run, or a service was a program
-            an external program.
+        ValueError: not the log of a run, it has code without `allow_code`, or it had an external service.
     """
     with LogReader(log) as read:
         modules = carried_modules(read)
@@ -88,18 +91,18 @@ def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = F
         if "fmu" in setup.services and not allow_code:
             files = ", ".join(fmu.path for fmu in setup.services["fmu"].parameters.fmus)
             raise ValueError(f"{log}: has FMUs, machine code of their authors ({files}); use --allow-code to run them")
-        if elsewhere := read.metadata.get("external"):
-            raise ValueError(f"{log}: cannot be resimulated: {elsewhere} was an external service")
+        if external := read.metadata.get("external"):
+            raise ValueError(f"{log}: cannot be resimulated: {external} was an external service")
         recorded = {vehicle: _firmware_messages(read, setup, vehicle) for vehicle in firmware_vehicles(setup)}
-        operators = {vehicle: _at(dict(given_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
+        operators = {vehicle: _at(dict(recorded_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
         times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
         last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
-        before = read.digest(current_names=True)
-    with tempfile.TemporaryDirectory() as place:
-        again = Path(place) / "again.mcap"
-        fly_single(setup, again, observer=observer, operator=operators, last=last, recorded=recorded)
-        with LogReader(again) as read:
-            return before, read.digest()
+        recorded_digest = read.digest(current_names=True)
+    with tempfile.TemporaryDirectory() as folder:
+        new_log = Path(folder) / "again.mcap"
+        fly_single(setup, new_log, observer=observer, operator=operators, last=last, recorded=recorded)
+        with LogReader(new_log) as read:
+            return recorded_digest, read.digest()
 
 
 def firmware_vehicles(setup: RunConfig) -> list[str]:
@@ -116,8 +119,8 @@ def _firmware_messages(read: LogReader, setup: RunConfig, vehicle: str) -> Recor
     return result
 
 
-def _at(given: Mapping[int, tuple[Any, ...]]) -> Operator:
-    return lambda tick: given.get(tick, ())
+def _at(commands: Mapping[int, tuple[Any, ...]]) -> Operator:
+    return lambda tick: commands.get(tick, ())
 
 
 def without_plan(setup: RunConfig) -> RunConfig:
@@ -125,5 +128,5 @@ def without_plan(setup: RunConfig) -> RunConfig:
     if "autopilot" not in setup.services or not setup.vehicle:  # a fleet has no plan
         return setup
     autopilot = setup.services["autopilot"]
-    flown = autopilot._replace(parameters=autopilot.parameters._replace(plan=()))
-    return setup._replace(services={**setup.services, "autopilot": flown})
+    without_commands = autopilot._replace(parameters=autopilot.parameters._replace(plan=()))
+    return setup._replace(services={**setup.services, "autopilot": without_commands})

@@ -11,25 +11,25 @@ class TimeLeft:
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Begin now; `clock` returns seconds."""
-        self._clock, self._began = clock, clock()
-        self._seen = [(0.0, 0.0)]  # ([s] since the beginning, what was done by then)
+        """Start now; `clock` returns seconds."""
+        self._clock, self._start = clock, clock()
+        self._reports = [(0.0, 0.0)]  # ([s] since the start, amount that was done)
 
     def done(self, amount: float) -> None:
         """Note that `amount` of the work is done by now."""
-        if amount > self._seen[-1][1]:
-            self._seen.append((self._clock() - self._began, amount))
+        if amount > self._reports[-1][1]:
+            self._reports.append((self._clock() - self._start, amount))
 
     def seconds(self, total: float) -> float | None:
         """Return the remaining time [s] up to `total`; None before the second report and at the end."""
-        elapsed, done = self._seen[-1]
-        if len(self._seen) < 3 or done >= total:
+        elapsed, done = self._reports[-1]
+        if len(self._reports) < 3 or done >= total:
             return None
         later = (elapsed - self._at(0.5 * done)) / (0.5 * done)  # [s] for one part
-        return max(0.0, later * (total - done) - (self._clock() - self._began - elapsed))
+        return max(0.0, later * (total - done) - (self._clock() - self._start - elapsed))
 
     def text(self, total: float) -> str:
-        """Return the remaining time as text, "" where it is unknown."""
+        """Return the remaining time as text, "" if it is unknown."""
         seconds = self.seconds(total)
         if seconds is None:
             return ""
@@ -37,6 +37,6 @@ class TimeLeft:
 
     def _at(self, amount: float) -> float:
         """Return the time [s] at which `amount` was done, between two reports in proportion."""
-        after = next(i for i, (_, done) in enumerate(self._seen) if done >= amount)
-        (t0, a0), (t1, a1) = self._seen[after - 1], self._seen[after]
+        after = next(i for i, (_, done) in enumerate(self._reports) if done >= amount)
+        (t0, a0), (t1, a1) = self._reports[after - 1], self._reports[after]
         return t0 + (t1 - t0) * (amount - a0) / (a1 - a0)

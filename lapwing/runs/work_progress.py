@@ -10,12 +10,12 @@ from lapwing.runs.compile_notice import Compilation
 from lapwing.runs.time_left import TimeLeft
 
 DELAY = 2.0  # [s] of work before a bar appears
-PERIOD = 0.25  # [s] between two pictures
-NEARLY = 0.97  # of an estimate that was too short, where the bar waits
+PERIOD = 0.25  # [s] between two updates of the bar
+NEARLY = 0.97  # share of an estimate that was too short at which the bar waits
 
 
 class Picture(Protocol):
-    """Place on which a bar is drawn."""
+    """Output on which a bar is drawn."""
 
     def draw(self, share: float, text: str) -> None:
         """Show a bar, `share` of it full (0 to 1), and a line."""
@@ -67,7 +67,7 @@ class NotebookPicture:
 
 
 def picture() -> type[Picture] | None:
-    """Return the picture for this program; None where nobody looks: no terminal, no notebook."""
+    """Return the output for this program; None without a terminal or notebook."""
     shell = sys.modules.get("IPython")
     if shell is not None and hasattr(shell.get_ipython(), "kernel"):
         return NotebookPicture
@@ -81,7 +81,7 @@ class WorkProgress:
         """Create the bar of work that ends at `total`, in `unit`."""
         self._title, self._total, self._unit = title, total, unit
         self._compiles: Compilation | None = None
-        self._began, self._done, self._left = time.monotonic(), 0.0, TimeLeft()
+        self._start, self._done, self._left = time.monotonic(), 0.0, TimeLeft()
         self._end, self._thread = threading.Event(), None
         if (kind := picture()) is not None:
             self._thread = threading.Thread(target=self._run, args=(kind,), daemon=True)
@@ -96,9 +96,9 @@ class WorkProgress:
             self._end.set()
             self._thread.join()
 
-    def compiling(self, what: Compilation) -> None:
+    def compiling(self, compilation: Compilation) -> None:
         """Note that kernels compile, until the first call of `show`."""
-        self._began, self._compiles = time.monotonic(), what
+        self._start, self._compiles = time.monotonic(), compilation
 
     def show(self, done: float) -> None:
         """Note that `done` of the total is reached."""
@@ -109,10 +109,10 @@ class WorkProgress:
 
     def state(self) -> tuple[float, str]:
         """Return the share of the bar that is full, and its line."""
-        if (what := self._compiles) is not None:
-            elapsed = time.monotonic() - self._began
-            share = min(NEARLY, elapsed / max(what.seconds, 1e-9))
-            return share, f"{self._title}: compiling once, {elapsed:.0f} of about {what.seconds:.0f} s"
+        if (compilation := self._compiles) is not None:
+            elapsed = time.monotonic() - self._start
+            share = min(NEARLY, elapsed / max(compilation.seconds, 1e-9))
+            return share, f"{self._title}: compiling once, {elapsed:.0f} of about {compilation.seconds:.0f} s"
         left = self._left.text(self._total)
         line = f"{self._title}: {self._done:.{0 if self._unit == 'flights' else 1}f} of {self._total:.4g} {self._unit}"
         return self._done / self._total, f"{line}, {left}" if left else line
@@ -120,11 +120,11 @@ class WorkProgress:
     def _run(self, kind: type[Picture]) -> None:
         if self._end.wait(DELAY):
             return
-        shown = kind()
+        output = kind()
         try:
             while True:
-                shown.draw(*self.state())
+                output.draw(*self.state())
                 if self._end.wait(PERIOD):
                     return
         finally:
-            shown.clear()
+            output.clear()

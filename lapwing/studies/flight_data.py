@@ -27,7 +27,7 @@ from lapwing.messages.topics import (
     STATUS,
     TRUTH,
     Topic,
-    of_all,
+    template_topic,
 )
 from lapwing.studies import tracking
 from lapwing.studies.flight_events import Event, events, slack
@@ -150,7 +150,7 @@ class FlightData(FlightTopics):
         said = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
         result = []
         for own in members(graph.setup):
-            views = {_short(of_all(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
+            views = {_short(template_topic(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
             result.append(cls(views, Origin.of_setup(own), failure, diverged))
         truths = {flight.vehicle: flight.truth for flight in result if flight.has("ground_truth")}
         for flight in result:

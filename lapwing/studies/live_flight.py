@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.messages.topic_columns import history
-from lapwing.messages.topics import ESTIMATE, STATUS, Topic, of_all
+from lapwing.messages.topics import ESTIMATE, STATUS, Topic, template_topic
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.flight_data import IN_SPACE, FlightData
 from lapwing.studies.flight_events import Event
@@ -30,7 +30,7 @@ class LiveFlight:
         """Add log packets of a service."""
         interval = self._setup.interval_ns
         for page in pages:
-            topic = of_all(page.topic)
+            topic = template_topic(page.topic)
             if topic in self._said and page.topic.vehicle in ("", self._setup.vehicle):
                 rows = zip(page.ticks, page.payloads, strict=True)
                 self._said[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]

@@ -10,7 +10,7 @@ from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder, due_ticks, encode
 from lapwing.kernels.row_packing import columns
 from lapwing.messages.topic_columns import TopicColumns, history, history_of_pages
-from lapwing.messages.topics import Topic, of_all
+from lapwing.messages.topics import Topic, template_topic
 
 
 def columns_of(
@@ -25,12 +25,12 @@ def columns_of(
     interval = graph.setup.interval_ns
     for service in graph.services:
         for wire in service.wires:
-            if graph.tick and (wire.topic.recorded if only is None else of_all(wire.topic) in only):
+            if graph.tick and (wire.topic.recorded if only is None else template_topic(wire.topic) in only):
                 columns = PortColumns(graph, wire)
                 yield wire.topic, columns.ticks * interval, columns
         for topic in service.python_topics:
             said = [(tick, payload) for of, tick, payload in service.messages if of is topic]
-            if said and (only is None or of_all(topic) in only):
+            if said and (only is None or template_topic(topic) in only):
                 ticks = np.array([tick for tick, _ in said], np.int64)
                 yield topic, ticks * interval, history(topic.message, [payload for _, payload in said])
 

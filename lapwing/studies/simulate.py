@@ -9,7 +9,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.cosim.scene import Scene
-from lapwing.messages.topics import Topic, of_all
+from lapwing.messages.topics import Topic, template_topic
 from lapwing.services.common.operator_inbox import Operator, no_operator
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import resolve
@@ -60,7 +60,9 @@ def _flown(
     setup = run if isinstance(run, RunConfig) else resolve(run)
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
-    wanted = {wire.port for wire in wires if (wire.topic.recorded if only is None else of_all(wire.topic) in only)}
+    wanted = {
+        wire.port for wire in wires if (wire.topic.recorded if only is None else template_topic(wire.topic) in only)
+    }
     graph, failure, diverged = BlockDiagram(setup, services, PAGE, wanted, rows), "", False
     try:
         look = setup.last_tick + 1 if observe is None else LOOK

@@ -55,7 +55,7 @@ class Group(NamedTuple):
 def form(scene: Scene, schema: Schema) -> list[Group]:
     """Return the tables of a scene as groups of fields, the important ones first."""
     written = tomllib.loads(scene.sources[SCENE_FILE].decode())
-    for override in scene.given or ():  # added tables are those of overrides
+    for override in scene.file_overrides or ():  # added tables are those of overrides
         if isinstance(override.value, dict) and not override.value:
             _table_at(written, override.key)
     resolved = scene.resolved

@@ -1,4 +1,4 @@
-"""The commander as an event-driven Python block.
+"""Commander as an event-driven Python block.
 
 It runs at every tick while it generates setpoints. Along the scene's trajectory it runs only at ticks at which its
 output may change (`commander.wakeup_conditions`).
@@ -56,7 +56,7 @@ class CommanderBlock:
 
     def __init__(
         self,
-        given: AutopilotSetup,
+        config: AutopilotSetup,
         law: Cell,
         thresholds: Cell,
         service: Service,
@@ -67,7 +67,7 @@ class CommanderBlock:
         """Create the block.
 
         Args:
-            given: configuration of the autopilot.
+            config: configuration of the autopilot.
             law: cell of the controller's parameters.
             thresholds: cell of the battery thresholds.
             service: receiver of the messages.
@@ -76,40 +76,46 @@ class CommanderBlock:
             px4: cell of the parameters of PX4's cascade, if it flies.
         """
         self._px4 = px4
-        unwritten = () if given.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
+        unwritten = () if config.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
         self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *unwritten)
-        a = given.airframe
-        self._given, self._law, self._thresholds, self._service, self._operator = (
-            given,
+        a = config.airframe
+        self._config, self._law, self._thresholds, self._service, self._operator = (
+            config,
             law,
             thresholds,
             service,
             operator,
         )
-        self._weight, self._lift = a.mass * a.gravity, lift(a) / len(a.rotor_x)  # [N]; of 1 N of all rotors' thrusts
-        table = {p.name: p for p in given.parameters}
-        thrust_max = controller(given, {p.name: p.default for p in given.parameters}).thrust_max
+        self._weight, self._lift = (
+            a.mass * a.gravity,
+            lift(a) / len(a.rotor_x),
+        )  # [N]; vertical force for 1 N of thrust of each rotor
+        table = {p.name: p for p in config.parameters}
+        thrust_max = controller(config, {p.name: p.default for p in config.parameters}).thrust_max
         self._commander = Commander(
             Constants(
                 table,
                 a.resting_height,
                 a.gravity,
                 self._weight / (lift(a) * thrust_max),
-                bool(given.phases),
-                given.operator,
+                bool(config.phases),
+                config.operator,
                 injection.units,
                 len(a.rotor_x),
             )
         )
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
-        self.phases, self.status_texts = TextTable(given.phases), TextTable([_words(self._commander.initial_status())])
-        self._driven: tuple[float, ...] | None = None  # direct motor voltages in use
-        self._asked = -1  # [tick] of the commander's last step
+        self.phases, self.status_texts = (
+            TextTable(config.phases),
+            TextTable([_status_fields(self._commander.initial_status())]),
+        )
+        self._direct_voltages: tuple[float, ...] | None = None  # direct motor voltages in use
+        self._last_step = -1  # [tick] of the commander's last step
         self._estimate: Any = None  # last estimate passed to the commander
-        self._shown = -1  # [tick] of that estimate
+        self._estimate_tick = -1  # [tick] of that estimate
         self._estimate_every_tick = False
-        self._ordered: ControllerInput | None = None  # last value of the port
+        self._last_order: ControllerInput | None = None  # last value of the port
         self._acknowledgements: list[Any] = []
         self._texts: list[str] = []
 
@@ -121,18 +127,18 @@ class CommanderBlock:
     def on_tick(self, tick: int) -> int:
         """Step the commander at `tick`. Return the tick of the next wake-up."""
         graph = self._graph
-        if self._given.operator and tick - self._asked > 1:
-            self._skip(range(self._asked + 1, tick))
-        self._asked = tick
+        if self._config.operator and tick - self._last_step > 1:
+            self._skip(range(self._last_step + 1, tick))
+        self._last_step = tick
         elapsed = 0.0
-        looked = tick - tick % ESTIMATE_POLL_TICKS
-        if tick == looked or self._estimate_every_tick:
+        estimate_tick = tick - tick % ESTIMATE_POLL_TICKS
+        if tick == estimate_tick or self._estimate_every_tick:
             elapsed = self._interval * (1 if self._estimate_every_tick else ESTIMATE_POLL_TICKS)
-            looked = tick
-        if looked > self._shown:
-            self._estimate, self._shown = graph.latest(ports.ESTIMATE, looked), looked
+            estimate_tick = tick
+        if estimate_tick > self._estimate_tick:
+            self._estimate, self._estimate_tick = graph.latest(ports.ESTIMATE, estimate_tick), estimate_tick
         flight = self._flight(tick)
-        followed = self._followed(tick) if self._given.phases else None
+        reference = self._reference(tick) if self._config.phases else None
         request = self._commander.step(
             CommanderInput(
                 self._interval,
@@ -140,7 +146,7 @@ class CommanderBlock:
                 elapsed,
                 graph.latest(self._battery, tick).charge if graph.has(self._battery) else math.nan,
                 flight.failed_motor,
-                followed,
+                reference,
                 self._thrust(tick),
                 flight.landed_state == LANDED,
                 self._commands(tick),
@@ -148,63 +154,63 @@ class CommanderBlock:
         )
         self._estimate_every_tick = request.estimate_every_tick
         if request.parameters is not None:
-            write(self._law, controller(self._given, dict(request.parameters)))
+            write(self._law, controller(self._config, dict(request.parameters)))
             write(self._thresholds, battery_thresholds(request.parameters))
             if self._px4 is not None:
-                write(self._px4, px4_law.build(request.parameters, self._given.airframe))
+                write(self._px4, px4_law.build(request.parameters, self._config.airframe))
         if request.faults is not None and self._injection.faults is not None:
             write(self._injection.faults, request.faults)
-        if self._injection.direct is not None and request.motor_voltage != self._driven:
-            self._driven = request.motor_voltage
+        if self._injection.direct is not None and request.motor_voltage != self._direct_voltages:
+            self._direct_voltages = request.motor_voltage
             write(self._injection.direct, self._direct(request.motor_voltage))
         order = self._order(tick, request, flight)
-        if order != self._ordered:
+        if order != self._last_order:
             graph.put(ORDER, tick, order)
-            self._ordered = order
-        self._answer(tick, request)
+            self._last_order = order
+        self._publish_acknowledgements(tick, request)
         return self._next(tick, request.valid_for)
 
     def _next(self, tick: int, valid_for: float) -> int:
         """Return the tick of the next wake-up after an output at `tick` that stays valid for `valid_for` [s]."""
         ticks = int(valid_for / self._interval) if valid_for < math.inf else NEVER
-        if self._given.operator:
-            ticks = min(ticks, *[every - tick % every for every in (ESTIMATE_POLL_TICKS, self._given.answers_every)])
+        if self._config.operator:
+            ticks = min(ticks, *[every - tick % every for every in (ESTIMATE_POLL_TICKS, self._config.answers_every)])
         return min(tick + max(1, ticks), NEVER)
 
     def _skip(self, missed: range) -> None:
         """Advance the commander over ticks at which its output stayed valid."""
-        flew = next((tick for tick in reversed(missed) if self._flies(tick)), None)
-        setpoint = None if flew is None else self._followed(flew)
-        self._commander.skip(len(missed), self._interval, flew == missed[-1], setpoint)
+        last_flying = next((tick for tick in reversed(missed) if self._flies(tick)), None)
+        setpoint = None if last_flying is None else self._reference(last_flying)
+        self._commander.skip(len(missed), self._interval, last_flying == missed[-1], setpoint)
 
     def _flies(self, tick: int) -> bool:
         """Return True if the vehicle flies along the trajectory."""
         return self._thrust(tick) > 0.0 and self._flight(tick).landed_state != LANDED
 
     def _flight(self, tick: int) -> Flight:
-        found: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
-        return found
+        flight: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
+        return flight
 
-    def _followed(self, tick: int) -> Setpoint:
-        found: Setpoint = self._graph.latest(ports.TRAJECTORY, tick)
-        return found
+    def _reference(self, tick: int) -> Setpoint:
+        setpoint: Setpoint = self._graph.latest(ports.TRAJECTORY, tick)
+        return setpoint
 
     def _direct(self, volts: tuple[float, ...] | None) -> DirectMotorControl:
         """Return the direct motor voltages within the motors' range; None: the controller's voltages."""
         if volts is None:
             return self._injection.released
-        return DirectMotorControl(True, tuple(min(max(v, 0.0), self._given.airframe.voltage_max) for v in volts))
+        return DirectMotorControl(True, tuple(min(max(v, 0.0), self._config.airframe.voltage_max) for v in volts))
 
     def _thrust(self, tick: int) -> float:
         """Return the last thrust command over the hover thrust; 1 without gravity."""
         if not self._weight > 0.0:
             return 1.0
-        asked = math.total(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
-        return asked * self._lift / self._weight
+        thrust = math.total(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
+        return thrust * self._lift / self._weight
 
     def _commands(self, tick: int) -> tuple[Any, ...]:
-        given = self._given
-        if not given.operator or tick % given.answers_every:
+        config = self._config
+        if not config.operator or tick % config.answers_every:
             return ()
         message = merge_commands(tick * self._interval_ns, self._operator(tick))
         self._service.messages.append((topic.OPERATOR, tick, message.encode()))
@@ -213,16 +219,16 @@ class CommanderBlock:
     def _order(self, tick: int, request: CommanderOutput, flight: Flight) -> ControllerInput:
         status, setpoint = request.status, request.setpoint
         restart = tick if request.reset_controller and flight.landed_state != ON_GROUND else -1
-        status_text_id = self.status_texts.number(_words(status))
+        status_text_id = self.status_texts.number(_status_fields(status))
         if setpoint is None:
             return ControllerInput(True, Setpoint(), status_text_id, False, False, status.released, restart)
         setpoint = setpoint._replace(phase=self.phases.number(status.phase), final=False, release=False)
         return ControllerInput(False, setpoint, status_text_id, status.armed, status.finished, status.released, restart)
 
-    def _answer(self, tick: int, request: CommanderOutput) -> None:
+    def _publish_acknowledgements(self, tick: int, request: CommanderOutput) -> None:
         self._acknowledgements += request.acknowledgements
         self._texts += request.texts
-        if self._given.operator and tick % self._given.answers_every == 0:
+        if self._config.operator and tick % self._config.answers_every == 0:
             message = CommandAcks(
                 header(tick * self._interval_ns, "world"), tuple(self._acknowledgements), tuple(self._texts)
             )
@@ -231,17 +237,17 @@ class CommanderBlock:
             self._texts.clear()
 
 
-def controller(given: AutopilotSetup, values: dict[str, float]) -> Any:
+def controller(config: AutopilotSetup, values: dict[str, float]) -> Any:
     """Return the controller's parameters with the commander's parameter `values`."""
-    gains = given.gains if flies_px4_cascade(given) else with_gains(given.gains, values)
-    return build(gains, given.airframe, given.geometric)
+    gains = config.gains if flies_px4_cascade(config) else with_gains(config.gains, values)
+    return build(gains, config.airframe, config.geometric)
 
 
-def flies_px4_cascade(given: AutopilotSetup) -> bool:
+def flies_px4_cascade(config: AutopilotSetup) -> bool:
     """Return True if PX4's cascade is the control law."""
-    return given.controller is not None and given.controller.name == PX4_CASCADE
+    return config.controller is not None and config.controller.name == PX4_CASCADE
 
 
-def _words(status: Status) -> Status:
+def _status_fields(status: Status) -> Status:
     """Return the part of a status that the port does not have as numbers."""
     return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)

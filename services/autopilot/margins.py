@@ -47,7 +47,7 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
     lag = 1.0 / (1.0 + airframe.motor.time_constant * s)
     moment_x, moment_y, moment_z = moments(airframe)
     i_x, i_y, i_z = airframe.inertia_body
-    found = {
+    responses = {
         "altitude": _pid(p.altitude, s) * lift(airframe) / airframe.mass * lag * late / s**2,
         "yaw": _pid(p.yaw, s) * moment_z / i_z * (1.0 + airframe.spin_up_zero * s) * lag * late / s**2,
     }
@@ -63,10 +63,10 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
         if p.smoothing.lag > 0.0:
             demand = smooth * (s**2 / effect + feedback / (1.0 + p.smoothing.lag * s))
         position = _pid(outer, s) * p.gravity / s**2  # desired tilt over tilt
-        found[tilt] = turn * feedback
-        found[way] = position * turn * demand / (1.0 + turn * feedback)
-        found[f"{way}_plant_input"] = turn * (feedback + position * demand)
-    return found
+        responses[tilt] = turn * feedback
+        responses[way] = position * turn * demand / (1.0 + turn * feedback)
+        responses[f"{way}_plant_input"] = turn * (feedback + position * demand)
+    return responses
 
 
 def margins(loop: np.ndarray) -> Margins:

@@ -32,22 +32,22 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         return None
     config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
     follows = follows_trajectory(scene)
-    truth, own = config.estimator == "ground_truth", config.estimator not in ESTIMATORS
-    carried = sorted(scene.tables("sensors"))
-    sensors = [name for name in FUSED if name in carried and not truth and not own]
+    exact, user_code = config.estimator == "ground_truth", config.estimator not in ESTIMATORS
+    fitted = sorted(scene.tables("sensors"))
+    sensors = [name for name in FUSED if name in fitted and not exact and not user_code]
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
-    inputs = [InputPort(ports.TRUTH)] if truth else [InputPort(name) for name in (carried if own else sensors)]
-    if ports.AIRSPEED in carried and config.accept_commands and not own:
+    inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (fitted if user_code else sensors)]
+    if ports.AIRSPEED in fitted and config.accept_commands and not user_code:
         inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only
     inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     imu_every = every.get(ports.IMU, 1)
-    given = AutopilotSetup(
-        None if truth or own else _estimator(scene, imu_every),
+    setup = AutopilotSetup(
+        None if exact or user_code else _estimator(scene, imu_every),
         start_place(scene),
         imu_every,
-        _lateness(scene, imu_every) if ports.GPS in sensors else 0,
+        _gps_delay(scene, imu_every) if ports.GPS in sensors else 0,
         scene[GainSet].plain(),
         config.attitude_error == "so3",
         known_airframe(scene),
@@ -59,20 +59,20 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         ticks(scene, min(rates.status, exchange.rate), "rates.status"),
         ticks(scene, min(rates.commands, exchange.rate), "rates.commands"),
         _controller(scene),
-        _custom(scene, "estimator", estimator_rate) if own else None,
-        vehicle_model(known_airframe(scene), exchange.interval) if config.controller or own else None,
+        _custom(scene, "estimator", estimator_rate) if user_code else None,
+        vehicle_model(known_airframe(scene), exchange.interval) if config.controller or user_code else None,
         distance_sensor(scene),
     )
-    none = (0.0,) * len(given.airframe.rotor_x)
+    no_voltage = (0.0,) * len(setup.airframe.rotor_x)
     return ServiceConfig(
-        given,
+        setup,
         tuple(inputs),
         (
-            Port(ports.ACTUATORS, MotorCommand(none, False, none, (0.0, 0.0, 0.0))),
+            Port(ports.ACTUATORS, MotorCommand(no_voltage, False, no_voltage, (0.0, 0.0, 0.0))),
             Port(ports.ESTIMATE, EXACT),
             Port(ports.SETPOINT, Setpoint()),
-            Port(ports.STATUS, AutopilotStatus(), given.status_every),
-            *([] if truth or own else [_covariance(scene)]),
+            Port(ports.STATUS, AutopilotStatus(), setup.status_every),
+            *([] if exact or user_code else [_covariance(scene)]),
         ),
     )
 
@@ -97,30 +97,30 @@ def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
     """Return the user code that the key names, after a trial step."""
     config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Communication].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
-    found = rate(name, user_modules.texts(scene), vehicle, options)
-    return CustomCode(name, options, ticks(scene, found, f"autopilot.{key}"))
+    code_rate = rate(name, user_modules.texts(scene), vehicle, options)
+    return CustomCode(name, options, ticks(scene, code_rate, f"autopilot.{key}"))
 
 
 def _estimator(scene: Scene, imu_every: int) -> Estimator:
     receiver = scene.tables("sensors")["gps"].get("preset", "rtk")
-    around, found = environment(scene), estimator.PRESETS.get(receiver, Estimator())
-    level = isinstance(around.terrain, Level)
-    ground = surface(around.terrain, *start_place(scene)[:2])[0]
+    surroundings, preset = environment(scene), estimator.PRESETS.get(receiver, Estimator())
+    level = isinstance(surroundings.terrain, Level)
+    ground = surface(surroundings.terrain, *start_place(scene)[:2])[0]
     if distance_sensor(scene) == ports.RANGEFINDER:
-        found = found._replace(sonar_half_beam_deg=0.5 * scene.lookup("sensors.rangefinder.beam_deg"))
+        preset = preset._replace(sonar_half_beam_deg=0.5 * scene.lookup("sensors.rangefinder.beam_deg"))
         ground -= scene.lookup("sensors.rangefinder.position")[2]  # origin of the distance
-    return found._replace(
+    return preset._replace(
         interval=scene[Communication].interval * imu_every,
-        home=around.home,
+        home=surroundings.home,
         gravity=gravity(scene),
-        atmosphere=around.atmosphere,
-        magnetic_field_world=around.magnetic_field_world,
+        atmosphere=surroundings.atmosphere,
+        magnetic_field_world=surroundings.magnetic_field_world,
         ground_height=ground,
-        sonar_height_max=found.sonar_height_max if level else 0.0,  # the filter assumes level ground
+        sonar_height_max=preset.sonar_height_max if level else 0.0,  # the filter assumes level ground
     )
 
 
-def _lateness(scene: Scene, imu_every: int) -> int:
+def _gps_delay(scene: Scene, imu_every: int) -> int:
     """Return the delay of the receiver in IMU readings."""
-    late = scene.lookup("sensors.gps.latency_samples") / scene.lookup("sensors.gps.rate")
-    return round(round(late * 1e9) / scene[Communication].interval_ns / imu_every)
+    delay = scene.lookup("sensors.gps.latency_samples") / scene.lookup("sensors.gps.rate")
+    return round(round(delay * 1e9) / scene[Communication].interval_ns / imu_every)

@@ -1,4 +1,4 @@
-"""The autopilot service: sensors or ground truth and references in, motor command out."""
+"""Autopilot service: computes motor commands from sensors or ground truth, and from references."""
 
 import math
 from typing import Any
@@ -43,81 +43,93 @@ BOUNCE = 1.0  # [s] of possible motion after a touch-down
 
 def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     """Return the autopilot of a run; `operator` is a source of commands in addition to the plan."""
-    given: AutopilotSetup = setup.services[NAME].parameters
+    config: AutopilotSetup = setup.services[NAME].parameters
     outputs = {port.name: port for port in setup.services[NAME].ports}
-    values = {p.name: p.default for p in given.parameters}
-    law, thresholds = Cell(controller(given, values)), Cell(battery_thresholds(values))
-    px4 = Cell(px4_law.build(values, given.airframe)) if flies_px4_cascade(given) else None
+    values = {p.name: p.default for p in config.parameters}
+    law, thresholds = Cell(controller(config, values)), Cell(battery_thresholds(values))
+    px4 = Cell(px4_law.build(values, config.airframe)) if flies_px4_cascade(config) else None
     wakeup = WakeupParameters(thresholds)
     service = Service(NAME, [], [])
 
-    def speak(tick: int) -> list[Any]:
-        return [*(given.plan if tick == 0 else ()), *operator(tick)]
+    def operator_commands(tick: int) -> list[Any]:
+        return [*(config.plan if tick == 0 else ()), *operator(tick)]
 
-    faults = Cell(Faults(motors=(SOUND,) * len(given.airframe.rotor_x))) if given.operator else None
-    read = () if given.own_estimator else [i.port for i in setup.services[NAME].inputs]
-    injection = Injection(faults, setup, read, given.airframe.motor)
-    commanding = CommanderBlock(given, law, thresholds, service, speak, injection, px4)
-    reference = ports.TRAJECTORY if given.phases else NO_TRAJECTORY
+    faults = Cell(Faults(motors=(SOUND,) * len(config.airframe.rotor_x))) if config.operator else None
+    sensor_ports = () if config.own_estimator else [i.port for i in setup.services[NAME].inputs]
+    injection = Injection(faults, setup, sensor_ports, config.airframe.motor)
+    commander = CommanderBlock(config, law, thresholds, service, operator_commands, injection, px4)
+    reference = ports.TRAJECTORY if config.phases else NO_TRAJECTORY
     common = Controller(
-        law, motor_failure.build(given.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
+        law, motor_failure.build(config.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
     )
     battery, actuators = injection.received(ports.BATTERY), outputs[ports.ACTUATORS]
     inputs = (InputPort(ports.ESTIMATE), InputPort(ORDER), InputPort(battery), InputPort(reference))
-    gives = (injection.commanded(actuators), outputs[ports.SETPOINT], outputs[ports.STATUS], Port(FLIGHT, Flight()))
+    control_outputs = (
+        injection.commanded(actuators),
+        outputs[ports.SETPOINT],
+        outputs[ports.STATUS],
+        Port(FLIGHT, Flight()),
+    )
     if px4 is not None:
         cascade = Px4Controller(common, px4)
-        control = [Block(f"{NAME}.control", cascade, Cell(px4_block.start(cascade)), inputs, gives)]
-    elif given.controller is None:
-        control = [Block(f"{NAME}.control", common, Cell(block.start(common)), inputs, gives)]
+        control = [Block(f"{NAME}.control", cascade, Cell(px4_block.start(cascade)), inputs, control_outputs)]
+    elif config.controller is None:
+        control = [Block(f"{NAME}.control", common, Cell(block.start(common)), inputs, control_outputs)]
     else:
-        control = controller_parts(f"{NAME}.control", setup.modules, given, common, inputs, gives)
-    navigation = _navigation(setup, given, wakeup, outputs[ports.ESTIMATE], injection)
-    service.parts = [*injection.before(NAME), *navigation, commanding, *control, *injection.after(NAME, actuators)]
-    texts, words = commanding.phases.table, commanding.status_texts.table
-    service.wires = wires(setup, given.estimate_every, given.status_every, texts, words)
-    if ports.AIRSPEED in read:
-        told = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
-        service.wires.append(airspeed_wire(topic.AIRSPEED_RECEIVED, setup.vehicle, told))
-    service.python_topics = (topic.OPERATOR, topic.COMMAND_ACKS) if given.operator else ()
+        control = controller_parts(f"{NAME}.control", setup.modules, config, common, inputs, control_outputs)
+    navigation = _navigation(setup, config, wakeup, outputs[ports.ESTIMATE], injection)
+    service.parts = [*injection.before(NAME), *navigation, commander, *control, *injection.after(NAME, actuators)]
+    texts, status_texts = commander.phases.table, commander.status_texts.table
+    service.wires = wires(setup, config.estimate_every, config.status_every, texts, status_texts)
+    if ports.AIRSPEED in sensor_ports:
+        airspeed_port = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
+        service.wires.append(airspeed_wire(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
+    service.python_topics = (topic.OPERATOR, topic.COMMAND_ACKS) if config.operator else ()
     return service
 
 
 def _navigation(
-    setup: RunConfig, given: AutopilotSetup, wakeup: WakeupParameters, estimate: Port, injection: Injection
+    setup: RunConfig, config: AutopilotSetup, wakeup: WakeupParameters, estimate: Port, injection: Injection
 ) -> list[Block]:
     """Return the estimator blocks in order."""
     battery, flight = InputPort(injection.received(ports.BATTERY)), InputPort(FLIGHT, 1)
-    p = given.estimator
-    if given.own_estimator is not None:
+    p = config.estimator
+    if config.own_estimator is not None:
         names = [port.name for port in setup.services["sensors"].ports] if "sensors" in setup.services else []
         sensors = {name: setup.port(name).period for name in names}
-        return estimator_parts(f"{NAME}.estimate", setup.modules, given, wakeup, sensors, (battery, flight), estimate)
+        return estimator_parts(f"{NAME}.estimate", setup.modules, config, wakeup, sensors, (battery, flight), estimate)
     if p is None:
         inputs = (InputPort(ports.TRUTH), battery, flight)
         return [Block(f"{NAME}.estimate", TrueEstimate(wakeup), Cell(0.0), inputs, (estimate,))]
     state = Cell(blank())
-    height_reference = next(q.default for q in given.parameters if q.name == "EKF2_HGT_REF")
+    height_reference = next(q.default for q in config.parameters if q.name == "EKF2_HGT_REF")
     over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
-    known = setup.ports
-    begin = InertialNavigation(p, given.start_world, STANDSTILL_EVERY * given.imu_every)
+    known_ports = setup.ports
+    inertial = InertialNavigation(p, config.start_world, STANDSTILL_EVERY * config.imu_every)
     inputs = (InputPort(injection.received(ports.IMU)), InputPort(injection.received(ports.MAGNETOMETER)), flight)
-    parts = [Block(f"{NAME}.inertial", begin, state, inputs, (), given.imu_every)]
+    parts = [Block(f"{NAME}.inertial", inertial, state, inputs, (), config.imu_every)]
     for port, fusion in (
         (ports.MAGNETOMETER, Correction(p)),
         (ports.BAROMETER, Correction(p)),
-        (ports.GPS, GpsFusion(p, given.gps_age, 0.0 if height_reference == GPS_HEIGHT else NO_HEIGHT)),
-        (given.distance_sensor or ports.SONAR, over_ground if height_reference == SONAR_HEIGHT else Correction(p)),
+        (ports.GPS, GpsFusion(p, config.gps_age, 0.0 if height_reference == GPS_HEIGHT else NO_HEIGHT)),
+        (config.distance_sensor or ports.SONAR, over_ground if height_reference == SONAR_HEIGHT else Correction(p)),
         (ports.OPTICAL_FLOW, Correction(p)),
     ):
-        if port in known:
+        if port in known_ports:
             parts.append(
-                Block(f"{NAME}.{port}", fusion, state, (InputPort(injection.received(port)),), (), known[port].period)
+                Block(
+                    f"{NAME}.{port}",
+                    fusion,
+                    state,
+                    (InputPort(injection.received(port)),),
+                    (),
+                    known_ports[port].period,
+                )
             )
-    told = FilterEstimate(p, wakeup, before(given.start_world))
-    parts.append(Block(f"{NAME}.estimate", told, state, (battery, flight), (estimate,)))
-    if ports.ESTIMATE_COVARIANCE in known:  # not in logs of former versions
-        reported = known[ports.ESTIMATE_COVARIANCE]
+    estimate_block = FilterEstimate(p, wakeup, before(config.start_world))
+    parts.append(Block(f"{NAME}.estimate", estimate_block, state, (battery, flight), (estimate,)))
+    if ports.ESTIMATE_COVARIANCE in known_ports:  # not in logs of former versions
+        covariance_port = known_ports[ports.ESTIMATE_COVARIANCE]
         output = CovarianceOutput(EstimateCovariance())
-        parts.append(Block(f"{NAME}.covariance", output, state, (), (reported,), reported.period))
+        parts.append(Block(f"{NAME}.covariance", output, state, (), (covariance_port,), covariance_port.period))
     return parts

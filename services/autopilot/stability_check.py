@@ -27,8 +27,8 @@ def unstable_loops(scene: Scene) -> list[str]:
     config, exchange, airframe = scene[Autopilot], scene[Communication], known_airframe(scene)
     p = build(scene[GainSet].plain(), airframe)
     loops = open_loops(p, airframe, exchange.interval, exchange.loop_delay)
-    found = {name: excess(response) for name, response in loops.items()}
-    return [f"gains {config.gains}: {name}: unstable{_by(factor)}" for name, factor in found.items() if factor != 1.0]
+    peaks = {name: excess(response) for name, response in loops.items()}
+    return [f"gains {config.gains}: {name}: unstable{_by(factor)}" for name, factor in peaks.items() if factor != 1.0]
 
 
 def _by(factor: float) -> str:

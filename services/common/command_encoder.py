@@ -1,4 +1,4 @@
-"""Topic encoders of what flies the vehicle: motor commands and status."""
+"""Topic encoders of motor commands and autopilot status."""
 
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -125,10 +125,10 @@ class EnvironmentTable(SceneTable):
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Read the file of a grid into its `heights`."""
         try:
-            given = cls.model_validate(tree.get(cls.TABLE, {}))
+            environment_table = cls.model_validate(tree.get(cls.TABLE, {}))
         except ValidationError:
             return  # reported with its key when all tables are validated
-        grid, key = given.terrain.grid, "environment.terrain.grid"
+        grid, key = environment_table.terrain.grid, "environment.terrain.grid"
         if grid is None or grid.file is None:
             if grid and grid.reach is not None:
                 raise ConfigError(f"{key}.reach", "needs a GeoTIFF", "no reach, or the file of a GeoTIFF")
@@ -138,7 +138,7 @@ class EnvironmentTable(SceneTable):
         path, table = files.folder / grid.file, tree[cls.TABLE]["terrain"]["grid"]
         if path.suffix in height_file.GEOTIFF:
             points = _points(grid, key)
-            heights = height_file.of_geotiff(f"{key}.file", path, given.home, points, grid.spacing)
+            heights = height_file.of_geotiff(f"{key}.file", path, environment_table.home, points, grid.spacing)
             table["corner"] = [-points * grid.spacing] * 2
         elif path.suffix != ".npy":
             raise ConfigError(f"{key}.file", f"got {path.name!r}", "the path of an .npy file or a GeoTIFF (.tif)")

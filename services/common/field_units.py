@@ -65,7 +65,7 @@ def field_unit(owner: type | None, field: str) -> str:
 
 @cache
 def parse_unit(name: str) -> Unit | None:
-    """Return a unit from a text such as "(m/s)^2", "N m" or "kg m^2/s"; None if it is none.
+    """Return a unit from a text such as "(m/s)^2", "N m" or "kg m^2/s"; None for other texts.
 
     A blank or a dot multiplies. Everything after a slash up to the next blank divides.
     """

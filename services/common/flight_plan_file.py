@@ -96,8 +96,8 @@ def parse(path: Path, text: str, standing_height: float = 0.0, home: Home = STAN
         ("finish", (), ()),
     ]
     return [
-        OperatorCommand(kind, SOURCE, number, values, "", tuple(given))
-        for number, (kind, values, given) in enumerate(steps, start=1)
+        OperatorCommand(kind, SOURCE, number, values, "", tuple(item_values))
+        for number, (kind, values, item_values) in enumerate(steps, start=1)
     ]
 
 

@@ -76,8 +76,8 @@ def _buffer(entry: dict[str, Any], binary: bytes) -> bytes:
     uri = entry.get("uri")
     if uri is None:
         return binary
-    head, found, text = uri.partition(_EMBEDDED)
-    if not (head.startswith("data:") and found):
+    head, is_embedded, text = uri.partition(_EMBEDDED)
+    if not (head.startswith("data:") and is_embedded):
         raise ValueError("its triangles are in another file; export it as .glb")
     return base64.b64decode(text)
 

@@ -1,1 +1,1 @@
-"""Serves the Foxglove WebSocket protocol: topics as they are, with the simulation's time."""
+"""Foxglove WebSocket server: topics with simulation time."""

@@ -1,6 +1,6 @@
-"""Gate before the WebSocket server: connections of foreign web pages are refused before the server sees them.
+"""Gate before the WebSocket server, which rejects connections of foreign web pages.
 
-A browser lets any page open a WebSocket to this machine, and names the page in Origin. A page whose name was bound anew
+A browser lets any page open a WebSocket to this machine, and names the page in Origin. A page whose name was rebound
 to a local address (DNS rebinding) is named in Host. foxglove-sdk checks neither. The SDK's server therefore listens at
 a random address of 127.0.0.0/8, which a page cannot find, and this gate at the public one.
 """
@@ -16,11 +16,11 @@ from urllib.parse import urlsplit
 
 from lapwing.services.common.address import is_loopback
 
-LONGEST_HEAD = 8192  # [bytes] of a request
-HEAD_TIMEOUT = 10.0  # [s] for it to arrive
-END_TIMEOUT = 2.0  # [s] for clients to read what was sent before the end
+LONGEST_HEAD = 8192  # [bytes] limit of a request's head
+HEAD_TIMEOUT = 10.0  # [s] for the head to arrive
+END_TIMEOUT = 2.0  # [s] for clients to read the remaining data
 CHUNK = 65536  # [bytes]
-HOSTED = ("https://app.foxglove.dev", "https://studio.foxglove.dev")  # pages that are viewers
+HOSTED = ("https://app.foxglove.dev", "https://studio.foxglove.dev")  # web pages of viewers
 DESKTOP = "file://"  # pages of an installed viewer
 _END = b"\r\n\r\n"
 
@@ -30,12 +30,12 @@ def hidden_address() -> str:
     return str(ipaddress.IPv4Address(0x7F000002 + secrets.randbelow(2**24 - 4)))
 
 
-def refusal(head: bytes, host: str) -> str | None:
-    """Return the reason to refuse a request, None for one of a viewer.
+def rejection_reason(head: bytes, host: str) -> str | None:
+    """Return the reason to reject a request, None to accept it.
 
     Args:
         head: request line and headers.
-        host: that the server was asked to listen on.
+        host: host on which the server listens.
     """
     result: dict[str, list[str]] = {}
     for line in head.decode("latin-1").split("\r\n")[1:]:
@@ -45,7 +45,7 @@ def refusal(head: bytes, host: str) -> str | None:
     if len(hosts) != 1 or not _is_own(_name(f"//{hosts[0]}"), host):
         return f"Host {', '.join(hosts) or 'missing'}: expected an address of this machine"
     if origins and not all(_is_viewer(origin, host) for origin in origins):
-        return f"Origin {', '.join(origins)}: is not a viewer's"
+        return f"Origin {', '.join(origins)}: is not a viewer; expected {' or '.join(HOSTED)} or a page of this machine"
     return None
 
 
@@ -72,12 +72,12 @@ class OriginGate:
     """Thread that forwards the connections of viewers.
 
     Attributes:
-        port: at which it listens.
-        refused: connections that were closed.
+        port: port at which it listens.
+        rejected: number of rejected connections.
     """
 
     def __init__(self, host: str, port: int, server: tuple[str, int]):
-        """Begin to listen.
+        """Start to listen.
 
         Args:
             host, port: public address.
@@ -86,7 +86,7 @@ class OriginGate:
         Raises:
             OSError: the address cannot be listened on.
         """
-        self._host, self._server, self.refused = host, server, 0
+        self._host, self._server, self.rejected = host, server, 0
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         self._socket = socket.create_server((host, port), family=family)
         self.port: int = self._socket.getsockname()[1]
@@ -114,8 +114,8 @@ class OriginGate:
         try:
             with suppress(OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
                 head = await asyncio.wait_for(reader.readuntil(_END), HEAD_TIMEOUT)
-                if reason := refusal(head, self._host):
-                    self.refused += 1
+                if reason := rejection_reason(head, self._host):
+                    self.rejected += 1
                     text = reason.encode("ascii", "replace")
                     status = b"HTTP/1.1 403 Forbidden\r\nConnection: close\r\nContent-Type: text/plain\r\n"
                     writer.write(status + b"Content-Length: %d\r\n\r\n%b" % (len(text), text))
@@ -127,24 +127,24 @@ class OriginGate:
             self._open.discard(task)
 
     async def _forward(self, head: bytes, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        behind, ahead = await asyncio.open_connection(*self._server)
-        ahead.write(head)
-        to_server = asyncio.create_task(_pump(reader, ahead))
+        server_reader, server_writer = await asyncio.open_connection(*self._server)
+        server_writer.write(head)
+        to_server = asyncio.create_task(_pump(reader, server_writer))
         try:
-            await _pump(behind, writer)
+            await _pump(server_reader, writer)
         finally:
             await _cancelled([to_server])
-            ahead.close()
+            server_writer.close()
 
     def close(self) -> None:
-        """Let clients read what the server has sent, and stop. Stop the server first."""
+        """Let clients read the remaining data, and stop. Stop the server first."""
         self._loop.call_soon_threadsafe(self._ended.set)
         self._thread.join()
         self._loop.close()
 
 
 async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-    """Copy until the end, and end the copy, too."""
+    """Copy until the end of `reader`, and end `writer`."""
     with suppress(OSError):
         while data := await reader.read(CHUNK):
             writer.write(data)

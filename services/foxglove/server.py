@@ -1,4 +1,4 @@
-"""The server that Foxglove and Lichtblick connect to: payloads go on as they are, with the simulation's time."""
+"""Server for Foxglove and Lichtblick: unchanged payloads with simulation time."""
 
 from typing import Any, Self
 
@@ -6,7 +6,7 @@ from lapwing.messages import TYPES
 from lapwing.services.common.address import host_and_port, is_loopback
 from lapwing.services.foxglove.origin_gate import OriginGate, hidden_address
 
-BACKLOG = 16384  # messages kept for a client; the oldest go where it is too slow
+BACKLOG = 16384  # [messages] queued for a slow client; the oldest are dropped
 
 
 def parse_address(text: str) -> tuple[str, int]:
@@ -33,10 +33,10 @@ def check_address(text: str, insecure: bool) -> None:
 
 
 class Server:
-    """A context manager; serves what is put."""
+    """WebSocket server of published messages; a context manager."""
 
     def __init__(self, address: str, insecure: bool = False):
-        """Begin to listen.
+        """Start to listen.
 
         Args:
             address: HOST:PORT.
@@ -77,7 +77,7 @@ class Server:
         self.port: int = self._gate.port
 
     def declare(self, topic: str, type_name: str) -> None:
-        """Tell clients of a topic before its first message; types that are not ours have no channel."""
+        """Announce a topic to clients before its first message; unknown types have no channel."""
         if topic in self._channels or type_name not in TYPES:
             return
         text = TYPES[type_name].schema_text.encode()

@@ -11,14 +11,14 @@ from lapwing.services.common.last_events import LastEvents
 from lapwing.services.foxglove.server import Server
 
 
-def run(process: Participant, given: Any) -> None:
-    """Serve until the flight has ended, or until asked to stop.
+def run(process: Participant, spec: Any) -> None:
+    """Serve until the run has ended or this process is requested to stop.
 
     Raises:
         ValueError: the address cannot be listened on.
     """
     setup = process.setup
-    with Server(given.foxglove, given.insecure) as server:
+    with Server(spec.foxglove, spec.insecure) as server:
         events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
         watcher = dict.fromkeys(events, process.participants.gid(MONITOR))
         arrived = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
@@ -28,14 +28,17 @@ def run(process: Participant, given: Any) -> None:
             for recorded in process.create_service(name).topics:
                 server.declare(recorded.key(setup.vehicle), recorded.message.type_name)
         process.join()
-        flying, ends = set(process.setup.services), LastEvents(events)  # services whose last batch has not come
-        while ends.await_more(bool(flying)) and not process.stopping:
+        unfinished, ends = (
+            set(process.setup.services),
+            LastEvents(events),
+        )  # services whose last log packet has not arrived
+        while ends.await_more(bool(unfinished)) and not process.stopping:
             news = arrived.get_with_key(POLL)
             if news is None:
                 continue
             key, time_ns, payload = news
             if not payload:
-                flying.discard(key.rpartition("/")[2])
+                unfinished.discard(key.rpartition("/")[2])
                 ends.take(key)
                 continue
             if key in events:

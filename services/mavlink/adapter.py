@@ -1,4 +1,4 @@
-"""The adapter without its sockets: bytes of endpoints and messages of the vehicle in, bytes and commands out."""
+"""MAVLink adapter without sockets: converts between bytes of endpoints and messages and commands of the vehicle."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -24,7 +24,7 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 SECOND = 1_000_000_000
-LINK_TIMEOUT = 3.5  # [s] after its last heartbeat a ground station counts as gone
+LINK_TIMEOUT = 3.5  # [s] after its last heartbeat, a ground station counts as lost
 HEARTBEAT_INTERVAL = 1.0  # [s]
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 ALL = 0  # target system or component of a message for all receivers
@@ -65,7 +65,7 @@ class Adapter:
         self.missions = MissionStore(
             self.clock, self.commands, lambda: self.vehicle.datum, firmware.HOME_FIRST, self.counts
         )
-        self.vehicle.mission = lambda: self.missions.held[mavlink.MAV_MISSION_TYPE_MISSION]
+        self.vehicle.mission = lambda: self.missions.items[mavlink.MAV_MISSION_TYPE_MISSION]
         self.parameters = ParameterStore(description, firmware, self.commands, self.broadcast, self.counts)
         self.setpoints = SetpointKeeper(self.clock, self.commands, lambda: self.parameters.value("COM_OF_LOSS_T"))
         self.sessions: dict[Endpoint, Session] = {}
@@ -80,10 +80,10 @@ class Adapter:
         """Return a new endpoint.
 
         Args:
-            local: it is on this machine.
-            datagrams: no frame continues in the next piece of its bytes.
+            local: True if it is on this machine.
+            datagrams: True if no frame continues in the next piece of its bytes.
             put: sends bytes to it.
-            strict: read nothing of it if its first bytes are not MAVLink.
+            strict: True to ignore it if its first bytes are not MAVLink.
         """
         channel = Channel(self.vehicle.description.system_id, self.signature, datagrams, self.counts, strict)
         endpoint = Endpoint(channel, local, put)
@@ -122,12 +122,12 @@ class Adapter:
 
     def receive(self, endpoint: Endpoint, data: bytes) -> int:
         """Handle bytes from an endpoint. Return the number of valid messages."""
-        sound = 0
+        valid = 0
         for m in endpoint.decode(data):
-            sound += 1
+            valid += 1
             self.counts["received"] += 1
             self._dispatch(endpoint, m)
-        return sound
+        return valid
 
     def _dispatch(self, endpoint: Endpoint, m: Any) -> None:
         system = self.vehicle.description.system_id
@@ -135,11 +135,11 @@ class Adapter:
         target = getattr(m, "target_system", getattr(m, "target", ALL))
         component = getattr(m, "target_component", ALL)
         if source == (system, COMPONENT):
-            self.counts["in our own name"] += 1
+            self.counts["with the address of the vehicle"] += 1
         elif target not in (ALL, system) or component not in (ALL, COMPONENT):
             self.counts["for another vehicle"] += 1
         elif (handler := handlers().get(m.get_msgId())) is None:
-            self.counts["message that we have no use for"] += 1
+            self.counts["unhandled message"] += 1
         else:
             endpoint.system, endpoint.component = source
             handler(self.sessions[endpoint], m)
@@ -155,9 +155,9 @@ class Adapter:
         """
         if topic is OPERATOR:
             if len(payload) > _EMPTY:
-                ours = {endpoint.name for endpoint in self.sessions} if self.commands.connected else ()
-                given = topic.message.decode(payload).commands
-                self.missions.observe([command for command in given if command.source not in ours], ())
+                own_endpoints = {endpoint.name for endpoint in self.sessions} if self.commands.connected else ()
+                accepted = topic.message.decode(payload).commands
+                self.missions.observe([command for command in accepted if command.source not in own_endpoints], ())
             return
         if topic is COMMAND_ACKS and len(payload) == _NO_ACKS:
             return
@@ -205,10 +205,10 @@ class Adapter:
         self.parameters.step()
         if self.vehicle.time_ns >= self._next_link:
             self._next_link = self.vehicle.time_ns + SECOND
-            self._keep_link()
+            self._report_link()
 
-    def _keep_link(self) -> None:
-        """Tell the autopilot once a simulated second that a ground station is there."""
+    def _report_link(self) -> None:
+        """Report a connected ground station to the autopilot; called once per simulated second."""
         for endpoint in self.sessions:
             heartbeat = endpoint.last_heartbeat
             if heartbeat and self.clock.since(heartbeat) < LINK_TIMEOUT and self.trusts(endpoint):

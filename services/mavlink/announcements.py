@@ -14,7 +14,7 @@ NO_ITEM = 0xFFFF  # Status.mission_reached before the first
 
 
 class Announcements:
-    """Compares each status with the one before."""
+    """Detector of changes between two statuses of the autopilot."""
 
     def __init__(self, vehicle: VehicleCache, broadcast: Callable[[Any], None]):
         """Create the comparison; `broadcast` sends a message to every endpoint."""
@@ -24,7 +24,7 @@ class Announcements:
         self._item = (0, 0)
         self._reached = NO_ITEM
         self._texts = 0
-        self._told = ""  # the text of a failsafe that an event has told
+        self._event_text = ""  # text of a failsafe that an event has reported
         self._watches = watches() if vehicle.firmware.EVENTS else []
 
     def step(self) -> None:
@@ -32,7 +32,7 @@ class Announcements:
         s = self._vehicle.status
         if (mode := (s.mode, s.armed, s.failsafe)) != self._mode:
             self._mode = mode
-            self._told = TAKEN_OVER.format(s.text, s.mode) if s.failsafe else ""
+            self._event_text = TAKEN_OVER.format(s.text, s.mode) if s.failsafe else ""
             self._send("HEARTBEAT")
             self._send("EXTENDED_SYS_STATE")
         if (home := self._vehicle.home_world) != self._home:
@@ -70,8 +70,8 @@ class Announcements:
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
         if text in ROUTINE:
             severity = mavlink.MAV_SEVERITY_INFO
-        if self._watches and (text in ROUTINE or text == self._told):
-            text, self._told = f"{text}\t", ""
+        if self._watches and (text in ROUTINE or text == self._event_text):
+            text, self._event_text = f"{text}\t", ""
         self._texts = self._texts % 0xFFFF + 1
         for message in statustext(severity, text, self._texts):
             self._broadcast(message)

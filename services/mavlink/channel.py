@@ -1,4 +1,4 @@
-"""One conversation as bytes: messages to frames and back, numbered, checked and signed. pymavlink does the work."""
+"""Encoding and decoding of the frames of one endpoint, with sequence numbers, checks and signatures (pymavlink)."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -41,10 +41,10 @@ class Channel:
 
         Args:
             system: system id of the vehicle, which sends as its autopilot, component 1.
-            signature: signs and checks, None for neither.
-            datagrams: frames do not continue from one piece of bytes to the next.
+            signature: signs and checks frames; None for no signing.
+            datagrams: True if no frame continues from one piece of bytes to the next.
             counts: rejected messages by reason.
-            strict: read nothing of an endpoint whose first bytes are no frame.
+            strict: True to ignore an endpoint whose first bytes are not a frame.
         """
         self._codec = _Codec(None, system, mavlink.MAV_COMP_ID_AUTOPILOT1)
         self._codec.robust_parsing = True
@@ -52,8 +52,8 @@ class Channel:
         if signature:
             self._codec.signing, self._codec.signature = signature.state, signature
         self._datagrams, self._counts = datagrams, counts
-        self._framed = not strict  # a frame has come, signed or not
-        self.foreign = False  # the first bytes were no frame
+        self._framed = not strict  # a frame was received, signed or not
+        self.foreign = False  # the first bytes were not a frame
 
     def encode(self, message: Any) -> bytes:
         """Return the next frame. Return no bytes, and count it, if a value does not fit its field."""
@@ -61,24 +61,24 @@ class Channel:
         if self._signature:
             self._signature.advance()
         try:
-            found = None if self._signature else frame(message, codec.seq, codec.srcSystem, codec.srcComponent)
-            found = found or message.pack(codec)
+            data = None if self._signature else frame(message, codec.seq, codec.srcSystem, codec.srcComponent)
+            data = data or message.pack(codec)
         except OverflowError:
-            self._counts["beyond what a message holds"] += 1
+            self._counts["value out of range of its field"] += 1
             return b""
         codec.seq = (codec.seq + 1) % 256
-        return found
+        return data
 
     def decode(self, data: bytes) -> Iterator[Any]:
         """Yield the valid messages in a piece of bytes; count the others."""
         codec = self._codec
         if self._datagrams:
             codec.buf, codec.buf_index, codec.expected_length = bytearray(), 0, mavlink.HEADER_LEN_V1 + 2
-        found = codec.parse_char(data)
-        while found is not None:
-            kind = found.get_type()
+        message = codec.parse_char(data)
+        while message is not None:
+            kind = message.get_type()
             if kind == "BAD_DATA":
-                reason = _reason(found.reason)
+                reason = _reason(message.reason)
                 self._counts[reason] += 1
                 self._framed |= reason == UNSIGNED
                 if not self._framed:
@@ -88,8 +88,8 @@ class Channel:
                 self._counts["unknown message"] += 1
             else:
                 self._framed = True
-                yield found
-            found = codec.parse_char(b"")
+                yield message
+            message = codec.parse_char(b"")
         del codec.buf[: codec.buf_index]
         codec.buf_index = 0
 
@@ -97,4 +97,4 @@ class Channel:
 def _reason(reason: str) -> str:
     if "signature" in reason:
         return UNSIGNED
-    return "wrong checksum" if "CRC" in reason else "no MAVLink"
+    return "wrong checksum" if "CRC" in reason else "not MAVLink"

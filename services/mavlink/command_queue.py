@@ -1,4 +1,4 @@
-"""Commands to the autopilot, and its acknowledgements back to those who gave them."""
+"""Commands to the autopilot, and its acknowledgements to their senders."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -7,19 +7,19 @@ from lapwing.messages import CommandAck, OperatorCommand
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.clock import Clock, Instant
 
-TIMEOUT = 2.0  # [s] the autopilot gets to acknowledge
+TIMEOUT = 2.0  # [s] for the autopilot to acknowledge a command
 MAX_WAITING = 256  # commands that may wait for their acknowledgement
 
-OnAcknowledgement = Callable[[Any], None]  # called with each Answer: some say only that it is in progress
+OnAcknowledgement = Callable[[Any], None]  # called with each CommandAck; some only report progress
 
 
 class CommandQueue:
-    """Numbers the commands and leads the acknowledgements back."""
+    """Queue that numbers commands, and passes each acknowledgement to the sender of its command."""
 
     def __init__(self, clock: Clock, put: Callable[[OperatorCommand], None] | None):
         """Create an empty queue; `put` passes a command to the autopilot, None for a recorded flight."""
         self._clock, self._put = clock, put
-        self.started = False  # the autopilot has spoken
+        self.started = False  # the autopilot has published its first message
         self._last = 0
         self._waiting: dict[int, tuple[OnAcknowledgement, Instant, str]] = {}
 
@@ -37,29 +37,29 @@ class CommandQueue:
         text: str = "",
         items: Sequence[Any] = (),
     ) -> None:
-        """Give a command.
+        """Send a command; see `OperatorCommand` for its fields.
 
         Args:
-            kind: of OperatorCommand.
+            kind: kind of command.
             source: sender, "system/component".
-            on_acknowledgement: called with every acknowledgement; with one of our own where none comes.
-            values: of OperatorCommand.
-            text: of OperatorCommand.
-            items: of OperatorCommand.
+            on_acknowledgement: called with every acknowledgement, and with a rejection after `TIMEOUT` without one.
+            values: numeric arguments.
+            text: text argument.
+            items: mission items.
         """
         if self._put is None or not self.started or len(self._waiting) >= MAX_WAITING:
             if on_acknowledgement:
-                on_acknowledgement(_rejection(self._refusal()))
+                on_acknowledgement(_rejection(self._rejection_reason()))
             return
         self._last = self._last % 0xFFFFFFFF + 1
         if on_acknowledgement:
             self._waiting[self._last] = on_acknowledgement, self._clock.now, source
         self._put(OperatorCommand(kind, source, self._last, tuple(float(v) for v in values), text, tuple(items)))
 
-    def _refusal(self) -> str:
+    def _rejection_reason(self) -> str:
         """Return the reason for rejecting a command now."""
         if self._put is None:
-            return "a recorded flight takes no commands"
+            return "a recorded flight accepts no commands"
         return "too many at once" if self.started else "the vehicle is still starting"
 
     def acknowledge(self, acknowledgements: Sequence[Any]) -> None:
@@ -75,9 +75,9 @@ class CommandQueue:
             waiting[0](acknowledgement)
 
     def step(self) -> None:
-        """Reject what the autopilot leaves without an acknowledgement."""
-        late = [n for n, (_, given, _) in self._waiting.items() if self._clock.since(given) > TIMEOUT]
-        for number in late:
+        """Reject the commands that the autopilot has not acknowledged in time."""
+        expired = [n for n, (_, sent, _) in self._waiting.items() if self._clock.since(sent) > TIMEOUT]
+        for number in expired:
             on_acknowledgement, *_ = self._waiting.pop(number)
             on_acknowledgement(_rejection("the autopilot does not acknowledge"))
 

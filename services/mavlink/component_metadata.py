@@ -32,14 +32,14 @@ def files(description: VehicleDescription) -> Mapping[str, bytes]:
     for fact in emulated.facts(description):
         table.setdefault(fact.name, _fact(fact, fact.value(values)))
     parameters = _json({"version": 1, "parameters": [table[name] for name in sorted(table)]})
-    described = {PARAMETERS: (PARAMETER_TYPE, parameters)}
+    contents = {PARAMETERS: (PARAMETER_TYPE, parameters)}
     if emulated.EVENTS:
-        described[EVENTS] = EVENTS_TYPE, _json(events())
-    if output_function(1) in table:  # with ArduPilot's parameters there is no such page
-        described[ACTUATORS] = ACTUATORS_TYPE, _json(actuators(description.rotors))
-    types = [{"type": kind, "uri": uri(path), "fileCrc": crc32(content)} for path, (kind, content) in described.items()]
+        contents[EVENTS] = EVENTS_TYPE, _json(events())
+    if output_function(1) in table:  # ArduPilot's parameters have no such page
+        contents[ACTUATORS] = ACTUATORS_TYPE, _json(actuators(description.rotors))
+    types = [{"type": kind, "uri": uri(path), "fileCrc": crc32(content)} for path, (kind, content) in contents.items()]
     general = {"version": 1, "vendorName": "Lapwing", "modelName": description.name, "metadataTypes": types}
-    return {GENERAL: _json(general)} | {path: content for path, (_, content) in described.items()}
+    return {GENERAL: _json(general)} | {path: content for path, (_, content) in contents.items()}
 
 
 def _json(value: Any) -> bytes:
@@ -47,17 +47,17 @@ def _json(value: Any) -> bytes:
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
-    found = _described(p.name, p.whole, p.unit, p.meaning[:1].upper() + p.meaning[1:], p.default)
+    entry = _entry(p.name, p.whole, p.unit, p.meaning[:1].upper() + p.meaning[1:], p.default)
     limits = {"min": _number(p.least, p.whole), "max": _number(p.most, p.whole)}
-    return found | limits | ({"rebootRequired": True} if p.at_start else {})
+    return entry | limits | ({"rebootRequired": True} if p.at_start else {})
 
 
 def _fact(fact: Fact, value: float) -> dict[str, Any]:
     text = "A fact of the vehicle; cannot be changed"
-    return _described(fact.name, fact.whole, fact.unit, text, value) | {"readOnly": True}
+    return _entry(fact.name, fact.whole, fact.unit, text, value) | {"readOnly": True}
 
 
-def _described(name: str, whole: bool, unit: str, text: str, default: float) -> dict[str, Any]:
+def _entry(name: str, whole: bool, unit: str, text: str, default: float) -> dict[str, Any]:
     return {
         "name": name,
         "type": "Int32" if whole else "Float",

@@ -6,7 +6,7 @@ from typing import Any
 from lapwing.services.mavlink.channel import Channel
 from lapwing.services.mavlink.clock import Instant
 
-MAX_DATAGRAM = 1400  # [bytes] that any network carries in one piece
+MAX_DATAGRAM = 1400  # [bytes] that networks transmit without fragmentation
 
 
 class Endpoint:
@@ -21,18 +21,18 @@ class Endpoint:
             put: sends bytes to it.
         """
         self.local = local
-        self.system = self.component = 0  # who it says it is
+        self.system = self.component = 0  # ids in its messages
         self.last_heartbeat: Instant | None = None
         self._channel, self._put = channel, put
 
     @property
     def name(self) -> str:
-        """ "system/component", as commands bear it."""
+        """ "system/component", the source of its commands."""
         return f"{self.system}/{self.component}"
 
     @property
     def foreign(self) -> bool:
-        """Return True if its first bytes were not MAVLink."""
+        """True if its first bytes were not MAVLink."""
         return self._channel.foreign
 
     def decode(self, data: bytes) -> Iterator[Any]:

@@ -1,4 +1,4 @@
-"""The events of a run: numbered, and stored for receivers that have missed one (MAVLink guide, "Events Interface")."""
+"""Events of a run, numbered and stored for receivers that have missed one (MAVLink guide, "Events Interface")."""
 
 from collections import deque
 from collections.abc import Iterator
@@ -7,19 +7,19 @@ from typing import Any
 from lapwing.services.common.mavlink.dialect import message_class
 
 KEPT = 100  # events that can be sent again
-ROUND = 1 << 16  # sequence numbers begin again after so many
+ROUND = 1 << 16  # modulus of the sequence numbers
 ARGUMENTS = 40  # [bytes] of a message
 ALL = 0  # destination of an event for all receivers
-RESET = 1  # MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET: the numbers have begun anew
+RESET = 1  # MAV_EVENT_CURRENT_SEQUENCE_FLAGS_RESET: the numbers have restarted
 UNAVAILABLE = 0  # MAV_EVENT_ERROR_REASON_UNAVAILABLE
 
 
 class EventLog:
-    """The last events, by their sequence numbers."""
+    """Last `KEPT` events by sequence number."""
 
     def __init__(self) -> None:
-        self.sequence = 0  # of the last event
-        self._kept: deque[tuple[int, Any]] = deque(maxlen=KEPT)  # with their numbers
+        self.sequence = 0  # sequence number of the last event
+        self._kept: deque[tuple[int, Any]] = deque(maxlen=KEPT)  # (sequence number, message)
 
     def current(self) -> Any:
         """Return CURRENT_EVENT_SEQUENCE, by which a station detects missing events."""
@@ -34,12 +34,12 @@ class EventLog:
             arguments: encoded arguments.
             time_ms: time since the start [ms].
         """
-        begins = [] if self._kept else [self.current()]
+        announcement = [] if self._kept else [self.current()]
         self.sequence = (self.sequence + 1) % ROUND
         padded = list(arguments.ljust(ARGUMENTS, b"\0"))
         message = message_class("EVENT")(ALL, ALL, number, time_ms, self.sequence, level << 4 | level, padded)
         self._kept.append((self.sequence, message))
-        return [*begins, message]
+        return [*announcement, message]
 
     def replies(self, first: int, last: int, address: tuple[int, int]) -> Iterator[Any]:
         """Yield the events of a range of sequence numbers; for a missing one, the number of the next.
@@ -49,15 +49,15 @@ class EventLog:
             last: sequence number; may be lower than `first`, since numbers wrap around.
             address: system and component of the requesting endpoint.
         """
-        wanted = (last - first) % ROUND + 1
-        found = dict(self._kept)
+        count = (last - first) % ROUND + 1
+        stored = dict(self._kept)
 
         def missing(number: int) -> Any:
-            oldest = min(found, key=lambda sequence: (sequence - number) % ROUND, default=self.sequence)
+            oldest = min(stored, key=lambda sequence: (sequence - number) % ROUND, default=self.sequence)
             return message_class("RESPONSE_EVENT_ERROR")(*address, number, oldest, UNAVAILABLE)
 
-        if wanted > KEPT:
+        if count > KEPT:
             yield missing(first)
-        for k in range(max(0, wanted - KEPT), wanted):
+        for k in range(max(0, count - KEPT), count):
             number = (first + k) % ROUND
-            yield found.get(number) or missing(number)
+            yield stored.get(number) or missing(number)

@@ -14,10 +14,12 @@ NAMESPACE = "lapwing"
 
 def events() -> dict[str, Any]:
     """Return the description of all events as a JSON tree."""
-    found = definitions().values()
-    enumerations = {a.type.name: a.type for d in found for a in d.arguments if isinstance(a.type, Enumeration)}
+    all_definitions = definitions().values()
+    enumerations = {
+        a.type.name: a.type for d in all_definitions for a in d.arguments if isinstance(a.type, Enumeration)
+    }
     groups: dict[str, Any] = {}
-    for definition in found:
+    for definition in all_definitions:
         groups.setdefault(definition.group, {"events": {}})["events"][str(definition.sub_id)] = _event(definition)
     numbers = {mode.kind: mode.number for mode in reversed(firmware.get("px4").MODES)}
     component = {
@@ -31,15 +33,15 @@ def events() -> dict[str, Any]:
 
 
 def _event(d: Definition) -> dict[str, Any]:
-    found: dict[str, Any] = {"name": d.name, "message": d.message}
+    entry: dict[str, Any] = {"name": d.name, "message": d.message}
     if d.description:
-        found["description"] = d.description
+        entry["description"] = d.description
     if d.type:
-        found["type"] = d.type
+        entry["type"] = d.type
     if d.arguments:
         types = [a.type.name if isinstance(a.type, Enumeration) else a.type for a in d.arguments]
-        found["arguments"] = [{"name": a.name, "type": kind} for a, kind in zip(d.arguments, types, strict=True)]
-    return found
+        entry["arguments"] = [{"name": a.name, "type": kind} for a, kind in zip(d.arguments, types, strict=True)]
+    return entry
 
 
 def _enumeration(e: Enumeration) -> dict[str, Any]:

@@ -23,19 +23,19 @@ class _Kind(NamedTuple):
 
 
 @cache
-def _kind(found: Any) -> _Kind | None:
+def _kind(message_type: Any) -> _Kind | None:
     """Return the constants of a message class. Return None for one with texts or a single field."""
-    names = found.ordered_fieldnames
-    if len(names) < 2 or {"c", "s"} & set(found.native_format.decode()):
+    names = message_type.ordered_fieldnames
+    if len(names) < 2 or {"c", "s"} & set(message_type.native_format.decode()):
         return None
-    arrays = tuple(k for k, length in reversed(list(enumerate(found.array_lengths))) if length)
-    return _Kind(attrgetter(*names), arrays, found.unpacker, found.id, bytes((found.crc_extra,)))
+    arrays = tuple(k for k, length in reversed(list(enumerate(message_type.array_lengths))) if length)
+    return _Kind(attrgetter(*names), arrays, message_type.unpacker, message_type.id, bytes((message_type.crc_extra,)))
 
 
 def frame(message: Any, sequence: int, system: int, component: int) -> bytes | None:
     """Return the unsigned MAVLink 2 frame of a message. Return None for one with texts or a single field."""
-    found: Any = type(message)
-    kind = _kind(found)
+    message_type: Any = type(message)
+    kind = _kind(message_type)
     if kind is None:
         return None
     values = kind.fields(message)

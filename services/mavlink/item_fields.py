@@ -1,4 +1,4 @@
-"""Fields of a MISSION_ITEM_INT, and the table of what is made of each command."""
+"""Fields of a MISSION_ITEM_INT, and the table of functions that convert items."""
 
 import math
 from collections.abc import Callable
@@ -13,7 +13,7 @@ _ON_GLOBE = ABOVE_SEA | ABOVE_HOME
 
 
 class RefusedItemError(ValueError):
-    """An item that cannot be flown; `result` is the MAV_MISSION_RESULT."""
+    """Item that cannot be flown; `result` is the MAV_MISSION_RESULT."""
 
     def __init__(self, result: int, item: int = 0):
         super().__init__(f"item {item}: {mavlink.enums['MAV_MISSION_RESULT'][result].name}")
@@ -23,11 +23,11 @@ class RefusedItemError(ValueError):
 Maker = Callable[[Any, Datum], Any]
 
 MAKERS: dict[int, Maker] = {}
-"""By MAV_CMD."""
+"""Conversion function by MAV_CMD."""
 
 
 def makes(*commands: int) -> Callable[[Maker], Maker]:
-    """Declare what is made of these commands."""
+    """Declare the function that converts items with these commands."""
 
     def declare(function: Maker) -> Maker:
         MAKERS.update(dict.fromkeys(commands, function))

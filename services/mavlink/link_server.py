@@ -1,4 +1,4 @@
-"""An adapter with its sockets: waits for endpoints and for the vehicle at once, and lets neither starve the other."""
+"""MAVLink adapter with its sockets: waits for endpoints and for the vehicle together, and serves both fairly."""
 
 import os
 import selectors
@@ -15,14 +15,14 @@ from lapwing.services.mavlink.links import Link, open_link
 from lapwing.services.mavlink.telemetry_timing import Pacing
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
-WAIT = 0.05  # [s] at most until something else is looked at
+WAIT = 0.05  # [s] longest wait
 
 
 class LinkServer:
-    """Links of one vehicle; a context manager. Those of several vehicles wait together.
+    """Links of one vehicle; a context manager. The servers of several vehicles share one wait.
 
     Attributes:
-        selector: of the sockets of all that wait together.
+        selector: selector of the sockets of all servers that share the wait.
     """
 
     def __init__(
@@ -30,15 +30,15 @@ class LinkServer:
         description: VehicleDescription,
         options: Options,
         operate: Callable[[bytes], None] | None,
-        beside: "LinkServer | None" = None,
+        first: "LinkServer | None" = None,
     ):
         """Open every link.
 
         Args:
-            description: what flies.
-            options: the links, and who may command.
-            operate: hands an encoded OperatorInput to the autopilot; None for a recorded flight.
-            beside: that of another vehicle, whose `wait` serves the sockets of this one, too.
+            description: vehicle.
+            options: URLs and permissions of the links.
+            operate: passes an encoded OperatorInput to the autopilot; None for a recorded flight.
+            first: server of another vehicle, whose `wait` also serves the sockets of this one.
 
         Raises:
             ValueError: a link cannot be opened.
@@ -52,11 +52,11 @@ class LinkServer:
         self.adapter = Adapter(description, operator, options.key, options.insecure, options.log, options.time_stamps)
         self._pacing = Pacing(options.speed)
         self._topics = {topic.key(description.name): topic for topic in TOPICS}
-        self.selector: selectors.BaseSelector = beside.selector if beside else selectors.DefaultSelector()
-        self._owns = beside is None
-        self._woken = os.eventfd(0, os.EFD_NONBLOCK)
+        self.selector: selectors.BaseSelector = first.selector if first else selectors.DefaultSelector()
+        self._owns = first is None
+        self._wakeup = os.eventfd(0, os.EFD_NONBLOCK)
         if self._owns:
-            self.selector.register(self._woken, selectors.EVENT_READ, self._drain)
+            self.selector.register(self._wakeup, selectors.EVENT_READ, self._drain)
         self._links: list[Link] = []
         try:
             for url in options.urls:
@@ -66,15 +66,15 @@ class LinkServer:
             raise
 
     def wake(self) -> None:
-        """End the present wait; may be called from any thread."""
-        with suppress(OSError):  # this is the end
-            os.eventfd_write(self._woken, 1)
+        """End the current wait; may be called from any thread."""
+        with suppress(OSError):  # the server is closed
+            os.eventfd_write(self._wakeup, 1)
 
     def _drain(self) -> None:
-        os.eventfd_read(self._woken)
+        os.eventfd_read(self._wakeup)
 
     def wait(self, seconds: float = WAIT) -> None:
-        """Serve the endpoints once, as soon as there is something; or until woken, or for so long."""
+        """Wait for data, for `wake`, or for `seconds`; then serve the endpoints once."""
         ready = self.selector.select(seconds)
         self.adapter.tick(time.monotonic())
         for key, _ in ready:
@@ -99,8 +99,10 @@ class LinkServer:
         """Return the lines of the final report."""
         lines = [self._pacing.report()]
         counts = self.adapter.counts
-        if refused := ", ".join(f"{count} {what}" for what, count in sorted(counts.items()) if what != "received"):
-            lines.append(f"endpoints: {counts['received']} messages received; {refused}")
+        if rejected := ", ".join(
+            f"{count} {reason}" for reason, count in sorted(counts.items()) if reason != "received"
+        ):
+            lines.append(f"endpoints: {counts['received']} messages received; {rejected}")
         return lines
 
     def close(self) -> None:
@@ -109,7 +111,7 @@ class LinkServer:
             link.close()
         if self._owns:
             self.selector.close()
-        os.close(self._woken)
+        os.close(self._wakeup)
         self.adapter.close()
 
     def __enter__(self) -> "LinkServer":

@@ -1,4 +1,4 @@
-"""The run's log as an endpoint downloads it: a file that may still be growing (MAVLink guide, "Log protocol")."""
+"""Download of the run's log, which may still grow (MAVLink guide, "Log protocol")."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,19 +6,19 @@ from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink
 
-NUMBER = 1  # of the only log there is
+NUMBER = 1  # number of the only log
 PIECE = 90  # [bytes] of one LOG_DATA
 PER_STEP = 100  # messages at each step of the telemetry
 
 
 class LogServer:
-    """Lists the log, and sends what is asked for of it, a few messages at a time."""
+    """Server that lists the log and sends the requested bytes, a few messages at a time."""
 
     def __init__(self, path: Path | None):
         """Create a server of the log at `path`; None: no log."""
         self._path = path
-        self._next = self._end = 0  # bytes that are still to be sent
-        self._due = False  # whether a request is not answered yet, if only by the word that there is no more
+        self._next = self._end = 0  # [bytes] range that remains to be sent
+        self._due = False  # a request needs a reply, which may be empty
 
     @property
     def _size(self) -> int:
@@ -34,14 +34,14 @@ class LogServer:
         return mavlink.MAVLink_log_entry_message(NUMBER, 1, NUMBER, int(self._path.stat().st_mtime), self._size)
 
     def request(self, number: int, offset: int, count: int) -> None:
-        """Send so many bytes from an offset on, in place of what was asked for before."""
+        """Start to send `count` bytes from an offset; this replaces the previous request."""
         self._next = offset
         self._end = min(self._size, offset + count) if number == NUMBER else offset
         self._end = max(self._end, offset)
         self._due = True
 
     def stop(self) -> None:
-        """Send no more."""
+        """Cancel the request."""
         self._next = self._end = 0
         self._due = False
 

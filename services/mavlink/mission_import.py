@@ -66,12 +66,12 @@ def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[A
     Raises:
         RefusedItemError: an item cannot be flown.
     """
-    found = [
+    result = [
         idle() if home_first and number == 0 and m.mission_type == mavlink.MAV_MISSION_TYPE_MISSION else _item(m, datum)
         for number, m in enumerate(items)
     ]
     # ArduPilot's ground stations write 0 where they mean no heading: its copter turns by CONDITION_YAW alone.
-    return [_without_heading(i) if home_first and i.action != "yaw" else i for i in found]
+    return [_without_heading(i) if home_first and i.action != "yaw" else i for i in result]
 
 
 def _without_heading(i: Any) -> Any:

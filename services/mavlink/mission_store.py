@@ -1,4 +1,4 @@
-"""The missions, fences and rally points that the vehicle holds, and uploads on their way."""
+"""Missions, fences and rally points of the vehicle, and active uploads."""
 
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
@@ -14,14 +14,14 @@ from lapwing.services.mavlink.mission_import import MAX_ITEMS, RefusedItemError,
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
 from lapwing.services.mavlink.statustext import statustext
 
-MAX_WARNINGS = 10  # texts about items that are skipped
-KINDS = {  # what the autopilot is asked to take
+MAX_WARNINGS = 10  # texts about skipped items
+KINDS = {  # command to the autopilot
     mavlink.MAV_MISSION_TYPE_MISSION: "mission_upload",
     mavlink.MAV_MISSION_TYPE_FENCE: "fence_upload",
     mavlink.MAV_MISSION_TYPE_RALLY: "rally_upload",
 }
 _KIND_OF = {command: kind for kind, command in KINDS.items()} | {"mission_clear": mavlink.MAV_MISSION_TYPE_MISSION}
-_RECENT = 64  # uploads and acceptances that wait for one another
+_RECENT = 64  # uploads and acknowledgements that wait for their counterpart
 _RESULTS = {
     mavlink.MAV_RESULT_ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED: mavlink.MAV_MISSION_DENIED,
@@ -47,16 +47,16 @@ class MissionStore:
             clock: clock of the link.
             commands: queue of commands to the autopilot.
             datum: returns the reference of coordinates.
-            home_first: the first item of a mission is home, as in ArduPilot.
+            home_first: True if the first item of a mission is home, as in ArduPilot.
             counts: rejected messages by reason.
         """
         self._clock, self._commands, self._datum = clock, commands, datum
         self._home_first, self._counts = home_first, counts
-        self.held: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as they came
+        self.items: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as the endpoint sent them
         self._uploads: dict[int, Upload] = {}
-        self._finished: dict[int, tuple[Endpoint, int]] = {}  # whose the last upload was, and how it ended
-        self._repeats: dict[int, Repeat] = {}  # of last acknowledgements, which may get lost
-        self._observed: deque[Any] = deque(maxlen=_RECENT)  # uploads that did not come through us
+        self._finished: dict[int, tuple[Endpoint, int]] = {}  # endpoint and result of the last upload
+        self._repeats: dict[int, Repeat] = {}  # repetitions of last acknowledgements, which may be lost
+        self._observed: deque[Any] = deque(maxlen=_RECENT)  # uploads of other senders
         self._accepted: deque[tuple[str, int]] = deque(maxlen=_RECENT)  # source and number of commands
 
     def begin(self, endpoint: Endpoint, kind: int, count: int) -> None:
@@ -67,7 +67,7 @@ class MissionStore:
             self._counts["upload while another endpoint uploads"] += 1
             self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_DENIED)
         elif upload and upload.complete:
-            return  # said twice: the acknowledgement is on its way
+            return  # a repeated message: the acknowledgement is pending
         elif kind not in KINDS:
             self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_UNSUPPORTED)
         elif count > MAX_ITEMS:
@@ -75,24 +75,24 @@ class MissionStore:
             self._acknowledge(endpoint, kind, mavlink.MAV_MISSION_NO_SPACE)
         else:
             upload = self._uploads[kind] = Upload(endpoint, kind, count, self._clock)
-            self._go_on(upload)
+            self._continue(upload)
 
     def take(self, endpoint: Endpoint, m: Any) -> None:
         """Handle an item of an upload: the next one, one out of order, or a repeated one."""
         upload = self._uploads.get(m.mission_type)
         if upload is None or upload.endpoint is not endpoint:
             self._counts["item without a request"] += 1
-            whose, result = self._finished.get(m.mission_type, (None, 0))
-            if whose is endpoint:  # it has missed the acknowledgement
+            last_endpoint, result = self._finished.get(m.mission_type, (None, 0))
+            if last_endpoint is endpoint:  # the acknowledgement was lost
                 self._acknowledge(endpoint, m.mission_type, result)
         elif upload.complete or m.seq < len(upload.items):
-            self._counts["item again"] += 1
+            self._counts["repeated item"] += 1
         elif m.seq > len(upload.items):
             self._counts["item out of order"] += 1
-            self._ask(upload)
+            self._request_next(upload)
         else:
             upload.take(m)
-            self._go_on(upload)
+            self._continue(upload)
 
     def forget(self, endpoint: Endpoint, kind: int | None = None) -> None:
         """Stop repeating the last acknowledgement to an endpoint that has left or continues with something else."""
@@ -107,11 +107,11 @@ class MissionStore:
             del self._uploads[kind]
 
     def clear(self, endpoint: Endpoint, kind: int) -> None:
-        """Forget what is held."""
+        """Delete the items of a kind."""
         if kind == mavlink.MAV_MISSION_TYPE_ALL:
             for other in KINDS:
                 if other not in self._uploads:
-                    self._hand_over(Upload(endpoint, other, 0, self._clock), told=kind)
+                    self._hand_over(Upload(endpoint, other, 0, self._clock), acknowledged_kind=kind)
         else:
             self.begin(endpoint, kind, 0)
 
@@ -121,13 +121,13 @@ class MissionStore:
         self._accepted += ((a.source, a.id) for a in acknowledgements if a.result == mavlink.MAV_RESULT_ACCEPTED)
         for command in [c for c in self._observed if (c.source, c.id) in self._accepted]:
             self._observed.remove(command)
-            self.hold(command)
+            self.store(command)
 
-    def hold(self, command: Any) -> None:
+    def store(self, command: Any) -> None:
         """Store the items of an upload command that the autopilot has accepted."""
         if command.kind in _KIND_OF:
             kind = _KIND_OF[command.kind]
-            self.held[kind] = to_mavlink(command.items, kind, self._datum())
+            self.items[kind] = to_mavlink(command.items, kind, self._datum())
 
     def step(self) -> None:
         """Repeat requests for missing items until the limit; repeat the last acknowledgements."""
@@ -137,30 +137,30 @@ class MissionStore:
             if repeat.over:
                 del self._repeats[kind]
         for upload in [u for u in self._uploads.values() if u.overdue]:
-            if upload.given_up:
-                self._counts["upload that stopped"] += 1
+            if upload.timed_out:
+                self._counts["upload timed out"] += 1
                 self._end(upload, mavlink.MAV_MISSION_OPERATION_CANCELLED)
             else:
-                upload.ask_again()
-                self._ask(upload)
+                upload.note_lost_request()
+                self._request_next(upload)
 
-    def _go_on(self, upload: Upload) -> None:
+    def _continue(self, upload: Upload) -> None:
         if len(upload.items) < upload.count:
-            self._ask(upload)
+            self._request_next(upload)
             return
         self._hand_over(upload)
 
-    def _ask(self, upload: Upload) -> None:
+    def _request_next(self, upload: Upload) -> None:
         to = upload.endpoint.system, upload.endpoint.component
-        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, upload.ask(), upload.kind))
+        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, upload.next_request(), upload.kind))
 
-    def _hand_over(self, upload: Upload, told: int | None = None) -> None:
+    def _hand_over(self, upload: Upload, acknowledged_kind: int | None = None) -> None:
         """Send the complete items to the autopilot, or reject them."""
         try:
             items = from_mavlink(upload.items, self._home_first, self._datum())
-        except RefusedItemError as refused:
-            self._counts["item that cannot be flown"] += 1
-            self._end(upload, refused.result)
+        except RefusedItemError as error:
+            self._counts["invalid item"] += 1
+            self._end(upload, error.result)
             return
         upload.complete = True
 
@@ -168,21 +168,23 @@ class MissionStore:
             if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 return
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
-                self.held[upload.kind] = upload.items
+                self.items[upload.kind] = upload.items
                 for text in skipped(upload.items)[:MAX_WARNINGS]:
                     for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
                         upload.endpoint.send(message)
-            self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), told)
+            self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), acknowledged_kind)
 
         self._commands.put(KINDS[upload.kind], upload.endpoint.name, acknowledged, items=items)
 
-    def _end(self, upload: Upload, result: int, told: int | None = None) -> None:
+    def _end(self, upload: Upload, result: int, acknowledged_kind: int | None = None) -> None:
         self._uploads.pop(upload.kind, None)
         self._finished[upload.kind] = upload.endpoint, result
         if upload.count:
             self._repeats[upload.kind] = Repeat(upload, result, self._clock)
-        if told is None or upload.kind == max(KINDS):  # of a clearing of everything once, at its end
-            self._acknowledge(upload.endpoint, upload.kind if told is None else told, result)
+        if acknowledged_kind is None or upload.kind == max(
+            KINDS
+        ):  # clearing all kinds has one acknowledgement, at its end
+            self._acknowledge(upload.endpoint, upload.kind if acknowledged_kind is None else acknowledged_kind, result)
 
     def _acknowledge(self, endpoint: Endpoint, kind: int, result: int) -> None:
         endpoint.send(mavlink.MAVLink_mission_ack_message(endpoint.system, endpoint.component, result, kind))

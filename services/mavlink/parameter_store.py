@@ -1,4 +1,4 @@
-"""The autopilot's tunable parameters as endpoints see them: numbered, typed, and always acknowledged."""
+"""Autopilot parameters for endpoints: numbered, typed, and always acknowledged."""
 
 import math
 import struct
@@ -19,7 +19,7 @@ MAX_PER_STEP = 20  # values of a list sent to one endpoint at each step of the t
 
 
 class ParameterStore:
-    """The autopilot's parameters with the values that it has last acknowledged, and the facts of the vehicle."""
+    """Parameters of the autopilot with their last acknowledged values, and facts of the vehicle."""
 
     def __init__(
         self,
@@ -44,24 +44,26 @@ class ParameterStore:
         self._number = {name: k for k, name in enumerate(self.names)}
         self._values = {name: p.default for name, p in self._table.items()}
         self._firmware, self._commands, self._broadcast, self._counts = firmware, commands, broadcast, counts
-        self._set_facts: dict[str, float] = {}  # as they were set, while their counterparts have these values
-        self._again: dict[str, int] = {}  # changed parameters to send again, in so many steps
-        self._lists: dict[Endpoint, int] = {}  # lists on their way: the next index of each
+        self._set_facts: dict[
+            str, float
+        ] = {}  # values that were set; valid while their counterparts have the corresponding values
+        self._repetitions: dict[str, int] = {}  # changed parameters to send again, with the number of steps until then
+        self._lists: dict[Endpoint, int] = {}  # next index of each active list
 
     def value(self, name: str) -> float:
         """Return a parameter's value; NaN if there is no such parameter."""
         fact = self._facts.get(name)
         if fact is None:
             return self._values.get(name, math.nan)
-        chosen = self._set_facts.get(name)
-        if chosen is not None and fact.assign is not None:
-            counterparts = fact.assign(chosen)
+        set_value = self._set_facts.get(name)
+        if set_value is not None and fact.assign is not None:
+            counterparts = fact.assign(set_value)
             if counterparts is not None and all(self._values.get(k) == v for k, v in counterparts.items()):
-                return chosen
+                return set_value
         return fact.value(self._values)
 
     def start_list(self, endpoint: Endpoint) -> None:
-        """Send all, a few at a time."""
+        """Start to send all parameters, a few at a time."""
         self._lists[endpoint] = 0
 
     def step(self) -> None:
@@ -69,10 +71,10 @@ class ParameterStore:
 
         PX4 sends a changed parameter twice, some milliseconds apart; MAVSDK's subscriptions need the second one.
         """
-        for name, steps in list(self._again.items()):
-            self._again[name] = steps - 1
+        for name, steps in list(self._repetitions.items()):
+            self._repetitions[name] = steps - 1
             if steps <= 1:
-                del self._again[name]
+                del self._repetitions[name]
                 self._broadcast(self._message(name))
         for endpoint, begin in list(self._lists.items()):
             for name in self.names[begin : begin + MAX_PER_STEP]:
@@ -86,7 +88,7 @@ class ParameterStore:
         self._lists.pop(endpoint, None)
 
     def read(self, endpoint: Endpoint, name: str, index: int) -> None:
-        """Send one, by its name or its index."""
+        """Send one parameter, by its name or its index."""
         if index != BY_NAME:
             name = self.names[index] if 0 <= index < len(self.names) else ""
         if name in self._number:
@@ -103,7 +105,7 @@ class ParameterStore:
         if parameter is None:
             self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
-        wanted = _unrounded(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
+        requested = _unrounded(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
 
         def acknowledged(acknowledgement: Any) -> None:
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
@@ -115,16 +117,16 @@ class ParameterStore:
         if not trusted:
             self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED)
             self._send(endpoint, name)
-        elif not math.isfinite(wanted):
+        elif not math.isfinite(requested):
             self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             self._send(endpoint, name)
         else:
-            self._commands.put("parameter", endpoint.name, acknowledged, (wanted,), name)
+            self._commands.put("parameter", endpoint.name, acknowledged, (requested,), name)
 
     def _set_fact(self, endpoint: Endpoint, fact: Fact, value: float, trusted: bool) -> None:
-        """Set the counterparts of a fact, one after the other."""
-        chosen = self._firmware.param_value(value, fact.whole)
-        counterparts = fact.assign(chosen) if fact.assign and math.isfinite(chosen) else None
+        """Set the counterparts of a fact, one after another."""
+        set_value = self._firmware.param_value(value, fact.whole)
+        counterparts = fact.assign(set_value) if fact.assign and math.isfinite(set_value) else None
         error = None
         if fact.assign is None:
             error = mavlink.MAV_PARAM_ERROR_READ_ONLY
@@ -139,33 +141,33 @@ class ParameterStore:
             self._send(endpoint, fact.name)
             return
         before = self.value(fact.name)
-        self._set_facts[fact.name] = chosen
+        self._set_facts[fact.name] = set_value
         waiting = {name: v for name, v in counterparts.items() if self._values[name] != v}
         if not waiting:
-            self._tell(fact.name)
+            self._announce(fact.name)
             return
 
         def acknowledged(name: str, acknowledgement: Any) -> None:
             del waiting[name]
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self._change(name, acknowledgement.value)
-            if not waiting and self.value(fact.name) == before:  # else told as what follows from the change
-                self._tell(fact.name)
+            if not waiting and self.value(fact.name) == before:  # otherwise `_change` has sent it
+                self._announce(fact.name)
 
         for name, v in list(waiting.items()):
             self._commands.put("parameter", endpoint.name, partial(acknowledged, name), (v,), name)
 
-    def _tell(self, name: str) -> None:
+    def _announce(self, name: str) -> None:
         """Send a changed parameter to every endpoint, and again at the next step."""
         self._broadcast(self._message(name))
-        self._again[name] = 1
+        self._repetitions[name] = 1
 
     def _change(self, name: str, value: float) -> None:
-        """Tell every endpoint the new value, and the facts that follow from it."""
-        before = {fact: self.value(fact) for fact in self._facts}
+        """Send the new value, and the facts that depend on it, to every endpoint."""
+        previous = {fact: self.value(fact) for fact in self._facts}
         self._values[name] = value
-        for changed in (name, *[fact for fact in self._facts if self.value(fact) != before[fact]]):
-            self._tell(changed)
+        for changed in (name, *[fact for fact in self._facts if self.value(fact) != previous[fact]]):
+            self._announce(changed)
 
     def _send(self, endpoint: Endpoint, name: str) -> None:
         endpoint.send(self._message(name))

@@ -1,8 +1,7 @@
-"""PX4's parameters that the autopilot has under other names or not at all: facts of the vehicle and translations.
+"""PX4 parameters that the autopilot lacks or names differently: facts of the vehicle, and translations.
 
-Names and values are those of PX4's parameter reference; a part that is not fitted says so. Some follow from others:
-what PX4 has in one number, the autopilot has in several. Those that PX4 lets a user set and that have a counterpart can
-be set, and set the counterparts.
+Names and values are those of PX4's parameter reference. A PX4 parameter may correspond to several parameters of the
+autopilot, its counterparts. Setting a PX4 parameter sets its counterparts.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -16,24 +15,24 @@ Values = Mapping[str, float]
 
 
 class Fact(NamedTuple):
-    """A parameter that follows from the vehicle or from the autopilot's parameters."""
+    """Parameter that is computed from the vehicle or from the autopilot's parameters."""
 
     name: str
     value: Callable[[Values], float]  # of the autopilot's parameters
     whole: bool = True
     unit: str = ""
-    # The autopilot's parameters for a value, None for one that it has no counterpart for; None: read only
+    # returns the autopilot's parameters for a value, or None for an unsupported value; None: read-only
     assign: Callable[[float], Values | None] | None = None
 
 
 def _translated(name: str, counterpart: str, actions: dict[int, int], default: int = 0) -> Fact:
     """Return a failsafe action of PX4 that is one of the autopilot's; `actions` has the latter by the former."""
-    shown = {ours: theirs for theirs, ours in reversed(actions.items())}
+    px4_actions = {own: px4 for px4, own in reversed(actions.items())}
 
     def assign(value: float) -> Values | None:
         return {counterpart: float(actions[int(value)])} if value in actions else None
 
-    return Fact(name, lambda v: shown.get(int(v.get(counterpart, NOTHING)), default), assign=assign)
+    return Fact(name, lambda v: px4_actions.get(int(v.get(counterpart, NOTHING)), default), assign=assign)
 
 
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
@@ -43,8 +42,8 @@ LOGGED_FROM_BOOT_TO_SHUTDOWN = 2  # SDLOG_MODE
 INTERNAL_COMPASS, NO_COLLISION_PREVENTION = -1, -1  # CAL_MAG0_ROT, CP_DIST
 NO_SWITCHES = ("MODE_SW", "FLTMODE", "RETURN_SW", "LOITER_SW", "OFFB_SW", "KILL_SW", "ARM_SW", "GEAR_SW", "TRANS_SW")
 NO_THRESHOLDS = ("ARMSWITCH", "GEAR", "KILLSWITCH", "LOITER", "OFFB", "RETURN")
-THRESHOLD = 0.75  # that PX4 begins with
-NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # what a failsafe of the autopilot does
+THRESHOLD = 0.75  # PX4's default
+NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # failsafe actions of the autopilot
 _WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
 # PX4's actions that the autopilot has; it has no termination
 _GEOFENCE = {1: NOTHING, 0: NOTHING, 2: HOLD, 3: RETURN, 5: LAND}  # GF_ACTION
@@ -123,7 +122,7 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         _translated("GF_ACTION", "FS_FENCE_ACT", _GEOFENCE, _DESCENT["GF_ACTION"]),
         _translated("NAV_RCL_ACT", "NAV_DLL_ACT", _LINK_LOSS),  # sticks come over the data link
         _translated("COM_ACT_FAIL_ACT", "FS_MOTOR_ACT", _MOTOR_LOSS, _DESCENT["COM_ACT_FAIL_ACT"]),
-        # Modes that go on without sticks: all that need none do so, whatever is set
+        # Modes that continue without sticks: all modes that need none, whatever the value
         Fact("COM_RCL_EXCEPT", lambda _: 0.0, assign=lambda x: {} if x in range(EXCEPTIONS + 1) else None),
         Fact("CP_DIST", lambda _: NO_COLLISION_PREVENTION, False, "m"),
         Fact("SENS_DPRES_OFF", lambda _: 0.0, False, "Pa"),

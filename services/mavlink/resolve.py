@@ -1,4 +1,4 @@
-"""From a scene to what the MAVLink link knows of its vehicle."""
+"""Description of a scene's vehicle for the MAVLink process."""
 
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.atmosphere import FREEZING, temperature

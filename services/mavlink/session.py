@@ -19,11 +19,11 @@ from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.stream_rates import Schedule
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-SAY_EVERY, MAX_SAID = 5.0, 64  # [s] between two times of the same text; texts that are remembered
+TEXT_PERIOD, MAX_TEXTS = 5.0, 64  # [s] between two equal texts; number of texts that are stored
 
 
 class Session:
-    """The conversation with one endpoint."""
+    """Conversation with one endpoint."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Session:
         self.log = LogServer(log)
         self.files = FileServer(files(vehicle.description))
         self._commands, self._counts, self._trusts = commands, counts, trusts
-        self._said: dict[str, Instant] = {}
+        self._sent_texts: dict[str, Instant] = {}
 
     @property
     def address(self) -> tuple[int, int]:
@@ -87,11 +87,11 @@ class Session:
 
     def say(self, text: str) -> None:
         """Send the reason of a rejection to this endpoint only, equal texts at most every few seconds."""
-        before = self._said.get(text)
-        if before is None or self.clock.since(before) > SAY_EVERY:
-            if len(self._said) >= MAX_SAID:
-                self._said.clear()
-            self._said[text] = self.clock.now
+        last_sent = self._sent_texts.get(text)
+        if last_sent is None or self.clock.since(last_sent) > TEXT_PERIOD:
+            if len(self._sent_texts) >= MAX_TEXTS:
+                self._sent_texts.clear()
+            self._sent_texts[text] = self.clock.now
             for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
                 self.endpoint.send(message)
 

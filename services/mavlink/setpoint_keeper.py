@@ -1,4 +1,4 @@
-"""Offboard setpoints in fast runs: repeated until their sender is late by wall time too.
+"""Repetition of offboard setpoints in fast runs, until their sender is late by wall time too.
 
 The autopilot counts COM_OF_LOSS_T in simulation time. In a run faster than real time a sender would be lost after a
 fraction of it in wall time: at five times real time a pause of 0.2 s loses 1 s.
@@ -13,28 +13,28 @@ INTERVAL = 200_000_000  # [ns] of simulation time between two repetitions
 
 
 class SetpointKeeper:
-    """The newest offboard setpoint and its repetitions."""
+    """Keeper of the newest offboard setpoint, which repeats it."""
 
     def __init__(self, clock: Clock, commands: CommandQueue, timeout: Callable[[], float]):
         """Create a keeper without a setpoint; `timeout` returns the time [s] after which setpoints are lost."""
         self._clock, self._commands, self._timeout = clock, commands, timeout
-        self._held: tuple[str, str, Sequence[float], Instant] | None = None
+        self._newest: tuple[str, str, Sequence[float], Instant] | None = None
         self._next = 0  # [ns] of the next repetition
 
     def hold(self, kind: str, source: str, values: Sequence[float]) -> None:
-        """Take a setpoint that was just sent."""
-        self._held = kind, source, values, self._clock.now
+        """Store a setpoint that was just sent."""
+        self._newest = kind, source, values, self._clock.now
         self._next = self._clock.now.time_ns + INTERVAL
 
     def step(self) -> None:
-        """Repeat the setpoint while, at the present speed, its loss then comes no later than by wall time."""
-        if self._held is None or self._clock.now.time_ns < self._next:
+        """Repeat the setpoint unless, at the current speed, its loss would then occur later than by wall time."""
+        if self._newest is None or self._clock.now.time_ns < self._next:
             return
-        kind, source, values, then = self._held
+        kind, source, values, received = self._newest
         now, timeout = self._clock.now, self._timeout()
-        simulated, wall = (now.time_ns - then.time_ns) * 1e-9, now.wall - then.wall
+        simulated, wall = (now.time_ns - received.time_ns) * 1e-9, now.wall - received.wall
         if not wall * (1.0 + timeout / simulated) <= timeout:  # NaN: the vehicle has no time-out
-            self._held = None
+            self._newest = None
             return
         self._next = now.time_ns + INTERVAL
         self._commands.put(kind, source, values=values)

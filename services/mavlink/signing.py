@@ -1,4 +1,4 @@
-"""MAVLink 2 signing: the key, and time stamps that survive a restart so that recorded frames cannot be replayed.
+"""MAVLink 2 signing: the key, and persistent time stamps, so that recorded frames cannot be replayed.
 
 MAVLink guide, "Message Signing": an accepted frame has a later time stamp than every frame accepted before on the same
 stream (link id, system, component), and time stamps are kept in persistent storage.

@@ -6,16 +6,16 @@ from lapwing.services.mavlink.telemetry import streams
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 SECOND = 1_000_000_000
-MAX_INTERVAL = 0x7FFFFFFF * 1000  # [ns] that MESSAGE_INTERVAL can hold
+MAX_INTERVAL = 0x7FFFFFFF * 1000  # [ns] largest value of MESSAGE_INTERVAL
 
 
 class Schedule:
-    """Intervals of the streams to one endpoint: of the telemetry's table, unless it has asked for others."""
+    """Intervals of the streams to one endpoint: defaults, or those that the endpoint has requested."""
 
     def __init__(self, vehicle: VehicleCache):
         """Create the intervals of a ground station, all due now."""
         self._vehicle = vehicle
-        self._asked: dict[int, int] = {}  # interval [ns] by message that the endpoint has asked for; 0: never
+        self._requested: dict[int, int] = {}  # requested interval [ns] by message; 0: never
         self._onboard = False
         self._intervals: dict[int, int] = {}
         self._due: dict[int, int] = {}
@@ -28,15 +28,15 @@ class Schedule:
             self._plan()
 
     def set_interval(self, number: int, interval_us: float) -> None:
-        """Send a message every so many microseconds; 0: as usual, negative: never.
+        """Set the interval of a message [us]; 0: default, negative: never.
 
         Raises:
             OverflowError: an infinite interval.
         """
         if interval_us == 0.0:
-            self._asked.pop(number, None)
+            self._requested.pop(number, None)
         else:
-            self._asked[number] = 0 if interval_us < 0.0 else max(1, min(MAX_INTERVAL, round(interval_us * 1e3)))
+            self._requested[number] = 0 if interval_us < 0.0 else max(1, min(MAX_INTERVAL, round(interval_us * 1e3)))
         self._plan()
 
     def interval_us(self, number: int) -> int:
@@ -45,22 +45,22 @@ class Schedule:
 
     def due(self, built: dict[int, list[Any]]) -> list[Any]:
         """Return the messages that are due; `built` caches messages of this time for all endpoints."""
-        now, found = self._vehicle.time_ns, []
+        now, messages = self._vehicle.time_ns, []
         for number, interval in self._intervals.items():
-            due = self._due[number]
-            if interval and now >= due:
-                self._due[number] = max(due + interval, now - interval)  # keeps the mean rate, catches up no more
+            due_ns = self._due[number]
+            if interval and now >= due_ns:
+                self._due[number] = max(due_ns + interval, now - interval)  # keeps the mean rate without bursts
                 if number not in built:
                     built[number] = streams()[number].messages(self._vehicle)
-                found += built[number]
-        return found
+                messages += built[number]
+        return messages
 
     def _plan(self) -> None:
-        """Set all intervals anew."""
+        """Set all intervals."""
         for number, stream in streams().items():
             rate = stream.onboard if self._onboard else stream.ground
             rate = self._vehicle.firmware.RATES.get(stream.name, rate)
-            interval = self._asked.get(number, round(SECOND / rate) if rate else 0)
+            interval = self._requested.get(number, round(SECOND / rate) if rate else 0)
             if self._intervals.get(number) != interval:
                 self._intervals[number] = interval
                 self._due[number] = self._vehicle.time_ns

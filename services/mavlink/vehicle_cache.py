@@ -1,4 +1,4 @@
-"""The newest state of the vehicle: every message that it publishes, decoded on demand."""
+"""Newest state of the vehicle: all messages that it publishes, decoded on demand."""
 
 from collections.abc import Callable, Sequence
 from functools import cached_property
@@ -34,7 +34,7 @@ class NedMotion:
 
     @cached_property
     def time_ns(self) -> int:
-        """Simulation time that it holds for [ns]."""
+        """Simulation time of the motion [ns]."""
         return nanoseconds(self._stamp)
 
     @cached_property
@@ -49,7 +49,7 @@ class NedMotion:
 
 
 class VehicleCache:
-    """A vehicle as its links see it: its description, simulation time, and the newest message of each topic."""
+    """Vehicle for its links: description, simulation time, and the newest message of each topic."""
 
     def __init__(self, description: VehicleDescription):
         """Create the cache of a vehicle that has published nothing yet."""
@@ -58,12 +58,12 @@ class VehicleCache:
         self.time_ns = 0
         self.flight = FlightTimes()
         self.events = EventLog()
-        self.reports_asked = 0  # of what hinders arming, by stations; one that is new asks, too
+        self.report_requests = 0  # number of requests for arming blockers, including that of each new station
         latitude, longitude, height = description.home
-        # GPS_GLOBAL_ORIGIN as told to ground stations: [1e-7 deg], [1e-7 deg], [mm]
+        # GPS_GLOBAL_ORIGIN for ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height
         self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
-        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # the items that it holds, as endpoints wrote them
+        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # its mission items, as endpoints wrote them
         self._home_heading = 0.0
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}
@@ -118,7 +118,7 @@ class VehicleCache:
 
     @property
     def home_heading(self) -> float:
-        """Heading [rad] from north, to the right, with which it was armed; before that, its heading now."""
+        """Heading [rad] from north, clockwise, at arming; the current heading before that."""
         return self._home_heading
 
     @property

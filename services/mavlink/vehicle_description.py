@@ -18,7 +18,7 @@ class Battery(NamedTuple):
 
 
 class Rotor(NamedTuple):
-    """A rotor, as the autopilot numbers them."""
+    """Rotor, in the order of the autopilot."""
 
     position_body: Vec3  # [m]
     counterclockwise: bool  # seen from above
@@ -27,19 +27,19 @@ class Rotor(NamedTuple):
 class VehicleDescription(NamedTuple):
     """Description of a vehicle for its ground stations."""
 
-    name: str = "drone1"  # first part of its topics' names
-    system_id: int = 1  # of MAVLink
-    firmware: str = "px4"  # the autopilot that it emulates: a module of services/mavlink/firmware
+    name: str = "drone1"  # first part of its topic names
+    system_id: int = 1  # MAVLink system id
+    firmware: str = "px4"  # emulated autopilot: a module of services/mavlink/firmware
     home: Home = Home()  # origin of the world frame on the Earth
     air_temperature: float = 15.0  # [deg C] at home
     standing_height: float = 0.0  # [m] of the body frame's origin above the ground at rest
     rotors: tuple[Rotor, ...] = ()
-    max_voltage: float | None = None  # [V] of its motors, None where they are not modelled
-    battery: Battery | None = None  # None where none is modelled: the motors get what they ask for
-    sensors: tuple[str, ...] = ()  # fitted; none: the vehicle flies on its true state
-    ray_deg: tuple[float, float] = (0.0, -90.0)  # azimuth and elevation of the rangefinder's
+    max_voltage: float | None = None  # [V] of its motors, None if they are not modelled
+    battery: Battery | None = None  # None for an ideal supply
+    sensors: tuple[str, ...] = ()  # fitted sensors; without any, the vehicle flies on its true state
+    ray_deg: tuple[float, float] = (0.0, -90.0)  # azimuth and elevation of the rangefinder
     flow_interval: float = 0.0  # [s] between two readings of the optical flow
-    parameters: tuple[Parameter, ...] = ()  # the autopilot's, with the values that it starts with
-    gripper: bool = False  # a payload that can be let go
-    accepts_commands: bool = False  # an operator is listened to
+    parameters: tuple[Parameter, ...] = ()  # autopilot parameters with their initial values
+    gripper: bool = False  # True if it can release a payload
+    accepts_commands: bool = False  # True if it accepts commands of an operator
     tick_ns: int = 4_000_000  # length of a tick of the lock step [ns]

@@ -46,7 +46,7 @@ class PlantWiring(NamedTuple):
 
 def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
     """Return the encoders of the plant's topics."""
-    truth, given, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
+    truth, declared_ports, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
     result = [
         TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
         TopicEncoder(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
@@ -56,21 +56,27 @@ def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
     if wiring.odometry:
         sample = Odometry(header(0, WORLD), setup.vehicle)
         result.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
-    if ports.BATTERY in given:
+    if ports.BATTERY in declared_ports:
         battery = _battery_sample(setup.vehicle, wiring)
         result.append(
-            TopicEncoder(topic.BATTERY, ports.BATTERY, given[ports.BATTERY].period, _battery(wiring), lambda: battery)
+            TopicEncoder(
+                topic.BATTERY, ports.BATTERY, declared_ports[ports.BATTERY].period, _battery(wiring), lambda: battery
+            )
         )
-    if ports.BODIES in given:
+    if ports.BODIES in declared_ports:
         sample_bodies = _bodies_sample(wiring.bodies)
         result.append(
-            TopicEncoder(topic.BODIES, ports.BODIES, given[ports.BODIES].period, _bodies, lambda: sample_bodies)
+            TopicEncoder(
+                topic.BODIES, ports.BODIES, declared_ports[ports.BODIES].period, _bodies, lambda: sample_bodies
+            )
         )
-    if ports.CONTACT in given:
-        n = len(given[ports.CONTACT].like.force_world)
+    if ports.CONTACT in declared_ports:
+        n = len(declared_ports[ports.CONTACT].like.force_world)
         sample_contact = lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
         result.append(
-            TopicEncoder(topic.CONTACT, ports.CONTACT, given[ports.CONTACT].period, _contact, lambda: sample_contact)
+            TopicEncoder(
+                topic.CONTACT, ports.CONTACT, declared_ports[ports.CONTACT].period, _contact, lambda: sample_contact
+            )
         )
     return result
 

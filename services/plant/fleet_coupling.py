@@ -23,7 +23,7 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
 
 PRESENCE, LOAD = "presence", "load"  # ports that plants of a fleet read of one another
-FASTEST = 0.5  # frequency of a cable times the exchange interval: up to here a load looks ahead to within 2 %
+FASTEST = 0.5  # limit of cable frequency times communication step: the predicted load is then accurate to 2 %
 
 
 def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
@@ -37,12 +37,12 @@ def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict
         ConfigError: vehicles touch at the start, disagree on their load, or cannot reach it.
     """
     _check_apart(shares, keys)
-    having = [name for name, given in shares.items() if interacts(effects_of(given))]
-    carriers = {name: sling for name in having if (sling := _sling(shares[name]))}
+    interacting = [name for name, config in shares.items() if interacts(effects_of(config))]
+    carriers = {name: sling for name in interacting if (sling := _sling(shares[name]))}
     owner = next(iter(carriers), "")
     result = dict(shares)
-    for name in having:
-        read = [neighbour_port(other, PRESENCE) for other in having if other != name]
+    for name in interacting:
+        read = [neighbour_port(other, PRESENCE) for other in interacting if other != name]
         load: dict[str, Any] = {}
         if name in carriers:
             read.append(LOAD if name == owner else neighbour_port(owner, LOAD))
@@ -57,36 +57,36 @@ def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict
     return result
 
 
-def effects_of(given: ServiceConfig) -> tuple:
+def effects_of(config: ServiceConfig) -> tuple:
     """Return the effects of a multirotor's plant; () for other plants."""
-    core = given.parameters.core
+    core = config.parameters.core
     return core.vehicle.effects if isinstance(core, MultirotorPlant) else ()
 
 
 def _check_apart(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> None:
     """Reject vehicles whose collision spheres touch at the start."""
     spheres = {
-        name: (e.radius, given.parameters.start.vehicle.motion.position_world)
-        for name, given in shares.items()
-        for e in effects_of(given)
+        name: (e.radius, config.parameters.start.vehicle.motion.position_world)
+        for name, config in shares.items()
+        for e in effects_of(config)
         if isinstance(e, Collision)
     }
     for (one, (r, position)), (other, (other_r, other_position)) in combinations(spheres.items(), 2):
-        away = norm(subtract(position, other_position))
-        if away < r + other_r:
-            message = f"got a place {away:.3g} m from {one}: their collision spheres touch"
+        distance = norm(subtract(position, other_position))
+        if distance < r + other_r:
+            message = f"got a position {distance:.3g} m from {one}: their collision spheres touch"
             raise ConfigError(f"{keys[other]}initial_position", message, f"at least {r + other_r:.3g} m between them")
 
 
-def _sling(given: ServiceConfig) -> Sling | None:
-    return next((e.sling for e in effects_of(given) if isinstance(e, SharedSlungLoad)), None)
+def _sling(config: ServiceConfig) -> Sling | None:
+    return next((e.sling for e in effects_of(config) if isinstance(e, SharedSlungLoad)), None)
 
 
-def _without_bodies(given: ServiceConfig) -> ServiceConfig:
+def _without_bodies(config: ServiceConfig) -> ServiceConfig:
     """Return the plant without the load's output, which another vehicle has."""
-    plant: PlantSetup = given.parameters
+    plant: PlantSetup = config.parameters
     parameters = plant._replace(wiring=plant.wiring._replace(bodies=()))
-    return ServiceConfig(parameters, given.inputs, tuple(port for port in given.ports if port.name != ports.BODIES))
+    return ServiceConfig(parameters, config.inputs, tuple(port for port in config.ports if port.name != ports.BODIES))
 
 
 def _load(
@@ -120,7 +120,7 @@ def _load(
     return {"load": plant, "load_start": start, "load_inputs": inputs}
 
 
-def _hook(given: ServiceConfig, sling: Sling) -> Vec3:
+def _hook(config: ServiceConfig, sling: Sling) -> Vec3:
     """Return the initial position of the cable's attachment [m], world."""
-    motion = given.parameters.start.vehicle.motion
+    motion = config.parameters.start.vehicle.motion
     return add(motion.position_world, rotate(motion.attitude, sling.hook_body))

@@ -37,19 +37,19 @@ def resolve(scene: Scene) -> ServiceConfig:
     return result
 
 
-def _with_contact(scene: Scene, found: ServiceConfig) -> ServiceConfig:
+def _with_contact(scene: Scene, config: ServiceConfig) -> ServiceConfig:
     """Return the plant with the output of its contact forces."""
     effect = next(
-        (e for e in fleet_coupling.effects_of(found) if isinstance(e, GroundContact | GroundContactSmooth)), None
+        (e for e in fleet_coupling.effects_of(config) if isinstance(e, GroundContact | GroundContactSmooth)), None
     )
     if effect is None:
         message = "no effect of the scene computes contact forces"
         raise ConfigError(
             "rates.contact_forces", message, "a multirotor with [effects.ground_contact], or to leave it out"
         )
-    plant, zero = found.parameters, (ZERO,) * len(effect.feet)
+    plant, zero = config.parameters, (ZERO,) * len(effect.feet)
     port = Port(ports.CONTACT, ContactForces(zero, zero), rate_ticks(scene, "contact_forces"))
-    return ServiceConfig(plant._replace(contact=ContactView(plant.core.vehicle)), found.inputs, (*found.ports, port))
+    return ServiceConfig(plant._replace(contact=ContactView(plant.core.vehicle)), config.inputs, (*config.ports, port))
 
 
 def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
@@ -57,10 +57,10 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
     return fleet_coupling.couple(shares, keys)
 
 
-def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
+def reseed(config: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
     """Return the plant with another seed; only a multirotor has random effects."""
-    plant = given.parameters
+    plant = config.parameters
     if not isinstance(plant.core, MultirotorPlant):
-        return given
+        return config
     core = plant.core._replace(key=noise_key(seed, vehicle))
-    return given._replace(parameters=plant._replace(core=core))
+    return config._replace(parameters=plant._replace(core=core))

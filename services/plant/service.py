@@ -1,4 +1,4 @@
-"""The plant as a service: it owns time, and integrates what the scene's `vehicle.model` names."""
+"""Plant service: the clock owner, which integrates the model of the scene's `vehicle.model`."""
 
 from dataclasses import replace
 from typing import Any
@@ -35,23 +35,28 @@ NAME = "plant"
 
 def create(setup: RunConfig) -> Service:
     """Return the plant of a run."""
-    given = setup.services[NAME]
-    plant: PlantSetup = given.parameters
+    config = setup.services[NAME]
+    plant: PlantSetup = config.parameters
     state = Cell(plant.start)
-    bodies = [port for port in given.ports if port.name == ports.BODIES]
-    feet = tuple(port for port in given.ports if port.name == ports.CONTACT)
-    told = tuple(port for port in given.ports if port not in bodies and port not in feet)
-    own = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
+    bodies = [port for port in config.ports if port.name == ports.BODIES]
+    feet = tuple(port for port in config.ports if port.name == ports.CONTACT)
+    truth_ports = tuple(port for port in config.ports if port not in bodies and port not in feet)
+    has_own_bodies = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
     part = Block(
-        NAME, plant.core, state, given.inputs, given.ports if own else told, failure=_diverged(setup, plant, state)
+        NAME,
+        plant.core,
+        state,
+        config.inputs,
+        config.ports if has_own_bodies else truth_ports,
+        failure=_diverged(setup, plant, state),
     )
     parts: list[Any] = [part]
     if plant.events:
         parts.insert(0, PropellerFailures(plant, part))
     if plant.others:
         parts = _among_others(plant, plant.others, parts, state, bodies)
-    if bodies and plant.bodies and not own:
-        inputs = given.inputs[:1]
+    if bodies and plant.bodies and not has_own_bodies:
+        inputs = config.inputs[:1]
         parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     if plant.contact:
         parts.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
@@ -71,9 +76,9 @@ def _among_others(
         Block(f"{NAME}.{PRESENCE}", view, state, (InputPort(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
     ]
     if others.load:
-        told = (Port(LOAD, NeighbourState()), *bodies)
+        load_ports = (Port(LOAD, NeighbourState()), *bodies)
         carriers = _a_tick_ago(*others.load_inputs)
-        result.append(Block(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, told))
+        result.append(Block(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, load_ports))
     return result
 
 
@@ -98,7 +103,7 @@ def _diverged(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
 
 
 class PropellerFailures:
-    """Propellers that are locked, let go or torn off in flight: from then on another plant goes on with the state."""
+    """Propellers that are locked, released or torn off in flight: another plant then continues with the state."""
 
     name = f"{NAME}.breakages"
     outputs = ()
@@ -107,7 +112,9 @@ class PropellerFailures:
         self._events, self._form = list(plant.events), multirotor_euler if plant.euler else multirotor_multibody
         self._part, self._core = part, plant.core
         self._bodies = plant.bodies
-        self._broken: list[tuple[Any, list[tuple[Block, BoundBlock]]]] = []  # of each event: the vehicle, its parts
+        self._failed_plants: list[
+            tuple[Any, list[tuple[Block, BoundBlock]]]
+        ] = []  # vehicle and prepared blocks of each event
 
     def bind(self, graph: BlockDiagram) -> None:
         """Compile the plants of all failures before the first tick."""
@@ -121,12 +128,12 @@ class PropellerFailures:
                 replace(graph.part(name), parameters=parameters._replace(vehicle=p))
                 for name, parameters in ((NAME, self._core), (f"{NAME}.bodies", self._bodies))
             ]
-            self._broken.append((p, [(part, graph.prepare(part)) for part in parts]))
+            self._failed_plants.append((p, [(part, graph.prepare(part)) for part in parts]))
 
     def on_tick(self, tick: int) -> int:
         """Apply the failures of `tick` after its state has been output."""
         while self._events and self._events[0].tick < tick:
-            self._break(tick, self._events.pop(0), *self._broken.pop(0))
+            self._break(tick, self._events.pop(0), *self._failed_plants.pop(0))
         return self._events[0].tick + 1 if self._events else NEVER
 
     def _break(self, tick: int, event: PlantEvent, p: Any, parts: list[tuple[Block, BoundBlock]]) -> None:

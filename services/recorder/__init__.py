@@ -1,1 +1,1 @@
-"""Writes what the services say to an MCAP log."""
+"""Recorder: writes the messages of all services to an MCAP log."""

@@ -1,4 +1,4 @@
-"""The recorder process: every recorded topic into one MCAP log, complete to the last tick."""
+"""Recorder process: writes all recorded topics to one MCAP log, complete to the last tick."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ import numpy as np
 
 from lapwing.cosim.config.provenance import WAITED, attachments, failure, metadata
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
-from lapwing.cosim.executors.deadlines import Lateness, entries, lateness
+from lapwing.cosim.executors.deadlines import Lateness, lateness, metadata_entries
 from lapwing.cosim.executors.log_backpressure import LogProgressPublisher
 from lapwing.cosim.executors.participant import Participant, Stopped
 from lapwing.cosim.log import LogWriter
@@ -25,26 +25,26 @@ from lapwing.cosim.transport.bus_keys import (
 )
 from lapwing.cosim.transport.packets import unpack_log_packet
 
-TOLD = 1.0  # [s] of waiting for the disk from which on the log says so
+REPORTED_WAIT = 1.0  # [s] of waiting for the disk above which the log's metadata reports it
 
 
-def run(process: Participant, given: Any) -> None:
-    """Record until every service has said that it has ended, or until asked to stop; the log is readable either way."""
+def run(process: Participant, spec: Any) -> None:
+    """Record until all services have ended or this process is requested to stop; the log is readable in both cases."""
     setup = process.setup
     senders: dict[str, bytes | None] = {}
     late: dict[str, Lateness] = {}
     for key in (BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY):
         senders |= process.participants.senders(key, setup.services)
     pending = Pending(setup.services)
-    news = process.bus.receive(senders)
-    about = metadata(setup, given.mode) | ({"external": ", ".join(given.external)} if given.external else {})
+    messages = process.bus.receive(senders)
+    log_metadata = metadata(setup, spec.mode) | ({"external": ", ".join(spec.external)} if spec.external else {})
     progress = LogProgressPublisher(process.bus, process.key_prefix, process.name)
-    with LogWriter(Path(given.log), about, attachments(setup, given.sources or {}), progress.waiting) as writer:
+    with LogWriter(Path(spec.log), log_metadata, attachments(setup, spec.sources or {}), progress.waiting) as writer:
         recording = Recording(writer, setup)
         try:
             process.join()
             while not pending.ended:
-                key, time_ns, payload = process.wait_with_status(news.get_with_key, pending.waits_for)
+                key, time_ns, payload = process.wait_with_status(messages.get_with_key, pending.waits_for)
                 head, name = key.split("/")[-2:]
                 if head == DEADLINES_KEY:
                     late[name] = lateness(payload.decode(errors="replace"))
@@ -53,7 +53,7 @@ def run(process: Participant, given: Any) -> None:
                     writer.metadata |= _entries(payload)
                     continue
                 if head != BATCH_KEY:
-                    if payload:  # an end without a reason is that of the run
+                    if payload:  # an empty reason is the normal end of the run
                         text = payload.decode(errors="replace")  # the first cause counts
                         writer.metadata = failure(text, head == DIVERGED_KEY) | writer.metadata
                     continue
@@ -62,7 +62,7 @@ def run(process: Participant, given: Any) -> None:
                 if pages:
                     recording.write(pages, pending.written - 1)
                     process.report_rejected()
-                progress.recorded(pending.written)  # also where a batch completes nothing: it still takes in
+                progress.recorded(pending.written)  # also if no tick was completed, as a sign of life
             process.confirm()
         except Stopped:
             writer.metadata = failure("the run was ended") | writer.metadata
@@ -72,8 +72,8 @@ def run(process: Participant, given: Any) -> None:
             raise
         finally:
             recording.finish()
-            writer.metadata |= entries(late)
-            if writer.waited >= TOLD:
+            writer.metadata |= metadata_entries(late)
+            if writer.waited >= REPORTED_WAIT:
                 writer.metadata[WAITED] = f"{writer.waited:.1f} s"
     progress.end()
     process.leave(progress.end, LOGGED_KEY, [MONITOR])
@@ -93,15 +93,15 @@ class Pending:
 
     def __init__(self, services: Any):
         """Wait for these services."""
-        self._stop = dict.fromkeys(services, 0)  # tick before which each has published all
-        self._left = set(services)  # those that have not ended
+        self._stop = dict.fromkeys(services, 0)  # each has published all ticks before this one
+        self._unfinished = set(services)  # services that have not ended
         self._pages: list[RecordBatch] = []
-        self.written = 0  # tick before which all is complete
+        self.written = 0  # all ticks before this one are complete
 
     @property
     def ended(self) -> bool:
         """True if no service will publish more."""
-        return not self._left
+        return not self._unfinished
 
     def add(self, name: str, payload: bytes, end: int) -> None:
         """Add a log packet of a service; an empty one declares that the service has ended before the tick `end`.
@@ -111,7 +111,7 @@ class Pending:
         """
         if not payload:
             self._check(name, end)
-            self._left.discard(name)
+            self._unfinished.discard(name)
             return
         start, stop, pages = unpack_log_packet(payload)
         self._check(name, start)
@@ -129,14 +129,14 @@ class Pending:
         if stop <= self.written:
             return []
         self.written = stop
-        done, left = [], []
+        done, remaining = [], []
         for page in self._pages:
             k = int(np.searchsorted(page.ticks, stop))
             if k > 0:
                 done.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
             if k < len(page.ticks):
-                left.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
-        self._pages = left
+                remaining.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
+        self._pages = remaining
         return done
 
     def waits_for(self) -> str:

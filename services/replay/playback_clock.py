@@ -4,11 +4,11 @@ import time
 from collections.abc import Callable
 
 PAUSE, STEP, QUIT = " ", ".", "q"  # keys
-POLL = 0.02  # [s] between two looks at the keys
+POLL = 0.02  # [s] between two checks of the keys
 
 
 class Pace:
-    """Lets messages go at their time; a pause holds them, a step lets all of the next instant go."""
+    """Clock that releases messages at their time, or all messages of one instant per step during a pause."""
 
     def __init__(
         self,
@@ -20,15 +20,15 @@ class Pace:
         """Prepare a replay that begins with the first call of `wait`.
 
         Args:
-            keys: what has been typed since the call before.
+            keys: returns the keys that were typed since the last call.
             say: shows a pause, a step and their end.
-            wait: waits so many seconds, or less.
-            clock: [s].
+            wait: waits at most a number of seconds.
+            clock: returns the time [s].
         """
         self._keys, self._say, self._wait, self._clock = keys, say, wait, clock
         self._paused = self._step = self.quit = False
-        self._stepped_ns = -1  # the instant that may go in a pause
-        self._next_look = clock()
+        self._stepped_ns = -1  # instant that is released during a pause
+        self._next_poll = clock()
         self.begin()
 
     def begin(self) -> None:
@@ -37,15 +37,15 @@ class Pace:
         self._stepped_ns = -1
 
     def wait(self, due: float, time_ns: int, stopping: Callable[[], bool]) -> None:
-        """Return when a message may go, or when to stop.
+        """Wait until a message is released, or until stopped.
 
         Args:
-            due: when, after the first message [s].
-            time_ns: its simulation time.
-            stopping: says whether to end.
+            due: time of the message after the first one [s].
+            time_ns: simulation time of the message.
+            stopping: returns True to stop.
         """
         while not (stopping() or self.quit):
-            self._look(due, time_ns)
+            self._handle_keys(due, time_ns)
             if self._paused:
                 if self._step and time_ns != self._stepped_ns:
                     self._step, self._stepped_ns = False, time_ns
@@ -54,16 +54,16 @@ class Pace:
                     return
                 self._wait(POLL)
                 continue
-            left = self._started + due - self._clock()
-            if left <= 0.0:
+            remaining = self._started + due - self._clock()
+            if remaining <= 0.0:
                 return
-            self._wait(min(left, POLL))
+            self._wait(min(remaining, POLL))
 
-    def _look(self, due: float, time_ns: int) -> None:
+    def _handle_keys(self, due: float, time_ns: int) -> None:
         """Execute typed commands."""
-        if self._clock() < self._next_look:
+        if self._clock() < self._next_poll:
             return
-        self._next_look = self._clock() + POLL
+        self._next_poll = self._clock() + POLL
         for key in self._keys():
             if key == PAUSE:
                 self._paused, self._step, self._stepped_ns = not self._paused, False, -1

@@ -36,7 +36,7 @@ class Due(NamedTuple):
 
 
 def schedule(messages: Iterable[tuple[str, str, int, bytes]], speed: float | None) -> Iterator[Due]:
-    """Yield each message with its time; speed None: all at once.
+    """Yield each message with its time; without `speed`, without waiting.
 
     Args:
         messages: (topic, type name, time [ns], payload) in the order of the log.

@@ -1,4 +1,4 @@
-"""Plays a log on the bus: the same keys, payloads and time stamps as the live run."""
+"""Playback of a log on the bus, with the keys, payloads and time stamps of the live run."""
 
 import time
 from collections.abc import Callable, Collection, Iterable
@@ -11,9 +11,9 @@ from lapwing.cosim.transport.bus_keys import ALIVE_KEY, HEARD_KEY
 from lapwing.services.replay.playback_clock import Pace
 from lapwing.services.replay.playback_schedule import Cut, schedule
 
-AUDIENCE = 1.0  # [s] the first subscriber gets to appear
-CONFIRMATION = 60.0  # [s] subscribers get to confirm the end
-BRIEF = 0.02  # [s]
+SUBSCRIBER_TIMEOUT = 1.0  # [s] for the first subscriber to appear
+CONFIRMATION_TIMEOUT = 60.0  # [s] for subscribers to confirm the end
+BRIEF = 0.02  # [s] between two checks
 
 
 def play(
@@ -25,55 +25,55 @@ def play(
     loop: bool,
     record: Path | None,
     stopping: Callable[[], bool],
-    heard: Callable[[str, int, bytes], object] = lambda topic, time_ns, payload: None,
+    listener: Callable[[str, int, bytes], object] = lambda topic, time_ns, payload: None,
     pace: Pace | None = None,
     topics: Collection[str] | None = None,
 ) -> int:
-    """Publish a log; how many messages were published.
+    """Publish a log. Return the number of published messages.
 
     Args:
-        log: the MCAP log.
+        log: MCAP log.
         key_prefix: key prefix to publish in.
         listen: endpoint that subscribers connect to.
-        cut: the part to replay.
-        speed: simulated seconds per second, None for as fast as it goes.
-        loop: begin again at the end.
-        record: a log to write what is published to, None for none.
-        stopping: says whether to end.
-        heard: called with each message, for consumers that do not subscribe.
-        pace: lets messages go; None: by the clock.
-        topics: only these; None: all.
+        cut: part of the log to play.
+        speed: simulated seconds per second; None for as fast as possible.
+        loop: True to start over at the end.
+        record: log to write the published messages to.
+        stopping: returns True to stop.
+        listener: called with each message, for consumers that do not subscribe.
+        pace: clock that releases messages; real time by default.
+        topics: topics to play; None for all.
 
     Raises:
-        ValueError: the log cannot be read, has no such topic, or has no message in the cut.
+        ValueError: the log cannot be read, has no such topic, or has no message in this part.
         BusError: the endpoint cannot be listened on.
     """
     with LogReader(log) as source, ZenohBus([listen]) as bus:
-        chosen = source.check_topics(topics)
-        source.check_versions(chosen)
-        types = {topic: kind for topic, kind in source.topics().items() if topic in chosen}
+        selected = source.check_topics(topics)
+        source.check_versions(selected)
+        types = {topic: kind for topic, kind in source.topics().items() if topic in selected}
         deterministic = source.deterministic_topics()
-        puts = {topic: bus.publisher(f"{key_prefix}{topic}") for topic in types}
+        publishers = {topic: bus.publisher(f"{key_prefix}{topic}") for topic in types}
         subscribers = Subscribers(bus, key_prefix)
-        _await_audience(bus, [f"{key_prefix}{topic}" for topic in types], stopping)
-        writer = LogWriter(record, _own(source.metadata), dict(source.attachments)) if record else None
+        _await_subscriber(bus, [f"{key_prefix}{topic}" for topic in types], stopping)
+        writer = LogWriter(record, _copied_metadata(source.metadata), dict(source.attachments)) if record else None
         count, pace = 0, pace or Pace()
         try:
             while not (stopping() or pace.quit):
                 pace.begin()
-                for due in schedule(source.messages(chosen, cut.start_ns, cut.end_ns), speed):
+                for due in schedule(source.messages(selected, cut.start_ns, cut.end_ns), speed):
                     pace.wait(due.wait, due.time_ns, stopping)
                     if stopping() or pace.quit:
                         break
-                    puts[due.topic](due.payload, due.time_ns)
-                    heard(due.topic, due.time_ns, due.payload)
+                    publishers[due.topic](due.payload, due.time_ns)
+                    listener(due.topic, due.time_ns, due.payload)
                     count += 1
                     if writer:
                         writer.write(due.topic, types[due.topic], due.payload, due.time_ns, due.topic in deterministic)
                 if count == 0 and not (stopping() or pace.quit):
-                    raise ValueError(f"{log}: no message in the part that is to be replayed")
+                    raise ValueError(f"{log}: no message between --from and --to")
                 if not loop or writer:
-                    subscribers.await_confirmation(puts.values(), stopping)
+                    subscribers.await_confirmation(publishers.values(), stopping)
                     break
         finally:
             if writer:
@@ -82,14 +82,14 @@ def play(
 
 
 class Subscribers:
-    """Programs that have declared that they take part, and those that have confirmed the end of the playback."""
+    """Programs that have declared their presence, and those that have confirmed the end of the playback."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str):
         """Follow the tokens of a key prefix."""
         self._alive: set[str] = set()
         self._confirmed: set[str] = set()
-        bus.watch_alive(f"{key_prefix}/{ALIVE_KEY}/*", partial(self._change, self._alive))
-        bus.watch_alive(f"{key_prefix}/{HEARD_KEY}/*", partial(self._change, self._confirmed))
+        bus.watch_liveliness(f"{key_prefix}/{ALIVE_KEY}/*", partial(self._change, self._alive))
+        bus.watch_liveliness(f"{key_prefix}/{HEARD_KEY}/*", partial(self._change, self._confirmed))
 
     @staticmethod
     def _change(names: set[str], key: str, alive: bool) -> None:
@@ -99,27 +99,31 @@ class Subscribers:
         else:
             names.discard(name)
 
-    def await_confirmation(self, puts: Iterable[Callable[[bytes, int], None]], stopping: Callable[[], bool]) -> None:
+    def await_confirmation(
+        self, publishers: Iterable[Callable[[bytes, int], None]], stopping: Callable[[], bool]
+    ) -> None:
         """Publish the end of each topic, and wait for confirmations, without which a closing session loses messages.
 
         Raises:
-            ValueError: names those that have not confirmed in time.
+            ValueError: names the programs that have not confirmed in time.
         """
-        for put in puts:
-            put(b"", 0)
-        deadline = time.monotonic() + CONFIRMATION
-        while (late := self._alive - self._confirmed) and not stopping():
+        for publish in publishers:
+            publish(b"", 0)
+        deadline = time.monotonic() + CONFIRMATION_TIMEOUT
+        while (unconfirmed := self._alive - self._confirmed) and not stopping():
             if time.monotonic() > deadline:
-                raise ValueError(f"{', '.join(sorted(late))}: did not confirm the last message in {CONFIRMATION:g} s")
+                raise ValueError(
+                    f"{', '.join(sorted(unconfirmed))}: did not confirm the last message in {CONFIRMATION_TIMEOUT:g} s"
+                )
             time.sleep(BRIEF)
 
 
-def _own(metadata: dict[str, str]) -> dict[str, str]:
+def _copied_metadata(metadata: dict[str, str]) -> dict[str, str]:
     """Return the log's metadata without the recomputed entries."""
     return {key: value for key, value in metadata.items() if key != "digest"}
 
 
-def _await_audience(bus: ZenohBus, keys: list[str], stopping: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + AUDIENCE
-    while time.monotonic() < deadline and not stopping() and not bus.has_audience(keys):
+def _await_subscriber(bus: ZenohBus, keys: list[str], stopping: Callable[[], bool]) -> None:
+    deadline = time.monotonic() + SUBSCRIBER_TIMEOUT
+    while time.monotonic() < deadline and not stopping() and not bus.has_subscribers(keys):
         time.sleep(BRIEF)

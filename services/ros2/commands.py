@@ -23,35 +23,35 @@ from lapwing.messages import (
 SOURCE = "ros2"
 WORLD = "world"
 _NONE = (math.nan,) * 3
-Wish = tuple[str, tuple[float, ...]]  # kind and values of an OperatorCommand
+CommandValues = tuple[str, tuple[float, ...]]  # kind and values of an OperatorCommand
 
 
 class Accepted(NamedTuple):
-    """A topic on which commands are taken."""
+    """Topic on which commands are accepted."""
 
-    name: str  # behind the vehicle's
+    name: str  # after the name of the vehicle
     message: Any
-    to_command: Callable[[Any], Wish]
+    to_command: Callable[[Any], CommandValues]
 
 
-def _pose(m: Any) -> Wish:
+def _pose(m: Any) -> CommandValues:
     _check_frame(m)
     q = m.pose.orientation
     yaw = to_roll_pitch_yaw(Quaternion(q.w, q.x, q.y, q.z))[2]
     return "offboard_position", (*m.pose.position, *_NONE, *_NONE, yaw, math.nan)
 
 
-def _velocity(m: Any) -> Wish:
+def _velocity(m: Any) -> CommandValues:
     _check_frame(m)
     return "offboard_position", (*_NONE, *m.twist.linear, *_NONE, math.nan, m.twist.angular.z)
 
 
-def _setpoint(m: Any) -> Wish:
+def _setpoint(m: Any) -> CommandValues:
     _check_frame(m)
     return "offboard_position", (*m.position, *m.velocity, *m.acceleration, m.yaw, m.yaw_rate)
 
 
-def _motors(m: Any) -> Wish:
+def _motors(m: Any) -> CommandValues:
     return "offboard_motors", tuple(m.motor_voltage)
 
 
@@ -68,11 +68,11 @@ ACCEPTED = (
     Accepted("command/setpoint", Setpoint, _setpoint),
     Accepted("command/motors", Actuators, _motors),
 )
-OPERATOR = "command/operator"  # takes an OperatorInput, with every command that there is
+OPERATOR = "command/operator"  # accepts an OperatorInput, with any command
 
 
 class Commands:
-    """Turns messages into commands of the autopilot, and counts."""
+    """Converter of messages into commands of the autopilot, with counts."""
 
     def __init__(self, vehicle: str):
         """Create the conversion for a vehicle name."""
@@ -80,8 +80,8 @@ class Commands:
         self._accepted = {f"/{vehicle}/{a.name}": a for a in ACCEPTED}
         self._operator = f"/{vehicle}/{OPERATOR}"
         self.messages = {topic: a.message for topic, a in self._accepted.items()} | {self._operator: OperatorInput}
-        self.taken, self.refused = 0, 0
-        self.why = ""  # the last message was refused
+        self.accepted_count, self.rejected_count = 0, 0
+        self.last_error = ""
         self._numbers = itertools.count(1)
 
     def read(self, topic: str, payload: bytes) -> tuple[Any, ...]:
@@ -89,22 +89,24 @@ class Commands:
         try:
             result = tuple(self._read(topic, payload))
         except ValueError as error:
-            self.refused, self.why = self.refused + 1, f"{topic}: {error}"
+            self.rejected_count, self.last_error = self.rejected_count + 1, f"{topic}: {error}"
             return ()
-        self.taken += len(result)
+        self.accepted_count += len(result)
         return result
 
     def _read(self, topic: str, payload: bytes) -> Iterable[Any]:
         if topic == self._operator:
-            given = OperatorInput.decode(payload).commands
-            return [command._replace(source=f"{SOURCE}/{command.source}") for command in given]
+            commands = OperatorInput.decode(payload).commands
+            return [command._replace(source=f"{SOURCE}/{command.source}") for command in commands]
         accepted = self._accepted[topic]
         kind, values = accepted.to_command(accepted.message.decode(payload))
         return [OperatorCommand(kind, SOURCE, next(self._numbers), tuple(values))]
 
     def report(self) -> str:
         """Return the line of the final report; "" if no command arrived."""
-        if not self.taken and not self.refused:
+        if not self.accepted_count and not self.rejected_count:
             return ""
-        refused = f", {self.refused} messages refused, the last: {self.why}" if self.refused else ""
-        return f"{self.taken} commands taken{refused}"
+        rejected = (
+            f", {self.rejected_count} messages rejected, the last one: {self.last_error}" if self.rejected_count else ""
+        )
+        return f"{self.accepted_count} commands accepted{rejected}"

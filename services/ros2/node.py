@@ -65,7 +65,7 @@ class Node:
         self._domain, self._entities = domain, 0
         self._bus = _open(endpoint, local)
         self._puts: dict[str, Callable[[bytes, int], None]] = {}
-        self._bus.declare_alive(node_token(domain, self._bus.session_id))
+        self._bus.declare_liveliness(node_token(domain, self._bus.session_id))
 
     def declare(self, topic: str, type_name: str) -> None:
         """Publish a topic, "/drone1/imu"; types that are not ours are left out."""
@@ -75,7 +75,7 @@ class Node:
         token = self._token(endpoint, PUBLISHER)
         # A node that is too slow misses messages, as with rmw_zenoh's own publishers; it does not hold up the run.
         self._puts[topic] = self._bus.publisher(endpoint.key(self._domain), identifier(token), drops=True)
-        self._bus.declare_alive(token)
+        self._bus.declare_liveliness(token)
 
     def put(self, topic: str, time_ns: int, payload: bytes) -> None:
         """Publish a message of a declared topic, stamped with the simulation time [ns]."""
@@ -83,12 +83,12 @@ class Node:
             self._puts[topic](payload, time_ns)
 
     def subscribe(self, messages: dict[str, Any]) -> "CommandSubscription":
-        """Receive what other nodes publish; message class by topic."""
+        """Subscribe to topics of other nodes; `topics` has the message class by topic."""
         endpoints = [Endpoint(topic, message.type_name) for topic, message in messages.items()]
         topics = {endpoint.key(self._domain): endpoint.topic for endpoint in endpoints}
         asked = CommandSubscription(self._bus.subscribe(*topics), topics)
         for endpoint in endpoints:
-            self._bus.declare_alive(self._token(endpoint, SUBSCRIPTION))
+            self._bus.declare_liveliness(self._token(endpoint, SUBSCRIPTION))
         return asked
 
     def _token(self, endpoint: Endpoint, kind: str) -> str:

@@ -1,4 +1,4 @@
-"""The process that is a node of a ROS 2 graph: what the services publish goes out, commands come in.
+"""ROS 2 node of a run: publishes the messages of the services, and receives commands.
 
 It is not part of the lock step: no service waits for it, and the flight continues when it ends.
 """
@@ -17,54 +17,56 @@ from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
 
 
-def run(process: Participant, given: Any) -> None:
-    """Publish until the flight has ended, or until asked to stop; then say what came in.
+def run(process: Participant, spec: Any) -> None:
+    """Publish until the run has ended or this process is requested to stop; then print a report.
 
     Raises:
         ValueError: the graph cannot be joined.
     """
     setup = process.setup
-    topics, authors = {}, {}
+    topics, senders = {}, {}
     for name in setup.services:
         for topic in process.create_service(name).topics:
             topics[process.key(topic)] = topic
-            authors[process.key(topic)] = process.participants.encoder_gid(name)
-    given_to = {topic: commands for commands in _commands(setup) for topic in commands.messages}
+            senders[process.key(topic)] = process.participants.encoder_gid(name)
+    commands_by_topic = {topic: commands for commands in _commands(setup) for topic in commands.messages}
     operate = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
-    with Node(given.ros2, given.ros2_router, given.insecure) as node:
+    with Node(spec.ros2, spec.ros2_router, spec.insecure) as node:
         for topic in topics.values():
             node.declare(topic.key(setup.vehicle), topic.message.type_name)
         events = {EVENTS.zenoh_key(name, process.key_prefix): of_vehicle(EVENTS, name) for name in setup.vehicles}
         for topic in events.values():
             node.declare(topic.key(), topic.message.type_name)
-        asked = node.subscribe({topic: commands.messages[topic] for topic, commands in given_to.items()})
-        watcher = dict.fromkeys(events, process.participants.gid(MONITOR))  # the run monitor publishes events
-        published = process.bus.receive(authors | watcher)
+        subscription = node.subscribe(
+            {topic: commands.messages[topic] for topic, commands in commands_by_topic.items()}
+        )
+        event_senders = dict.fromkeys(events, process.participants.gid(MONITOR))  # the run monitor publishes events
+        published = process.bus.receive(senders | event_senders)
         process.join()
-        flying = set(topics)  # topics that have not come to their end
+        unfinished = set(topics)  # topics that have not ended
         topics |= events
         ends = LastEvents(events)
-        while ends.await_more(bool(flying)) and not process.stopping:
-            while arrived := asked.get():
-                commands = given_to[arrived[0]]
-                for command in commands.read(*arrived):
+        while ends.await_more(bool(unfinished)) and not process.stopping:
+            while received := subscription.get():
+                commands = commands_by_topic[received[0]]
+                for command in commands.read(*received):
                     operate(OperatorInput(header(0, commands.vehicle), (command,)).encode(), 0)
-            news = published.get_with_key(POLL)
-            if news is None:
+            message = published.get_with_key(POLL)
+            if message is None:
                 continue
-            key, time_ns, payload = news
+            key, time_ns, payload = message
             if payload:
                 node.put(topics[key].key(setup.vehicle), time_ns, payload)
             else:
-                flying.discard(key)
+                unfinished.discard(key)
                 ends.take(key)
         process.confirm()
-    for commands in dict.fromkeys(given_to.values()):
+    for commands in dict.fromkeys(commands_by_topic.values()):
         if report := commands.report():
             print(report if setup.vehicle else f"{commands.vehicle}: {report}", flush=True)
 
 
 def _commands(setup: RunConfig) -> list[Commands]:
     """Return the conversions of all vehicles with `autopilot.accept_commands`."""
-    steered = [member for member in members(setup) if "autopilot" in member.services]
-    return [Commands(member.vehicle) for member in steered if member.services["autopilot"].parameters.operator]
+    with_autopilot = [member for member in members(setup) if "autopilot" in member.services]
+    return [Commands(member.vehicle) for member in with_autopilot if member.services["autopilot"].parameters.operator]

@@ -1,6 +1,6 @@
-"""The listen endpoint for programs outside a run, a viewer or a ROS 2 bridge: they connect to it as clients.
+"""Router process: the endpoint for external clients of a run, such as a viewer or a ROS 2 bridge.
 
-It is no part of the lock step: the services are joined pairwise, and the router only passes on what they publish.
+It is not part of the lock step: the services are connected pairwise, and the router only forwards their messages.
 """
 
 import time
@@ -9,10 +9,10 @@ from typing import Any
 from lapwing.cosim.executors.participant import POLL, Participant, Stopped
 
 
-def run(process: Participant, given: Any) -> None:
-    """Route until the recorder has the entire run, or until asked to stop."""
+def run(process: Participant, spec: Any) -> None:
+    """Route until the recorder has the entire run or this process is requested to stop."""
     process.join()
-    process.confirm()  # it takes no messages, but passes them on
+    process.confirm()  # it forwards messages, but does not read them
     process.stop_without("recorder")
     while not process.stopping:
         time.sleep(POLL)

@@ -31,10 +31,10 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     trajectory, result = scene[Trajectory], compiled(scene)
     path = result.parameters._replace(origin_world=start_place(scene))
     core = TrajectoryPath(path, result.final, exchange.interval)
-    ahead = max(1, round(LEAD * exchange.rate))
+    lead_ticks = max(1, round(LEAD * exchange.rate))
     return ServiceConfig(
         TrajectorySetup(core, result.phases, *_leader(trajectory)),
-        (InputPort(ports.TRUTH, ahead),),
+        (InputPort(ports.TRUTH, lead_ticks),),
         (Port(ports.TRAJECTORY, Setpoint()),),
     )
 

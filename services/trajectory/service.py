@@ -26,6 +26,6 @@ class TrajectorySetup(NamedTuple):
 
 def create(setup: RunConfig) -> Service:
     """Return the trajectory service of a run."""
-    given: Any = setup.services[NAME]
-    part = Block(NAME, given.parameters.core, Cell(0.0), given.inputs, given.ports)
-    return Service(NAME, [part], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, given.parameters.phases)])
+    config: Any = setup.services[NAME]
+    part = Block(NAME, config.parameters.core, Cell(0.0), config.inputs, config.ports)
+    return Service(NAME, [part], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, config.parameters.phases)])

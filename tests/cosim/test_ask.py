@@ -10,7 +10,7 @@ def test_query_returns_payload_or_none():
     (endpoint,) = loopback_endpoints(["responder"]).values()
     with ZenohBus([endpoint]) as responder, ZenohBus(connect=[endpoint]) as client:
         responder.answer("test/_setup/responder", b"payload")
-        responder.declare_alive(KEYS[0])
-        assert client.wait_alive(KEYS, 20.0) == []
+        responder.declare_liveliness(KEYS[0])
+        assert client.wait_for_liveliness(KEYS, 20.0) == []
         assert client.query("test/_setup/responder", 20.0) == b"payload"
         assert client.query("test/_setup/missing", 20.0) is None

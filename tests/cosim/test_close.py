@@ -26,14 +26,14 @@ def receive(endpoint, results, slow):
                 done.set()
 
         news = bus.subscribe(KEY)
-        bus.watch_alive("test-close/sender", gone)
-        bus.declare_alive(THERE)
+        bus.watch_liveliness("test-close/sender", gone)
+        bus.declare_liveliness(THERE)
         while (result := news.get(0.2)) is not None or not done.is_set():
             if result:
                 count += 1
                 sum(range(slow))  # keeps the interpreter, which the session needs, too
                 if result[0] == MESSAGES - 1:
-                    bus.declare_alive(CONFIRMED)
+                    bus.declare_liveliness(CONFIRMED)
     results.put(count)
 
 
@@ -47,9 +47,9 @@ def lost(waits):
             receiver = context.Process(target=receive, args=(endpoints["sender"], results, 20_000))
             receiver.start()
             put = bus.publisher(KEY)
-            bus.declare_alive("test-close/sender")
-            bus.watch_alive(CONFIRMED, lambda _, alive: alive and confirmed.set())
-            assert bus.wait_alive([THERE], 60.0) == []
+            bus.declare_liveliness("test-close/sender")
+            bus.watch_liveliness(CONFIRMED, lambda _, alive: alive and confirmed.set())
+            assert bus.wait_for_liveliness([THERE], 60.0) == []
             for i in range(MESSAGES):
                 put(bytes(SIZE), i)
             if waits:

@@ -95,9 +95,9 @@ def test_participant_cannot_publish_for_others(tmp_path):
         pairs = (("plant", plant, "sensors"), ("sensors", sensors, "plant"))
         heard = {name: bus.receive(run.senders(STEP_KEY, [other, "autopilot"])) for name, bus, other in pairs}
         for name, bus, _ in pairs:
-            bus.declare_alive(f"test-access/{ALIVE_KEY}/{name}")
+            bus.declare_liveliness(f"test-access/{ALIVE_KEY}/{name}")
         for _, bus, other in pairs:
-            assert not bus.wait_alive([f"test-access/{ALIVE_KEY}/{other}"], 10.0)
+            assert not bus.wait_for_liveliness([f"test-access/{ALIVE_KEY}/{other}"], 10.0)
         for name, bus, _ in pairs:
             own, bus._gid = bus._gid, run.gid("autopilot")
             bus.publisher(f"test-access/{STEP_KEY}/autopilot")(b"forged", 0)
@@ -112,7 +112,7 @@ def test_participant_cannot_publish_for_others(tmp_path):
                 (f"test-access/{STEP_KEY}/autopilot", 0, b"forged"),
                 (f"test-access/{STEP_KEY}/{other}", 0, b"own"),
             ]
-            assert bus.refused == 0
+            assert bus.rejected == 0
 
 
 def test_viewer_reads_only_and_needs_certificate(tmp_path):
@@ -137,8 +137,8 @@ def test_viewer_reads_only_and_needs_certificate(tmp_path):
             viewer.publisher(f"test-viewer/{key}")(b"command", 0)
             viewer._session.put(f"test-viewer/{key}", b"command")
             viewer._session.delete(f"test-viewer/{key}")
-        viewer.declare_alive(f"test-viewer/{ALIVE_KEY}/plant")
-        assert autopilot.wait_alive([f"test-viewer/{ALIVE_KEY}/plant"], 1.0)  # is not there
+        viewer.declare_liveliness(f"test-viewer/{ALIVE_KEY}/plant")
+        assert autopilot.wait_for_liveliness([f"test-viewer/{ALIVE_KEY}/plant"], 1.0)  # is not there
         while (message := heard.get_with_key(timeout=1.0)) is not None:
             assert message in ((topic, 0, b"status"), (bundles, 0, b"bundle"))  # its own
         with pytest.raises(BusError):

@@ -29,7 +29,7 @@ def joined(monkeypatch, external=()):
     with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
         process = Participant("plant", SETUP, bus, PublisherIds(PREFIX, external=external), ["plant", "other"])
         with ZenohBus(connect=[endpoints["plant"]]) as other:
-            other.declare_alive(f"{PREFIX}/{ALIVE_KEY}/other")
+            other.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/other")
             process.join()
             yield process, other
 
@@ -50,7 +50,7 @@ def test_last_message_is_repeated_until_confirmed(monkeypatch):
         def repeat():
             output["end"] += 1
             if output["end"] == 3:
-                other.declare_alive(f"{PREFIX}/{HEARD_KEY}/other")
+                other.declare_liveliness(f"{PREFIX}/{HEARD_KEY}/other")
                 heard.set()
 
         process.leave(repeat)
@@ -63,6 +63,6 @@ def test_participant_that_has_left_is_not_awaited(monkeypatch):
 
 
 def test_external_service_confirms_by_leaving_or_timeout(monkeypatch):
-    monkeypatch.setattr(lapwing.cosim.executors.peer_tracker, "FOREIGN", 0.1)
+    monkeypatch.setattr(lapwing.cosim.executors.peer_tracker, "EXTERNAL_GRACE", 0.1)
     with joined(monkeypatch, external=("other",)) as (process, _):
         process.leave(lambda: None)

@@ -96,13 +96,13 @@ def test_replay_waits_for_confirmation_of_its_end(log):
     command = replay(log, "--speed", "max", "--key-prefix", key_prefix, "--listen", endpoint)
     with subprocess.Popen(command) as player, ZenohBus(connect=[endpoint]) as bus:
         arriving = bus.subscribe(f"{key_prefix}/clock")
-        bus.declare_alive(f"{key_prefix}/_alive/slow")
+        bus.declare_liveliness(f"{key_prefix}/_alive/slow")
         payloads = [arriving.get(timeout=30.0)[1]]
         while payloads[-1]:
             payloads.append(arriving.get(timeout=30.0)[1])
         time.sleep(1.0)
         assert player.poll() is None
-        bus.declare_alive(f"{key_prefix}/_heard/slow")
+        bus.declare_liveliness(f"{key_prefix}/_heard/slow")
         assert player.wait(timeout=30) == 0
     assert len(payloads) == 201
 
@@ -150,7 +150,7 @@ def test_unreplayable_log_is_rejected_in_single_line(log, arguments, said):
 
 
 def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkeypatch):
-    monkeypatch.setattr(player, "AUDIENCE", 0.0)
+    monkeypatch.setattr(player, "SUBSCRIBER_TIMEOUT", 0.0)
     path, rng = tmp_path / "0.mcap", random.Random(1)
     with LogWriter(path, {}, {}) as writer:
         for tick in range(60):
@@ -171,7 +171,7 @@ def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkey
 
 
 def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
-    monkeypatch.setattr(player, "AUDIENCE", 0.0)
+    monkeypatch.setattr(player, "SUBSCRIBER_TIMEOUT", 0.0)
     (endpoint,) = loopback_endpoints(["a"]).values()
     heard, record = [], tmp_path / "a.mcap"
     say = lambda topic, time_ns, payload: heard.append((topic, time_ns))  # noqa: E731

@@ -57,8 +57,8 @@ def test_only_sender_is_received():
         ):
             zenoh = stranger._session
             for bus_ in (plant, stranger):
-                bus_.declare_alive(f"{PREFIX}/{ALIVE_KEY}/{'plant' if bus_ is plant else 'stranger'}")
-            assert not bus.wait_alive([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in ("plant", "stranger")], 10.0)
+                bus_.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/{'plant' if bus_ is plant else 'stranger'}")
+            assert not bus.wait_for_liveliness([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in ("plant", "stranger")], 10.0)
             stranger.publisher(key)(b"", 0)
             zenoh.put(key, b"")
             zenoh.put(key, b"hello", attachment=b"short")
@@ -66,7 +66,7 @@ def test_only_sender_is_received():
             zenoh.delete(key)
             plant.publisher(key)(b"bundle", 4)
             assert arrivals(received) == [(4, b"bundle")]
-            assert bus.refused >= 5
+            assert bus.rejected >= 5
             plant.publisher(f"{PREFIX}/free")(b"one", 1)
             assert first_comer.get(2.0) == (1, b"one")
             stranger.publisher(f"{PREFIX}/free")(b"two", 2)
@@ -151,7 +151,7 @@ def test_external_service_with_other_configuration_is_rejected(tmp_path):
     with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
         program.answer(f"{PREFIX}/{SETUP_KEY}/autopilot", other)
         run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
-        program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
+        program.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/autopilot")
         _, output = run.communicate(timeout=120)
     assert run.returncode == 2
     assert output.startswith("lapwing: autopilot_messages: last_tick is ")
@@ -162,9 +162,9 @@ def test_external_service_with_other_configuration_is_rejected(tmp_path):
 def test_early_end_of_external_service_fails_run(tmp_path):
     with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
         run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
-        program.declare_alive(f"{PREFIX}/{ALIVE_KEY}/autopilot")
+        program.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/autopilot")
         others = ("plant", "trajectory", "recorder", "autopilot_messages")
-        assert not program.wait_alive([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in others], 120.0)
+        assert not program.wait_for_liveliness([f"{PREFIX}/{ALIVE_KEY}/{name}" for name in others], 120.0)
         program.publisher(f"{PREFIX}/{STEP_KEY}/autopilot")(b"", 0)
         _, output = run.communicate(timeout=120)
     assert run.returncode == 1

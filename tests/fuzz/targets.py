@@ -14,7 +14,7 @@ from lapwing.messages.topics import POSE
 from lapwing.messages.types import TYPES
 from lapwing.services import scene_resolver
 from lapwing.services.common import flight_plan_file, parameter_file
-from lapwing.services.foxglove.origin_gate import refusal
+from lapwing.services.foxglove.origin_gate import rejection_reason
 from tests.fuzz.flights import csv, dataflash, tlog, ulog, usd
 from tests.fuzz.memory_file import memory_file
 from tests.fuzz.sockets import frames, link, page, requests, websocket
@@ -139,7 +139,7 @@ def set_up_messages() -> Target:
 def origins() -> Target:
     """Requests to the gate before the Foxglove server."""
     request = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://app.foxglove.dev\r\n\r\n"
-    return Target(lambda data: refusal(data, "127.0.0.1"), (request,))
+    return Target(lambda data: rejection_reason(data, "127.0.0.1"), (request,))
 
 
 TARGETS = {

@@ -142,6 +142,6 @@ def _fields(name: str, old: TopicSample, new: dict[int, bytes], end_ns: float) -
             return
         result = first_field(message_class(kind), was, now)
         assert result
-        by = f", by {result.by:.3g}" if result.by is not None else ""
+        by = f", by {result.delta:.3g}" if result.delta is not None else ""
         yield time_ns, where + f"{result.field or 'length'} was {result.one!r}, is {result.other!r}{by}"
         return

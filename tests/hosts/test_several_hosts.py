@@ -61,6 +61,6 @@ def test_lost_host_is_named_and_run_ends(keys, tmp_path):
     output = {name: words for name, (_, words) in ends.items()}
     assert {name: code for name, (code, _) in ends.items()} == dict.fromkeys(ends, 1), output
     assert output.pop(MONITOR).startswith("lapwing: autopilot, sensors, trajectory: no answer for 6 s, at t = ")
-    assert output == {name: f"lapwing: {name}: {MONITOR} is gone before the run has ended\n" for name in output}
+    assert output == {name: f"lapwing: {name}: {MONITOR} left before the end of the run\n" for name in output}
     with LogReader(run.log) as read:
         assert list(read.messages())

@@ -92,7 +92,7 @@ def test_body_rate_control_is_that_of_voltages_computed_in_numpy():
     one, other = (lapwing.BatchSimulator("hover", 3) for _ in range(2))
     for batch in (one, other):
         batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=one.hover_speed, omega_body=(0.4, -0.3, 0.2))
-    a = one._steered
+    a = one._nominal_airframe
     inertia, x, y, z = np.array(a.inertia_body), a.rotor_x, a.rotor_y, np.array(a.reaction_sign) * a.torque_per_thrust
     effect = np.array([np.ones(4), y, -np.array(x), z])  # of a rotor's thrust on thrust and torques
     thrust, rates = (

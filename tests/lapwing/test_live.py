@@ -59,7 +59,7 @@ class Run:
     def __init__(self, scene="hover", overrides=()):
         self.setup = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
         self._graph = BlockDiagram(self.setup, create_all(self.setup), PAGE)
-        self.reporting_services, self.listen, self.time_ns = set(self.setup.services), None, 0
+        self.reporting_services, self.on_batches, self.time_ns = set(self.setup.services), None, 0
         self.published, self.complete = [], False
 
     def publish(self, key, time_ns, payload):
@@ -70,7 +70,7 @@ class Run:
         for first in range(before, before + rows, PAGE // 2):
             stop = min(first + PAGE // 2, before + rows)
             self._graph.advance(stop)
-            self.listen(self._graph.record_batches(first, stop))
+            self.on_batches(self._graph.record_batches(first, stop))
         self.time_ns = (before + rows - 1) * self.setup.interval_ns
 
 

@@ -137,7 +137,7 @@ def test_invalid_figure_is_rejected_without_output_file(tmp_path, figures, messa
 
 def test_weak_vehicle_is_warned_of_and_names_are_kept(tmp_path):
     _, (remark,) = write_vehicle("mine", {"speed_constant": 470.0}, tmp_path)
-    assert re.fullmatch(r"its thrust is 1\.\d\d times its weight; below 1.4 too little is left for control", remark)
+    assert re.fullmatch(r"its thrust is 1\.\d\d times its weight; control authority is small below 1.4", remark)
     for name in ("mine", "delivery_drone", "My Quad"):
         with pytest.raises(ValueError, match=f"NAME {name}"):
             write_vehicle(name, {}, tmp_path)
@@ -156,8 +156,8 @@ def test_on_command_line(tmp_path, monkeypatch):
 
 def test_usual_motor_resistance_is_not_doubted():
     (figure,) = (figure for figure in FIGURES if figure.name == "resistance")
-    assert figure.doubt(0.06, 1.1) == ""
-    assert "is that the unit?" in figure.doubt(60.0, 0.06)
+    assert figure.plausibility_question(0.06, 1.1) == ""
+    assert "is that the unit?" in figure.plausibility_question(60.0, 0.06)
 
 
 def test_neighbouring_rotors_turn_in_opposite_directions():

@@ -11,10 +11,10 @@ def test_first_field_that_differs_is_named_with_both_values():
     one = Imu(header(5, "base"))
     other = one._replace(linear_acceleration=(0.0, 9.81, 1.0))
     result = first_difference(Imu, one.encode(), other.encode())
-    assert (result.field, result.one, result.other, result.by) == ("linear_acceleration.y", 0.0, 9.81, 9.81)
+    assert (result.field, result.one, result.other, result.delta) == ("linear_acceleration.y", 0.0, 9.81, 9.81)
     assert first_difference(Imu, one.encode(), one.encode()) is None
     text = first_difference(Status, Status(mode="a").encode(), Status(mode="b").encode())
-    assert (text.field, text.by) == ("mode", None)
+    assert (text.field, text.delta) == ("mode", None)
 
 
 def test_negative_zero_is_not_zero():

@@ -3,7 +3,7 @@
 import pytest
 
 from lapwing.messages import TYPES
-from lapwing.messages.type_compatibility import otherwise
+from lapwing.messages.type_compatibility import first_type_difference
 
 STATE = "lapwing_msgs/msg/VehicleState"
 TEXT = TYPES[STATE].schema_text
@@ -12,17 +12,20 @@ TEXT = TYPES[STATE].schema_text
 @pytest.mark.parametrize("name", TYPES)
 def test_every_type_is_its_own(name):
     text = TYPES[name].schema_text
-    assert otherwise(name, text) == ""
-    assert otherwise(name, "# of another program\n" + text.replace("\n", "\r\n").replace("uint8 ", "char ")) == ""
+    assert first_type_difference(name, text) == ""
+    assert (
+        first_type_difference(name, "# of another program\n" + text.replace("\n", "\r\n").replace("uint8 ", "char "))
+        == ""
+    )
 
 
 def test_nested_types_may_have_any_order():
     bar = "=" * 80 + "\n"
     own, *others = TEXT.split(bar)
     ended = [part if part.endswith("\n") else part + "\n" for part in reversed(others)]
-    assert otherwise(STATE, bar.join([own, *ended])) == ""
-    assert otherwise("foreign/msg/A", "anything <= 3") == ""
-    assert otherwise(STATE, "") == ""
+    assert first_type_difference(STATE, bar.join([own, *ended])) == ""
+    assert first_type_difference("foreign/msg/A", "anything <= 3") == ""
+    assert first_type_difference(STATE, "") == ""
 
 
 @pytest.mark.parametrize(
@@ -43,4 +46,4 @@ def test_nested_types_may_have_any_order():
 )
 def test_first_type_difference_is_named(there, here, said):
     assert there in TEXT
-    assert otherwise(STATE, TEXT.replace(there, here)).startswith(said)
+    assert first_type_difference(STATE, TEXT.replace(there, here)).startswith(said)

@@ -113,7 +113,7 @@ def test_stalled_viewer_does_not_block_run(tmp_path):
             keys |= {message[0] for _ in range(50) if (message := arrived.get_with_key(timeout=0.1))}
         # one that holds Zenoh's only thread: nothing is read any more
         frozen = zenoh.handlers.Callback(lambda sample: released.wait(), indirect=False)
-        viewer._held.append(viewer._session.declare_subscriber(f"{PREFIX}/**", frozen))
+        viewer._declared.append(viewer._session.declare_subscriber(f"{PREFIX}/**", frozen))
         output = run.communicate(timeout=200)[0]
         released.set()
         viewer.close()

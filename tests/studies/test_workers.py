@@ -17,11 +17,11 @@ pytestmark = pytest.mark.long
 PATIENCE = 120.0  # [s] a generous bound; the target is a second
 SCRIPT = """
 import os, time
-from lapwing.cosim.processes.interrupt import end_at_once
+from lapwing.cosim.processes.interrupt import raise_on_interrupt
 from lapwing.studies.workers import workers
 
 if __name__ == "__main__":
-    end_at_once()
+    raise_on_interrupt()
     with workers(2) as pool:
         busy = [pool.submit(time.sleep, 3600.0) for _ in range(2)]
         while not all(job.running() for job in busy):

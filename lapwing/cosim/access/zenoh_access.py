@@ -1,4 +1,4 @@
-"""Zenoh access-control rules for both ends of every link. All that is not allowed is denied."""
+"""Zenoh access-control rules for both ends of every link. The default is to deny."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -6,29 +6,29 @@ from typing import Any
 from lapwing.cosim.access.private_sockets import SCHEME
 from lapwing.cosim.transport.bus_keys import SETUP_KEY
 
-VIEWER = "viewer"  # whose certificate reads, and says nothing
+VIEWER = "viewer"  # common name of the certificate that may read and not publish
 
 _LISTEN = ["declare_subscriber", "declare_liveliness_subscriber", "liveliness_query"]
-_SAY = ["put", "liveliness_token", "declare_queryable", "reply"]
+_PUBLISH = ["put", "liveliness_token", "declare_queryable", "reply"]
 _VIEWING = {"rules": ["receive", "listen", "withhold"], "subjects": [VIEWER]}
-_ALL = [*_LISTEN, *_SAY, "query", "delete"]
+_ALL = [*_LISTEN, *_PUBLISH, "query", "delete"]
 
 
-def by_certificate(key_prefix: str, says: Mapping[str, Iterable[str]]) -> dict[str, Any]:
+def by_certificate(key_prefix: str, publishable: Mapping[str, Iterable[str]]) -> dict[str, Any]:
     """Return Zenoh's settings for a run whose participants have certificates.
 
     Args:
-        key_prefix: of the run.
-        says: what each participant may publish: key expressions, by the common name of its certificate.
+        key_prefix: key prefix of the run.
+        publishable: key expressions that a participant may publish, by the common name of its certificate.
     """
     everything = f"{key_prefix}/**"
     rules = [
         *_reading(everything),
         _rule("ask", ["query"], "ingress", [f"{key_prefix}/{SETUP_KEY}/*"]),
-        *(_rule(f"say {name}", _SAY, "ingress", keys) for name, keys in says.items()),
+        *(_rule(f"say {name}", _PUBLISH, "ingress", keys) for name, keys in publishable.items()),
     ]
-    subjects = [{"id": name, "cert_common_names": [name]} for name in [*says, VIEWER]]
-    policies = [{"rules": ["receive", "listen", "ask", f"say {name}"], "subjects": [name]} for name in says]
+    subjects = [{"id": name, "cert_common_names": [name]} for name in [*publishable, VIEWER]]
+    policies = [{"rules": ["receive", "listen", "ask", f"say {name}"], "subjects": [name]} for name in publishable]
     return _settings([*rules, _withheld(key_prefix)], subjects, [*policies, _VIEWING])
 
 
@@ -36,8 +36,8 @@ def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
     """Return the Zenoh settings for the open endpoint of a run on one machine: its clients read, and publish nothing.
 
     Args:
-        key_prefix: of the run.
-        certificates: whether only a viewer's certificate lets in.
+        key_prefix: key prefix of the run.
+        certificates: True to accept only the viewer's certificate.
     """
     inside = {"id": "inside", "link_protocols": [SCHEME.rstrip("/")]}
     outside = {"id": VIEWER, "cert_common_names": [VIEWER]}

@@ -20,8 +20,8 @@ class ServiceConfig(NamedTuple):
 class PerVehicle(NamedTuple):
     """Values of the vehicles of a fleet: their parameters of a service or of an auxiliary process."""
 
-    vehicles: tuple[str, ...]  # names; those that have it
-    given: tuple[Any, ...]
+    vehicles: tuple[str, ...]  # names of the vehicles that have the service or process
+    given: tuple[Any, ...]  # value of each vehicle
 
 
 class RunConfig(NamedTuple):
@@ -38,10 +38,10 @@ class RunConfig(NamedTuple):
     rate: int  # [Hz] ticks
     interval_ns: int  # length of a tick
     coupling: str  # "gauss_seidel" or "jacobi"
-    vehicle: str  # name, first part of its topics' names; "" of a fleet, whose topics have it already
+    vehicle: str  # name, the first part of its topics; "" for a fleet, whose topic names contain it
     services: dict[str, ServiceConfig]  # those of the lock step, by name
-    auxiliary: dict[str, Any]  # what processes outside of the lock step are given, by name
-    resolved: dict[str, Any]  # the scene's tables with all that its files say
+    auxiliary: dict[str, Any]  # configurations of the processes outside the lock step, by name
+    resolved: dict[str, Any]  # tables of the scene, including the content of its files
 
     @property
     def interval(self) -> float:
@@ -55,24 +55,24 @@ class RunConfig(NamedTuple):
 
     @property
     def vehicles(self) -> tuple[str, ...]:
-        """The names of all vehicles."""
+        """Names of all vehicles."""
         if self.vehicle:
             return (self.vehicle,)
         return tuple(entry["vehicle"]["name"] for entry in self.resolved["vehicle"])
 
     @property
     def modules(self) -> dict[str, str]:
-        """Texts of the user's own modules, by name."""
+        """Texts of the user's modules, by name."""
         return self.resolved.get("modules", {})
 
     @property
     def ports(self) -> dict[str, Port]:
-        """Every port of the run by name."""
+        """All ports of the run by name."""
         return {port.name: port for service in self.services.values() for port in service.ports}
 
     @property
     def producers(self) -> dict[str, str]:
-        """The service that publishes each port."""
+        """Name of the service that publishes each port."""
         return {port.name: name for name, service in self.services.items() for port in service.ports}
 
     @property

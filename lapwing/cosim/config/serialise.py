@@ -1,12 +1,12 @@
 """Exact conversion of trees of values to canonical JSON and back: equal trees lead to equal text on every machine.
 
-Dicts and lists are JSON's own. All else is an object with the key "$", which says what it is:
+Dicts and lists are JSON objects and arrays. Other values are objects with the key "$", their type:
 
     {"$": "tuple", "of": [...]}
-    {"$": "float", "of": "inf"}                             what JSON has no number for: inf, -inf, nan
-    {"$": "scalar", "dtype": "uint64", "of": 3}             a number of numpy
+    {"$": "float", "of": "inf"}                             inf, -inf, nan
+    {"$": "scalar", "dtype": "uint64", "of": 3}             numpy scalar
     {"$": "array", "dtype": "float64", "shape": [2], "of": [0.5, 1.0]}
-    {"$": "dict", "of": {...}}                              a dict that itself has the key "$"
+    {"$": "dict", "of": {...}}                              dict with the key "$"
     {"$": "lapwing.dynamics.effects.gravity:Gravity", "acceleration": 9.80665}      a NamedTuple or frozen dataclass
 """
 
@@ -26,33 +26,33 @@ from lapwing.cosim.config.former_names import FORMER_PACKAGES, present_fields, p
 from lapwing.messages.former_names import current_fields
 
 TAG = "$"
-LARGEST = 1 << 26  # [bytes] of the text of a run configuration; the largest have some millions
+LARGEST = 1 << 26  # [bytes] limit of the text of a run configuration; typical ones have up to a few million
 DTYPES = ("bool", "float64", "int64")  # of arrays
 SCALARS = ("bool", "float64", "int64", "uint64")
 
 
 def to_json(tree: Any) -> str:
-    """Canonical text of a tree: keys sorted, no spaces, floats as Python's `repr` writes them.
+    """Return the canonical text of a tree: sorted keys, no spaces, floats in Python's `repr` format.
 
     Args:
         tree: NamedTuples, frozen dataclasses, tuples, lists, dicts with texts as keys, str, bool, int, float, None,
             numpy arrays of float64, int64 and bool, numpy scalars.
 
     Raises:
-        ValueError: anything else, or a class that cannot be imported by its name; says where in the tree.
+        ValueError: a value of another type, or a class that cannot be imported by its name; names its path.
     """
     return json.dumps(_encoded(tree, ""), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def from_json(text: str, modules: Collection[str] = ()) -> Any:
-    """Return the tree of a text that `to_json` has written.
+    """Return the tree of a text of `to_json`.
 
     Args:
-        text: may be untrusted: only this package and the declared modules are imported for it.
-        modules: further modules whose classes it may have.
+        text: may be untrusted: only this package and `modules` are imported for it.
+        modules: further modules whose classes the text may name.
 
     Raises:
-        ValueError: not JSON, an unknown tag, or a class that is not there, has other fields now, or is not declared.
+        ValueError: not JSON, an unknown tag, or a class that is missing, not declared, or has other fields now.
     """
     try:
         return _decoded(json.loads(text), modules)
@@ -73,36 +73,36 @@ def decompress(message: bytes) -> str:
     """
     if message.startswith(b"{"):
         return message.decode()
-    unpacking = zlib.decompressobj()
+    decompressor = zlib.decompressobj()
     try:
-        text = unpacking.decompress(message, LARGEST)
+        text = decompressor.decompress(message, LARGEST)
     except zlib.error as error:
         raise ValueError(f"not a compressed text: {error}") from None
-    if not unpacking.eof:
+    if not decompressor.eof:
         raise ValueError(f"compressed text is incomplete, or larger than {LARGEST} bytes")
     return text.decode()
 
 
 def digest(tree: Any) -> str:
-    """BLAKE2b of the canonical text, hexadecimal."""
+    """Return the BLAKE2b digest of the canonical text, hexadecimal."""
     return hashlib.blake2b(to_json(tree).encode(), digest_size=16).hexdigest()
 
 
 class Absent:
-    """Stands for a value that only one of two trees has."""
+    """Placeholder for a value that only one of two trees has."""
 
     def __repr__(self) -> str:
         return "nothing"
 
 
 ABSENT = Absent()
-OWN = ("lapwing",)  # packages whose modules a text may have imported
+OWN = ("lapwing",)  # packages whose modules a text may import
 
 
 def first_difference(a: Any, b: Any) -> tuple[str, Any, Any] | None:
     """Return the first difference of two trees: (dotted path, value in `a`, value in `b`); None if they are identical.
 
-    A value that one of them does not have is `ABSENT`.
+    A missing value is `ABSENT`.
     """
     return _difference(a, b, "")
 

@@ -24,7 +24,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
-from lapwing.cosim.access.private_sockets import only_ours
+from lapwing.cosim.access.private_sockets import only_user_writable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, forget_sources
 
@@ -41,7 +41,7 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
         Files by the name of the module; the first is its own.
 
     Raises:
-        KeyedError: there is none, it has no source, or its name is taken.
+        ConfigError: there is none, it has no source, or its name is taken.
     """
     if not all(part.isidentifier() for part in name.split(".")):
         raise ConfigError(key, f"got module {name!r}", "a name that Python can import")
@@ -76,7 +76,7 @@ def _taken(name: str, file: Path) -> bool:
 def installed_module(name: str) -> ModuleSpec | None:
     """Return the module of that name on `sys.path`, except in the folders that this module has written."""
     if "." not in name:
-        return PathFinder.find_spec(name, [path for path in sys.path if path not in _laid_down])
+        return PathFinder.find_spec(name, [path for path in sys.path if path not in _module_folders])
     with suppress(ImportError, ValueError):
         return importlib.util.find_spec(name)
     return None
@@ -98,38 +98,38 @@ def _imports(file: Path) -> list[str]:
     return sorted(result)
 
 
-FAULTS = (Exception, SystemExit)  # what a user's code may raise, and a run ends with one line
-_laid_down: set[str] = set()  # folders on `sys.path` with the texts of set-ups
+FAULTS = (Exception, SystemExit)  # errors of a user's code that end a run with one line
+_module_folders: set[str] = set()  # folders on `sys.path` with the modules of run configurations
 
 
 def load(name: str, texts: Mapping[str, str]) -> ModuleType:
     """Return the module of that name, imported from its text unless the same text was imported before.
 
     Args:
-        name: of the module.
-        texts: of all modules that the set-up carries, by name.
+        name: name of the module.
+        texts: sources of all modules in the run configuration, by name.
 
     Raises:
-        Exception: whatever the module raises; ImportError where one that is not carried is missing.
+        Exception: any error of the module; ImportError if it needs a module that is missing.
     """
     install(texts)
     return importlib.import_module(name)
 
 
 def install(texts: Mapping[str, str]) -> None:
-    """Let imports find the modules that a set-up carries; what was imported from other texts is forgotten."""
+    """Make the modules of a run configuration importable, and unload modules of the same name with other sources."""
     plain = {n: text for n, text in texts.items() if "." not in n}
     stale = [n for n in plain if n in sys.modules and source(sys.modules[n]) not in (None, plain[n])]
     for n in plain if stale else ():
-        sys.modules.pop(n, None)  # those that import a stale one are stale, too
+        sys.modules.pop(n, None)  # including modules that import a stale one
     if stale:
         forget_sources()
     if any(n not in sys.modules for n in plain):
-        folder = _lay_down(plain)
+        folder = _write_modules(plain)
         if folder not in sys.path:
             sys.path.append(folder)
-        _laid_down.add(folder)
-        for other in _laid_down - {folder}:
+        _module_folders.add(folder)
+        for other in _module_folders - {folder}:
             if other in sys.path:
                 sys.path.remove(other)
         importlib.invalidate_caches()
@@ -143,16 +143,16 @@ def source(module: ModuleType) -> str | None:
     return ""
 
 
-def _lay_down(texts: Mapping[str, str]) -> str:
+def _write_modules(texts: Mapping[str, str]) -> str:
     """Write these modules into a folder of the cache, or of this process if other users can write there."""
     digest = hashlib.blake2b("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode(), digest_size=16).hexdigest()
-    kept = cache_folder()
-    if kept is not None:
-        folder = kept / "modules" / digest
+    cache_root = cache_folder()
+    if cache_root is not None:
+        folder = cache_root / "modules" / digest
         with suppress(OSError):
-            for path in (kept, folder.parent, folder):
-                path.mkdir(mode=0o700, parents=True, exist_ok=True)  # what is read from here is run
-            if all(map(only_ours, (kept, folder.parent, folder))):
+            for path in (cache_root, folder.parent, folder):
+                path.mkdir(mode=0o700, parents=True, exist_ok=True)  # its files are executed
+            if all(map(only_user_writable, (cache_root, folder.parent, folder))):
                 _write(folder, texts)
                 return str(folder)
     folder = _folder_of_this_process() / digest
@@ -162,10 +162,10 @@ def _lay_down(texts: Mapping[str, str]) -> str:
 
 
 def _write(folder: Path, texts: Mapping[str, str]) -> None:
-    """Write what is not there as it should be."""
+    """Write the modules whose files are missing or different."""
     for name, text in texts.items():
         file, content = folder / f"{name}.py", text.encode()
-        if not file.exists() or not only_ours(file) or file.read_bytes() != content:
+        if not file.exists() or not only_user_writable(file) or file.read_bytes() != content:
             temporary = folder / f"{name}.{uuid.uuid4().hex}"
             with open(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as out:
                 out.write(content)
@@ -174,7 +174,7 @@ def _write(folder: Path, texts: Mapping[str, str]) -> None:
 
 @cache
 def _folder_of_this_process() -> Path:
-    """Create a folder that is removed with this process; its forks may use it, too."""
+    """Create a folder that is removed at the exit of this process; its forks may use it."""
     folder, maker = tempfile.mkdtemp(prefix="lapwing-"), os.getpid()
 
     @atexit.register
@@ -187,8 +187,8 @@ def _folder_of_this_process() -> Path:
 
 def blame(error: BaseException, module: ModuleType) -> str:
     """Return the message of an exception, with the last line of the module in its traceback."""
-    file = getattr(module, "__file__", None)  # what is typed at a prompt has none
+    file = getattr(module, "__file__", None)  # None for code of an interactive prompt
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
     where = f" ({Path(str(file)).name}, line {lines[-1]})" if lines else ""
-    said = str(error).strip().partition("\n")[0]
-    return f"{type(error).__name__}{': ' if said else ''}{said}{where}"
+    message = str(error).strip().partition("\n")[0]
+    return f"{type(error).__name__}{': ' if message else ''}{message}{where}"

@@ -1,7 +1,7 @@
 """Executable block diagram: the blocks of one or all services of a run, bound to the rows of their ports.
 
-All executors run a diagram: a process one with the blocks of its service, the single-process and batch executors one
-with the blocks of all services.
+A service process runs a diagram of the blocks of its service; the single-process and batch executors run a diagram of
+the blocks of all services.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -20,7 +20,7 @@ from lapwing.kernels.row_packing import pack_row, row_unpacker, row_width
 from lapwing.messages.topics import Topic
 
 NEVER = 2**62  # [tick]
-SPARE = 8  # rows of a port beyond those of a page
+SPARE = 8  # rows of a port in addition to those of a tick block
 
 
 class PythonBlock(Protocol):
@@ -41,8 +41,8 @@ class PythonBlock(Protocol):
 class ConnectedBlock(PythonBlock, Protocol):
     """A Python block with a connection to a program outside the run."""
 
-    def open(self, waits: Callable[[str], None]) -> None:
-        """Connect, before the first tick; call `waits` with what it waits for, again and again, here and in `act`."""
+    def open(self, report_wait: Callable[[str], None]) -> None:
+        """Connect before the first tick. Call `report_wait` with a text during each wait, here and in `on_tick`."""
         ...
 
     def close(self) -> None:
@@ -60,24 +60,24 @@ class Service:
     """Running lock-step service: its blocks in their order, and its topics."""
 
     name: str
-    parts: Sequence[Any]  # Part or PythonPart
+    parts: Sequence[Any]  # Block or PythonBlock
     wires: Sequence[TopicEncoder]
     messages: list[tuple[Topic, int, bytes]] = field(default_factory=list)  # (topic, tick, payload) not yet fetched
     python_topics: Sequence[Topic] = ()  # the topics of `messages`
 
     @property
     def topics(self) -> list[Topic]:
-        """Every topic that it publishes."""
+        """All topics that it publishes."""
         return [*(wire.topic for wire in self.wires), *self.python_topics]
 
 
 class BlockDiagram:
-    """Bound parts.
+    """Block diagram of one or more services.
 
     Attributes:
-        setup: the run.
-        tick: the next tick.
-        ended: whether the last tick of the run is over.
+        setup: run configuration.
+        tick: next tick.
+        ended: True after the last tick of the run.
     """
 
     def __init__(
@@ -91,11 +91,11 @@ class BlockDiagram:
         """Bind services, in their order of execution.
 
         Args:
-            setup: the run.
-            services: all of the run, or one.
-            page: ticks that the rows keep at least, counted back from the newest.
-            whole: ports of which every tick of the run is kept.
-            rows: of a graph that is no longer wanted, which this one writes over where it has the same ports.
+            setup: run configuration.
+            services: all services of the run, or one.
+            page: number of most recent ticks whose rows are kept.
+            whole: names of the ports with full history.
+            rows: rows of a diagram that is no longer needed; their memory is used again where the shape is equal.
         """
         self.setup, self.services = setup, services
         self.tick, self.ended = 0, False
@@ -103,25 +103,25 @@ class BlockDiagram:
         self.ports = dict(setup.ports)
         for part in parts:
             self.ports |= {port.name: port for port in part.outputs}
-        used = {port.name for part in parts for port in part.outputs}
-        used |= {i.port for part in parts for i in getattr(part, "inputs", ())}
-        unknown = sorted(used - self.ports.keys())
+        port_names = {port.name for part in parts for port in part.outputs}
+        port_names |= {i.port for part in parts for i in getattr(part, "inputs", ())}
+        unknown = sorted(port_names - self.ports.keys())
         if unknown:
             raise LockStepError(f"no service of this scene publishes {', '.join(unknown)}")
         delays: dict[str, int] = {}
         for part in parts:
             for i in getattr(part, "inputs", ()):
                 delays[i.port] = max(delays.get(i.port, 0), i.delay)
-        kept = {name: setup.last_tick + 1 if name in whole else page + delays.get(name, 0) for name in used}
+        depths = {name: setup.last_tick + 1 if name in whole else page + delays.get(name, 0) for name in port_names}
         self._rows = {} if rows is None else rows
-        for name in sorted(used):
-            self._rows[name] = _ring(self.ports[name], kept[name], delays.get(name, 0), self._rows.get(name))
-        self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # of the ports that were read
+        for name in sorted(port_names):
+            self._rows[name] = _ring(self.ports[name], depths[name], delays.get(name, 0), self._rows.get(name))
+        self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # by port
         self._parts = parts
         self._codes: list[BoundBlock | None] = []
         for part in parts:
             self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Block) else None)
-        self._turns = [ExecutionGroup(numbers, parts, self._codes) for numbers in independent_groups(parts)]
+        self._groups = [ExecutionGroup(numbers, parts, self._codes) for numbers in independent_groups(parts)]
         for part in parts:
             if not isinstance(part, Block):
                 part.bind(self)
@@ -130,13 +130,13 @@ class BlockDiagram:
     def _connected(self) -> list[Any]:
         return [part for part in self._parts if hasattr(part, "reports")]
 
-    def open(self, waits: Callable[[str], None] = lambda text: None) -> None:
+    def open(self, report_wait: Callable[[str], None] = lambda text: None) -> None:
         """Connect the blocks that have a connection; see `ConnectedBlock`."""
         for part in self._connected:
-            part.open(waits)
+            part.open(report_wait)
 
     def close(self) -> None:
-        """End these connections."""
+        """Close the connections of these blocks."""
         for part in self._connected:
             part.close()
 
@@ -150,47 +150,47 @@ class BlockDiagram:
         return next(part for part in self._parts if part.name == name)
 
     def prepare(self, part: Block) -> BoundBlock:
-        """Compile or load a part that is to take another's place later."""
+        """Compile or load a block that replaces another one later."""
         return bind(part, self.ports, self._rows)
 
     def replace(self, part: Block, code: BoundBlock) -> None:
-        """Put a prepared part in the place of the one of its name; it takes over the state that it was given."""
+        """Replace the block of the same name by a prepared one, which starts from its own state."""
         k = self._parts.index(self.part(part.name))
         self._parts[k], self._codes[k] = part, code
-        next(turn for turn in self._turns if k in turn.parts).replace(k, code)
+        next(group for group in self._groups if k in group.parts).replace(k, code)
 
     def advance(self, stop: int) -> None:
-        """Run up to before the tick `stop`, or to the end of the run.
+        """Run to the tick `stop` (exclusive), or to the end of the run.
 
         Raises:
             LockStepError: the state of a block is invalid.
         """
         if self.ended:
             return
-        stop, self.ended, failed = advance_groups(self._turns, stop, self._act, self._failure)
+        stop, self.ended, failed = advance_groups(self._groups, stop, self._act, self._failure)
         self.tick = max(self.tick, stop)
-        if len(self._turns) > 1:
+        if len(self._groups) > 1:
             for service in self.services:
                 service.messages.sort(key=_tick)
         if failed is not None:
             raise failed
 
     def _act(self, part: int, tick: int) -> int:
-        self._come_to(tick)
+        self._set_tick(tick)
         return self._parts[part].on_tick(tick)
 
     def _failure(self, part: int, tick: int) -> Exception:
-        self._come_to(tick)
-        return (self._parts[part].failure or _unsound(self._parts[part].name))(tick)
+        self._set_tick(tick)
+        return (self._parts[part].failure or _diverged(self._parts[part].name))(tick)
 
-    def _come_to(self, tick: int) -> None:
-        if len(self._turns) == 1:
+    def _set_tick(self, tick: int) -> None:
+        if len(self._groups) == 1:
             self.tick = tick
 
     def finish(self) -> None:
-        """Let the present tick be the last; for a part in Python that owns time."""
-        for turn in self._turns:
-            turn.finish()
+        """End the run after the current tick; for Python blocks."""
+        for group in self._groups:
+            group.finish()
 
     def has(self, port: str) -> bool:
         """Return True if a block of this diagram reads or writes the port."""
@@ -204,15 +204,15 @@ class BlockDiagram:
         return self._readers[port](self._rows[port][self._index(port, tick - tick % period)])
 
     def put(self, port: str, tick: int, value: Any) -> None:
-        """Give the value of a port at `tick`."""
+        """Set the value of a port at `tick`."""
         self._rows[port][self._index(port, tick)] = pack_row(value)
 
     def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
-        """Give the value of a port at `tick` as numbers, shape (width,)."""
+        """Set the row of a port at `tick`, shape (width,)."""
         self._rows[port][self._index(port, tick)] = row
 
     def put_rows(self, port: str, ticks: np.ndarray, rows: np.ndarray) -> None:
-        """Give the values of a port at `ticks` (n,) as numbers, shape (n, width)."""
+        """Set the rows of a port at `ticks` (n,), shape (n, width)."""
         self._rows[port][self._index(port, ticks)] = rows
 
     def row(self, port: str, tick: int) -> np.ndarray:
@@ -234,20 +234,22 @@ class BlockDiagram:
         """Return the messages of the ticks [first, stop).
 
         Args:
-            first: the first tick.
-            stop: the tick after the last.
-            only: the topics wanted, None for all that are recorded.
-            keep: whether single messages are to be given again by a later call.
+            first: first tick.
+            stop: last tick (exclusive).
+            only: topics to return; None for all recorded topics.
+            keep: True to return the messages of Python blocks again in a later call.
         """
-        wanted = None if only is None else set(only)
+        topics = None if only is None else set(only)
         result: list[RecordBatch] = []
         for service in self.services:
             for wire in service.wires:
                 ticks = due_ticks(first, stop, wire.period)
-                if len(ticks) and (wire.topic.recorded if wanted is None else wire.topic in wanted):
+                if len(ticks) and (wire.topic.recorded if topics is None else wire.topic in topics):
                     result += encode(wire, self.ports[wire.port], self.setup, ticks, self.rows(wire.port, ticks))
-            said = [m for m in service.messages if first <= m[1] < stop and (wanted is None or m[0] in wanted)]
-            result += to_record_batches(said)
+            python_messages = [
+                m for m in service.messages if first <= m[1] < stop and (topics is None or m[0] in topics)
+            ]
+            result += to_record_batches(python_messages)
             if not keep:
                 service.messages = [m for m in service.messages if m[1] >= stop]
         return result
@@ -258,7 +260,7 @@ class BlockDiagram:
 
 
 def to_record_batches(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
-    """Single messages (topic, tick, payload) as pages of messages of one length."""
+    """Group messages (topic, tick, payload) into record batches of equal topic and length."""
     groups: dict[tuple[Topic, int], list[tuple[int, bytes]]] = {}
     for topic, tick, payload in messages:
         groups.setdefault((topic, len(payload)), []).append((tick, payload))
@@ -270,12 +272,12 @@ def to_record_batches(messages: Iterable[tuple[Topic, int, bytes]]) -> list[Reco
 
 
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
-    """Return rows for `ticks` ticks, in the memory of the former ones if these have the same shape."""
+    """Return rows for `ticks` ticks, in the memory of `former` if it has the same shape."""
     rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
     shape = 1 << (rows - 1).bit_length(), max(1, row_width(port.like))
     if former is None or former.shape != shape:
         return np.zeros(shape)
-    former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # those read before they are written, of ticks before 0
+    former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # rows of ticks before 0 are read before they are written
     return former
 
 
@@ -283,5 +285,5 @@ def _tick(message: tuple[Topic, int, bytes]) -> int:
     return message[1]
 
 
-def _unsound(name: str) -> Any:
+def _diverged(name: str) -> Any:
     return lambda tick: DivergedError(f"{name}: non-finite or invalid state at tick {tick}")

@@ -4,9 +4,8 @@ A block is described by its parameters, a NamedTuple. The module of their class 
 
     step(parameters, state, tick, inputs) -> (state, outputs, signal)
 
-`inputs` is a tuple of `InputSample`, `outputs` a tuple of trees, one for each port; the state lives in a cell,
-which parts
-of one service may share. Every block is compiled once, to a function of (its memory, tick), and every executor calls
+`inputs` is a tuple of `InputSample`, `outputs` a tuple of trees, one for each port. The state is in a cell, which
+blocks of one service may share. Every block is compiled once, to a function of (its memory, tick). Every executor calls
 the same machine code by its address, so the results of all executors are bit-for-bit identical.
 """
 
@@ -72,12 +71,12 @@ class Block:
         name: "plant", "sensors.imu".
         parameters: a NamedTuple whose module has `step`.
         state: the cell that holds its state.
-        inputs: what it takes, in the order of the argument `inputs`.
+        inputs: its input ports, in the order of the argument `inputs`.
         outputs: its output ports, in the order of its outputs.
         every: ticks between two steps.
         failure: returns the error of a tick at which the state is non-finite.
-        vehicle: of a fleet, whose part it is.
-        trusted: whether its step changes arrays in place or not at all, so that references need not be counted.
+        vehicle: vehicle of a fleet that it belongs to.
+        trusted: True if its step never replaces an array, so that references need not be counted.
     """
 
     name: str
@@ -96,7 +95,7 @@ class BoundBlock(NamedTuple):
 
     function: int  # address
     memory: int  # address
-    cell: Any  # what is at that address; it must live as long as the code is called
+    cell: Any  # owner of the memory; it must live as long as the code is called
 
 
 def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> BoundBlock:
@@ -195,15 +194,15 @@ def _invoke(typing_context: Any, function: types.Type, memory: types.Type, tick:
 
 
 class Schedule(NamedTuple):
-    """The parts of a graph in their order of execution, as the compiled loop calls them."""
+    """Blocks of a diagram in their order of execution, for the compiled loop."""
 
-    function: np.ndarray  # (n,) int64 address; 0: a part in Python
+    function: np.ndarray  # (n,) int64 address; 0: a Python block
     memory: np.ndarray  # (n,) int64 address
-    every: np.ndarray  # (n,) int64 [ticks] between two steps of a compiled part
-    next: np.ndarray  # (n,) int64 tick of the next step, or of a Python part's next say
-    vehicle: np.ndarray  # (n,) int64 number of the vehicle whose part it is
-    done: np.ndarray  # (vehicles,) int64: 1 once a part of the vehicle has said that the tick is its last
-    ended: np.ndarray  # (1,) int64: 1 once all vehicles have
+    every: np.ndarray  # (n,) int64 [ticks] between two steps of a compiled block
+    next: np.ndarray  # (n,) int64 tick of the next step
+    vehicle: np.ndarray  # (n,) int64 number of the block's vehicle
+    done: np.ndarray  # (vehicles,) int64: 1 after a block of the vehicle has finished
+    ended: np.ndarray  # (1,) int64: 1 after all vehicles have finished
 
 
 def schedule(codes: Sequence[BoundBlock | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:

@@ -18,20 +18,20 @@ def independent_groups(parts: Sequence[Any]) -> list[list[int]]:
     """Return the numbers of the blocks of each group: those of each vehicle, or of all if one reads
     a port of another vehicle or an external port."""
     vehicles = [getattr(part, "vehicle", "") for part in parts]
-    giver = {port.name: vehicle for part, vehicle in zip(parts, vehicles, strict=True) for port in part.outputs}
+    producer = {port.name: vehicle for part, vehicle in zip(parts, vehicles, strict=True) for port in part.outputs}
     for part, vehicle in zip(parts, vehicles, strict=True):
-        if any(giver.get(i.port) != vehicle for i in getattr(part, "inputs", ())):
+        if any(producer.get(i.port) != vehicle for i in getattr(part, "inputs", ())):
             return [list(range(len(parts)))]
     return [[k for k, other in enumerate(vehicles) if other == vehicle] for vehicle in dict.fromkeys(vehicles)]
 
 
 class ExecutionGroup:
-    """Parts that step together.
+    """Blocks that step together.
 
     Attributes:
-        parts: their numbers in the graph, in their order.
-        tick: the next.
-        over: whether they have said that the tick before was the last.
+        parts: numbers of the blocks in the diagram, in order.
+        tick: next tick.
+        finished: True if the previous tick was their last.
     """
 
     def __init__(self, numbers: Sequence[int], parts: Sequence[Any], codes: Sequence[BoundBlock | None]):
@@ -40,14 +40,14 @@ class ExecutionGroup:
         own = [parts[k] for k in numbers]
         every, vehicles = [getattr(part, "every", 1) for part in own], [getattr(part, "vehicle", "") for part in own]
         plan = schedule([codes[k] for k in numbers], every, vehicles)
-        self._plan = plan._replace(done=np.append(plan.done, 1))  # the last: whether they may end
-        self._cell = Cell(self._plan)  # the same arrays; a cell is handed over faster
+        self._plan = plan._replace(done=np.append(plan.done, 1))  # the last entry: 1 if the group may end
+        self._cell = Cell(self._plan)  # shares the arrays; a cell is a faster argument
 
     def advance(self, stop: int, on_tick: Callable[[int, int], int], failure: Callable[[int, int], Exception]) -> None:
-        """Run up to before the tick `stop`, or until they are over.
+        """Run to the tick `stop` (exclusive), or until the blocks have finished.
 
         Args:
-            stop: tick.
+            stop: last tick (exclusive).
             on_tick: runs the Python block of a number at a tick; returns the tick of its next wake-up.
             failure: returns the error of a block whose state is invalid at a tick.
         """
@@ -74,42 +74,42 @@ class ExecutionGroup:
         self.finished = True
 
     def finish(self) -> None:
-        """Let the present tick be the last."""
+        """End after the current tick."""
         self._plan.ended[0] = 1
 
     def replace(self, part: int, code: BoundBlock) -> None:
-        """Let other code step a part from now on."""
+        """Replace the machine code of the block `part`."""
         k = self.parts.index(part)
         self._plan.function[k], self._plan.memory[k] = code.function, code.memory
 
 
 def advance_groups(
-    turns: Sequence[ExecutionGroup],
+    groups: Sequence[ExecutionGroup],
     stop: int,
     on_tick: Callable[[int, int], int],
     failure: Callable[[int, int], Exception],
 ) -> tuple[int, bool, LockStepError | None]:
-    """Run all up to before the tick `stop`, or until the last of them is over; arguments as of
-    `ExecutionGroup.advance`.
+    """Run all groups to the tick `stop` (exclusive), or until the last one has finished.
+
+    See `ExecutionGroup.advance` for arguments.
 
     Returns:
-        The tick that all have come to, those that were over before the last one, too; whether the run is over; the
-        first failure, which ends the run at its tick.
+        The tick that all groups have reached, True if the run has ended, and the first failure, which ends the run.
     """
     failed: LockStepError | None = None
-    for turn in [turn for turn in turns if not turn.finished]:
+    for group in [group for group in groups if not group.finished]:
         try:
-            turn.advance(stop, on_tick, failure)
+            group.advance(stop, on_tick, failure)
         except LockStepError as error:
-            failed, stop = error, turn.tick
-    if not any(turn.finished for turn in turns):
+            failed, stop = error, group.tick
+    if not any(group.finished for group in groups):
         return stop, False, failed
-    ended = failed is None and all(turn.finished for turn in turns)
+    ended = failed is None and all(group.finished for group in groups)
     if ended:
-        stop = max(turn.tick for turn in turns)
-    for turn in [turn for turn in turns if turn.finished and turn.tick < stop]:
+        stop = max(group.tick for group in groups)
+    for group in [group for group in groups if group.finished and group.tick < stop]:
         try:
-            turn.run_past_end(stop, on_tick, failure)
+            group.run_past_end(stop, on_tick, failure)
         except LockStepError as error:
-            failed, stop, ended = error, turn.tick, False
+            failed, stop, ended = error, group.tick, False
     return stop, ended, failed

@@ -19,9 +19,9 @@ from lapwing.messages.topics import CLOCK, Topic, of_vehicle
 
 
 def qualified_name(vehicle: str, name: str) -> str:
-    """Full name of a port or part of `vehicle` in a fleet.
+    """Return the full name of a port or block of `vehicle` in a fleet.
 
-    A name with a leading slash is one of another vehicle and is already full: "/left/truth".
+    A name with a leading slash belongs to another vehicle and is already complete: "/left/truth".
     """
     return name[1:] if name.startswith("/") else f"{vehicle}/{name}"
 
@@ -35,36 +35,36 @@ def merge_configs(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> 
     """Return the run configuration of a fleet.
 
     Args:
-        members: that of each vehicle, as if it flew alone; all with the same scene, seed, ticks and coupling.
-        resolved: the tables of the whole scene.
+        members: run configuration of each vehicle alone; all with the same scene, seed, ticks and coupling.
+        resolved: tables of the whole scene.
     """
     services = {}
     for name in dict.fromkeys(name for member in members for name in member.services):
-        having = [member for member in members if name in member.services]
-        shares = tuple(member.services[name] for member in having)
-        pairs = [(member.vehicle, share) for member, share in zip(having, shares, strict=True)]
+        users = [member for member in members if name in member.services]
+        configs = tuple(member.services[name] for member in users)
+        vehicle_configs = [(member.vehicle, share) for member, share in zip(users, configs, strict=True)]
         services[name] = ServiceConfig(
-            PerVehicle(tuple(member.vehicle for member in having), shares),
-            tuple(_input(vehicle, i) for vehicle, share in pairs for i in share.inputs),
-            tuple(_port(vehicle, port) for vehicle, share in pairs for port in share.ports),
+            PerVehicle(tuple(member.vehicle for member in users), configs),
+            tuple(_input(vehicle, i) for vehicle, share in vehicle_configs for i in share.inputs),
+            tuple(_port(vehicle, port) for vehicle, share in vehicle_configs for port in share.ports),
         )
-    beside = {}
+    auxiliary = {}
     for name in dict.fromkeys(name for member in members for name in member.auxiliary):
-        having = [member for member in members if name in member.auxiliary]
-        beside[name] = PerVehicle(tuple(m.vehicle for m in having), tuple(m.auxiliary[name] for m in having))
-    return members[0]._replace(vehicle="", services=services, auxiliary=beside, resolved=dict(resolved))
+        users = [member for member in members if name in member.auxiliary]
+        auxiliary[name] = PerVehicle(tuple(m.vehicle for m in users), tuple(m.auxiliary[name] for m in users))
+    return members[0]._replace(vehicle="", services=services, auxiliary=auxiliary, resolved=dict(resolved))
 
 
 def members(setup: RunConfig) -> tuple[RunConfig, ...]:
-    """Return the run configuration of each vehicle, as if it flew alone; of a single vehicle the run itself."""
+    """Return the run configuration of each vehicle alone; for a single vehicle, that of the run."""
     if setup.vehicle:
         return (setup,)
     common = {name: table for name, table in setup.resolved.items() if name != "vehicle"}
     return tuple(
         setup._replace(
             vehicle=vehicle,
-            services=_of(vehicle, {name: service.parameters for name, service in setup.services.items()}),
-            auxiliary=_of(vehicle, setup.auxiliary),
+            services=_values_of(vehicle, {name: service.parameters for name, service in setup.services.items()}),
+            auxiliary=_values_of(vehicle, setup.auxiliary),
             resolved={**common, **entry},
         )
         for vehicle, entry in zip(setup.vehicles, setup.resolved["vehicle"], strict=True)
@@ -72,13 +72,15 @@ def members(setup: RunConfig) -> tuple[RunConfig, ...]:
 
 
 def member(setup: RunConfig, vehicle: str) -> RunConfig:
-    """Return the run configuration of one of the vehicles, as if it flew alone."""
+    """Return the run configuration of one vehicle alone."""
     return members(setup)[setup.vehicles.index(vehicle)]
 
 
-def _of(vehicle: str, each: Mapping[str, PerVehicle]) -> dict[str, Any]:
+def _values_of(vehicle: str, services: Mapping[str, PerVehicle]) -> dict[str, Any]:
     return {
-        name: given.given[given.vehicles.index(vehicle)] for name, given in each.items() if vehicle in given.vehicles
+        name: values.given[values.vehicles.index(vehicle)]
+        for name, values in services.items()
+        if vehicle in values.vehicles
     }
 
 
@@ -87,35 +89,35 @@ def primary_topic(setup: RunConfig, topic: Topic) -> Topic:
     return topic if setup.vehicle else of_vehicle(topic, setup.vehicles[0])
 
 
-def joined_service(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
-    """Merge the services of the vehicles of a fleet, given with their run configurations."""
-    whole = Service(name, [], [])
-    parts, wires, spoken = [], [], []
+def merge_services(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
+    """Return a service with the blocks of all vehicles; `services` has the configuration and service of each."""
+    fleet = Service(name, [], [])
+    parts, wires, python_topics = [], [], []
     clocks = 0
     for member, service in services:
         vehicle = member.vehicle
         parts += [_part(member, part) for part in service.parts]
         for wire in service.wires:
             clocks += wire.topic is CLOCK
-            if wire.topic is not CLOCK or clocks == 1:  # they would all tell the same time
+            if wire.topic is not CLOCK or clocks == 1:  # the clocks of all vehicles are equal
                 topic, port = of_vehicle(wire.topic, vehicle), qualified_name(vehicle, wire.port)
                 wires.append(replace(wire, topic=topic, port=port))
-        service.messages = _Outbox(whole, vehicle)
-        spoken += [of_vehicle(topic, vehicle) for topic in service.python_topics]
-    whole.parts, whole.wires, whole.python_topics = parts, wires, spoken
-    return whole
+        service.messages = _Outbox(fleet, vehicle)
+        python_topics += [of_vehicle(topic, vehicle) for topic in service.python_topics]
+    fleet.parts, fleet.wires, fleet.python_topics = parts, wires, python_topics
+    return fleet
 
 
 class _Outbox(list[tuple[Topic, int, bytes]]):
-    """Passes the messages of a vehicle's service on to that of the fleet."""
+    """Adds the messages of a vehicle's service to those of the fleet's service."""
 
-    def __init__(self, whole: Service, vehicle: str):
+    def __init__(self, fleet: Service, vehicle: str):
         super().__init__()
-        self._whole, self._vehicle = whole, vehicle
+        self._fleet, self._vehicle = fleet, vehicle
 
     def append(self, message: tuple[Topic, int, bytes]) -> None:
         topic, tick, payload = message
-        self._whole.messages.append((of_vehicle(topic, self._vehicle), tick, payload))
+        self._fleet.messages.append((of_vehicle(topic, self._vehicle), tick, payload))
 
 
 def _input(vehicle: str, i: InputPort) -> InputPort:
@@ -140,13 +142,13 @@ def _part(member: RunConfig, part: Any) -> Any:
     )
 
 
-def _failure(vehicle: str, of_part: Callable[[int], Exception], tick: int) -> Exception:
-    error = of_part(tick)
+def _failure(vehicle: str, failure: Callable[[int], Exception], tick: int) -> Exception:
+    error = failure(tick)
     return type(error)(f"{vehicle}: {error}")
 
 
 class VehicleBlock:
-    """A part of a vehicle that stays in Python."""
+    """Python block of a vehicle in a fleet."""
 
     def __init__(self, member: RunConfig, part: Any):
         """Wrap a Python block of the vehicle with the run configuration `member`."""
@@ -157,7 +159,7 @@ class VehicleBlock:
         self.inputs = tuple(_input(self.vehicle, i) for i in getattr(part, "inputs", ()))
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Get the vehicle's own part of the graph."""
+        """Bind the block to the vehicle's view of the diagram."""
         self._part.bind(VehicleDiagram(graph, self._member))
 
     def on_tick(self, tick: int) -> int:
@@ -168,9 +170,9 @@ class VehicleBlock:
 class ConnectedVehicleBlock(VehicleBlock):
     """A Python block of a vehicle with a connection to a program outside the run."""
 
-    def open(self, waits: Callable[[str], None]) -> None:
+    def open(self, report_wait: Callable[[str], None]) -> None:
         """Connect."""
-        self._part.open(waits)
+        self._part.open(report_wait)
 
     def close(self) -> None:
         """End the connection."""
@@ -210,7 +212,7 @@ class VehicleDiagram:
 
     @property
     def ports(self) -> dict[str, Port]:
-        """Ports of the vehicle by their names without its own."""
+        """Ports of the vehicle by name without the vehicle's prefix."""
         return self.setup.ports
 
     def row(self, port: str, tick: int) -> np.ndarray:

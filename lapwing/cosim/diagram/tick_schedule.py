@@ -18,7 +18,7 @@ class Port(NamedTuple):
     """Stream of values from one block to others: a tree of numbers every `period` ticks, or LATCHED."""
 
     name: str
-    like: Any  # a value of this port: fixes the shape and the types
+    like: Any  # example value: fixes the shape and the types
     period: int = 1  # [ticks]
 
 
@@ -44,7 +44,7 @@ def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str
         gives: names of the output ports of each participant.
 
     Raises:
-        LockStepError: a loop has no delay in it, or an input has no producer.
+        LockStepError: a loop has no delay, or an input has no producer.
     """
     producer = {port: name for name, ports in gives.items() for port in ports}
     for name, inputs in needs.items():

@@ -1,8 +1,8 @@
 """Conversion of port rows into messages: one topic encoder for each topic, in the services' `encoders.py`.
 
-A batch of rows becomes a batch of payloads at once: `fields` returns the columns of the message's numbers, `sample` a
-message that fixes its texts and the lengths of its sequences. Where texts change during a run, rows hold their numbers
-in the service's table of texts, and a page falls into parts of the same texts.
+An encoder converts many rows in one call: `fields` returns the columns of the message's numbers, `sample` a message
+that fixes its texts and the lengths of its sequences. If texts change during a run, rows hold their indices in the
+service's table of texts, and a batch is split into parts of the same texts.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ from lapwing.kernels.row_packing import columns
 from lapwing.messages.cdr_arrays import Record
 from lapwing.messages.topics import Topic
 
-Fields = Mapping[str, Any]  # by field of the message a column (n,) or (n, k), a scalar, or a function that returns one
+Fields = Mapping[str, Any]  # by field name: a column (n,) or (n, k), a scalar, or a function that returns one of them
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class TopicEncoder:
         port: name of the port.
         period: ticks between two messages; a multiple of the port's.
         fields: (columns of the port's tree, instants [ns] (n,) of int64) to the message's fields.
-        sample: a message with the texts of the given key; the key is () where `texts` is None.
-        texts: the columns, each (n,), whose numbers choose the texts.
+        sample: returns a message with the texts of a key; the key is () if `texts` is None.
+        texts: returns the columns of the key, each (n,): indices into the tables of texts.
     """
 
     topic: Topic
@@ -55,16 +55,16 @@ def encode(
     """Yield the messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
     tree = columns(port.like, rows)
     if wire.texts is None:
-        yield _page(wire, wire.sample(), tree, ticks, setup)
+        yield _record_batch(wire, wire.sample(), tree, ticks, setup)
         return
     keys = np.stack([np.asarray(column, np.int64) for column in wire.texts(tree)], axis=1)
     for key in np.unique(keys, axis=0):
-        chosen = np.flatnonzero((keys == key).all(axis=1))
-        part = columns(port.like, rows[chosen]) if len(chosen) < len(ticks) else tree
-        yield _page(wire, wire.sample(*key.tolist()), part, ticks[chosen], setup)
+        selected = np.flatnonzero((keys == key).all(axis=1))
+        part = columns(port.like, rows[selected]) if len(selected) < len(ticks) else tree
+        yield _record_batch(wire, wire.sample(*key.tolist()), part, ticks[selected], setup)
 
 
-def _page(wire: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: RunConfig) -> RecordBatch:
+def _record_batch(wire: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: RunConfig) -> RecordBatch:
     fields = wire.fields(tree, ticks * setup.interval_ns)
     return RecordBatch(wire.topic, ticks, Record.of(sample).encode(len(ticks), fields))
 

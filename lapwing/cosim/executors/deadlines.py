@@ -1,4 +1,4 @@
-"""Deadlines of a run that keeps a speed: how often a service, and the run as a whole, is late, and by how much at most.
+"""Deadlines of a run with a real-time factor: number of late ticks and largest lateness of each service and of the run.
 
 A service is late at a tick when its own step takes longer than a tick may; the clock owner is late when it cannot
 begin a tick in time because the previous tick is not complete, whichever service caused it.
@@ -14,8 +14,8 @@ MISSED, WORST = "missed_deadlines", "worst_lateness"  # keys of a log's metadata
 class Lateness(NamedTuple):
     """Number of late ticks of a service in a run, and the largest delay."""
 
-    ticks: int  # at which it was late
-    worst: float  # [s], 0 where it never was
+    ticks: int  # number of late ticks
+    worst: float  # [s], 0 without a late tick
 
 
 class Deadlines:
@@ -25,7 +25,7 @@ class Deadlines:
         self._ticks, self._worst = 0, 0.0
 
     def note(self, late: float) -> None:
-        """Count a tick that was done `late` seconds after its time; negative where it was early."""
+        """Count a tick that was finished `late` [s] after its time; negative if it was early."""
         if late > 0.0:
             self._ticks += 1
             self._worst = max(self._worst, late)
@@ -35,24 +35,24 @@ class Deadlines:
         return json.dumps(Lateness(self._ticks, self._worst))
 
 
-def lateness(told: str) -> Lateness:
+def lateness(text: str) -> Lateness:
     """Parse the result of `Deadlines.to_text`.
 
     Raises:
-        ValueError: something else.
+        ValueError: the text is invalid.
     """
     try:
-        ticks, worst = json.loads(told)
+        ticks, worst = json.loads(text)
         return Lateness(int(ticks), float(worst))
     except TypeError as error:
         raise ValueError(f"no lateness: {error}") from None
 
 
-def entries(found: Mapping[str, Lateness]) -> dict[str, str]:
-    """Return entries of a log's metadata from the lateness of each service, empty without reports."""
-    if not found:
+def metadata_entries(services: Mapping[str, Lateness]) -> dict[str, str]:
+    """Return metadata_entries of a log's metadata from the lateness of each service, empty without reports."""
+    if not services:
         return {}
     return {
-        MISSED: ", ".join(f"{name} {late.ticks}" for name, late in sorted(found.items())),
-        WORST: ", ".join(f"{name} {1e3 * late.worst:.2f} ms" for name, late in sorted(found.items())),
+        MISSED: ", ".join(f"{name} {late.ticks}" for name, late in sorted(services.items())),
+        WORST: ", ".join(f"{name} {1e3 * late.worst:.2f} ms" for name, late in sorted(services.items())),
     }

@@ -1,4 +1,4 @@
-"""The lock step of a process: wait for what is due, step, publish."""
+"""Lock step of a process: wait for the inputs that are due, step, publish."""
 
 import json
 import os
@@ -22,8 +22,8 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
 
     Args:
         process: the participant.
-        service: what it steps.
-        owns_time: whether it keeps the pace, and says which tick is the last.
+        service: service to step.
+        owns_time: True if this process sets the pace and decides which tick is the last.
         recorder: the participant for whose log the clock owner waits.
 
     The end travels with the step packets: an empty one is the last. The clock owner publishes in addition
@@ -35,19 +35,19 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     """
     setup = process.setup
     graph = BlockDiagram(setup, [service], 2 * PAGE)
-    graph.advance(0)  # nothing is stepped, but the loop over the parts is compiled before the clock begins
-    givers = packet_receivers(process, graph)
-    outlets = PacketSender(process, service, graph)
-    backlog = LogBackpressure(process, recorder) if owns_time else None
+    graph.advance(0)  # steps nothing, but compiles the loop over the blocks before the clock starts
+    receivers = packet_receivers(process, graph)
+    sender = PacketSender(process, service, graph)
+    backpressure = LogBackpressure(process, recorder) if owns_time else None
 
-    def waits(text: str) -> None:
+    def report_wait(text: str) -> None:
         if process.stopping:
             raise Stopped
-        process.waits_outside(text)
+        process.report_external_wait(text)
 
     try:
-        graph.open(waits)
-        _run(process, graph, givers, outlets, owns_time, backlog)
+        graph.open(report_wait)
+        _run(process, graph, receivers, sender, owns_time, backpressure)
     finally:
         graph.close()
 
@@ -55,23 +55,23 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
 def _run(
     process: Participant,
     graph: BlockDiagram,
-    givers: list[PacketReceiver],
-    outlets: PacketSender,
+    receivers: list[PacketReceiver],
+    sender: PacketSender,
     owns_time: bool,
-    backlog: LogBackpressure | None,
+    backpressure: LogBackpressure | None,
 ) -> None:
-    """Join the others, and step from tick 0 to the last tick of the run."""
+    """Join the other participants, and step from tick 0 to the last tick of the run."""
     setup = process.setup
     process.join()
-    outlets.refresh_subscribers()
+    sender.refresh_subscribers()
     if process.core is not None:
         pin(process.core)
         if process.speed is None:
             batch()
     if process.realtime:
         realtime.enter()
-    allowed = setup.interval / process.speed if process.speed is not None else None
-    at_once = ticks_per_packet(setup, process.name) if process.packs_ticks else 1
+    tick_duration = setup.interval / process.speed if process.speed is not None else None
+    ticks_per_call = ticks_per_packet(setup, process.name) if process.packs_ticks else 1
     deadlines = Deadlines()
     started = time.perf_counter()
     try:
@@ -79,16 +79,16 @@ def _run(
             if process.stopping:
                 raise Stopped
             tick = graph.tick
-            known = min([giver.receive(tick) for giver in givers], default=tick + 1)
-            if backlog:
-                backlog.wait_for_log(tick)
-            if allowed is not None and owns_time:
-                deadlines.note(_pace(started + tick * allowed))
-            begun = time.perf_counter()
-            graph.advance(min(known, tick + at_once))
-            outlets.publish(tick, graph.tick)
-            if allowed is not None and not owns_time:
-                deadlines.note(time.perf_counter() - begun - allowed * (graph.tick - tick))
+            stop = min([receiver.receive(tick) for receiver in receivers], default=tick + 1)
+            if backpressure:
+                backpressure.wait_for_log(tick)
+            if tick_duration is not None and owns_time:
+                deadlines.note(_pace(started + tick * tick_duration))
+            step_start = time.perf_counter()
+            graph.advance(min(stop, tick + ticks_per_call))
+            sender.publish(tick, graph.tick)
+            if tick_duration is not None and not owns_time:
+                deadlines.note(time.perf_counter() - step_start - tick_duration * (graph.tick - tick))
         if owns_time:
             process.publish_final_status(ENDED_KEY)
     except EndOfRun as end:
@@ -99,22 +99,22 @@ def _run(
         if process.terminated:
             process.publish_final_status(ENDED_KEY, f"{process.name} was ended by SIGTERM")
         raise
-    except DivergedError as error:  # said before the end is
+    except DivergedError as error:  # published before the end of the run
         process.publish_final_status(DIVERGED_KEY, str(error))
         raise
     finally:
-        if allowed is not None:
+        if tick_duration is not None:
             process.publish_final_status(DEADLINES_KEY, deadlines.to_text())
         if reports := graph.reports:
             process.publish_final_status(REPORTS_KEY, json.dumps(reports))
-        _leave(process, outlets, graph.tick)
+        _leave(process, sender, graph.tick)
 
 
-def _leave(process: Participant, outlets: PacketSender, stop: int) -> None:
+def _leave(process: Participant, sender: PacketSender, stop: int) -> None:
     """Publish the remaining ticks before `stop`, and wait until all participants have received them."""
-    outlets.end(stop)
+    sender.end(stop)
     process.confirm()
-    process.leave(lambda: outlets.publish_end(stop))
+    process.leave(lambda: sender.publish_end(stop))
 
 
 class _Rows:
@@ -124,7 +124,7 @@ class _Rows:
         self.name, self.outputs = service, ports
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Nothing to be known."""
+        """Do nothing, because the rows arrive on the bus."""
 
     def on_tick(self, tick: int) -> int:
         """Do nothing, because the rows have arrived."""
@@ -136,37 +136,37 @@ def run_encoder(process: Participant, service: Service) -> None:
 
     Args:
         process: the participant.
-        service: its wires are used, its parts are not.
+        service: its topic encoders are used, its blocks are not.
 
     Raises:
-        Stopped: asked to end.
-        LockStepError: a bundle did not come, or not the one that was due.
+        Stopped: this process was requested to end.
+        LockStepError: a step packet is missing or out of order.
     """
     ports = process.setup.services[service.name].ports
-    elsewhere = Service(service.name, [_Rows(service.name, ports)], service.wires)
-    graph = BlockDiagram(process.setup, [elsewhere], 2 * PAGE)
-    giver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
-    outlets = PacketSender(process, elsewhere, graph, hands_over=False)
+    external = Service(service.name, [_Rows(service.name, ports)], service.wires)
+    graph = BlockDiagram(process.setup, [external], 2 * PAGE)
+    receiver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
+    sender = PacketSender(process, external, graph, publishes_steps=False)
     process.join()
-    outlets.refresh_subscribers()
+    sender.refresh_subscribers()
     try:
         while not process.stopping:
             tick = graph.tick
-            giver.receive(tick)
+            receiver.receive(tick)
             graph.advance(tick + 1)
-            outlets.publish(tick, tick + 1)
+            sender.publish(tick, tick + 1)
     except EndOfRun:
         return
     finally:
-        _leave(process, outlets, graph.tick)
+        _leave(process, sender, graph.tick)
     raise Stopped
 
 
 def pin(core: int) -> None:
     """Keep all threads of this process on one core.
 
-    In sequential lock step only one process works at a time; handing over on one core costs half of what waking
-    another core costs (docs/reference/benchmarks.md).
+    In sequential lock step only one process works at a time, and a switch on one core costs half as much as waking
+    another core (docs/reference/benchmarks.md).
     """
     if hasattr(os, "sched_setaffinity"):
         for thread in os.listdir("/proc/self/task"):
@@ -174,23 +174,23 @@ def pin(core: int) -> None:
 
 
 def batch() -> None:
-    """Let the scheduler take this process for batch work, where it is an ordinary one.
+    """Put this process into the scheduler's batch class, unless it has a special class.
 
-    What it wakes then runs when it waits, instead of interrupting it: on a core that all services share that spares a
-    third of the switches from one thread to another (docs/reference/benchmarks.md).
+    A thread that it wakes then runs when it waits, instead of interrupting it. On a core that all services share, that
+    saves a third of the thread switches (docs/reference/benchmarks.md).
     """
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         for thread in os.listdir("/proc/self/task"):
-            with suppress(OSError):  # it has ended meanwhile, or a sandbox knows no classes
+            with suppress(OSError):  # the thread has ended, or a sandbox has no classes
                 os.sched_setscheduler(int(thread), os.SCHED_BATCH, os.sched_param(0))
 
 
 def _pace(when: float) -> float:
-    """Sleep until `when` on the performance counter; says by how much [s] that has passed, negative where it has not.
+    """Sleep until `when` on the performance counter. Return the lateness [s], negative if it was early.
 
-    A run that is late hurries until it is on time again.
+    A late run does not sleep until it is on time again.
     """
-    left = when - time.perf_counter()
-    if left > 0:
-        time.sleep(left)
-    return -left
+    remaining = when - time.perf_counter()
+    if remaining > 0:
+        time.sleep(remaining)
+    return -remaining

@@ -6,14 +6,14 @@ from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import RECORDED_KEY
 
-AHEAD = 8192  # ticks that the run of one vehicle may be ahead of its log: some 20 MB; of several fewer
-LEAST = 2048  # ticks, of however many vehicles
-LOOK = 256  # ticks between two looks
-_PROGRESS = struct.Struct("<q?")  # tick before which all is recorded, whether the disk is waited for
+AHEAD = 8192  # [ticks] that the run of one vehicle may be ahead of its log, about 20 MB; fewer with several vehicles
+LEAST = 2048  # [ticks] lower limit with many vehicles
+LOOK = 256  # [ticks] between two checks
+_PROGRESS = struct.Struct("<q?")  # ticks before this one are recorded; True while the recorder waits for the disk
 
 
 class LogProgressPublisher:
-    """Publishes, for the recorder of a run, how far its log is."""
+    """Publisher of the progress of a run's log, for its recorder."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str, name: str):
         """Publish for the recorder `name`."""
@@ -43,22 +43,24 @@ class LogBackpressure:
     """Blocks the run while it is too far ahead of its log; a run without a recorder is never blocked."""
 
     def __init__(self, process: Participant, recorder: str):
-        """Listen to the recorder of the run that `process` owns the time of."""
+        """Subscribe to the progress of `recorder`; `process` is the clock owner of the run."""
         self._process = process
         self._get = process.bus.receive(process.participants.senders(RECORDED_KEY, [recorder])).get
         self._recorded: int | None = None
         self._ahead = max(LEAST, AHEAD // len(process.setup.vehicles))
 
     def wait_for_log(self, tick: int) -> None:
-        """Return when `tick` may be stepped.
+        """Wait until `tick` may be stepped.
 
         Raises:
-            Stopped: asked to end meanwhile.
+            Stopped: requested to stop during the wait.
         """
         if tick % LOOK:
             return
-        while news := self._get(0.0):
-            self._recorded = _PROGRESS.unpack(news[1])[0]
+        while message := self._get(0.0):
+            self._recorded = _PROGRESS.unpack(message[1])[0]
         while self._recorded is not None and tick - self._recorded >= self._ahead:
-            news = self._process.wait_with_status(self._get, lambda: f"the log, recorded up to tick {self._recorded}")
-            self._recorded = _PROGRESS.unpack(news[1])[0]
+            message = self._process.wait_with_status(
+                self._get, lambda: f"the log, recorded up to tick {self._recorded}"
+            )
+            self._recorded = _PROGRESS.unpack(message[1])[0]

@@ -32,8 +32,8 @@ OUTSIDE_PERIOD = 0.4  # [s] between two messages about a program outside the run
 PATIENCE = 1.0  # [s] of waiting before a service publishes what it waits for
 JOIN_TIMEOUT = 600.0  # [s] for the others to compile their kernels and to appear
 ANSWER_TIMEOUT = 5.0  # [s] for the reply of a participant with its run configuration
-CONFIRMED = 60.0  # [s] for the others to confirm a last message; a launcher, which measures starvation, is stricter
-INTERRUPTED = 1.0  # [s] for the same after a request to stop
+CONFIRMED = 60.0  # [s] for the other participants to confirm a last message; a launcher ends the run earlier
+INTERRUPTED = 1.0  # [s] for these confirmations after a request to stop
 REPEAT = 0.2  # [s] between two last messages, for late subscribers and links that were cut
 BRIEF = 0.02  # [s] between two checks for confirmations
 COMPARE_TIME = 3.0  # [s] for all participants to find a difference
@@ -77,7 +77,7 @@ class Participant(StopRequest):
         self.create_service: Callable[[str], Service]  # by name, for its topics
         self._compiling = False
         self._rejected = 0
-        self._next_outside = 0.0  # [s] of the monotonic clock
+        self._next_wait_report = 0.0  # [s] of the monotonic clock
         self._peers = PeerTracker(name, others, participants.external)
         self._final_status: list[tuple[str, str]] = []
         on_compile(self._report_compiling)
@@ -104,11 +104,11 @@ class Participant(StopRequest):
         """Publish a status for the run monitor on a key of the lock step."""
         self.bus.publisher(f"{self.key_prefix}/{key}/{self.name}")(text.encode(), 0)
 
-    def waits_outside(self, text: str) -> None:
-        """Publish, from time to time, what a block of this service waits for outside the run."""
+    def report_external_wait(self, text: str) -> None:
+        """Publish, at most every `OUTSIDE_PERIOD`, that a block of this service waits for an external program."""
         now = time.monotonic()
-        if now >= self._next_outside:
-            self._next_outside = now + OUTSIDE_PERIOD
+        if now >= self._next_wait_report:
+            self._next_wait_report = now + OUTSIDE_PERIOD
             self.publish_status(OUTSIDE_KEY, text)
 
     def publish_final_status(self, key: str, text: str = "") -> None:
@@ -118,19 +118,19 @@ class Participant(StopRequest):
 
     def report_rejected(self) -> None:
         """Publish the number of rejected messages if it has increased."""
-        if self.bus.refused > self._rejected:
-            self._rejected = self.bus.refused
+        if self.bus.rejected > self._rejected:
+            self._rejected = self.bus.rejected
             self.publish_status(REFUSED_KEY, str(self._rejected))
 
     def stop_without(self, name: str) -> None:
         """Stop when the participant `name`, which monitors the run, has left."""
         self.stop_when_gone(self.bus, f"{self.key_prefix}/{ALIVE_KEY}/{name}")
 
-    def join(self, meanwhile: Callable[[], None] = lambda: None) -> None:
-        """Declare that all is subscribed, wait until the others have declared it, and compare run configurations.
+    def join(self, on_wait: Callable[[], None] = lambda: None) -> None:
+        """Declare that this process has subscribed, wait for the other participants, and compare run configurations.
 
         Args:
-            meanwhile: called repeatedly during the wait.
+            on_wait: called repeatedly during the wait.
 
         Raises:
             Stopped: requested to stop during the wait.
@@ -139,23 +139,23 @@ class Participant(StopRequest):
         """
         self._peers.watch(self.bus, self.key_prefix)
         self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", compress(self.setup))
-        self.bus.declare_alive(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
-        self._await([other for other in self.others if other != self.name], meanwhile)
+        self.bus.declare_liveliness(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
+        self._await([other for other in self.others if other != self.name], on_wait)
         limit_silence(LEASE_MS)
         if self.compares:
             self._compare()
 
-    def _await(self, names: list[str], meanwhile: Callable[[], None]) -> None:
+    def _await(self, names: list[str], on_wait: Callable[[], None]) -> None:
         def stop() -> bool:
-            meanwhile()
+            on_wait()
             return self.stopping
 
         keys = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in names]
-        missing = self.bus.wait_alive(keys, timeout=JOIN_TIMEOUT, stop=stop)
+        missing_keys = self.bus.wait_for_liveliness(keys, timeout=JOIN_TIMEOUT, stop=stop)
         if self.stopping:
             raise Stopped
-        if missing:
-            absent = ", ".join(key.rsplit("/", 1)[1] for key in missing)
+        if missing_keys:
+            absent = ", ".join(key.rsplit("/", 1)[1] for key in missing_keys)
             raise LockStepError(f"{self.name}: no participant {absent} within {JOIN_TIMEOUT:g} s")
 
     def _compare(self) -> None:
@@ -171,13 +171,15 @@ class Participant(StopRequest):
                 difference = first_difference(self.setup, from_json(text, self.setup.modules))
             except ValueError as error:
                 raise ValueError(f"{self.name}: run configuration of {other} cannot be read: {error}") from None
-            key, here, there = difference or ("run configuration", "?", "?")
+            key, own_value, other_value = difference or ("run configuration", "?", "?")
             if self.name in self.compares:
                 time.sleep(COMPARE_TIME)  # answer participants that compare later
-            raise ValueError(f"{key} is {here!r} here but {there!r} in {other}; start all services from the same scene")
+            raise ValueError(
+                f"{key} is {own_value!r} here but {other_value!r} in {other}; start all services from the same scene"
+            )
 
     def wait_with_status(self, get: Callable[[float], T | None], waiting_for: Callable[[], str]) -> T:
-        """Return the first result of `get(timeout)`. Publish what is waited for if that takes long.
+        """Return the first result of `get(timeout)`. Publish the text of `waiting_for` if it takes long.
 
         Raises:
             Stopped: requested to stop.
@@ -199,7 +201,7 @@ class Participant(StopRequest):
 
         The token lives as long as the session, so that a participant whose link was cut receives it later.
         """
-        self.bus.declare_alive(f"{self.key_prefix}/{HEARD_KEY}/{self.name}")
+        self.bus.declare_liveliness(f"{self.key_prefix}/{HEARD_KEY}/{self.name}")
 
     def leave(self, repeat: Callable[[], None], key: str = HEARD_KEY, only: Collection[str] | None = None) -> None:
         """Wait until the others have confirmed the last message of this process, or have left.
@@ -208,23 +210,23 @@ class Participant(StopRequest):
 
         Args:
             repeat: publishes the last message again; called until all have confirmed it.
-            key: of the token that confirms it.
+            key: key of the token that confirms it.
             only: participants that confirm it; None for all.
 
         Raises:
             LockStepError: names the participants that did not confirm in time.
         """
-        began = repeated = time.monotonic()
-        while late := self._peers.unconfirmed(key, only, time.monotonic() - began):
+        start = last_repeat = time.monotonic()
+        while unconfirmed := self._peers.unconfirmed(key, only, time.monotonic() - start):
             now = time.monotonic()
-            if now - began > (INTERRUPTED if self.stopping else CONFIRMED):
+            if now - start > (INTERRUPTED if self.stopping else CONFIRMED):
                 if self.stopping:
                     return
-                raise LockStepError(f"{self.name}: {', '.join(late)} did not confirm its last message")
-            if now - repeated > REPEAT:
+                raise LockStepError(f"{self.name}: {', '.join(unconfirmed)} did not confirm its last message")
+            if now - last_repeat > REPEAT:
                 for status in self._final_status:
                     self.publish_status(*status)
                 repeat()
-                repeated = now
+                last_repeat = now
             self._peers.changed.wait(BRIEF)
             self._peers.changed.clear()

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, HEARD_KEY, LOGGED_KEY
 
-FOREIGN = 2.0  # [s] an external service has to leave after the end: it confirms nothing
+EXTERNAL_GRACE = 2.0  # [s] for an external service to leave after the end: it confirms nothing
 
 
 class PeerTracker:
@@ -20,7 +20,7 @@ class PeerTracker:
         """Track `others` as present from the start, since the run cannot begin without them.
 
         Args:
-            name: of the participant that tracks.
+            name: name of the participant that tracks.
             others: required participants.
             external: services that external programs run.
         """
@@ -31,9 +31,9 @@ class PeerTracker:
 
     def watch(self, bus: ZenohBus, key_prefix: str) -> None:
         """Follow the tokens of the participants on the bus."""
-        bus.watch_alive(f"{key_prefix}/{ALIVE_KEY}/*", self._note_presence)
+        bus.watch_liveliness(f"{key_prefix}/{ALIVE_KEY}/*", self._note_presence)
         for key in (HEARD_KEY, LOGGED_KEY):
-            bus.watch_alive(f"{key_prefix}/{key}/*", self._note_confirmation)
+            bus.watch_liveliness(f"{key_prefix}/{key}/*", self._note_confirmation)
 
     def unconfirmed(self, key: str, only: Collection[str] | None, waited: float) -> list[str]:
         """Return the names of the present participants that have not declared the token `key`.
@@ -41,12 +41,12 @@ class PeerTracker:
         Args:
             key: `HEARD_KEY` or `LOGGED_KEY`.
             only: participants that declare it; None for all.
-            waited: [s] since the last message; external services are left out after `FOREIGN`.
+            waited: [s] since the last message; external services are left out after `EXTERNAL_GRACE`.
         """
         late = self._present.copy() - self._confirmed.get(key, set())
         if only is not None:
             late &= set(only)
-        return sorted(late - self._external if waited > FOREIGN else late)
+        return sorted(late - self._external if waited > EXTERNAL_GRACE else late)
 
     def _note_presence(self, key: str, alive: bool) -> None:
         name = key.rpartition("/")[2]

@@ -1,18 +1,18 @@
-"""The scheduler's real-time class, for runs in real time."""
+"""Real-time scheduling class of the operating system, for runs in real time."""
 
 import os
 
-PRIORITY = 10  # of SCHED_FIFO: before all ordinary programs, behind the kernel's own threads
+PRIORITY = 10  # SCHED_FIFO priority: above all ordinary programs, below the threads of the operating system's kernel
 
 
-def why_not() -> str:
+def unavailable_reason() -> str:
     """Return the reason why this process cannot use the real-time class; "" if it can."""
     if not hasattr(os, "sched_setscheduler"):
         return "this system has no real-time class"
-    before, priority = os.sched_getscheduler(0), os.sched_getparam(0)
+    policy, priority = os.sched_getscheduler(0), os.sched_getparam(0)
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-        os.sched_setscheduler(0, before, priority)
+        os.sched_setscheduler(0, policy, priority)
     except OSError as error:
         reason = str(error.strerror).lower()
         return f"{reason}; it needs the capability CAP_SYS_NICE or a limit RLIMIT_RTPRIO of {PRIORITY}"
@@ -23,7 +23,7 @@ def enter() -> None:
     """Put all threads of this process into the real-time class.
 
     Raises:
-        OSError: it may not (`why_not`).
+        OSError: it has no permission (see `unavailable_reason`).
     """
     for thread in os.listdir("/proc/self/task"):
         os.sched_setscheduler(int(thread), os.SCHED_FIFO, os.sched_param(PRIORITY))

@@ -1,4 +1,4 @@
-"""All services in this process: the graph of the whole scene, advanced by pages of ticks, logged a page at a time."""
+"""Single-process executor: steps all services of a scene in blocks of ticks, and logs each block."""
 
 import time
 from collections.abc import Callable
@@ -7,8 +7,8 @@ from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.log.log_sequencer import Recording
 
 PAGE = 1000  # ticks
-PACED = 0.05  # [s] of wall time in a page of a run that keeps a speed
-LOOK = 0.2  # [s] of wall time between two looks at the run
+PACED = 0.05  # [s] of wall time in a block of a run with a real-time factor
+OBSERVE_PERIOD = 0.2  # [s] of wall time between two calls of `observe`
 
 
 def run_single(
@@ -18,14 +18,14 @@ def run_single(
     observe: Callable[[BlockDiagram], bool] = lambda graph: False,
     last: int | None = None,
 ) -> None:
-    """Fly a scene to its end.
+    """Run a scene to its end.
 
     Args:
-        graph: all services of the run, at its beginning, on rows that keep a `PAGE`.
+        graph: all services of the run, at tick 0, with rows for `PAGE` ticks.
         recording: receives the messages; None without a log.
-        speed: simulated seconds per second, None for as fast as it goes.
-        observe: called now and then; says whether to stop.
-        last: the tick after which to stop, None for the end of the run.
+        speed: simulated seconds per second; None for as fast as possible.
+        observe: called every `OBSERVE_PERIOD`; the run stops when it returns True.
+        last: last tick; None for the end of the run.
 
     Raises:
         LockStepError: a state is invalid; all earlier ticks are recorded.
@@ -33,7 +33,7 @@ def run_single(
     setup = graph.setup
     page = PAGE if speed is None else max(1, min(PAGE, round(PACED * speed / setup.interval)))
     end = setup.last_tick + 1 if last is None else last + 1
-    started = next_look = time.perf_counter()
+    started = next_observation = time.perf_counter()
     recorded = 0
     try:
         while not graph.ended and graph.tick < end:
@@ -43,8 +43,8 @@ def run_single(
             if recording:
                 recording.write(graph.record_batches(recorded, graph.tick), graph.tick - 1)
             recorded = graph.tick
-            if time.perf_counter() >= next_look:
-                next_look += LOOK
+            if time.perf_counter() >= next_observation:
+                next_observation += OBSERVE_PERIOD
                 if observe(graph):
                     return
         observe(graph)

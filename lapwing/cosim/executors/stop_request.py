@@ -66,4 +66,4 @@ class StopRequest:
             if not (alive or self.stopping):
                 self.abandoned, self.stopping = key.rpartition("/")[2], True
 
-        bus.watch_alive(key, changed)
+        bus.watch_liveliness(key, changed)

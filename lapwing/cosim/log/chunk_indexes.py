@@ -20,7 +20,7 @@ class ChunkIndexes:
     """Encoded records of kind CHUNK_INDEX. A flight of days has hundreds of thousands, as objects 2 kB each.
 
     Attributes:
-        extent: what counts; set it to an earlier one to take back what was added since.
+        extent: valid indexes; set it to an earlier value to remove the indexes that were added since.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -32,7 +32,7 @@ class ChunkIndexes:
         """Keep the index of a chunk with messages of these times [ns].
 
         Raises:
-            OSError: it cannot be written; it does not count then.
+            OSError: it cannot be written; the index is then not added.
         """
         chunks, size, first_ns, last_ns = self.extent
         self._file.seek(size)
@@ -46,5 +46,5 @@ class ChunkIndexes:
         return self._file.read(self.extent.size)
 
     def close(self) -> None:
-        """Forget them."""
+        """Delete the indexes."""
         self._file.close()

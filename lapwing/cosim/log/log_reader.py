@@ -15,21 +15,21 @@ from lapwing.cosim.log.mcap_writer import DETERMINISTIC
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
 from lapwing.messages.topic_columns import ColumnBuilder, TopicColumns
-from lapwing.messages.type_compatibility import otherwise
+from lapwing.messages.type_compatibility import first_type_difference
 
 _FOREVER = 1 << 64
 _time, _place = itemgetter(0), itemgetter(0, 1)
 
 
 class LogReader:
-    """Reads one log, also one whose writer was killed; a context manager.
+    """Reader of one log, which may lack its end; a context manager.
 
     Attributes:
-        metadata: of the record `lapwing`; empty in other tools' logs.
+        metadata: content of the records `lapwing` and `lapwing_end`; empty for logs of other tools.
         recorded_names: name of each topic in the file by its current name.
-        attachments: file name to contents.
-        complete: False if the file has no end (its writer was killed); it then ends with its last whole chunk.
-        damaged: a line for each chunk that was left out because it is damaged; with `skip_damaged` only.
+        attachments: contents by file name.
+        complete: False if the file has no end (its writer was killed); it then ends with its last complete chunk.
+        damaged: a line for each damaged chunk; with `skip_damaged` only.
 
     Raises:
         ValueError: the file is missing or no MCAP file; from `messages` and `digest`, also if a chunk is damaged.
@@ -39,8 +39,8 @@ class LogReader:
         self.path = Path(path)
         try:
             self._file = open(self.path, "rb")  # noqa: SIM115 (closed in close)
-        except OSError as fault:
-            raise ValueError(f"{self.path}: cannot read the log: {fault.strerror}") from None
+        except OSError as error:
+            raise ValueError(f"{self.path}: cannot read the log: {error.strerror}") from None
         try:
             self._contents = Contents(self.path, self._file, skip_damaged)
         except BaseException:
@@ -59,36 +59,37 @@ class LogReader:
         """Return the named topics; all for None.
 
         Raises:
-            ValueError: the log has no such topic; names those that it has.
+            ValueError: the log has no such topic; names its topics.
         """
         names = self.topics()
-        wanted = set(names if topics is None else topics)
-        if wanted - set(names):
-            missing = ", ".join(sorted(wanted - set(names)))
+        requested = set(names if topics is None else topics)
+        if requested - set(names):
+            missing = ", ".join(sorted(requested - set(names)))
             raise ValueError(f"{self.path}: the log has no topic {missing}; it has {', '.join(names)}")
-        return wanted
+        return requested
 
     def incompatible_types(self, topics: Iterable[str] | None = None) -> dict[str, str]:
         """Return the first difference of each topic's type from this version's, by topic; empty if there is none."""
         labels, channels = self._labels(topics), self._contents.channels
         texts = {topic: self._contents.definitions.get(channels[i].schema_id, "") for i, (topic, _) in labels.items()}
-        result = {topic: otherwise(kind, texts[topic]) for topic, kind in labels.values()}
-        return {topic: f"{dict(labels.values())[topic]} {how}" for topic, how in result.items() if how}
+        result = {topic: first_type_difference(kind, texts[topic]) for topic, kind in labels.values()}
+        return {
+            topic: f"{dict(labels.values())[topic]} {difference}" for topic, difference in result.items() if difference
+        }
 
     @property
     def versions(self) -> str:
-        """Text that names the version that reads and the one that wrote."""
+        """Text that names this version and the version that wrote the log."""
         wrote = self.metadata.get("version")
         return f"Lapwing {package_version()}, got one of {f'Lapwing {wrote}' if wrote else 'another program'}"
 
     def check_versions(self, topics: Iterable[str] | None = None) -> None:
-        """Refuse topics (None: any) whose messages this version would read wrongly.
+        """Raise ValueError if this version would read messages of these topics (None: any) wrongly.
 
-        Raises:
-            ValueError: names the first, what is otherwise, and both versions.
+        The message names the first topic, the difference of its type, and both versions.
         """
-        for topic, how in self.incompatible_types(topics).items():
-            raise ValueError(f"{self.path}: {topic}: {how}; expected a log of this version, {self.versions}")
+        for topic, difference in self.incompatible_types(topics).items():
+            raise ValueError(f"{self.path}: {topic}: {difference}; expected a log of this version, {self.versions}")
 
     def messages(
         self, topics: Iterable[str] | None = None, start_ns: int | None = None, end_ns: int | None = None
@@ -96,9 +97,9 @@ class LogReader:
         """Yield messages in order of time, and in order of writing within equal times.
 
         Args:
-            topics: only these; None: all.
-            start_ns: the first instant [ns]; None: the log's.
-            end_ns: the first instant left out [ns]; None: to the end.
+            topics: topics to read; None for all.
+            start_ns: start time [ns]; None for that of the log.
+            end_ns: end time (exclusive) [ns]; None for that of the log.
 
         Yields:
             topic, full type name, simulation time [ns], payload.
@@ -129,8 +130,8 @@ class LogReader:
             simulation times [ns], int64, shape (n,), in order; the messages' columns by dotted field name.
 
         Raises:
-            ValueError: the log has no such topic, its type is not one of ours or of another version, or a chunk or
-                message is damaged.
+            ValueError: the log has no such topic, its type is unknown or of another version, or a chunk or message is
+                damaged.
         """
         return self.histories([topic])[topic]
 
@@ -138,15 +139,15 @@ class LogReader:
         """Return the columns of several topics (None: all), reading the file once. See `history` for the values.
 
         Raises:
-            ValueError: as `history`.
+            ValueError: see `history`.
         """
         labels = self._labels(topics)
         self.check_versions(topics)
         classes = {topic: message_class(type_name) for topic, type_name in labels.values()}
-        gathered = {topic: ColumnBuilder(message) for topic, message in classes.items()}
+        builders = {topic: ColumnBuilder(message) for topic, message in classes.items()}
         for topic, _, time_ns, payload in self.messages(list(classes)):
-            gathered[topic].add(time_ns, payload)
-        return {topic: messages.history() for topic, messages in gathered.items()}
+            builders[topic].add(time_ns, payload)
+        return {topic: builder.history() for topic, builder in builders.items()}
 
     def deterministic_topics(self) -> set[str]:
         """Return the topics that enter the digest."""
@@ -174,6 +175,6 @@ class LogReader:
         self.close()
 
     def _labels(self, topics: Iterable[str] | None) -> dict[int, tuple[str, str]]:
-        """Topic and type of the channels of these topics, None: of all."""
-        names, wanted = self.topics(), self.check_topics(topics)
-        return {i: (c.topic, names[c.topic]) for i, c in self._contents.channels.items() if c.topic in wanted}
+        """Return topic and type of each channel of these topics (None: all)."""
+        names, requested = self.topics(), self.check_topics(topics)
+        return {i: (c.topic, names[c.topic]) for i, c in self._contents.channels.items() if c.topic in requested}

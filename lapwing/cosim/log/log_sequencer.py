@@ -1,4 +1,4 @@
-"""Pages of messages into a log, in one order: by tick, within a tick in the order of the topic table."""
+"""Order of the messages of a log: by tick, and within a tick in the order of the topic table."""
 
 import time
 from collections.abc import Iterable
@@ -9,14 +9,12 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.log import LogWriter
 from lapwing.messages import WallTime, header
-from lapwing.messages.topics import TOPICS, WALL_TIME, Topic, place
+from lapwing.messages.topics import TOPICS, WALL_TIME, Topic, topic_rank
 
-CHUNK = 1000  # ticks of one vehicle: of several fewer, so that what is sorted at once stays in the processor's cache
+CHUNK = 1000  # [ticks] of one vehicle; fewer with several vehicles, so that a chunk stays in the processor's cache
 SHORTEST = 250  # ticks
-FLUSH_PERIOD = (
-    0.25  # [s] of wall time after which what has come of a chunk is in the file, too; batches take 0.1 s more
-)
-SPARED = 10.0  # times as long as bringing it there has taken, where that is longer: a chunk's beginning is written anew
+FLUSH_PERIOD = 0.25  # [s] of wall time between two writes of an incomplete chunk; log packets take 0.1 s more
+FLUSH_RATIO = 10.0  # smallest ratio of this period to the time of such a write, which repeats the chunk's beginning
 
 
 def chunk(setup: RunConfig) -> int:
@@ -25,7 +23,7 @@ def chunk(setup: RunConfig) -> int:
 
 
 class Recording:
-    """Writes pages, and with every chunk the wall time. Call `finish` after the last page."""
+    """Writes record batches, and the wall time with every chunk. Call `finish` after the last batch."""
 
     def __init__(self, writer: LogWriter, setup: RunConfig):
         """Record the messages of the run `setup` with `writer`."""
@@ -33,9 +31,9 @@ class Recording:
         self._started = time.monotonic()
         self._flushed = self._started
         self._tail_took = 0.0  # [s] of this thread for the newest tail
-        self._waiting: list[RecordBatch] = []  # of the chunk that is not yet complete
+        self._waiting: list[RecordBatch] = []  # batches of the incomplete chunk
         self._chunk = chunk(setup)
-        self._cut = self._chunk  # the tick at which it ends
+        self._cut = self._chunk  # tick at which the chunk ends
         self.newest: dict[Topic, bytes] = {}
         self.time_ns = 0
         self._write_wall_time(0)
@@ -49,37 +47,37 @@ class Recording:
         while last + 1 >= self._cut:
             self._write_chunk()
         now = time.monotonic()
-        if now - self._flushed >= max(FLUSH_PERIOD, SPARED * (self._tail_took + self._writer.tail_took)):
+        if now - self._flushed >= max(FLUSH_PERIOD, FLUSH_RATIO * (self._tail_took + self._writer.tail_took)):
             self._writer.write_tail(self._parts(self._waiting))
             self._flushed = time.monotonic()
             self._tail_took = self._flushed - now
 
     def finish(self) -> None:
-        """Write what is left: the last chunk."""
+        """Write the last chunk."""
         self._write_chunk()
 
     def _write_chunk(self) -> None:
         """Write the messages of the ticks before the cut, and the wall time."""
-        complete, left = [], []
+        complete, remaining = [], []
         for page in self._waiting:
             k = int(np.searchsorted(page.ticks, self._cut))
             if k > 0:
                 complete.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
             if k < len(page.ticks):
-                left.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
+                remaining.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
         if complete:
             self._writer.write_page(self._parts(complete))
             self._flushed = time.monotonic()
         self._write_wall_time(min(self.time_ns, (self._cut - 1) * self._setup.interval_ns))
-        self._waiting = left
+        self._waiting = remaining
         self._cut += self._chunk
 
     def _parts(self, pages: list[RecordBatch]) -> list[tuple]:
         interval, vehicles = self._setup.interval_ns, self._setup.vehicles
         parts = []
-        for page in sorted(pages, key=lambda page: place(page.topic)):  # in any order of arrival
-            which = vehicles.index(page.topic.vehicle) if page.topic.vehicle else 0
-            order = (page.ticks * (len(TOPICS) + 1) + place(page.topic)) * len(vehicles) + which
+        for page in sorted(pages, key=lambda page: topic_rank(page.topic)):  # independent of the order of arrival
+            vehicle = vehicles.index(page.topic.vehicle) if page.topic.vehicle else 0
+            order = (page.ticks * (len(TOPICS) + 1) + topic_rank(page.topic)) * len(vehicles) + vehicle
             name = page.topic.key(self._setup.vehicle)
             parts.append((name, page.topic.message, page.ticks * interval, page.payloads, order))
         return parts

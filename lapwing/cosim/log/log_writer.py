@@ -1,4 +1,4 @@
-"""Writing a log: message by message, or a page of columns at a time."""
+"""Writer of a log: single messages, or record batches."""
 
 import time
 from collections.abc import Callable, Iterable
@@ -26,16 +26,16 @@ class LogWriter:
     """Writer of one log; a context manager. A separate thread hashes, arranges, compresses and writes chunks.
 
     Record batches and single messages may be mixed; they are written in the order of the calls. Every batch is a chunk;
-    single messages are collected into chunks of at most `CHUNK_SIZE` and 0.5 s of wall time. So a log that is written
-    by pages has the same bytes whenever it is written from the same pages, attachments and metadata with the same
-    version of zstd; the wall clock shows only in how single messages are parted into chunks.
+    single messages are collected into chunks of at most `CHUNK_SIZE` and 0.5 s of wall time. The same batches,
+    attachments and metadata give the same bytes with the same version of zstd; wall time only determines which single
+    messages share a chunk.
 
     Args:
-        path: the file; overwritten.
-        metadata: goes into the record `lapwing` at the start; what the attribute `metadata` is given later, and the key
-            `digest`, into the record `lapwing_end`.
-        attachments: file name to contents.
-        waiting: called twice a second while a chunk has to wait for the one before to be written.
+        path: file to write; an existing file is replaced.
+        metadata: content of the record `lapwing` at the start. Keys that are added to the attribute `metadata` later,
+            and the key `digest`, are written into the record `lapwing_end`.
+        attachments: contents by file name.
+        on_wait: called twice a second while a chunk waits until the previous one is written.
 
     Raises:
         ValueError: another process is writing the file, or it cannot be written (then also from `write`,
@@ -47,34 +47,34 @@ class LogWriter:
         path: str | Path,
         metadata: dict[str, str],
         attachments: dict[str, bytes],
-        waiting: Callable[[], None] = lambda: None,
+        on_wait: Callable[[], None] = lambda: None,
     ) -> None:
         self.path = Path(path)
         self.metadata = dict(metadata)
         self._about = dict(metadata)
-        self._waiting = waiting
+        self._on_wait = on_wait
         self._failed = False  # a chunk could not be written
-        self.waited = 0.0  # [s] for chunks that were not yet written when the next one came
+        self.waited = 0.0  # [s] for previous chunks to be written
         self.tail_took = 0.0  # [s] to write the newest tail
         self._digest = Digest()
         self._topics: dict[str, WrittenTopic] = {}
         self._schemas: dict[str, int] = {}
-        self._declarations: list[Schema | Channel] = []  # that no chunk holds yet
+        self._declarations: list[Schema | Channel] = []  # not in a chunk yet
         self._entries: list[tuple[WrittenTopic, int, bytes]] = []
         self._size = 0
         self._pending: Future | None = None
         try:
             self._file = open_locked(self.path)
-        except OSError as fault:
-            raise self._error(fault) from None
+        except OSError as error:
+            raise self._error(error) from None
         try:
             self._container = Container(self._file)
             self._container.add_metadata(METADATA, self.metadata)
             for name, data in attachments.items():
                 self._container.add_attachment(name, data)
-        except OSError as fault:
+        except OSError as error:
             self._file.close()
-            raise self._error(fault) from None
+            raise self._error(error) from None
         self._worker = ThreadPoolExecutor(max_workers=1, thread_name_prefix="log")
         self._due = time.monotonic()  # the first message gets its own chunk: even a short log is readable
 
@@ -86,7 +86,7 @@ class LogWriter:
             message: message class, or full name of the type.
             payload: the encoded message.
             time_ns: simulation time [ns], not negative.
-            deterministic: whether it enters the digest.
+            deterministic: True to include it in the digest.
 
         Raises:
             ValueError: the time is negative, or the log cannot be written.
@@ -100,11 +100,10 @@ class LogWriter:
             self._cut()
 
     def write_page(self, parts: Iterable[Part]) -> None:
-        """Record messages that enter the digest as one chunk, in ascending order over all parts.
+        """Record messages of the digest as one chunk, in ascending order over all parts.
 
-        A topic may come in several parts, if its messages differ in size; where orders are equal, the earlier part
-        goes first. The arrays may be reused after the call. To lose at most 0.5 s when the process is killed, write a
-        page at least so often.
+        A topic has several parts if its messages differ in size; for equal orders, the earlier part is first. The
+        arrays may be reused after the call. If the process is killed, the messages since the last call are lost.
 
         Raises:
             ValueError: arrays of different lengths, payloads of another type, shape or layout, or a negative time.
@@ -114,13 +113,13 @@ class LogWriter:
             self._submit(lambda declarations: self._write_chunk(declarations, page))
 
     def write_tail(self, parts: Iterable[Part]) -> None:
-        """Bring the beginning of the next page into the file, for the case that nothing follows; see `write_page`."""
+        """Write the beginning of the next page, which the next write replaces. See `write_page`."""
         self._cut()
         if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
             self._submit(lambda declarations: self._write_tail(declarations, page), keep=True)
 
     def flush(self) -> None:
-        """Bring everything written so far into the file. `write` does it every 0.5 s; call this when none comes."""
+        """Write all recorded messages to the file. `write` does it every 0.5 s; call this if there is no message."""
         if self._failed:
             return
         self._cut()
@@ -133,9 +132,9 @@ class LogWriter:
         return self._digest.hexdigest()
 
     def close(self) -> None:
-        """Write what is left, the metadata with the digest, and the summary; close the file.
+        """Write the remaining messages, the metadata with the digest, and the summary; close the file.
 
-        After a chunk could not be written, the file is ended where it could be read so far.
+        If a chunk could not be written, the file ends after the last complete chunk.
         """
         if self._file.closed:
             return
@@ -144,9 +143,9 @@ class LogWriter:
         finally:
             try:
                 self._end()
-            except OSError as fault:
+            except OSError as error:
                 if not self._failed:
-                    raise self._error(fault) from None
+                    raise self._error(error) from None
             finally:
                 self._worker.shutdown()
                 self._container.close()
@@ -165,7 +164,7 @@ class LogWriter:
         self._container.finish()
 
     def _declare(self, topic: str, message: Any, deterministic: bool) -> WrittenTopic:
-        """Give a topic its channel; the next chunk declares it."""
+        """Create the channel of a topic, which the next chunk declares."""
         cls = message_class(message) if isinstance(message, str) else message
         if cls.type_name not in self._schemas:
             schema_id = self._schemas[cls.type_name] = len(self._schemas) + 1
@@ -202,14 +201,14 @@ class LogWriter:
         return rows(written, times_ns, payloads, np.array(order, np.int64))
 
     def _cut(self) -> None:
-        """Make a chunk of the single messages."""
+        """Write the single messages as a chunk."""
         entries, self._entries, self._size = self._entries, [], 0
         self._due = time.monotonic() + FLUSH_PERIOD
         if entries:
             self._submit(lambda declarations: self._write_chunk(declarations, rows_of(entries)))
 
     def _submit(self, job: Callable[[list[Schema | Channel]], None], keep: bool = False) -> None:
-        """Give a chunk to the worker, once it has finished the one before; a later one declares again what is kept."""
+        """Submit a chunk to the worker after the previous one is written. `keep` declares its topics again later."""
         if self._failed:
             raise ValueError(f"{self.path}: {self.metadata['failure']}")
         declarations = self._declarations
@@ -224,29 +223,29 @@ class LogWriter:
             started = time.perf_counter()
             try:
                 while not wait([pending], FLUSH_PERIOD).done:
-                    self._waiting()
+                    self._on_wait()
                 pending.result()
-            except OSError as fault:
+            except OSError as error:
                 self._failed = True
-                self.metadata["failure"] = _failure(fault)
-                raise self._error(fault) from None
+                self.metadata["failure"] = _failure(error)
+                raise self._error(error) from None
             self.waited += time.perf_counter() - started
 
     def _write_tail(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
-        began = time.monotonic()
+        start = time.monotonic()
         counts = {part.topic: part.topic.count for part in parts}
         self._container.write_provisional_chunk(declarations, arrange(parts))
         for topic, count in counts.items():  # its messages come again
             topic.count = count
-        self.tail_took = time.monotonic() - began
+        self.tail_took = time.monotonic() - start
 
     def _write_chunk(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
         self._container.add_chunk(declarations, arrange(parts))
         add_to_digest(self._digest, parts)
 
-    def _error(self, fault: OSError) -> ValueError:
-        return ValueError(f"{self.path}: {_failure(fault)}")
+    def _error(self, error: OSError) -> ValueError:
+        return ValueError(f"{self.path}: {_failure(error)}")
 
 
-def _failure(fault: OSError) -> str:
-    return f"cannot write the log: {fault.strerror or fault}"
+def _failure(error: OSError) -> str:
+    return f"cannot write the log: {error.strerror or error}"

@@ -1,4 +1,4 @@
-"""The contents of an MCAP file: what it declares, where its chunks are, and the messages of a chunk."""
+"""Contents of an MCAP file: declarations, positions of the chunks, and messages of a chunk."""
 
 import io
 import os
@@ -19,7 +19,7 @@ from mcap.writer import MCAP0_MAGIC
 from lapwing.cosim.log.mcap_writer import METADATA, METADATA_END
 from lapwing.messages.former_names import current_topic, current_type
 
-_RECORD = struct.Struct("<BQ")  # opcode, length of what follows
+_RECORD = struct.Struct("<BQ")  # opcode, length of the remaining record
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the payload
 _CHUNK = struct.Struct("<QQQ")  # times of the first and last message, unpacked size
 _CHANNEL = struct.Struct("<H")
@@ -31,12 +31,12 @@ _DECLARATIONS: dict[int, Any] = {
 }
 
 ROS2 = "ros2msg"  # encoding of schemas
-LARGEST = 1 << 28  # [bytes] of a chunk; those of the usual writers have some millions
-RATIO = 200  # most unpacked bytes of all chunks over the size of the file, beyond one chunk; Lapwing's own logs: 2 to 5
+LARGEST = 1 << 28  # [bytes] limit of a chunk; usual writers make chunks of a few million
+RATIO = 200  # limit of unpacked bytes beyond one chunk, relative to the size of the file; logs of Lapwing: 2 to 5
 
 
 def has_footer(path: Path) -> bool:
-    """Return True if a file ends as its writer ends it, behind the index. Raises OSError if it cannot be read."""
+    """Return True if a file has the footer of a complete MCAP file. Raise OSError if it cannot be read."""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - len(MCAP0_MAGIC)))
         return file.read() == MCAP0_MAGIC
@@ -48,7 +48,7 @@ class ChunkInfo(NamedTuple):
     offset: int  # [bytes]
     start_ns: int
     end_ns: int
-    channels: set[int]  # as the index behind the chunk says; empty: not known
+    channels: set[int]  # according to the index of the chunk; empty: unknown
 
     def may_hold(self, channels: Collection[int]) -> bool:
         """Return True if it can hold a message of these channels."""
@@ -59,15 +59,15 @@ class Contents:
     """Contents of a file.
 
     Attributes:
-        metadata: of the records `lapwing` and `lapwing_end`.
-        attachments: file name to contents.
+        metadata: content of the records `lapwing` and `lapwing_end`.
+        attachments: contents by file name.
         schemas: type name by schema id.
-        definitions: text of the type by schema id, where ROS 2's encoding has one.
-        channels: by channel id, with the current names of the topics.
+        definitions: text of the type by schema id, for ROS 2 encodings.
+        channels: channels by id, with the current names of the topics.
         recorded_names: former or current name of each topic, as in the file, by its current name.
         chunks: in order of the file.
-        complete: whether the file has its end.
-        damaged: a line for each chunk that was left out, where that is asked for.
+        complete: True if the file has its end.
+        damaged: a line for each damaged chunk, with `skip_damaged` only.
 
     Raises:
         ValueError: no MCAP file, or a damaged one.
@@ -187,28 +187,24 @@ class Contents:
 
 
 def _check_size(chunk: records.Chunk) -> None:
-    """Refuse a chunk that would fill the memory, whichever of its two sizes says so.
-
-    Raises:
-        ValueError: with the size.
-    """
+    """Raise ValueError if one of the two declared sizes of a chunk exceeds `LARGEST`."""
     size = chunk.uncompressed_size
     if chunk.compression == "zstd":
-        size = max(size, zstandard.frame_content_size(chunk.data))  # -1: not told
+        size = max(size, zstandard.frame_content_size(chunk.data))  # -1: unknown
     if size > LARGEST:
         raise ValueError(f"{size} bytes, expected at most {LARGEST}")
 
 
 def _unpack_lz4(chunk: records.Chunk) -> None:
-    """Unpack a chunk of this kind here: mcap's reader has no limit for it, and what is packed does not tell its size.
+    """Unpack an LZ4 chunk with a limit, which the reader of mcap does not have; an LZ4 frame need not state its size.
 
     Raises:
-        ValueError: it is larger than `LARGEST`, or cut short.
+        ValueError: the chunk is larger than `LARGEST`, or truncated.
     """
     if chunk.compression != "lz4":
         return
-    unpacking = LZ4FrameDecompressor()
-    data = unpacking.decompress(chunk.data, max_length=LARGEST)
-    if not unpacking.eof:
-        raise ValueError(f"cut short, or larger than {LARGEST} bytes")
+    decompressor = LZ4FrameDecompressor()
+    data = decompressor.decompress(chunk.data, max_length=LARGEST)
+    if not decompressor.eof:
+        raise ValueError(f"truncated, or larger than {LARGEST} bytes")
     chunk.compression, chunk.data = "", data

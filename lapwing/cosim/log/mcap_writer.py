@@ -1,4 +1,4 @@
-"""The MCAP container: records one after the other, and at the end the index of what is where."""
+"""Writer of MCAP files: records in order, and the index at the end."""
 
 import mimetypes
 import zlib
@@ -34,11 +34,11 @@ from lapwing.cosim.log.chunk import Messages
 from lapwing.cosim.log.chunk_indexes import ChunkIndexes, Extent
 
 METADATA = "lapwing"  # name of the metadata record at the start
-METADATA_END = "lapwing_end"  # and of that at the end, with what was not known before: no key is in both
+METADATA_END = "lapwing_end"  # name of the metadata record at the end, with entries that were not known at the start
 DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false"
 COMPRESSION_LEVEL = 2  # zstd: level 3, its default, makes such logs larger; level 9 saves 3 % for five times the work
 SMALL = 1024  # [bytes] of messages that are not worth compressing
-_CRC = 4  # [bytes] of the footer's checksum, which it does not cover itself
+_CRC = 4  # [bytes] size of the footer's checksum, which does not cover these bytes
 
 
 class _State(NamedTuple):
@@ -52,10 +52,10 @@ class _State(NamedTuple):
 
 
 class Container:
-    """Writes a file's records in order and remembers where they are, until `close`. All methods may raise OSError."""
+    """Writer of a file's records and of their index. All methods may raise OSError."""
 
     def __init__(self, file: FileIO) -> None:
-        """Begin a file that is open for writing, without a buffer, and empty."""
+        """Begin a file that is empty, unbuffered and open for writing."""
         self._begin(file)
         self._write(MCAP0_MAGIC)
         self._write(encoded(Header(profile="ros2", library="lapwing")))
@@ -112,26 +112,26 @@ class Container:
         self._write(record)
 
     def write_provisional_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
-        """Write a chunk that the next record takes the place of: what a reader finds if that never comes."""
+        """Write a chunk that the next record replaces, so that readers find its messages until then."""
         self._drop_tail()
         before = _State(self._offset, len(self._schemas), len(self._channels), self._chunks.extent, self._counts.copy())
         self.add_chunk(declarations, messages)
         self._before_tail = before
 
     def add_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
-        """Write a compressed chunk with the index of its messages, and bring it to the disk.
+        """Write a compressed chunk with the index of its messages.
 
         Args:
-            declarations: the schemas and channels that this chunk is the first to use; they go into it.
-            messages: at least one.
+            declarations: schemas and channels that no earlier chunk has declared; they are written into this one.
+            messages: at least one message.
         """
         self._drop_tail()
         head = b"".join(map(encoded, declarations))
         data = head + messages.data
-        small = len(messages.data) < SMALL
-        stored = data if small else self._compressor.compress(data)
+        is_small = len(messages.data) < SMALL
+        stored = data if is_small else self._compressor.compress(data)
         chunk = Chunk(
-            compression="" if small else "zstd",
+            compression="" if is_small else "zstd",
             data=stored,
             message_start_time=messages.start_ns,
             message_end_time=messages.end_ns,
@@ -141,11 +141,11 @@ class Container:
         records = [encoded(chunk)]
         offset = end = self._offset
         length = len(records[0])
-        places: dict[int, int] = {}
-        for each in messages.indexes:
+        index_offsets: dict[int, int] = {}
+        for index_record in messages.indexes:
             end += len(records[-1])
-            places[each.channel_id] = end
-            records.append(each.record(len(head)))
+            index_offsets[index_record.channel_id] = end
+            records.append(index_record.record(len(head)))
         record = b"".join(records)
         index = ChunkIndex(
             chunk_start_offset=offset,
@@ -155,7 +155,7 @@ class Container:
             uncompressed_size=len(data),
             message_start_time=messages.start_ns,
             message_end_time=messages.end_ns,
-            message_index_offsets=places,
+            message_index_offsets=index_offsets,
             message_index_length=len(record) - length,
         )
         before = self._chunks.extent
@@ -165,10 +165,12 @@ class Container:
         except OSError:
             self._chunks.extent = before
             raise
-        self._schemas += [each for each in declarations if isinstance(each, Schema)]
-        self._channels += [each for each in declarations if isinstance(each, Channel)]
-        for each in messages.indexes:
-            self._counts[each.channel_id] = self._counts.get(each.channel_id, 0) + len(each.times_ns)
+        self._schemas += [index_record for index_record in declarations if isinstance(index_record, Schema)]
+        self._channels += [index_record for index_record in declarations if isinstance(index_record, Channel)]
+        for index_record in messages.indexes:
+            self._counts[index_record.channel_id] = self._counts.get(index_record.channel_id, 0) + len(
+                index_record.times_ns
+            )
         self._cut()
 
     def finish(self) -> None:
@@ -198,7 +200,7 @@ class Container:
         self._cut()
 
     def close(self) -> None:
-        """Forget where the records are."""
+        """Delete the index of the records."""
         self._chunks.close()
 
     def _statistics(self) -> Statistics:
@@ -216,7 +218,7 @@ class Container:
         )
 
     def _drop_tail(self) -> None:
-        """Go back to where the tail begins; it is written over, so that a reader finds it for as long as possible."""
+        """Seek to the start of the provisional chunk, which stays readable until it is overwritten."""
         state, self._before_tail = self._before_tail, None
         if state is None:
             return
@@ -227,17 +229,17 @@ class Container:
         del self._schemas[state.schemas :], self._channels[state.channels :]
 
     def _cut(self) -> None:
-        """Take away what is left of a tail behind the newest record."""
+        """Truncate the file after the newest record."""
         if self._length > self._offset:
             self._file.truncate()
         self._length = 0
 
     def _write(self, data: bytes) -> None:
         """Write all data or none: a file on a full disk ends with its last complete record."""
-        left = memoryview(data)
+        remaining = memoryview(data)
         try:
-            while left:
-                left = left[self._file.write(left) :]
+            while remaining:
+                remaining = remaining[self._file.write(remaining) :]
         except OSError:
             with suppress(OSError):
                 self._file.seek(self._offset)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 from lapwing.cosim.log.log_reader import LogReader
 from lapwing.cosim.log.log_writer import LogWriter
 
-RECOVERED = "recovered"  # key in the metadata: from which file, and what it lacked
+RECOVERED = "recovered"  # key in the metadata: the original file, and its defects
 
 
 class RecoveryResult(NamedTuple):
@@ -14,25 +14,25 @@ class RecoveryResult(NamedTuple):
 
     messages: int
     end_ns: int  # time of the last message
-    damaged: tuple[str, ...]  # what was left out, a line each
-    digest: str  # of what was found
+    damaged: tuple[str, ...]  # a line for each chunk that was left out
+    digest: str  # digest of the recovered messages
 
 
 def recover(path: Path, out: Path) -> RecoveryResult:
-    """Write all whole chunks of a log into a new one, in their order, with index, digest and end.
+    """Write all complete chunks of a log into a new log, with index, digest and end.
 
     Raises:
-        ValueError: no MCAP log, one that is whole, one of other types of messages, or `out` cannot be written.
+        ValueError: `path` is not an MCAP log, is undamaged, or has other message types, or `out` cannot be written.
     """
     with LogReader(path, skip_damaged=True) as log:
         if log.complete and not log.damaged:
-            raise ValueError(f"{path}: has its end and no damage; there is nothing to recover")
+            raise ValueError(f"{path}: is complete and undamaged; there is nothing to recover")
         log.check_versions()
-        lacked = "; ".join([*log.damaged, *([] if log.complete else ["it has no end"])])
-        about = {key: value for key, value in log.metadata.items() if key != "digest"}
+        defects = "; ".join([*log.damaged, *([] if log.complete else ["it has no end"])])
+        metadata = {key: value for key, value in log.metadata.items() if key != "digest"}
         deterministic, count, end_ns = log.deterministic_topics(), 0, 0
         try:
-            with LogWriter(out, about | {RECOVERED: f"{path.name}: {lacked}"}, dict(log.attachments)) as writer:
+            with LogWriter(out, metadata | {RECOVERED: f"{path.name}: {defects}"}, dict(log.attachments)) as writer:
                 for topic, kind, time_ns, payload in log.messages():
                     writer.write(topic, kind, payload, time_ns, topic in deterministic)
                     count, end_ns = count + 1, time_ns

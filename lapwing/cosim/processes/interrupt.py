@@ -1,15 +1,15 @@
-"""Ctrl-C and termination: at once where nothing is at stake, in order while a run has processes or a log."""
+"""Ctrl-C and SIGTERM: a run ends in order, other commands end immediately."""
 
 import signal
 import sys
 from contextlib import suppress
 from signal import SIGINT, SIGTERM
 
-AGAIN = 0.5  # [s] until an interruption that was lost in compiled code is raised once more
+REPEAT_DELAY = 0.5  # [s] until an interrupt that was lost in compiled code is raised again
 
 
 class Interrupted(BaseException):
-    """The user ended the run; `signal` is how. Like KeyboardInterrupt, no `except Exception` holds it up."""
+    """The user ended the program by `signal`. Like KeyboardInterrupt, it is not an Exception."""
 
     def __init__(self, number: int):
         super().__init__(f"ended by {signal.Signals(number).name}")
@@ -17,7 +17,7 @@ class Interrupted(BaseException):
 
 
 class Stop:
-    """Remembers SIGINT and SIGTERM while it is entered."""
+    """Context in which SIGINT and SIGTERM are stored instead of raised."""
 
     def __init__(self) -> None:
         self.number: int | None = None
@@ -34,25 +34,25 @@ class Stop:
             signal.signal(number, handler)
 
     def check(self) -> None:
-        """Raise `Interrupted` when a signal has come."""
+        """Raise `Interrupted` if a signal was received."""
         if self.number is not None:
             raise Interrupted(self.number)
 
 
-def end_at_once() -> None:
-    """Let SIGINT and SIGTERM raise `Interrupted` wherever the program is; a flight has its gentler `Stop`."""
+def raise_on_interrupt() -> None:
+    """Let SIGINT and SIGTERM raise `Interrupted` immediately; a run uses `Stop` instead."""
 
     def raise_(number: int, _: object) -> None:
         # An exception that is raised inside a call from the compiler's library is lost there: raise it again, later.
         signal.signal(signal.SIGALRM, lambda *_: raise_(number, None))
-        signal.setitimer(signal.ITIMER_REAL, AGAIN)
+        signal.setitimer(signal.ITIMER_REAL, REPEAT_DELAY)
         raise Interrupted(number)
 
-    def lost(fault: "sys.UnraisableHookArgs") -> None:
-        if not isinstance(fault.exc_value, Interrupted):
-            sys.__unraisablehook__(fault)
+    def report_unraisable(unraisable: "sys.UnraisableHookArgs") -> None:
+        if not isinstance(unraisable.exc_value, Interrupted):
+            sys.__unraisablehook__(unraisable)
 
-    sys.unraisablehook = lost
+    sys.unraisablehook = report_unraisable
     for number in (SIGINT, SIGTERM):
         signal.signal(number, raise_)
 
@@ -60,12 +60,12 @@ def end_at_once() -> None:
 def report_interrupt(interrupted: Interrupted) -> int:
     """Print the interrupt in one line and return the exit code.
 
-    Further signals do not disturb this; later ones end a hanging process.
+    Signals are ignored until the line is printed; later ones end a hanging process.
     """
     for number in (SIGINT, SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     signal.setitimer(signal.ITIMER_REAL, 0.0)
-    with suppress(OSError):  # the exit code tells it, too
+    with suppress(OSError):  # the exit code also reports it
         print(f"lapwing: {interrupted}", file=sys.stderr, flush=True)
     for number in (SIGINT, SIGTERM):
         signal.signal(number, signal.SIG_DFL)

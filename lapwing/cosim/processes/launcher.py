@@ -54,7 +54,7 @@ def launch(
         stack.callback(_close, children)
         endpoints = {**external, **sockets}
 
-        def begin(names: list[str]) -> None:
+        def start_processes(names: list[str]) -> None:
             for name in names:
                 children[name] = early.pop(name) if name in early else start(name)
             for name in names:
@@ -67,10 +67,10 @@ def launch(
         with ZenohBus(listen, connect, gid=publisher_ids.gid(MONITOR), awaits=False) as bus:
             try:
                 monitor = RunMonitor(bus, publisher_ids, [*required, *optional, *external], services=services)
-                bus.declare_alive(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # all others wait for it
+                bus.declare_liveliness(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # all others wait for it
                 ready = [name for name in own if name in early]
-                begin(ready)
-                begin([name for name in own if name not in ready])
+                start_processes(ready)
+                start_processes([name for name in own if name not in ready])
                 terminate_unused(early)
                 RunSupervisor(monitor, children, required, external).supervise(observe)
                 _wait([children[name] for name in optional if name in monitor.confirmed], SHUTDOWN_TIMEOUT)
@@ -101,12 +101,12 @@ def _request_end(children: Iterable[Child]) -> None:
 
 def _wait(children: list[Child], seconds: float) -> None:
     """Wait until all have exited, at most `seconds` without the time in which they got no CPU."""
-    began = time.monotonic()
-    before = {child.process.pid: waited(child.process.pid) for child in children}
-    while left := [child.process.pid for child in children if child.process.poll() is None]:
-        passed = time.monotonic() - began
-        starved = sum(max(0.0, waited(pid) - before[pid]) for pid in left)
-        if passed > LONGEST or passed - starved > seconds:
+    start = time.monotonic()
+    starved_before = {child.process.pid: waited(child.process.pid) for child in children}
+    while running := [child.process.pid for child in children if child.process.poll() is None]:
+        elapsed = time.monotonic() - start
+        starved = sum(max(0.0, waited(pid) - starved_before[pid]) for pid in running)
+        if elapsed > LONGEST or elapsed - starved > seconds:
             return
         time.sleep(BRIEF)
 

@@ -24,9 +24,18 @@ from lapwing.cosim.transport.packets import unpack_log_packet
 from lapwing.messages.topics import Topic
 
 STALL = 2.5  # [s] without a message after which a participant counts as stalled
-LONGEST = 60.0  # [s] for the same while processes wait for a processor
+LONGEST = 60.0  # [s] instead of `STALL` while processes wait for a processor
 MONITOR = "mission"  # name of the run monitor among the participants
-HEARD = (BATCH_KEY, WAITING_KEY, OUTSIDE_KEY, COMPILING_KEY, DIVERGED_KEY, ENDED_KEY, RECORDED_KEY, REFUSED_KEY)
+MONITORED_KEYS = (
+    BATCH_KEY,
+    WAITING_KEY,
+    OUTSIDE_KEY,
+    COMPILING_KEY,
+    DIVERGED_KEY,
+    ENDED_KEY,
+    RECORDED_KEY,
+    REFUSED_KEY,
+)
 
 
 class RunMonitor:
@@ -44,40 +53,40 @@ class RunMonitor:
 
         Args:
             bus: the session.
-            participants: of the run.
-            names: of the participants.
-            patience: time [s] without news after which one counts as frozen.
+            participants: publisher GIDs of the run.
+            names: names of the participants.
+            patience: time [s] without a message after which a participant counts as stalled.
             services: publishers of log packets; each waits until its last one is confirmed.
         """
-        self._going = set(services)  # those of which the last message has not come
+        self._unfinished = set(services)  # services whose last message has not arrived
         self.confirmed: set[str] = set()  # participants that have received the last message of every service
-        self._logged = False  # the recorder's last message has come
+        self._logged = False  # the recorder's last message has arrived
         self._patience = patience
         self._bus, self._key_prefix, names = bus, participants.key_prefix, list(names)
         self.newest: dict[Topic, bytes] = {}
-        self.listen: Callable[[list[RecordBatch]], None] | None = None  # is given all messages
+        self.on_batches: Callable[[list[RecordBatch]], None] | None = None  # called with all messages
         self.waiting: dict[str, str] = {}
         self.compiling = False  # a participant compiles kernels
         self.diverged = False  # a state is invalid: the run ends, and its log has the reason
         self.slow_disk = False  # the recorder has waited for the disk
         self.present: set[str] = set()
         self.gone: set[str] = set()
-        self.time_ns = 0  # up to which all reporting services have stepped
+        self.time_ns = 0  # time that all reporting services have reached
         self._times: dict[str, int] = {}
-        self.began: float | None = None  # [s] of the monotonic clock, at the first batch
-        self.wall = 0.0  # [s] from the first batch to the newest
+        self.start: float | None = None  # [s] of the monotonic clock, at the first log packet
+        self.wall = 0.0  # [s] from the first log packet to the newest
         self.ended = False  # a service has published its last log packet
-        self.outcome: str | None = None  # "" when the run has come to its end, else why it ended before; None: unknown
-        self._refused: dict[str, int] = {}  # numbers of rejected messages by participant
+        self.outcome: str | None = None  # "" if the run was completed, the reason if it ended early; None: unknown
+        self._rejected: dict[str, int] = {}  # numbers of rejected messages by participant
         self.last_news = time.monotonic()
         senders: dict[str, bytes | None] = {}
-        for key in HEARD:
+        for key in MONITORED_KEYS:
             senders |= participants.senders(key, names)
         self._news = bus.receive(senders)
-        bus.watch_alive(f"{self._key_prefix}/{ALIVE_KEY}/*", self._alive)
-        bus.watch_alive(f"{self._key_prefix}/{HEARD_KEY}/*", self._confirms)
+        bus.watch_liveliness(f"{self._key_prefix}/{ALIVE_KEY}/*", self._note_presence)
+        bus.watch_liveliness(f"{self._key_prefix}/{HEARD_KEY}/*", self._note_confirmation)
 
-    def _alive(self, key: str, alive: bool) -> None:
+    def _note_presence(self, key: str, alive: bool) -> None:
         name = key.rsplit("/", 1)[1]
         if alive:
             self.present.add(name)
@@ -85,21 +94,21 @@ class RunMonitor:
         elif name in self.present:
             self.gone.add(name)
 
-    def _confirms(self, key: str, alive: bool) -> None:
+    def _note_confirmation(self, key: str, alive: bool) -> None:
         if alive:
             self.confirmed.add(key.rsplit("/", 1)[1])
 
     def poll(self, seconds: float) -> None:
-        """Take in what arrives during `seconds`."""
-        until = time.monotonic() + seconds
-        while (left := until - time.monotonic()) > 0:
-            news = self._news.get_with_key(timeout=left)
-            if news is None:
+        """Read the messages that arrive within `seconds`."""
+        deadline = time.monotonic() + seconds
+        while (remaining := deadline - time.monotonic()) > 0:
+            message = self._news.get_with_key(timeout=remaining)
+            if message is None:
                 return
-            key, time_ns, payload = news
+            key, time_ns, payload = message
             head, _, name = key.removeprefix(f"{self._key_prefix}/").partition("/")
             if head == BATCH_KEY:
-                self._take_batch(name, time_ns, payload)
+                self._read_log_packet(name, time_ns, payload)
             elif head == COMPILING_KEY:
                 self.compiling = True
             elif head == DIVERGED_KEY:
@@ -117,36 +126,36 @@ class RunMonitor:
             elif head == ENDED_KEY:
                 self.outcome = self.outcome or payload.decode(errors="replace")  # the first cause counts
             elif head == REFUSED_KEY and payload.isdigit():
-                self._refused[name] = int(payload)
+                self._rejected[name] = int(payload)
 
-    def _take_batch(self, name: str, time_ns: int, payload: bytes) -> None:
+    def _read_log_packet(self, name: str, time_ns: int, payload: bytes) -> None:
         if not payload:
-            self._take_end(name)
+            self._note_last_packet(name)
             return
         self.last_news = time.monotonic()
         self.waiting.clear()
-        self.began = self.began or self.last_news
-        self.wall = self.last_news - self.began
+        self.start = self.start or self.last_news
+        self.wall = self.last_news - self.start
         self._times[name] = max(time_ns, self._times.get(name, 0))
         self.time_ns = min(self._times.values())
         _, _, pages = unpack_log_packet(payload)
         for page in pages:
             self.newest[page.topic] = page.payloads[-1].tobytes()
-        if self.listen:
-            self.listen(pages)
+        if self.on_batches:
+            self.on_batches(pages)
 
-    def _take_end(self, name: str) -> None:
-        if name in self._going:
-            self._going.discard(name)
+    def _note_last_packet(self, name: str) -> None:
+        if name in self._unfinished:
+            self._unfinished.discard(name)
             self.last_news = time.monotonic()
             self.waiting.clear()
-            if not self._going:
+            if not self._unfinished:
                 self._declare(HEARD_KEY)
         self.ended = True
 
     def _declare(self, key: str) -> None:
         """Confirm last messages; their senders wait for that before they leave."""
-        self._bus.declare_alive(f"{self._key_prefix}/{key}/{MONITOR}")
+        self._bus.declare_liveliness(f"{self._key_prefix}/{key}/{MONITOR}")
 
     def publish(self, key: str, time_ns: int, payload: bytes) -> None:
         """Publish a message for viewers, on a key below the prefix of the run."""
@@ -155,7 +164,7 @@ class RunMonitor:
     @property
     def complete(self) -> bool:
         """True if the last message of every service has arrived."""
-        return self.ended and not self._going
+        return self.ended and not self._unfinished
 
     @property
     def reporting_services(self) -> set[str]:
@@ -163,16 +172,16 @@ class RunMonitor:
         return set(self._times)
 
     @property
-    def refused(self) -> int:
+    def rejected(self) -> int:
         """Number of messages that all participants have rejected, as far as they have reported it."""
-        return sum(self._refused.values()) + self._bus.refused
+        return sum(self._rejected.values()) + self._bus.rejected
 
     def abort_message(self) -> str | None:
         """Return a sentence about a run that ended early, None if it completed or diverged."""
         if self.outcome == "" or self.diverged:
             return None
-        why = f": {self.outcome}" if self.outcome else ""
-        return f"the run ended early at t = {self.time_ns * 1e-9:.3f} s{why}"
+        cause = f": {self.outcome}" if self.outcome else ""
+        return f"the run ended early at t = {self.time_ns * 1e-9:.3f} s{cause}"
 
     def stall_message(
         self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0

@@ -116,8 +116,8 @@ class RunSupervisor:
                 raise self._unexpected_end(name, code)
 
     def _change_state(self, alive: list[str], now: float) -> None:
-        awaited = self._required if self._monitor.began else self._required | self._children.keys()
-        if self.state is RunState.STARTING and self._monitor.present >= awaited:
+        expected = self._required if self._monitor.start else self._required | self._children.keys()
+        if self.state is RunState.STARTING and self._monitor.present >= expected:
             self.state = RunState.RUNNING
         ends = len(alive) < len(self._own) or (self.state is RunState.RUNNING and self._monitor.ended)
         if ends and self.state is not RunState.ENDING:
@@ -163,8 +163,8 @@ class RunSupervisor:
                 raise self._unexpected_end(name, code)
         if message := monitor.abort_message():
             raise RunFailed(message)
-        left = [name for name in self._own if self._children[name].process.poll() is None]
-        silent = [name for name in left if name not in monitor.confirmed] or left
+        running = [name for name in self._own if self._children[name].process.poll() is None]
+        silent = [name for name in running if name not in monitor.confirmed] or running
         raise RunFailed(f"{', '.join(silent)}: did not end within {SHUTDOWN_TIMEOUT:g} s of the last news")
 
     def _check_outcome(self) -> None:
@@ -191,10 +191,10 @@ class RunSupervisor:
         return RunFailed(f"{', '.join(sorted(self._stopped_since))}: stopped for {STALL:g} s, {self._at()}")
 
     def _unexpected_end(self, name: str, code: int) -> RunFailed:
-        words = self._children[name].last_line()
-        short = code == -signal.SIGKILL and out_of_memory.kills() > self._killed_before
-        memory = "; the system killed it for lack of memory" if short else ""
-        return RunFailed(f"{name} ended unexpectedly ({reason(code)}) {self._at()}{words}{memory}")
+        output = self._children[name].last_line()
+        killed = code == -signal.SIGKILL and out_of_memory.kills() > self._killed_before
+        memory = "; the system killed it for lack of memory" if killed else ""
+        return RunFailed(f"{name} ended unexpectedly ({reason(code)}) {self._at()}{output}{memory}")
 
     def _at(self) -> str:
         return f"at t = {self._monitor.time_ns * 1e-9:.3f} s"

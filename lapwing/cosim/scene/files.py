@@ -1,8 +1,8 @@
-"""The files that a scene names: found by path or by name, read once, remembered for the log."""
+"""Files that a scene names: found by path or by name, read once, and kept for the log."""
 
 import tomllib
 from functools import lru_cache
-from os.path import isfile  # false, and no error, of a name that no file can have
+from os.path import isfile  # returns False for names that no file can have
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +14,23 @@ class Files:
     """Reads the files of one scene."""
 
     def __init__(self, folder: Path):
-        self.folder = folder  # of the scene; paths are relative to it
-        self.sources: dict[str, bytes] = {}  # every file that was read, by file name: airframe.toml
-        self.read_from: dict[str, Path] = {}  # file by the dotted key that its content has in the scene
-        self.texts: dict[str, str] = {}  # its text, by the same
+        self.folder = folder  # folder of the scene; paths are relative to it
+        self.sources: dict[str, bytes] = {}  # contents of the files that were read, by file name: airframe.toml
+        self.read_from: dict[str, Path] = {}  # file by the dotted key of its content in the scene
+        self.texts: dict[str, str] = {}  # text of the file by the same key
 
-    def find(self, key: str, what: str, name: str, beside: str, shipped: Path) -> Path:
+    def find(self, key: str, kind: str, name: str, local_folder: str, shipped: Path) -> Path:
         """Return the TOML file that a key names: by path, or by name in the scene's folder or in the package.
 
         Args:
             key: dotted key whose value is the name.
-            what: what the name is of, for the message.
-            name: a path that ends in .toml, relative to the scene; or a name.
-            beside: name of a folder next to the scene.
+            kind: kind of file, for the message.
+            name: path that ends in .toml, relative to the scene; or a name.
+            local_folder: name of a folder next to the scene.
             shipped: folder of the package.
 
         Raises:
-            KeyedError: there is none; lists the choices.
+            ConfigError: there is no such file; lists the choices.
         """
         if name.endswith(".toml"):
             if not isfile(self.folder / name):
@@ -38,12 +38,12 @@ class Files:
                     key, f"no file {self.folder / name}", "the path of a .toml file relative to the scene, or a name"
                 )
             return self.folder / name
-        places = (self.folder / beside, shipped)
-        for place in places:
-            if isfile(place / f"{name}.toml"):
-                return place / f"{name}.toml"
-        choices = {path.stem for place in places for path in place.glob("*.toml")}
-        error = ConfigError.unknown(key, what, name, choices)
+        folders = (self.folder / local_folder, shipped)
+        for folder in folders:
+            if isfile(folder / f"{name}.toml"):
+                return folder / f"{name}.toml"
+        choices = {path.stem for folder in folders for path in folder.glob("*.toml")}
+        error = ConfigError.unknown(key, kind, name, choices)
         raise ConfigError(key, error.message, f"{error.expected}, or the path of a .toml file")
 
     def text(self, key: str, named_by: str, path: Path) -> str:
@@ -52,10 +52,10 @@ class Files:
         Args:
             key: dotted key that its content will have in the scene.
             named_by: dotted key whose value names the file.
-            path: of the file.
+            path: path of the file.
 
         Raises:
-            KeyedError: it cannot be read.
+            ConfigError: it cannot be read.
         """
         if path.exists() and not path.is_file() and not path.is_dir():
             raise ConfigError(named_by, f"{path}: is not a regular file")
@@ -87,7 +87,7 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _tables(text: str) -> dict[str, Any]:
-    """Parsed once: the runs of a campaign are made of the same texts."""
+    """Parse a text once: the runs of a campaign have the same texts."""
     return tomllib.loads(text)
 
 
@@ -98,14 +98,16 @@ def copied(value: Any) -> Any:
     return [copied(item) for item in value] if isinstance(value, list) else value
 
 
-def merge_tables(content: dict[str, Any], given: Any) -> Any:
-    """Merge the tables of a scene over those of a file, key by key."""
-    if not isinstance(given, dict):
-        return given
+def merge_tables(content: dict[str, Any], override: Any) -> Any:
+    """Return the tables of a file with the keys of `override` replaced."""
+    if not isinstance(override, dict):
+        return override
     merged = dict(content)
-    for key, value in given.items():
-        below = content.get(key)
-        merged[key] = merge_tables(below, value) if isinstance(below, dict) and isinstance(value, dict) else value
+    for key, value in override.items():
+        file_value = content.get(key)
+        merged[key] = (
+            merge_tables(file_value, value) if isinstance(file_value, dict) and isinstance(value, dict) else value
+        )
     return merged
 
 

@@ -13,35 +13,35 @@ def source_of(key: str, path: Path, text: str, overrides: Iterable[str], files: 
 
     Args:
         key: dotted key.
-        path: of the scene.
-        text: of the scene.
-        overrides: the keys that were overridden.
-        files: those that the scene names.
+        path: file of the scene.
+        text: text of the scene.
+        overrides: overridden keys.
+        files: files that the scene names.
     """
     overrides = list(overrides)
-    around = [k for k in files.read_from if f"{key}.".startswith(f"{k}.")]
-    content = max(around, key=len, default="")  # the key under which a file's content holds this one
-    above = [k for k in overrides if f"{key}.".startswith(f"{k}.") and len(k) > len(content)]
-    if above:
-        return KeyOrigin(override=max(above, key=len))
-    below = [k for k in overrides if k.startswith(f"{key}.")]
-    if below:
-        return KeyOrigin(override=below[0])
+    file_keys = [k for k in files.read_from if f"{key}.".startswith(f"{k}.")]
+    file_key = max(file_keys, key=len, default="")  # key of the file that contains this key
+    parents = [k for k in overrides if f"{key}.".startswith(f"{k}.") and len(k) > len(file_key)]
+    if parents:
+        return KeyOrigin(override=max(parents, key=len))
+    children = [k for k in overrides if k.startswith(f"{key}.")]
+    if children:
+        return KeyOrigin(override=children[0])
     line, matched = line_of(text, key)
-    if content and matched <= len(content):
-        inside, _ = line_of(files.texts[content], key[len(content) + 1 :])
-        return KeyOrigin(files.read_from[content], inside)
+    if file_key and matched <= len(file_key):
+        file_line, _ = line_of(files.texts[file_key], key[len(file_key) + 1 :])
+        return KeyOrigin(files.read_from[file_key], file_line)
     return KeyOrigin(path, line)
 
 
 def line_of(text: str, key: str) -> tuple[int | None, int]:
-    """Return the line of a dotted key in TOML text, or of the nearest table around it, by a plain search.
+    """Search a dotted key in TOML text, or the nearest table that contains it.
 
     Returns:
-        The line, None if there is none, and the length of the part of the key that was found.
+        The line number (None if there is none), and the length of the matching part of the key.
     """
     table = ""
-    entries: dict[str, int] = {}  # how many entries of each array of tables have begun
+    entries: dict[str, int] = {}  # index of the newest entry of each array of tables
     best, result = 0, None
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*(\[\[?)\s*([\w.]+)\s*\]", line):

@@ -1,4 +1,4 @@
-"""From a file, its overrides and the files that it names to a scene; or from a recorded tree."""
+"""Scene from a TOML file, its overrides and the files that it names, or from a recorded tree."""
 
 import difflib
 from collections.abc import Callable, Mapping
@@ -22,16 +22,16 @@ SCENE_FILE = "scene.toml"  # the scene's own text among its sources
 
 
 def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shipped: Path) -> Scene:
-    """Read a scene and every file that it names, override, and validate.
+    """Read a scene and all files that it names, apply overrides, and validate it.
 
     Args:
-        scene: path of its TOML file, or the name of one that ships.
-        overrides: of any key that the scene resolves to, those of the files that it names among them.
-        vocabulary: the tables that there are.
-        shipped: folder of the scenes that ship.
+        scene: path of its TOML file, or name of a shipped scene.
+        overrides: overrides of any key of the scene and of the files that it names.
+        vocabulary: tables that a scene may have.
+        shipped: folder of the shipped scenes.
 
     Raises:
-        SceneError: what is wrong with which key, and what would be right.
+        SceneError: names the key, the fault and the expected value.
     """
     path = _find(scene, shipped)
     return parse(path, _read(path), overrides, vocabulary)
@@ -43,29 +43,31 @@ def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -
 
 
 def with_overrides(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
-    """Return a loaded scene with further overrides, the last of which win; the files that it names are read again.
+    """Return a loaded scene with further overrides; the last of a key counts. Files that it names are read again.
 
     Raises:
-        SceneError: what is wrong with which key, and what would be right.
-        ValueError: it was not read from a file.
+        SceneError: names the key, the fault and the expected value.
+        ValueError: the scene was not read from a file.
     """
-    if scene.given is None or SCENE_FILE not in scene.sources:
-        raise ValueError(f"{scene.path}: not as it was read from a file; it takes no overrides")
-    return _parse(scene.path, scene.sources[SCENE_FILE].decode(), [*scene.given, *parsed(overrides)], vocabulary)
+    if scene.file_overrides is None or SCENE_FILE not in scene.sources:
+        raise ValueError(f"{scene.path}: was not read from a file; load it from a file to override keys")
+    return _parse(
+        scene.path, scene.sources[SCENE_FILE].decode(), [*scene.file_overrides, *parsed(overrides)], vocabulary
+    )
 
 
-def _parse(path: Path, text: str, given: list[Override], vocabulary: Vocabulary) -> Scene:
+def _parse(path: Path, text: str, overrides: list[Override], vocabulary: Vocabulary) -> Scene:
     tree, files = parse_toml(text, path), Files(path.parent)
     files.sources[SCENE_FILE] = text.encode()
-    locate = partial(_locate, path=path, text=text, keys=[o.key for o in given], files=files)
+    locate = partial(_locate, path=path, text=text, keys=[o.key for o in overrides], files=files)
     with Scene(path, {}, vocabulary, locate=locate).located():
         vehicles = vehicle_scenes.count(tree)
         if vehicles:
-            members = [_member(path, text, tree, i, given, vocabulary) for i in range(vehicles)]
+            members = [_member(path, text, tree, i, overrides, vocabulary) for i in range(vehicles)]
             common = vehicle_scenes.common_tables(members, vocabulary)
             sources = files.sources | {name: text for scene in members for name, text in scene.sources.items()}
-            return Scene(path, common, vocabulary, sources, tuple(given), locate, members)
-    return _scene(path, tree, given, vocabulary, files, locate)
+            return Scene(path, common, vocabulary, sources, tuple(overrides), locate, members)
+    return _scene(path, tree, overrides, vocabulary, files, locate)
 
 
 def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, KeyOrigin]:
@@ -76,20 +78,24 @@ def _locate(key: str, path: Path, text: str, keys: list[str], files: Files) -> t
 def _locate_own(key: str, vehicle: int, path: Path, text: str, keys: list[str], files: Files) -> tuple[str, KeyOrigin]:
     """Return the full key and origin of a key of one of several vehicles; it may be common to all."""
     full = vehicle_scenes.own_key(key, vehicle)
-    said = line_of(text, full)[1] > len(f"{vehicle_scenes.VEHICLE}.{vehicle}.")
-    if said or key.partition(".")[0] == vehicle_scenes.VEHICLE or any(f"{full}.".startswith(f"{k}.") for k in keys):
+    has_own_value = line_of(text, full)[1] > len(f"{vehicle_scenes.VEHICLE}.{vehicle}.")
+    if (
+        has_own_value
+        or key.partition(".")[0] == vehicle_scenes.VEHICLE
+        or any(f"{full}.".startswith(f"{k}.") for k in keys)
+    ):
         return _locate(full, path, text, keys, files)
     return _locate(key, path, text, keys, files)
 
 
 def _member(
-    path: Path, text: str, tree: dict[str, Any], i: int, given: list[Override], vocabulary: Vocabulary
+    path: Path, text: str, tree: dict[str, Any], i: int, overrides: list[Override], vocabulary: Vocabulary
 ) -> Scene:
     """Return the scene of vehicle i of several."""
-    files, keys = Files(path.parent), [o.key for o in given]
-    own = vehicle_scenes.overrides_of(given, i, vehicle_scenes.count(tree), vocabulary)
+    files, keys = Files(path.parent), [o.key for o in overrides]
+    own_overrides = vehicle_scenes.overrides_of(overrides, i, vehicle_scenes.count(tree), vocabulary)
     locate = partial(_locate_own, vehicle=i, path=path, text=text, keys=keys, files=files)
-    scene = _scene(path, vehicle_scenes.member(tree, i, vocabulary), own, vocabulary, files, locate)
+    scene = _scene(path, vehicle_scenes.member(tree, i, vocabulary), own_overrides, vocabulary, files, locate)
     name = scene.lookup(f"{vehicle_scenes.VEHICLE}.name")
     scene.sources = {f"{name}.{source}": content for source, content in files.sources.items()}
     return scene
@@ -98,15 +104,15 @@ def _member(
 def _scene(
     path: Path,
     tree: dict[str, Any],
-    given: list[Override],
+    overrides: list[Override],
     vocabulary: Vocabulary,
     files: Files,
     locate: Callable[[str], tuple[str, KeyOrigin]],
 ) -> Scene:
-    with Scene(path, {}, vocabulary, files.sources, tuple(given), locate).located():
-        _resolve(tree, given, vocabulary, files)
+    with Scene(path, {}, vocabulary, files.sources, tuple(overrides), locate).located():
+        _resolve(tree, overrides, vocabulary, files)
         tables = _tables(tree, vocabulary)
-        scene = Scene(path, tables, vocabulary, files.sources, tuple(given), locate)
+        scene = Scene(path, tables, vocabulary, files.sources, tuple(overrides), locate)
         _check(scene, tables, vocabulary)
     return scene
 
@@ -115,7 +121,7 @@ def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) ->
     """Return the scene whose `resolved` is `tree`, without opening a file.
 
     Raises:
-        SceneError: it is no longer a sound scene.
+        SceneError: the scene is no longer valid.
     """
     tree = present_tables(tree)
     with Scene(Path(name), {}, vocabulary).located():
@@ -151,24 +157,24 @@ def _read(path: Path) -> str:
     except UnicodeDecodeError:
         raise SceneError("", "not valid TOML: not a UTF-8 text file", source=KeyOrigin(path)) from None
     except OSError as error:
-        near = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
-        hint = f"did you mean {path.parent / near[0]}?" if near else "`lapwing scenes` lists those there are"
+        similar = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
+        hint = f"did you mean {path.parent / similar[0]}?" if similar else "`lapwing scenes` lists the shipped scenes"
         message = (error.strerror or "cannot be read").lower()
         raise SceneError("", f"{message}; {hint}", source=KeyOrigin(path)) from None
 
 
-def _resolve(tree: dict[str, Any], given: list[Override], vocabulary: Vocabulary, files: Files) -> None:
-    """Put the content of all files into the tree, and the overrides: first those that may name a file."""
-    embedded = {name for name, section in vocabulary.sections.items() if section.FROM_FILE}
-    later = []
-    for override in given:
-        if override.key.partition(".")[0] in embedded or is_below_file_name(tree, override.key):
-            later.append(override)
+def _resolve(tree: dict[str, Any], overrides: list[Override], vocabulary: Vocabulary, files: Files) -> None:
+    """Apply the overrides that may name a file, embed the content of all files, and apply the other overrides."""
+    file_tables = {name for name, section in vocabulary.sections.items() if section.FROM_FILE}
+    file_overrides = []
+    for override in overrides:
+        if override.key.partition(".")[0] in file_tables or is_below_file_name(tree, override.key):
+            file_overrides.append(override)
         else:
             apply(tree, override)
     for section in vocabulary.sections.values():
         section.embed(tree, files)
-    for override in later:
+    for override in file_overrides:
         apply(tree, override)
 
 

@@ -1,4 +1,4 @@
-"""Overrides: keys of a scene that are given another value, by `--set KEY=VALUE` or by a mapping."""
+"""Overrides: new values for keys of a scene, from `--set KEY=VALUE` or from a mapping."""
 
 import copy
 import re
@@ -17,7 +17,7 @@ class Override(NamedTuple):
 
     key: str
     value: Any
-    text: str  # as given
+    text: str  # text of the user
 
 
 def parsed(overrides: Overrides) -> list[Override]:
@@ -25,8 +25,8 @@ def parsed(overrides: Overrides) -> list[Override]:
     if isinstance(overrides, str):
         raise SceneError("", f"got {overrides!r}", 'overrides as a dictionary or a list: ["KEY=VALUE"]')
     if isinstance(overrides, Mapping):
-        if strange := [key for key in overrides if not isinstance(key, str)]:
-            raise SceneError("", f"got {strange[0]!r}", "the keys of overrides as texts")
+        if invalid := [key for key in overrides if not isinstance(key, str)]:
+            raise SceneError("", f"got {invalid[0]!r}", "the keys of overrides as texts")
         return [Override(key, _plain(value), f"{key}={value!r}") for key, value in overrides.items()]
     return [_parsed(text) for text in overrides]
 
@@ -82,23 +82,23 @@ def with_values(tree: dict[str, Any], overrides: Overrides) -> dict[str, Any]:
 
 
 def apply(tree: dict[str, Any], override: Override) -> None:
-    """Put its value into a tree of tables; a table that is missing is made.
+    """Set the value of an override in a tree of tables. Create missing tables.
 
     Raises:
-        SceneError: an entry that a list does not have, or a key within a value.
+        SceneError: a list has no such entry, or the key is below a value.
     """
-    at: Any = tree
+    node: Any = tree
     *parents, last = override.key.split(".")
     for parent in parents:
-        if isinstance(at, list):
-            at = at[_index(at, parent, override)]
-        elif isinstance(at, dict):
-            at = at.setdefault(parent, {})
+        if isinstance(node, list):
+            node = node[_index(node, parent, override)]
+        elif isinstance(node, dict):
+            node = node.setdefault(parent, {})
     value = copy.deepcopy(override.value)
-    if isinstance(at, list):
-        at[_index(at, last, override)] = value
-    elif isinstance(at, dict):
-        at[last] = value
+    if isinstance(node, list):
+        node[_index(node, last, override)] = value
+    elif isinstance(node, dict):
+        node[last] = value
     else:
         message = f"{'.'.join(parents)} is a value, not a table"
         raise SceneError(override.key, message, source=KeyOrigin(override=override.text))

@@ -1,4 +1,4 @@
-"""A validated scene, the tables that it consists of, and the vocabulary of tables that there are."""
+"""Validated scene, its tables, and the vocabulary of tables that a scene may have."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,24 +15,24 @@ from lapwing.dynamics.config_error import ConfigError
 
 
 class SceneTable(BaseModel):
-    """A table of the scene. Subclasses say `TABLE`, the table's name.
+    """Table of a scene. Subclasses set `TABLE`, the name of the table.
 
-    Strict: TOML has types, so a number in quotes or `true` for 1.0 is a slip of the pen.
+    Validation is strict: TOML has types, so a number in quotes or `true` for 1.0 is an error.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     TABLE: ClassVar[str]
-    OPTIONAL: ClassVar[bool] = False  # whether a scene may do without it; `scene.has` says if it does
-    FROM_FILE: ClassVar[bool] = False  # whether its content is that of a file which another table names
-    SHARED: ClassVar[bool] = False  # whether all vehicles of a scene have it in common
-    DISTINCT: ClassVar[str] = ""  # its key of which each of several vehicles has another value
+    OPTIONAL: ClassVar[bool] = False  # True if a scene may omit it; see `Scene.has`
+    FROM_FILE: ClassVar[bool] = False  # True if its content is that of a file that another table names
+    SHARED: ClassVar[bool] = False  # True if all vehicles of a scene share it
+    DISTINCT: ClassVar[str] = ""  # key whose value must differ between vehicles
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """Put the content of every file that this table names into the scene's data, not yet validated.
+        """Insert the content of each file that this table names into the scene's data, which is not validated yet.
 
         Raises:
-            KeyedError: no such file, or its content is not of the right form.
+            ConfigError: a file is missing or invalid.
         """
 
     @classmethod
@@ -52,10 +52,10 @@ class SceneTable(BaseModel):
         return value
 
     def check(self, scene: "Scene") -> None:
-        """Check what only the whole scene shows.
+        """Check the table against the other tables of the scene.
 
         Raises:
-            KeyedError: with the key's path in the scene.
+            ConfigError: with the path of the key in the scene.
         """
 
 
@@ -77,15 +77,15 @@ S = TypeVar("S", bound=SceneTable)
 T = TypeVar("T")
 
 
-class _Found(NamedTuple):
-    """Result of a function of a scene, and the tables that it has read."""
+class _CachedResult(NamedTuple):
+    """Result of a function of a scene, and the tables that the function has read."""
 
     value: Any
     read: set[type[SceneTable] | None]
 
 
 class Scene:
-    """A validated scene. `scene[Run]` is the table that the class `Run` declares. It opens no file."""
+    """Validated scene. `scene[Run]` is the table that the class `Run` declares."""
 
     def __init__(
         self,
@@ -93,33 +93,35 @@ class Scene:
         tables: Mapping[type[SceneTable], SceneTable],
         vocabulary: Vocabulary,
         sources: Mapping[str, bytes] | None = None,
-        given: tuple[Override, ...] | None = None,
+        file_overrides: tuple[Override, ...] | None = None,
         locate: Callable[[str], tuple[str, KeyOrigin]] | None = None,
         vehicles: Sequence["Scene"] = (),
     ):
-        self.path = path  # where it was read from
-        self.sources = dict(sources or {})  # every file that was read, by file name: airframe.toml
-        self.given = given  # overrides; None where the scene is more than its file and these
-        self.vehicles = tuple(vehicles)  # a scene of each vehicle, where the file lists them; its own tables are common
+        self.path = path  # file of the scene
+        self.sources = dict(sources or {})  # contents of all files that were read, by file name: airframe.toml
+        self.file_overrides = file_overrides  # overrides of the file; None if the scene has other changes
+        self.vehicles = tuple(
+            vehicles
+        )  # scene of each vehicle if the file lists vehicles; own tables are the shared ones
         self._locate = locate  # returns the key in the file, and the origin of its value
         self._tables = dict(tables)
         self._vocabulary = vocabulary
-        self._found: dict[Callable[[Scene], Any], _Found] = {}
-        self._reading: list[set[type[SceneTable] | None]] = []  # the tables that functions under way have asked for
+        self._cached: dict[Callable[[Scene], Any], _CachedResult] = {}
+        self._reading: list[set[type[SceneTable] | None]] = []  # tables that the running functions have read
 
-    def cached(self, of: Callable[["Scene"], T]) -> T:
+    def cached(self, function: Callable[["Scene"], T]) -> T:
         """Return the result of a function of the scene; it is called once, and its result is kept.
 
         The function may read the tables only, by `[]`, `has`, `section`, `tables` and `lookup`.
         """
-        result = self._found.get(of)
+        result = self._cached.get(function)
         if result is None:
             self._reading.append(set())
             try:
-                value = of(self)
+                value = function(self)
             finally:
                 read = self._reading.pop()
-            result = self._found[of] = _Found(value, read)
+            result = self._cached[function] = _CachedResult(value, read)
         if self._reading:
             self._reading[-1] |= result.read
         return result.value
@@ -132,7 +134,7 @@ class Scene:
         if self._reading:
             self._reading[-1].add(section)
         if self.vehicles and section is not None and not section.SHARED:
-            expected = "a scene of one vehicle, which is all that can be used here"
+            expected = "a scene with one vehicle"
             raise SceneError("vehicle", f"there are {len(self.vehicles)}", expected, KeyOrigin(self.path))
         return self
 
@@ -155,7 +157,9 @@ class Scene:
         tables = {**self._tables, type(section): section}
         vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
         scene = Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
-        scene._found = {of: result for of, result in self._found.items() if type(section) not in result.read}
+        scene._cached = {
+            function: result for function, result in self._cached.items() if type(section) not in result.read
+        }
         return scene
 
     @contextmanager
@@ -175,11 +179,11 @@ class Scene:
     @property
     def overrides(self) -> tuple[str, ...]:
         """KEY=VALUE, as given."""
-        return tuple(override.text for override in self.given or ())
+        return tuple(override.text for override in self.file_overrides or ())
 
     @property
     def name(self) -> str:
-        """The file's name without its ending."""
+        """File name without its extension."""
         return self.path.stem
 
     @property

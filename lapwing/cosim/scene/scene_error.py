@@ -11,8 +11,8 @@ class KeyOrigin(NamedTuple):
 
     path: Path | None = None
     line: int | None = None
-    override: str | None = None  # its key, or all of it where it is not KEY=VALUE or reaches nothing
-    option: str = "--set"  # by which the override was given
+    override: str | None = None  # its key, or its full text if it is not KEY=VALUE or has no effect
+    option: str = "--set"  # option of the override
 
     def __str__(self) -> str:
         if self.override is not None:
@@ -24,7 +24,7 @@ NOWHERE = KeyOrigin()
 
 
 class SceneError(ConfigError):
-    """A scene that cannot be flown; `str` is one line for the user."""
+    """Invalid scene; `str` is one line for the user."""
 
     def __init__(self, key: str, message: str, expected: str = "", source: KeyOrigin = NOWHERE):
         super().__init__(key, message, expected)
@@ -35,5 +35,5 @@ class SceneError(ConfigError):
         override = self.source.override
         if override is not None and f"{self.key}.".startswith(f"{override}."):
             return f"{self.source.option} {self.key}: {self.sentence}"
-        said = self.sentence if override and override.startswith(f"{self.key}=") else super().__str__()
-        return ": ".join(filter(None, (str(self.source), said)))
+        sentence = self.sentence if override and override.startswith(f"{self.key}=") else super().__str__()
+        return ": ".join(filter(None, (str(self.source), sentence)))

@@ -1,7 +1,7 @@
-"""Scenes of several vehicles: each entry of `[[vehicle]]` is a scene of the common tables and those of the entry.
+"""Scenes of several vehicles: each entry of `[[vehicle]]` is a scene of the shared tables and those of the entry.
 
-What an entry says of a table is laid over the common one, key by key. A text in the place of a table's name is a key of
-the vehicle: `airframe = "quad_x"` names a file, `[vehicle.airframe.mass]` changes what the file says.
+The keys of an entry's table override those of the shared table. Keys of an entry that are not tables belong to
+`[vehicle]`: `airframe = "quad_x"` names a file, `[vehicle.airframe.mass]` overrides its values.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,20 +14,20 @@ from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
 
 VEHICLE = "vehicle"
-MOST = 50  # vehicles
+MAX_VEHICLES = 50
 
 
 def count(tree: Mapping[str, Any]) -> int:
     """Return the number of vehicles that a scene lists; 0 if it has a table `[vehicle]`, or none.
 
     Raises:
-        KeyedError: too many, or an entry is no table.
+        ConfigError: too many vehicles, or an entry is not a table.
     """
     entries = tree.get(VEHICLE)
     if not isinstance(entries, list):
         return 0
-    if not 1 <= len(entries) <= MOST:
-        raise ConfigError(VEHICLE, f"{len(entries)} vehicles", f"1 to {MOST}")
+    if not 1 <= len(entries) <= MAX_VEHICLES:
+        raise ConfigError(VEHICLE, f"{len(entries)} vehicles", f"1 to {MAX_VEHICLES}")
     for i, entry in enumerate(entries):
         if not isinstance(entry, dict):
             raise ConfigError(f"{VEHICLE}.{i}", f"got {entry!r}", f"a table [[{VEHICLE}]]")
@@ -38,7 +38,7 @@ def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str,
     """Return the tables of vehicle i, as in a scene of that vehicle alone, not yet validated.
 
     Raises:
-        KeyedError: it has a table that all vehicles share.
+        ConfigError: the entry has a table that all vehicles share.
     """
     common = {name: table for name, table in tree.items() if name != VEHICLE}
     own: dict[str, Any] = {VEHICLE: {}}
@@ -52,23 +52,23 @@ def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str,
     return copied(merge_tables(defaults, merge_tables(common, own)))
 
 
-def overrides_of(given: Iterable[Override], i: int, vehicles: int, vocabulary: Vocabulary) -> list[Override]:
+def overrides_of(overrides: Iterable[Override], i: int, vehicles: int, vocabulary: Vocabulary) -> list[Override]:
     """Return the overrides of vehicle i: its own, with the keys of a scene of that vehicle alone, and the common ones.
 
     Raises:
-        SceneError: a key of `vehicle` without the vehicle's number, or of a table that all share.
+        SceneError: a key of `vehicle` without the vehicle's number, or of a table that all vehicles share.
     """
     result = []
-    for override in given:
+    for override in overrides:
         table, *rest = override.key.split(".")
         if table != VEHICLE:
             result.append(override)
             continue
         if len(rest) < 2 or not rest[0].isdigit() or int(rest[0]) >= vehicles:
             known = {*vocabulary.sections, *vocabulary.sections[VEHICLE].model_fields}
-            which = len(rest) > 1 and rest[0] not in known
-            expected = f"{VEHICLE}.N.{'.'.join(rest[which:]) or 'KEY'}, N from 0 to {vehicles - 1}"
-            raise SceneError(override.key, "which vehicle?", expected, KeyOrigin(override=override.text))
+            has_number = len(rest) > 1 and rest[0] not in known
+            expected = f"{VEHICLE}.N.{'.'.join(rest[has_number:]) or 'KEY'}, N from 0 to {vehicles - 1}"
+            raise SceneError(override.key, "no such vehicle", expected, KeyOrigin(override=override.text))
         name, *inner = rest[1:]
         if int(rest[0]) == i:
             if inner and name in vocabulary.sections:
@@ -87,7 +87,7 @@ def common_tables(members: Iterable[Scene], vocabulary: Vocabulary) -> dict[Any,
     """Return the tables that all vehicles share.
 
     Raises:
-        KeyedError: two vehicles have the same name, or another value that each has its own of.
+        ConfigError: two vehicles have the same name, or the same value of another distinct key.
     """
     members = list(members)
     for section in vocabulary.sections.values():
@@ -105,12 +105,12 @@ def common_tables(members: Iterable[Scene], vocabulary: Vocabulary) -> dict[Any,
 
 def _check_own(table: str, key: str, vocabulary: Vocabulary) -> None:
     if vocabulary.sections[table].SHARED:
-        raise ConfigError(key, "all vehicles share it", f"a table [{table}] of the scene")
+        raise ConfigError(key, "all vehicles share this table", f"a table [{table}] of the scene")
 
 
 def _check_distinct(values: list[Any], section: type[SceneTable]) -> None:
     for i, value in enumerate(values):
         if value in values[:i]:
             table = "" if section.TABLE == VEHICLE else f"{section.TABLE}."
-            message = f"{value} is also that of {VEHICLE}.{values.index(value)}"
-            raise ConfigError(f"{VEHICLE}.{i}.{table}{section.DISTINCT}", message, "another")
+            message = f"{value} is already used by {VEHICLE}.{values.index(value)}"
+            raise ConfigError(f"{VEHICLE}.{i}.{table}{section.DISTINCT}", message, "another value")

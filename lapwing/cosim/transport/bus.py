@@ -1,6 +1,6 @@
-"""The bus: how messages travel between services. The only file that imports zenoh.
+"""Zenoh session of a process: publishers, subscriptions, queries and liveliness. The only file that imports zenoh.
 
-`ZenohBus` joins separate processes; the single-process mode needs no bus.
+The single-process mode needs no bus.
 """
 
 import json
@@ -26,7 +26,7 @@ os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 
 import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
 
-INBOX = 4096  # messages; far more than come in lock step before one is taken
+INBOX = 4096  # [messages]; far more than arrive in lock step before one is read
 WAKE = 0.05  # [s] between two checks of the deadlines of waiting threads
 
 _opened = False
@@ -38,10 +38,10 @@ def in_use() -> bool:
 
 
 class ZenohBus:
-    """A session with explicit endpoints, publishers by key, and subscriptions that are queues.
+    """Session with explicit endpoints, publishers by key, and queued subscriptions.
 
     Attributes:
-        refused: number of rejected messages: without a valid attachment, or from another sender.
+        rejected: number of messages without a valid attachment, or from another sender.
     """
 
     def __init__(
@@ -58,10 +58,10 @@ class ZenohBus:
         Args:
             listen: endpoints that others connect to.
             connect: endpoints of others.
-            mode: of Zenoh: "peer", "client" or "router".
-            gid: 16 bytes that every message carries; made up where there are none.
+            mode: Zenoh mode: "peer", "client" or "router".
+            gid: publisher GID of every message, 16 bytes; random by default.
             security: further entries of the Zenoh configuration, by key.
-            awaits: wait until a peer is there, half a second at most; else they are met as they come.
+            awaits: True to wait up to half a second for a peer to connect.
 
         Raises:
             BusError: an endpoint cannot be listened on, or a client's router cannot be reached.
@@ -77,11 +77,11 @@ class ZenohBus:
             action = "connect to" if mode == "client" else "listen on"
             raise BusError(f"cannot {action} {endpoints}: {str(error).partition(' at /')[0]}") from None
         self._gid = gid or uuid.uuid4().bytes
-        self.refused = 0
+        self.rejected = 0
         self._publishers: dict[str, tuple[zenoh.Publisher, Callable[[bytes, int], None]]] = {}
-        self._held: list = []  # subscribers and tokens live as long as the session
+        self._declared: list = []  # subscribers and tokens live as long as the session
         self._inboxes: dict[str, Inbox] = {}  # by key
-        self._waker = uuid.uuid4().bytes  # the gid of what this bus says to its own inboxes
+        self._waker = uuid.uuid4().bytes  # GID of the wake-up messages to its own inboxes
         self._closed = threading.Event()
 
     @property
@@ -94,24 +94,24 @@ class ZenohBus:
 
         Args:
             key: Zenoh key.
-            gid: 16 bytes that its messages carry instead of the bus's.
-            drops: leave out what a slow subscriber has no room for, instead of waiting for it.
+            gid: GID of its messages, 16 bytes; that of the bus by default.
+            drops: drop messages for which a slow subscriber has no room, instead of waiting for it.
         """
         if key not in self._publishers:
-            control = zenoh.CongestionControl.DROP if drops else zenoh.CongestionControl.BLOCK
-            declared = self._session.declare_publisher(key, congestion_control=control)
+            congestion_control = zenoh.CongestionControl.DROP if drops else zenoh.CongestionControl.BLOCK
+            zenoh_publisher = self._session.declare_publisher(key, congestion_control=congestion_control)
             sequence = 0
             gid = gid or self._gid
 
             def put(payload: bytes, time_ns: int) -> None:
                 nonlocal sequence
                 sequence += 1
-                declared.put(payload, attachment=pack(sequence, time_ns, gid))
+                zenoh_publisher.put(payload, attachment=pack(sequence, time_ns, gid))
 
-            self._publishers[key] = (declared, put)
+            self._publishers[key] = (zenoh_publisher, put)
         return self._publishers[key][1]
 
-    def has_audience(self, keys: Iterable[str]) -> bool:
+    def has_subscribers(self, keys: Iterable[str]) -> bool:
         """Return True if one of the keys, for which this bus has publishers, has a subscriber."""
         statuses = (self._publishers[key][0].matching_status for key in keys)
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
@@ -121,18 +121,18 @@ class ZenohBus:
 
         `notify` is called from another thread after each arrival, for callers that also wait for other events.
         """
-        return self._receive(key_expressions, Subscription(_message, None, self._refuse, notify))
+        return self._receive(key_expressions, Subscription(_message, None, self._count_rejected, notify))
 
     def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> Subscription:
         """Subscribe to known senders: by key the GID of a message, None to accept that of the first message."""
-        return self._receive(senders, Subscription(_message, dict(senders), self._refuse, notify))
+        return self._receive(senders, Subscription(_message, dict(senders), self._count_rejected, notify))
 
     def inbox(self, key: str, sender: bytes | None) -> Inbox:
         """Subscribe to the sender with this GID on `key`, for messages that are read soon after they arrive: a message
         keeps 64 kB of memory alive, and a full ring drops its oldest. None accepts the GID of the first message."""
         subscriber = self._session.declare_subscriber(key, zenoh.handlers.RingChannel(INBOX))
-        self._held.append(subscriber)
-        result = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._refuse)
+        self._declared.append(subscriber)
+        result = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._count_rejected)
         if not self._inboxes:
             threading.Thread(target=self._wake, daemon=True).start()
         self._inboxes[key] = result
@@ -142,34 +142,34 @@ class ZenohBus:
         """Wake threads whose deadline at an inbox has passed: Zenoh's queues have no time-out."""
         while not self._closed.wait(WAKE):
             for key, inbox in list(self._inboxes.items()):
-                if time.monotonic() >= inbox.until:
-                    here = zenoh.Locality.SESSION_LOCAL
-                    with suppress(zenoh.ZError):  # closed meanwhile
-                        self._session.put(key, b"", attachment=pack(0, 0, self._waker), allowed_destination=here)
+                if time.monotonic() >= inbox.deadline:
+                    own_session = zenoh.Locality.SESSION_LOCAL
+                    with suppress(zenoh.ZError):  # the session has been closed
+                        self._session.put(key, b"", attachment=pack(0, 0, self._waker), allowed_destination=own_session)
 
     def _receive(self, keys: Iterable[str], subscription: Subscription) -> Subscription:
         handler = zenoh.handlers.Callback(subscription.arrive, indirect=False)
-        self._held.extend(self._session.declare_subscriber(key, handler) for key in keys)
+        self._declared.extend(self._session.declare_subscriber(key, handler) for key in keys)
         return subscription
 
-    def _refuse(self) -> None:
-        self.refused += 1
+    def _count_rejected(self) -> None:
+        self.rejected += 1
 
-    def declare_alive(self, key: str) -> Callable[[], None]:
+    def declare_liveliness(self, key: str) -> Callable[[], None]:
         """Declare that this participant is present, until the returned function is called. Call it after `subscribe`: a
         participant that sees it may publish."""
         token = self._session.liveliness().declare_token(key)
-        self._held.append(token)
+        self._declared.append(token)
         return token.undeclare
 
-    def watch_alive(self, key_expression: str, seen: Callable[[str, bool], None]) -> None:
-        """Call `seen(key, alive)` from another thread for every participant that is there, comes or goes."""
+    def watch_liveliness(self, key_expression: str, on_change: Callable[[str, bool], None]) -> None:
+        """Call `on_change(key, alive)` from another thread for every participant that is present, joins or leaves."""
 
         def handle(sample: zenoh.Sample) -> None:
-            seen(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+            on_change(str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
         handler = zenoh.handlers.Callback(handle, indirect=False)
-        self._held.append(self._session.liveliness().declare_subscriber(key_expression, handler, history=True))
+        self._declared.append(self._session.liveliness().declare_subscriber(key_expression, handler, history=True))
 
     def answer(self, key: str, payload: bytes) -> None:
         """Reply with `payload` to every query for `key`."""
@@ -179,7 +179,7 @@ class ZenohBus:
 
         # In a separate thread: in Zenoh's only thread, a reply of several fragments would wait for itself
         handler: Any = zenoh.handlers.Callback(reply, indirect=True)
-        self._held.append(self._session.declare_queryable(key, handler))
+        self._declared.append(self._session.declare_queryable(key, handler))
 
     def query(self, key: str, timeout: float) -> bytes | None:
         """Return the first reply to a query for `key`, None after `timeout` seconds."""
@@ -188,12 +188,14 @@ class ZenohBus:
                 return reply.ok.payload.to_bytes()
         return None
 
-    def wait_alive(self, keys: Iterable[str], timeout: float, stop: Callable[[], bool] = lambda: False) -> list[str]:
-        """Wait until a participant is there for each key; the keys still missing after `timeout` seconds."""
+    def wait_for_liveliness(
+        self, keys: Iterable[str], timeout: float, stop: Callable[[], bool] = lambda: False
+    ) -> list[str]:
+        """Wait until a participant is present for each key. Return the keys that are missing after `timeout` [s]."""
         missing = set(keys)
         arrivals: queue.SimpleQueue = queue.SimpleQueue()
         for folder in {key.rpartition("/")[0] for key in missing}:
-            self.watch_alive(f"{folder}/*", lambda key, alive: arrivals.put((key, alive)))
+            self.watch_liveliness(f"{folder}/*", lambda key, alive: arrivals.put((key, alive)))
         deadline = time.monotonic() + timeout
         while missing and time.monotonic() < deadline and not stop():
             try:
@@ -211,7 +213,7 @@ class ZenohBus:
         for their confirmation, as `lapwing.cosim.executors.participant.Participant.leave` does.
         """
         self._closed.set()
-        with suppress(zenoh.ZError):  # it has waited for one of these
+        with suppress(zenoh.ZError):
             self._session.close()
 
     def __enter__(self) -> "ZenohBus":

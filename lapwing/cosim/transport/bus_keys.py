@@ -1,18 +1,18 @@
-"""Keys of the lock step on the bus: what follows the key prefix of a run, before the name of a participant."""
+"""Keys of the lock step on the bus: the part between the key prefix of a run and the name of a participant."""
 
-STEP_KEY = "_step"  # bundles
-BATCH_KEY = "_batch"  # what the recorder is given
-WAITING_KEY = "_waiting"  # what a participant has waited for
+STEP_KEY = "_step"  # step packets
+BATCH_KEY = "_batch"  # log packets
+WAITING_KEY = "_waiting"  # text: the data that a participant has waited for
 OUTSIDE_KEY = "_outside"  # program outside the run that a service waits for, with its own time-out
 REPORTS_KEY = "_reports"  # entries of the log's metadata, as a JSON object
 ALIVE_KEY = "_alive"  # token: the participant is present
 SETUP_KEY = "_setup"  # run configuration of a participant, as reply to a query
 DIVERGED_KEY = "_diverged"  # reason why a state is invalid
-ENDED_KEY = "_ended"  # of the owner of time: that the run has come to its end, or why it ended before
+ENDED_KEY = "_ended"  # from the clock owner: "" if the run was completed, the reason if it ended early
 REFUSED_KEY = "_refused"  # number of messages that a participant has rejected
 DEADLINES_KEY = "_deadlines"  # lateness of a participant in a paced run
 COMPILING_KEY = "_compiling"  # a participant compiles kernels
-RECORDED_KEY = "_log_progress"  # how far the log is; an empty message: it is complete
+RECORDED_KEY = "_log_progress"  # progress of the log; empty if it is complete
 HEARD_KEY = "_heard"  # token: the participant has received the last message of each of its producers
 LOGGED_KEY = "_logged"  # token: the participant has received the last message of the recorder
 

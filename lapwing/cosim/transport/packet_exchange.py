@@ -16,74 +16,74 @@ from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_l
 from lapwing.kernels import python_function
 from lapwing.messages.topics import Topic
 
-BATCH = 0.1  # [s] of wall time between two batches
-LOOK = 0.2  # [s] between two looks
+LOG_PERIOD = 0.1  # [s] of wall time between two log packets
+WATCH_PERIOD = 0.2  # [s] between two checks of the watchdog
 PAGE = 1024  # ticks in a log packet at most
 
 _due = python_function(due)
 
 
 class EndOfRun(Exception):
-    """A producer says that there will be no further message; its name."""
+    """A producer has published its last message; the argument is its name."""
 
 
 class PacketReceiver:
-    """A service with outputs that this service reads."""
+    """Receiver of the step packets of one producer."""
 
-    def __init__(self, process: Participant, name: str, taken: list[tuple[str, int, int]], graph: BlockDiagram):
-        """Subscribe to the service `name`; `taken` has (port, period, delay) of each input that it produces."""
-        self._process, self._name, self._taken, self._graph = process, name, taken, graph
-        self._way = packet_schedule(process.setup, name, process.name) if process.packs_ticks else EACH_TICK
-        self._bundles = StepPacketCodec(self._way.ports(process.setup.services[name].ports), self._way.ticks)
-        ((key, gid),) = process.participants.senders(self._way.key, [name]).items()
+    def __init__(self, process: Participant, name: str, inputs: list[tuple[str, int, int]], graph: BlockDiagram):
+        """Subscribe to the service `name`; `inputs` has (port, period, delay) of each input that it produces."""
+        self._process, self._name, self._inputs, self._graph = process, name, inputs, graph
+        self._schedule = packet_schedule(process.setup, name, process.name) if process.packs_ticks else EACH_TICK
+        self._codec = StepPacketCodec(self._schedule.ports(process.setup.services[name].ports), self._schedule.ticks)
+        ((key, gid),) = process.participants.senders(self._schedule.key, [name]).items()
         self._inbox = process.bus.inbox(key, gid)
-        self._needs = {(period, delay) for _, period, delay in taken}
-        self._newest = -1  # tick up to which bundles are taken
-        self._known = 0  # tick before which nothing more is needed
+        self._timings = {(period, delay) for _, period, delay in inputs}
+        self._newest = -1  # last tick whose packets have been received
+        self._complete_before = 0  # all inputs of the ticks before this one have been received
 
     def receive(self, tick: int) -> int:
-        """Take bundles up to the newest that is needed at `tick`; the tick before which nothing more is needed.
+        """Receive step packets up to the newest one that is due at `tick`. Return the first tick with missing inputs.
 
         Raises:
             EndOfRun: the producer has ended.
-            LockStepError: another bundle came than the one that is due.
+            LockStepError: a step packet is out of order or invalid.
         """
-        if tick < self._known:
-            return self._known
-        needed = max([_due(tick, period, delay) for period, delay in self._needs])
-        while self._newest < needed:
-            stamp = self._newest + 1
-            while not self._bundles.due(stamp):
-                stamp += self._way.every
-            due_ns = stamp * self._process.setup.interval_ns
+        if tick < self._complete_before:
+            return self._complete_before
+        newest_due = max([_due(tick, period, delay) for period, delay in self._timings])
+        while self._newest < newest_due:
+            packet_tick = self._newest + 1
+            while not self._codec.due(packet_tick):
+                packet_tick += self._schedule.every
+            expected_ns = packet_tick * self._process.setup.interval_ns
             time_ns, payload = self._inbox.get(POLL) or self._process.wait_with_status(
-                self._inbox.get, lambda: self._describe(needed)
+                self._inbox.get, lambda: self._describe(newest_due)
             )
             if not payload:
                 raise EndOfRun(self._name)
-            if time_ns != due_ns:
-                raise LockStepError(f"{self._name}: expected the bundle of tick {stamp}, got {time_ns} ns")
+            if time_ns != expected_ns:
+                raise LockStepError(f"{self._name}: expected the step packet of tick {packet_tick}, got {time_ns} ns")
             try:
-                self._bundles.unpack(payload, self._graph, stamp)
+                self._codec.unpack(payload, self._graph, packet_tick)
             except PacketError as error:
                 raise LockStepError(f"{self._name}: {error}") from None
-            self._newest = stamp + self._way.every - 1
-        self._known = min([(self._newest // period + 1) * period + delay for period, delay in self._needs])
-        return self._known
+            self._newest = packet_tick + self._schedule.every - 1
+        self._complete_before = min([(self._newest // period + 1) * period + delay for period, delay in self._timings])
+        return self._complete_before
 
     def _describe(self, tick: int) -> str:
-        ports = [port for port, period, delay in self._taken if tick % period == 0]
+        ports = [port for port, period, delay in self._inputs if tick % period == 0]
         return f"{', '.join(ports)} of tick {tick} from {self._name}"
 
 
 def packet_receivers(process: Participant, graph: BlockDiagram) -> list[PacketReceiver]:
     """Return a receiver for each producer of an input of this process's service."""
     setup = process.setup
-    taken: dict[str, list[tuple[str, int, int]]] = {}
-    for needed in setup.services[process.name].inputs:
-        producer = setup.producers[needed.port]
-        taken.setdefault(producer, []).append((needed.port, setup.port(needed.port).period, needed.delay))
-    return [PacketReceiver(process, producer, ports, graph) for producer, ports in sorted(taken.items())]
+    inputs: dict[str, list[tuple[str, int, int]]] = {}
+    for i in setup.services[process.name].inputs:
+        producer = setup.producers[i.port]
+        inputs.setdefault(producer, []).append((i.port, setup.port(i.port).period, i.delay))
+    return [PacketReceiver(process, producer, ports, graph) for producer, ports in sorted(inputs.items())]
 
 
 @dataclass
@@ -109,19 +109,19 @@ class _TopicPublisher:
     def __init__(self, process: Participant, service: Service):
         self._bus = process.bus
         self._keys = {topic: process.key(topic) for topic in service.topics}
-        self.puts = {topic: process.bus.publisher(key, drops=True) for topic, key in self._keys.items()}
+        self.publishers = {topic: process.bus.publisher(key, drops=True) for topic, key in self._keys.items()}
         self._subscribed: set[Topic] = set()
 
     def refresh_subscribers(self) -> None:
-        """Find out which topics have subscribers."""
-        self._subscribed = {topic for topic, key in self._keys.items() if self._bus.has_audience([key])}
+        """Store which topics have subscribers."""
+        self._subscribed = {topic for topic, key in self._keys.items() if self._bus.has_subscribers([key])}
 
     def publish(self, graph: BlockDiagram, first: int, stop: int, interval_ns: int) -> None:
         """Publish the messages of the ticks [first, stop)."""
         if self._subscribed:
             for page in graph.record_batches(first, stop, self._subscribed, keep=True):
                 for at, payload in zip(page.ticks, page.payloads, strict=True):
-                    self.puts[page.topic](payload.tobytes(), int(at) * interval_ns)
+                    self.publishers[page.topic](payload.tobytes(), int(at) * interval_ns)
 
 
 class PublishWatchdog:
@@ -130,42 +130,42 @@ class PublishWatchdog:
     The run monitor then names the consumer that accepts no data, and not the producer that waits for it.
     """
 
-    def __init__(self, say: Callable[[], None], patience: float):
-        """Call `say` each time when what is done within this context has taken `patience` [s] more."""
-        self._say, self._patience = say, patience
-        self._begun = self._said = math.inf  # [s] of the monotonic clock; infinite while nothing is published
+    def __init__(self, report: Callable[[], None], patience: float):
+        """Call `report` each time the work within this context has taken `patience` [s] more."""
+        self._report, self._patience = report, patience
+        self._entered = self._reported = math.inf  # [s] of the monotonic clock; infinite while nothing is published
         self._closed = threading.Event()
         threading.Thread(target=self._watch, daemon=True).start()
 
     def __enter__(self) -> None:
-        self._begun = time.monotonic()
+        self._entered = time.monotonic()
 
     def __exit__(self, *_: object) -> None:
-        self._begun = math.inf
+        self._entered = math.inf
 
     def close(self) -> None:
-        """Watch no longer."""
+        """Stop the thread."""
         self._closed.set()
 
     def _watch(self) -> None:
-        while not self._closed.wait(LOOK):
-            begun, now = self._begun, time.monotonic()
-            if now - begun < self._patience:
-                self._said = -math.inf
-            elif now - self._said >= self._patience:
-                self._said = now
-                self._say()
+        while not self._closed.wait(WATCH_PERIOD):
+            entered, now = self._entered, time.monotonic()
+            if now - entered < self._patience:
+                self._reported = -math.inf
+            elif now - self._reported >= self._patience:
+                self._reported = now
+                self._report()
 
 
 class PacketSender:
     """Publishes the output of a service: step packets, log packets, and topics with subscribers."""
 
-    def __init__(self, process: Participant, service: Service, graph: BlockDiagram, hands_over: bool = True):
-        """Declare the publishers; without `hands_over`, an external program publishes the step packets."""
+    def __init__(self, process: Participant, service: Service, graph: BlockDiagram, publishes_steps: bool = True):
+        """Declare the publishers; without `publishes_steps`, an external program publishes the step packets."""
         key_prefix, bus = process.key_prefix, process.bus
         self._process, self._graph = process, graph
         self._outlets = []
-        if hands_over:
+        if publishes_steps:
             for schedule in packet_schedules(process.setup, service.name) if process.packs_ticks else {EACH_TICK}:
                 put = bus.publisher(f"{key_prefix}/{schedule.key}/{service.name}")
                 codec = StepPacketCodec(schedule.ports(process.setup.services[service.name].ports), schedule.ticks)
@@ -181,7 +181,7 @@ class PacketSender:
         )
 
     def refresh_subscribers(self) -> None:
-        """Find out which topics have subscribers."""
+        """Check again which topics have subscribers."""
         self._topics.refresh_subscribers()
 
     def publish(self, first: int, stop: int) -> None:
@@ -196,14 +196,14 @@ class PacketSender:
                 self.refresh_subscribers()
 
     def _publish_log(self, stop: int) -> None:
-        self._log_due = time.monotonic() + BATCH
+        self._log_due = time.monotonic() + LOG_PERIOD
         if stop > self._logged:
             pages = self._graph.record_batches(self._logged, stop)
             self._put_log(pack_log_packet(pages, self._logged, stop), (stop - 1) * self._interval_ns)
             self._logged = stop
 
     def end(self, stop: int) -> None:
-        """Publish what is left of the ticks before `stop`, then the end (`publish_end`)."""
+        """Publish the remaining ticks before `stop`, then the end (`publish_end`)."""
         self._watchdog.close()
         self._publish_log(stop)
         self._process.report_rejected()
@@ -215,5 +215,5 @@ class PacketSender:
         Consumers get none if the run monitor is gone: they must detect that themselves instead of seeing a normal end.
         """
         steps = [] if self._process.abandoned else [outlet.put for outlet in self._outlets]
-        for put in (*steps, self._put_log, *self._topics.puts.values()):
+        for put in (*steps, self._put_log, *self._topics.publishers.values()):
             put(b"", stop * self._interval_ns)

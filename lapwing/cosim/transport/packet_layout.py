@@ -1,4 +1,4 @@
-"""Layout of the step packets of a run for programs in other languages: every column of every port by name."""
+"""Layout of the step packets of a run, for programs in other languages: the columns of each port by name."""
 
 from typing import Any
 
@@ -21,9 +21,9 @@ def layout(setup: RunConfig) -> dict[str, Any]:
 
     Returns:
         "rate" [Hz], "interval_ns", "last_tick", "order" (of the services within a tick), "keys" (the first parts of
-        their keys, by what they are for), "services" (by name: "inputs", each with "port" and "delay" [ticks], and
-        "ports" in the order of a bundle, each with "name", "period" [ticks] and "columns"), and "setup", the text of
-        the whole set-up.
+        their keys, by purpose), "services" (by name: "inputs", each with "port" and "delay" [ticks], and "ports" in the
+        order of a step packet, each with "name", "period" [ticks] and "columns"), and "setup", the text of the run
+        configuration.
     """
     return {
         "rate": setup.rate,

@@ -25,19 +25,19 @@ def ticks_per_packet(setup: RunConfig, name: str) -> int:
 class PacketSchedule(NamedTuple):
     """Schedule of the packets from one service to another."""
 
-    ticks: int  # of a bundle
-    every: int  # ticks from the first of a bundle to that of the next; only ports whose period is a multiple
+    ticks: int  # [ticks] in a packet
+    every: int  # [ticks] between the starts of two packets; only ports whose period is a multiple
 
     @property
     def key(self) -> str:
-        """The key of its packets, without the name of the sending service."""
+        """Key of its packets, without the name of the sending service."""
         if self.ticks > 1:
             return f"{STEP_KEY}_{self.ticks}"
         return STEP_KEY if self.every == 1 else f"{STEP_KEY}_every_{self.every}"
 
-    def ports(self, given: Iterable[Port]) -> list[Port]:
+    def ports(self, ports: Iterable[Port]) -> list[Port]:
         """Return the ports of a service that its packets contain."""
-        return [port for port in given if self.ticks > 1 or port.period % self.every == 0]
+        return [port for port in ports if self.ticks > 1 or port.period % self.every == 0]
 
 
 EACH_TICK = PacketSchedule(1, 1)
@@ -48,13 +48,13 @@ def packet_schedule(setup: RunConfig, producer: str, consumer: str) -> PacketSch
     """Return the schedule of the packets from one service to a consumer."""
     if (ticks := max(ticks_per_packet(setup, producer), ticks_per_packet(setup, consumer))) > 1:
         return PacketSchedule(ticks, ticks)
-    taken = {i.port for i in setup.services[consumer].inputs}
-    periods = [port.period for port in setup.services[producer].ports if port.name in taken]
+    consumed = {i.port for i in setup.services[consumer].inputs}
+    periods = [port.period for port in setup.services[producer].ports if port.name in consumed]
     return PacketSchedule(1, math.gcd(*periods))
 
 
 def packet_schedules(setup: RunConfig, producer: str) -> set[PacketSchedule]:
     """Return the packet schedules of a service; one packet per tick if it has no consumer."""
-    given = {port.name for port in setup.services[producer].ports}
-    takers = [name for name, service in setup.services.items() if any(i.port in given for i in service.inputs)]
-    return {packet_schedule(setup, producer, taker) for taker in takers} or {EACH_TICK}
+    produced = {port.name for port in setup.services[producer].ports}
+    consumers = [name for name, service in setup.services.items() if any(i.port in produced for i in service.inputs)]
+    return {packet_schedule(setup, producer, consumer) for consumer in consumers} or {EACH_TICK}

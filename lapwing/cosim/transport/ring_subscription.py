@@ -12,10 +12,10 @@ from lapwing.cosim.transport.subscription import Message
 
 
 class Inbox:
-    """Messages in order of arrival; what is not of the sender is left out. For one thread.
+    """Queue of the messages of one sender, in order of arrival; for one reading thread.
 
     Attributes:
-        until: when `get` has waited long enough, on the monotonic clock; infinite while no thread waits.
+        deadline: end of the wait in `get` [s], on the monotonic clock; infinite while no thread waits.
     """
 
     def __init__(
@@ -24,40 +24,40 @@ class Inbox:
         read: Callable[[Any], Message | None],
         sender: bytes | None,
         waker: bytes,
-        refuse: Callable[[], None],
+        on_rejected: Callable[[], None],
     ):
-        """Without a message.
+        """Create an empty queue.
 
         Args:
-            receive: waits for the next sample of the bus, however long that takes.
-            read: what a sample says, None where it is no message.
-            sender: the gid that a message must carry, None for that of the first.
-            waker: the gid of a message that says that `until` has passed.
-            refuse: called for each message that is left out.
+            receive: waits for the next sample of the bus without a time-out.
+            read: returns the message of a sample, None if it is invalid.
+            sender: required GID of the messages; None for that of the first message.
+            waker: GID of the message that announces that `deadline` has passed.
+            on_rejected: called for each rejected message.
         """
-        self._receive, self._read, self._refuse = receive, read, refuse
+        self._receive, self._read, self._on_rejected = receive, read, on_rejected
         self._sender, self._waker = sender, waker
-        self.until = float("inf")
+        self.deadline = float("inf")
 
     def get(self, timeout: float) -> tuple[int, bytes] | None:
         """Return simulation time [ns] and payload of the next message, None after about `timeout` seconds."""
-        until = self.until = time.monotonic() + timeout
+        deadline = self.deadline = time.monotonic() + timeout
         try:
             while True:
                 message = self._read(self._receive())
                 if message is None:
-                    self._refuse()
+                    self._on_rejected()
                     continue
                 time_ns, gid, payload = message
                 if gid == self._sender:
                     return time_ns, payload
                 if gid == self._waker:
-                    if time.monotonic() >= until:
+                    if time.monotonic() >= deadline:
                         return None
                 elif self._sender is None:
                     self._sender = gid
                     return time_ns, payload
                 else:
-                    self._refuse()
+                    self._on_rejected()
         finally:
-            self.until = float("inf")
+            self.deadline = float("inf")

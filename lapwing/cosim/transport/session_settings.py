@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
-LEASE_MS = 10_000  # after this long without a sign of life a peer counts as gone; the launcher finds out sooner
-OPEN_MS = 2_000  # for one attempt to reach a peer; others follow, and closing a session waits for the one under way
-LARGEST = 1 << 26  # [bytes] of a message that is put together from fragments; a set-up or a batch has less
+LEASE_MS = 10_000  # [ms] without a message after which a peer counts as lost; the launcher detects it earlier
+OPEN_MS = 2_000  # [ms] for one attempt to reach a peer; closing a session waits for the current attempt
+LARGEST = 1 << 26  # [bytes] limit of a fragmented message; run configurations and log packets are smaller
 
 
 def session_settings(listen: Sequence[str], connect: Sequence[str], mode: str, awaits: bool) -> dict[str, Any]:
@@ -26,7 +26,7 @@ def session_settings(listen: Sequence[str], connect: Sequence[str], mode: str, a
         "transport/shared_memory/enabled": False,
         "transport/unicast/open_timeout": OPEN_MS,
         "transport/link/tx/lease": LEASE_MS,
-        # as long for one that takes nothing: after a cut of 2 s, TCP may wait for 3 s more before it tries again
+        # also for a peer that accepts no data: after an interruption of 2 s, TCP may wait 3 s more before it retries
         "transport/link/tx/queue/congestion_control/block/wait_before_close": 1000 * LEASE_MS,
         "transport/link/rx/max_message_size": LARGEST,
     }
@@ -36,15 +36,15 @@ _LINUX = hasattr(socket, "TCP_USER_TIMEOUT")
 
 
 def limit_silence(milliseconds: int) -> None:
-    """Have the system end each connection that is open now once what it sent is not confirmed for so long.
+    """Set the TCP time-out for unacknowledged data of all connections that are open now.
 
-    Without, it tries for a quarter of an hour (tcp(7), tcp_retries2); Zenoh waits for that where it closes a link over
-    TLS that still has something to send, and until then counts its peer as there.
+    Without it, the system retries for a quarter of an hour (tcp(7), tcp_retries2). Zenoh waits for that when it closes
+    a TLS link with unsent data, and counts the peer as present until then.
     """
     if not _LINUX:
         return
     for name in os.listdir("/proc/self/fd"):
-        with suppress(OSError):  # gone meanwhile, or no TCP
+        with suppress(OSError):  # closed since the listing, or not TCP
             descriptor = int(name)
             if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
                 with socket.socket(fileno=os.dup(descriptor)) as result:

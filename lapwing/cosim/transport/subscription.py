@@ -5,28 +5,28 @@ from collections.abc import Callable
 from typing import Any
 
 Message = tuple[int, bytes, bytes]
-"""Simulation time [ns], gid of the sender (16 bytes) and payload."""
+"""Simulation time [ns], GID of the sender (16 bytes) and payload."""
 
 
 class Subscription:
-    """A queue of messages, which a thread of the bus fills."""
+    """Queue of messages, which a thread of the bus fills."""
 
     def __init__(
         self,
         read: Callable[[Any], Message | None],
         senders: dict[str, bytes | None] | None,
-        refuse: Callable[[], None],
+        on_rejected: Callable[[], None],
         notify: Callable[[], None] | None = None,
     ):
-        """Without a message.
+        """Create an empty queue.
 
         Args:
-            read: what a sample says, None where it is no message.
+            read: returns the message of a sample, None if it is invalid.
             senders: see `ZenohBus.receive`; None to accept all senders.
-            refuse: called for each message that is left out.
+            on_rejected: called for each rejected message.
             notify: called after each arrival.
         """
-        self._read, self._senders, self._refuse, self._notify = read, senders, refuse, notify
+        self._read, self._senders, self._on_rejected, self._notify = read, senders, on_rejected, notify
         self._only_gid = next(iter(senders.values())) if senders and len(senders) == 1 else None
         self._arrived: queue.SimpleQueue[tuple[str, int, bytes]] = queue.SimpleQueue()
 
@@ -45,15 +45,15 @@ class Subscription:
     def arrive(self, sample: Any) -> None:
         """Keep a sample of the bus, which has its `key_expr`; called by a thread of the bus."""
         message = self._read(sample)
-        if message is None or not self._is_of_its_sender(sample, message[1]):
-            self._refuse()
+        if message is None or not self._has_expected_sender(sample, message[1]):
+            self._on_rejected()
             return
         self._arrived.put((str(sample.key_expr), message[0], message[2]))
         if self._notify:
             self._notify()
 
-    def _is_of_its_sender(self, sample: Any, gid: bytes) -> bool:
-        if self._only_gid or self._senders is None:  # the text of a key takes longer than all else
+    def _has_expected_sender(self, sample: Any, gid: bytes) -> bool:
+        if self._only_gid or self._senders is None:  # converting the key to text takes most of the time
             return self._only_gid in (None, gid)
         key = str(sample.key_expr)
         expected = self._senders.get(key, b"")

@@ -29,9 +29,9 @@ class FlightMode:
         return None
 
 
-def fill_in(position: Vec3, asked: Vec3) -> Vec3:
-    """Return `asked` with NaN coordinates replaced by those of `position`."""
-    x, y, z = (p if math.isnan(a) else a for p, a in zip(position, asked, strict=True))
+def fill_in(position: Vec3, requested: Vec3) -> Vec3:
+    """Return `requested` with NaN coordinates replaced by those of `position`."""
+    x, y, z = (p if math.isnan(a) else a for p, a in zip(position, requested, strict=True))
     return x, y, z
 
 

@@ -55,8 +55,8 @@ class Leg:
         smoothing.turn_to(wanted, limits, dt)
 
     def _wanted_yaw(self, guidance: Guidance) -> float:
-        found = heading(guidance, self.target)
-        self._heading = self._heading if math.isnan(found) else found
+        course = heading(guidance, self.target)
+        self._heading = self._heading if math.isnan(course) else course
         return self._heading
 
 

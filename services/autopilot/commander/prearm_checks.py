@@ -24,13 +24,13 @@ def arming_blockers(view: CommanderInput, state: State) -> list[str]:
     if estimate.health == NOT_STARTED:
         return [status_texts.NOT_STARTED]
     bad = (name for name, time in zip(SOURCES, state.source_outage, strict=True) if time > MAXIMUM_OUTAGE)
-    found = [status_texts.NO_READINGS.format(name) for name in bad]
-    found += [text for bit, text in _UNCERTAIN.items() if estimate.health & bit]
+    blockers = [status_texts.NO_READINGS.format(name) for name in bad]
+    blockers += [text for bit, text in _UNCERTAIN.items() if estimate.health & bit]
     q = estimate.attitude
     if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(MAXIMUM_TILT):
-        found.append(status_texts.NOT_LEVEL)
+        blockers.append(status_texts.NOT_LEVEL)
     if view.battery_charge < guidance.parameters["BAT_CRIT_THR"]:
-        found.append(f"{status_texts.BATTERY_LOW}: {view.battery_charge:.0%}")
+        blockers.append(f"{status_texts.BATTERY_LOW}: {view.battery_charge:.0%}")
     if not guidance.fence.allows(*estimate.position_world[:2]):
-        found.append(status_texts.OUTSIDE_FENCE)
-    return found
+        blockers.append(status_texts.OUTSIDE_FENCE)
+    return blockers

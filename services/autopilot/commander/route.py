@@ -67,9 +67,9 @@ class Route:
             item = self.item
             if item is None or item.action != "jump":
                 return
-            taken = self._jumped.get(self.current, 0)
-            if taken < item.values[1]:
-                self._jumped[self.current] = taken + 1
+            jumps = self._jumped.get(self.current, 0)
+            if jumps < item.values[1]:
+                self._jumped[self.current] = jumps + 1
                 self.current = int(item.values[0])
             else:
                 self.current += 1
@@ -79,12 +79,12 @@ class Route:
         number, jumped = self.current + 1, dict(self._jumped)
         while number < len(self.items):
             item = self.items[number]
-            taken = jumped.get(number, 0)
+            jumps = jumped.get(number, 0)
             if item.action != "jump":
                 yield item
                 number += 1
-            elif taken < item.values[1]:
-                jumped[number] = taken + 1
+            elif jumps < item.values[1]:
+                jumped[number] = jumps + 1
                 number = int(item.values[0])
             else:
                 number += 1

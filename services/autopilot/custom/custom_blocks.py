@@ -22,7 +22,7 @@ from lapwing.services.common.user_code import named
 def controller_parts(
     name: str,
     texts: Mapping[str, str],
-    given: AutopilotSetup,
+    config: AutopilotSetup,
     common: Controller,
     inputs: tuple[InputPort, ...],
     outputs: tuple[Port, ...],
@@ -32,30 +32,30 @@ def controller_parts(
     Args:
         name: name of the latter.
         texts: module texts of the run configuration.
-        given: configuration of the autopilot.
+        config: configuration of the autopilot.
         common: parameters in common with the cascaded PID.
         inputs: estimate, commander output, battery and reference.
         outputs: outputs of the latter.
     """
-    code, vehicle = given.controller, given.vehicle
+    code, vehicle = config.controller, config.vehicle
     assert code is not None
     assert vehicle is not None
-    module, found = named(CONTROLLER, code.name, texts)
-    per_demand = lift(given.airframe), moments(given.airframe)
-    if is_compiled(found):
-        own, start = compiled(module, found, vehicle, code.options)
-        p = CustomController(common, own, start, code.every, *per_demand, vehicle.voltage_max)
+    module, user_code = named(CONTROLLER, code.name, texts)
+    per_demand = lift(config.airframe), moments(config.airframe)
+    if is_compiled(user_code):
+        parameters, start = compiled(module, user_code, vehicle, code.options)
+        p = CustomController(common, parameters, start, code.every, *per_demand, vehicle.voltage_max)
         return [Block(name, p, Cell(block.start(p)), inputs, outputs, trusted=False)]
-    construct = constructor(CONTROLLER, module, found, vehicle, code.options)
-    asked = PythonControllerBlock(code, module, construct, inputs[3].port, vehicle)
+    construct = constructor(CONTROLLER, module, user_code, vehicle, code.options)
+    python_block = PythonControllerBlock(code, module, construct, inputs[3].port, vehicle)
     p = CustomController(common, PythonControllerProxy(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)
-    return [asked, Block(name, p, Cell(block.start(p)), (*inputs, InputPort(CONTROLLER_OUTPUT)), outputs)]
+    return [python_block, Block(name, p, Cell(block.start(p)), (*inputs, InputPort(CONTROLLER_OUTPUT)), outputs)]
 
 
 def estimator_parts(
     name: str,
     texts: Mapping[str, str],
-    given: AutopilotSetup,
+    config: AutopilotSetup,
     wakeup: WakeupParameters,
     sensors: dict[str, int],
     inputs: tuple[InputPort, ...],
@@ -66,15 +66,17 @@ def estimator_parts(
     Args:
         name: name of the latter.
         texts: module texts of the run configuration.
-        given: configuration of the autopilot.
-        attention: wake-up parameters of the commander.
+        config: configuration of the autopilot.
+        wakeup: wake-up parameters of the commander.
         sensors: ticks between two readings, by port.
         inputs: battery and flight.
         estimate: port of the estimate.
     """
-    code, vehicle = given.own_estimator, given.vehicle
+    code, vehicle = config.own_estimator, config.vehicle
     assert code is not None
     assert vehicle is not None
-    module, found = named(ESTIMATOR, code.name, texts)
-    asked = PythonEstimatorBlock(code, module, constructor(ESTIMATOR, module, found, vehicle, code.options), sensors)
-    return [asked, Block(name, HeldEstimate(wakeup), Cell(0.0), (InputPort(HELD), *inputs), (estimate,))]
+    module, user_code = named(ESTIMATOR, code.name, texts)
+    python_block = PythonEstimatorBlock(
+        code, module, constructor(ESTIMATOR, module, user_code, vehicle, code.options), sensors
+    )
+    return [python_block, Block(name, HeldEstimate(wakeup), Cell(0.0), (InputPort(HELD), *inputs), (estimate,))]

@@ -19,9 +19,9 @@ class PeriodicPart(ABC):
         """Call the user code if it is due at `tick`. Return the tick of the next wake-up."""
         every = self._code.every
         if tick % every == 0:
-            self._ask(tick)
+            self._call_user_code(tick)
         return tick - tick % every + every
 
     @abstractmethod
-    def _ask(self, tick: int) -> None:
+    def _call_user_code(self, tick: int) -> None:
         """Call the user code with the inputs at `tick` and write its output."""

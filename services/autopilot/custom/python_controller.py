@@ -47,7 +47,7 @@ class PythonControllerBlock(PeriodicPart):
         self._reference, self._resting_height = reference, vehicle.resting_height
         self._controller: Any = None
 
-    def _ask(self, tick: int) -> None:
+    def _call_user_code(self, tick: int) -> None:
         graph = self._graph
         estimate, order = graph.latest(ports.ESTIMATE, tick), graph.latest(ORDER, tick)
         follows = order.follow and self._reference != NO_TRAJECTORY

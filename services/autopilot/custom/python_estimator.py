@@ -32,7 +32,7 @@ class PythonEstimatorBlock(PeriodicPart):
         self.inputs = tuple(InputPort(name) for name in sensors)
         self._estimator: Any = None
 
-    def _ask(self, tick: int) -> None:
+    def _call_user_code(self, tick: int) -> None:
         new = {name: period for name, period in self._sensors.items() if tick % period < self._code.every}
         readings = {name: self._graph.latest(name, tick) for name in new}
         time = tick * self._graph.setup.interval

@@ -55,18 +55,18 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
     Raises:
         ConfigError: the controller cannot be constructed, has no rate, or its step fails or returns another type.
     """
-    module, found = named(CONTROLLER, name, texts)
+    module, user_code = named(CONTROLLER, name, texts)
     start = (0.0, 0.0, vehicle.resting_height)
-    given = (0.0, StateEstimate(position_world=start), Setpoint(position_world=start))
-    if not is_compiled(found):
-        p = constructor(CONTROLLER, module, found, vehicle, options)()
-        none = (0.0,) * len(vehicle.spin_directions)
-        _try(CONTROLLER, name, module, p, lambda: parse_controller_output(p.step(*given), none))
+    arguments = (0.0, StateEstimate(position_world=start), Setpoint(position_world=start))
+    if not is_compiled(user_code):
+        p = constructor(CONTROLLER, module, user_code, vehicle, options)()
+        no_voltage = (0.0,) * len(vehicle.spin_directions)
+        _try(CONTROLLER, name, module, p, lambda: parse_controller_output(p.step(*arguments), no_voltage))
         return _rate(CONTROLLER, name, p)
-    p, s = compiled(module, found, vehicle, options)
+    p, s = compiled(module, user_code, vehicle, options)
 
     def trial() -> None:
-        output = module.step(p, s, *given)
+        output = module.step(p, s, *arguments)
         if not (type(output) is tuple and len(output) == 2 and isinstance(output[1], OUTPUTS)):
             raise TypeError("step must return (state, MotorVoltages or ThrustAndMoments)")
         if numba.typeof(output[0]) != numba.typeof(s):
@@ -79,8 +79,8 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
 
 def estimator_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, options: Mapping[str, Any]) -> float:
     """Return the rate [Hz] of an estimator after a trial step without readings. See `controller_rate`."""
-    module, found = named(ESTIMATOR, name, texts)
-    p = constructor(ESTIMATOR, module, found, vehicle, options)()
+    module, user_code = named(ESTIMATOR, name, texts)
+    p = constructor(ESTIMATOR, module, user_code, vehicle, options)()
     _try(ESTIMATOR, name, module, p, lambda: checked_estimate(p.step(0.0, {})))
     return _rate(ESTIMATOR, name, p)
 
@@ -91,7 +91,7 @@ def _try(key: str, name: str, module: ModuleType, owner: Any, step: Callable[[],
     try:
         step()
     except FAULTS as error:
-        raise ConfigError(key, f"{name}: {_told(error, module)}") from error
+        raise ConfigError(key, f"{name}: {_error_text(error, module)}") from error
 
 
 def _rate(key: str, name: str, p: Any) -> float:
@@ -101,53 +101,53 @@ def _rate(key: str, name: str, p: Any) -> float:
     return float(rate)
 
 
-def _told(error: BaseException, module: ModuleType) -> str:
+def _error_text(error: BaseException, module: ModuleType) -> str:
     if isinstance(error, NumbaError):
         lines = [line.strip() for line in str(error).splitlines() if line.strip()]
         return f"cannot be compiled: {lines[1] if len(lines) > 1 else lines[0]}"
     return blame(error, module)
 
 
-def is_compiled(found: Any) -> bool:
+def is_compiled(user_code: Any) -> bool:
     """Return True for a compiled controller, which is a function, not a class."""
-    return inspect.isfunction(found)
+    return inspect.isfunction(user_code)
 
 
 def constructor(
-    key: str, module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]
+    key: str, module: ModuleType, user_code: Any, vehicle: VehicleModel, options: Mapping[str, Any]
 ) -> Callable[[], Any]:
     """Return a function that constructs the user's class, or copies the user's object, that `key` names.
 
     Raises:
         ConfigError: an object has options, or the constructor fails.
     """
-    if options and not inspect.isclass(found):
-        raise ConfigError(f"{key}_options", f"a {type(found).__name__} object takes no options", "a class")
+    if options and not inspect.isclass(user_code):
+        raise ConfigError(f"{key}_options", f"a {type(user_code).__name__} object takes no options", "a class")
 
-    cls: Callable[..., Any] | None = found if inspect.isclass(found) else None
+    cls: Callable[..., Any] | None = user_code if inspect.isclass(user_code) else None
 
     def construct() -> Any:
         try:
-            return cls(vehicle, **options) if cls else copy.deepcopy(found)
+            return cls(vehicle, **options) if cls else copy.deepcopy(user_code)
         except FAULTS as error:
-            raise _refused(key, error, module) from error
+            raise _constructor_error(key, error, module) from error
 
     return construct
 
 
-def compiled(module: ModuleType, found: Any, vehicle: VehicleModel, options: Mapping[str, Any]) -> tuple[Any, Any]:
+def compiled(module: ModuleType, user_code: Any, vehicle: VehicleModel, options: Mapping[str, Any]) -> tuple[Any, Any]:
     """Return parameters and initial state of a compiled controller. Raise ConfigError if they are invalid."""
     try:
-        p, s = found(vehicle, **options)
+        p, s = user_code(vehicle, **options)
     except FAULTS as error:
-        raise _refused(CONTROLLER, error, module) from error
+        raise _constructor_error(CONTROLLER, error, module) from error
     if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
         expected = "a NamedTuple of the same module, which also defines `step`"
-        raise ConfigError(CONTROLLER, f"{found.__name__} returned {type(p).__name__} parameters", expected)
+        raise ConfigError(CONTROLLER, f"{user_code.__name__} returned {type(p).__name__} parameters", expected)
     return p, s
 
 
-def _refused(key: str, error: BaseException, module: ModuleType) -> ConfigError:
+def _constructor_error(key: str, error: BaseException, module: ModuleType) -> ConfigError:
     """Return the error of a constructor, under the options' key if an argument is wrong."""
     options = isinstance(error, TypeError) and "argument" in str(error)
     return ConfigError(f"{key}_options" if options else key, blame(error, module))

@@ -68,23 +68,23 @@ class Injection:
 
     def before(self, name: str) -> list[Block]:
         """Return the blocks between sensors and estimator and after the battery."""
-        found = []
+        blocks = []
         for port in self._sensors:
             known = self._known[port]
             memory = Cell(Memory(known.like, 0))
-            given = known._replace(name=self.received(port))
+            received_port = known._replace(name=self.received(port))
             key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
             late = known.period * max(1, round(DELAY / self._setup.interval / known.period))
             inputs = InputPort(port), InputPort(port, late)
             parameters = _SENSORS[port](self.faults, key)
-            found.append(Block(f"{name}.inject.{port}", parameters, memory, inputs, (given,), known.period))
+            blocks.append(Block(f"{name}.inject.{port}", parameters, memory, inputs, (received_port,), known.period))
         if self.faults is not None:
             known = self._known[ports.BATTERY]
-            given = known._replace(name=self.received(ports.BATTERY))
+            received_port = known._replace(name=self.received(ports.BATTERY))
             battery, memory = BatteryInjection(self.faults), Cell(known.like)
             reads = (InputPort(ports.BATTERY),)
-            found.append(Block(f"{name}.inject.battery", battery, memory, reads, (given,), known.period))
-        return found
+            blocks.append(Block(f"{name}.inject.battery", battery, memory, reads, (received_port,), known.period))
+        return blocks
 
     def after(self, name: str, actuators: Port) -> list[Block]:
         """Return the block between the controller and the motors."""

@@ -1,4 +1,4 @@
-"""The MAVLink dialect: all that pymavlink knows, and what it leaves out."""
+"""MAVLink dialect of pymavlink, with additional messages."""
 
 from functools import cache
 from typing import Any

@@ -32,7 +32,7 @@ def _parse(text: str) -> _Field:
 
 
 class _Message(mavlink.MAVLink_message):
-    """A message whose class is made from its fields."""
+    """Message whose class is generated from its fields."""
 
     def __init__(self, *values: Any):
         super().__init__(self.id, self.msgname)

@@ -10,7 +10,7 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum, from_world
 
 GROUND_SPEED, NO_THROTTLE, DEFAULT_SPEED = 1.0, -1.0, -2.0  # parameters of DO_CHANGE_SPEED
 _PLACELESS = ("gripper", "return", "delay", "condition", "jump", "speed", "yaw")
-_NOWHERE = {"roi": mavlink.MAV_CMD_DO_SET_ROI_NONE}  # what an action without a place is
+_NOWHERE = {"roi": mavlink.MAV_CMD_DO_SET_ROI_NONE}  # command of an action without a position
 _Params = tuple[float, ...]
 
 

@@ -14,7 +14,7 @@ from lapwing.services.mavlink.events.definition import (
     Definition,
     Entry,
     Enumeration,
-    Happened,
+    Occurrence,
     event,
     watch,
 )
@@ -25,7 +25,7 @@ INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
 WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
 MODES = tuple(dict.fromkeys(mode.kind for mode in firmware.get("px4").MODES))
 _GPS = ("gps", "GPS")
-_OF_SOURCE = {  # what PX4 calls them
+_OF_SOURCE = {  # PX4's names
     "imu": ("gyro", "Gyroscope and accelerometer"),
     "gps": _GPS,
     "gps_velocity": _GPS,
@@ -96,40 +96,44 @@ class ArmingWatch:
     """Reports on every change, and to new endpoints."""
 
     def __init__(self) -> None:
-        self._told: tuple = ()  # what a change of is reported at once
+        self._announced: tuple = ()  # values whose change is reported immediately
         self._reported: tuple = ()
         self._next = 0  # [ns]
 
-    def step(self, v: VehicleCache) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Occurrence]:
         """Yield the next report if one is due."""
-        told = v.reports_asked, tuple(v.status.arming_blockers)
-        if told == self._told and v.time_ns < self._next:
+        current = v.report_requests, tuple(v.status.arming_blockers)
+        if current == self._announced and v.time_ns < self._next:
             return
         self._next = v.time_ns + INTERVAL
-        health = tuple((source, sound) for source, _, sound in sensor_health(v))
-        report = *told, healthy(v), health
+        health = tuple((source, is_valid) for source, _, is_valid in sensor_health(v))
+        report = *current, healthy(v), health
         if report != self._reported:
-            self._told, self._reported = told, report
-            yield from _report(told[1], healthy(v), health)
+            self._announced, self._reported = current, report
+            yield from _report(current[1], healthy(v), health)
 
 
-def _report(reasons: tuple[str, ...], located: bool, health: tuple[tuple[str, bool], ...]) -> Iterator[Happened]:
+def _report(
+    reasons: tuple[str, ...], position_known: bool, health: tuple[tuple[str, bool], ...]
+) -> Iterator[Occurrence]:
     failed = [_failed(reason) for reason in reasons]
     wrong = sum({1 << values[1] for _, values in failed})
     can_arm = 0 if failed else _ALL
-    can_run = _ALL if located else sum(1 << MODES.index(mode) for mode in WITHOUT_POSITION)
+    can_run = _ALL if position_known else sum(1 << MODES.index(mode) for mode in WITHOUT_POSITION)
     yield CHECKS, (0, wrong, 0, can_arm, can_run)
     yield from failed
     present = sum({1 << _component(source) for source, _ in health})
-    unsound = sum({1 << _component(source) for source, sound in health if not sound})
-    yield HEALTH, (0, present, unsound, 0)
+    invalid = sum({1 << _component(source) for source, is_valid in health if not is_valid})
+    yield HEALTH, (0, present, invalid, 0)
 
 
 def _failed(reason: str) -> tuple:
     """Return the event of a failed check and the values of its arguments."""
     if source := _READINGS.get(reason):
         return READINGS, (_ALL, _component(source), SOURCES.index(source))
-    definition, component = next((found for text, found in FAILED.items() if reason.startswith(text)), OTHER)
+    definition, component = next(
+        (event_entry for text, event_entry in FAILED.items() if reason.startswith(text)), OTHER
+    )
     return definition, (_ALL, _INDEX[component])
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from lapwing.messages.topics import TRUTH
-from lapwing.services.mavlink.events.definition import WARNING, Argument, Entry, Enumeration, Happened, event, watch
+from lapwing.services.mavlink.events.definition import WARNING, Argument, Entry, Enumeration, Occurrence, event, watch
 from lapwing.services.mavlink.telemetry.power import motor_fractions
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -32,7 +32,7 @@ class ContactWatch:
     def __init__(self) -> None:
         self._contact = True
 
-    def step(self, v: VehicleCache) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Occurrence]:
         """Yield an event if the ground contact changed."""
         truth = v.get(TRUTH)
         if truth is None:
@@ -44,23 +44,23 @@ class ContactWatch:
 
 @watch
 class SaturationWatch:
-    """Times how long motors are at a limit in the air."""
+    """Detector of motors that stay at a limit in the air."""
 
     def __init__(self) -> None:
-        self._since: int | None = None  # [ns] that some have been there
-        self._last = -LASTS  # [ns] when some were
-        self._told = 0
+        self._since: int | None = None  # [ns] start of the saturation
+        self._last = -LASTS  # [ns] newest time of saturation
+        self._reported = 0  # bits of the reported motors
 
-    def step(self, v: VehicleCache) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Occurrence]:
         """Yield an event for motors that have been at a limit for `LASTS`, once each."""
         flying = v.status.armed and not v.status.landed
         fractions = motor_fractions(v)[:MOTORS] if flying else []
-        there = sum(1 << k for k, f in enumerate(fractions) if not _NEAR < f < 1.0 - _NEAR)
-        if there:
+        saturated = sum(1 << k for k, f in enumerate(fractions) if not _NEAR < f < 1.0 - _NEAR)
+        if saturated:
             self._since = v.time_ns if self._since is None else self._since
             self._last = v.time_ns
-            if v.time_ns - self._since > LASTS and there & ~self._told:
-                self._told |= there
-                yield SATURATED, (there,)
+            if v.time_ns - self._since > LASTS and saturated & ~self._reported:
+                self._reported |= saturated
+                yield SATURATED, (saturated,)
         elif v.time_ns - self._last > LASTS:
-            self._since, self._told = None, 0
+            self._since, self._reported = None, 0

@@ -54,25 +54,25 @@ class Argument(NamedTuple):
 
 
 class Definition(NamedTuple):
-    """An event that may happen."""
+    """Declaration of an event."""
 
     name: str
-    kind: str  # of lapwing.services.common.event_kinds
+    kind: str  # name in lapwing.services.common.event_kinds
     message: str
     arguments: tuple[Argument, ...]
     level: int
     group: str
-    type: str  # what it is for within its group, "" for nothing special
+    type: str  # type within its group, "" for none
     description: str
 
     @property
     def sub_id(self) -> int:
-        """The event's number within its component, 24 bits: a checksum of its name, which no other event changes."""
+        """Number of the event within its component, 24 bits: a checksum of its name."""
         return zlib.crc32(self.name.encode()) & 0xFFFFFF
 
     @property
     def id(self) -> int:
-        """The event's number as messages carry it: the component's in the upper 8 bits, `sub_id` below."""
+        """Number of the event in messages: the component's number in the upper 8 bits, then `sub_id`."""
         return _COMPONENT << 24 | self.sub_id
 
     def encode(self, values: Sequence[int]) -> bytes:
@@ -80,13 +80,13 @@ class Definition(NamedTuple):
         return struct.pack("<" + "".join(FORMATS[a.base] for a in self.arguments), *values)
 
 
-Happened = tuple[Definition, Sequence[int]]  # and the values of its arguments
+Occurrence = tuple[Definition, Sequence[int]]  # event and the values of its arguments
 
 
 class EventDetector(Protocol):
-    """Looks for events of some sort."""
+    """Detector of one group of events."""
 
-    def step(self, v: VehicleCache) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Occurrence]:
         """Yield the events since the previous step."""
 
 
@@ -111,23 +111,23 @@ def event(
     """Declare an event.
 
     Args:
-        name: unique.
-        kind: of lapwing.services.common.event_kinds; says how serious it is where `level` does not.
+        name: unique name.
+        kind: name in lapwing.services.common.event_kinds; determines the severity if `level` is None.
         message: one line, with the arguments' places.
-        arguments: in their order.
-        level: of MAV_SEVERITY, or PROTOCOL.
-        group: of libevents.
-        type_: of libevents.
-        description: more than one line has room for.
+        arguments: arguments in their order.
+        level: MAV_SEVERITY, or PROTOCOL.
+        group: group of libevents.
+        type_: type of libevents.
+        description: longer description.
     """
     if level is None:
         level = WARNING if KINDS[kind].serious else INFO
-    found = Definition(name, kind, message, arguments, level, group, type_, description)
-    DEFINITIONS[name] = found
-    return found
+    definition = Definition(name, kind, message, arguments, level, group, type_, description)
+    DEFINITIONS[name] = definition
+    return definition
 
 
-def watch(found: Kind) -> Kind:
-    """Declare a class that looks for events."""
-    WATCHES.append(found)
-    return found
+def watch(detector: Kind) -> Kind:
+    """Declare a class that detects events."""
+    WATCHES.append(detector)
+    return detector

@@ -10,7 +10,7 @@ from lapwing.services.mavlink.events.definition import (
     Argument,
     Entry,
     Enumeration,
-    Happened,
+    Occurrence,
     event,
     watch,
 )
@@ -42,7 +42,7 @@ class FailureWatch:
     def __init__(self) -> None:
         self._failsafe, self._motor, self._battery = "", 0, 0
 
-    def step(self, v: VehicleCache) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Occurrence]:
         """Yield events for new failures and for the end of a failsafe."""
         s = v.status
         if s.battery_warning != self._battery:

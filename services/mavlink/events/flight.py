@@ -1,9 +1,9 @@
-"""Arming, take-off, landing, flight modes: what the autopilot does on command."""
+"""Events of arming, take-off, landing and flight modes."""
 
 from collections.abc import Iterator
 
 from lapwing.services.mavlink import firmware
-from lapwing.services.mavlink.events.definition import Argument, Entry, Enumeration, Happened, event, watch
+from lapwing.services.mavlink.events.definition import Argument, Entry, Enumeration, Occurrence, event, watch
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 ON_GROUND, NO_TAKEOFF, IN_AIR = range(3)
@@ -41,7 +41,7 @@ class FlightWatch:
     def __init__(self) -> None:
         self._armed, self._landed, self._mode = False, True, ""
 
-    def step(self, v: VehicleCache) -> Iterator[Happened]:
+    def step(self, v: VehicleCache) -> Iterator[Occurrence]:
         """Yield events for a changed mode, landed state or arming state."""
         s = v.status
         if s.mode != self._mode:

@@ -17,7 +17,7 @@ class Firmware(Protocol):
     GUIDED: bool  # whether setpoints are followed without a mode of their own
     EVENTS: bool  # True if its ground stations read events; otherwise they get texts only
     TAKEOFF_ABOVE_SEA: bool  # whether a take-off's altitude counts from the sea level; else from home
-    PARAMETER_ENCODING: int  # MAV_PROTOCOL_CAPABILITY that says how whole parameters travel
+    PARAMETER_ENCODING: int  # MAV_PROTOCOL_CAPABILITY of the encoding of integer parameters
     MODES: Sequence[FlightMode]  # that an operator may choose
     RATES: Mapping[str, float]  # rates of messages [Hz] that differ from the telemetry's table
 

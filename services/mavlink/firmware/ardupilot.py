@@ -15,7 +15,7 @@ RATES = {"EKF_STATUS_REPORT": 1.0}  # dronekit waits for it
 
 _STABILIZE, _ACRO, _CIRCLE = 0, 1, 7
 _ALT_HOLD, _AUTO, _GUIDED, _LOITER, _RTL, _LAND, _POSHOLD, _BRAKE = 2, 3, 4, 5, 6, 9, 16, 17
-_SHOWN = {  # what a mode looks like
+_SHOWN = {  # displayed mode by mode of the autopilot
     "takeoff": _GUIDED,
     "hold": _GUIDED,
     "goto": _GUIDED,

@@ -1,4 +1,4 @@
-"""Ways to endpoints: a kind of link a file, found by the first word of its URL."""
+"""Links to endpoints: one file for each kind, found by the scheme of its URL."""
 
 from functools import cache
 from selectors import BaseSelector
@@ -22,7 +22,7 @@ def check(url: str) -> type[Link]:
     """Return the link class of a URL.
 
     Raises:
-        ValueError: there is none; the message lists the forms.
+        ValueError: invalid URL; the message lists the forms.
     """
     scheme, _, rest = url.partition(":")
     kind = kinds().get(scheme)
@@ -49,7 +49,7 @@ def open_link(url: str, adapter: Adapter, selector: BaseSelector) -> Link:
     """Open the link of a URL.
 
     Raises:
-        ValueError: no such kind, or it cannot be opened.
+        ValueError: invalid URL, or the link cannot be opened.
     """
     kind = check(url)
     try:

@@ -1,4 +1,4 @@
-"""An endpoint behind a stream of bytes, whose end may be slow to take what is sent."""
+"""Endpoint behind a stream of bytes, which may be slow to read."""
 
 import os
 from collections.abc import Callable
@@ -7,11 +7,11 @@ from selectors import EVENT_READ, BaseSelector
 from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.mavlink.links.link import PIECE, ROUND
 
-MAX_PENDING = 256 * 1024  # [bytes] kept for an endpoint that does not take them; more, and it is dropped
+MAX_PENDING = 256 * 1024  # [bytes] of unread data, above which an endpoint is disconnected
 
 
 class ByteStream:
-    """A non-blocking file descriptor and the endpoint behind it."""
+    """Non-blocking file descriptor and the endpoint behind it."""
 
     def __init__(
         self,
@@ -19,23 +19,23 @@ class ByteStream:
         local: bool,
         adapter: Adapter,
         selector: BaseSelector,
-        affords: Callable[[], bool],
-        gone: Callable[[], None],
+        may_read: Callable[[], bool],
+        on_end: Callable[[], None],
         strict: bool = False,
     ):
         """Register the descriptor.
 
         Args:
-            descriptor: non-blocking.
-            local: its other end is on this machine.
-            adapter: of the vehicle.
-            selector: that waits for it.
-            affords: returns True if one more piece may be read.
-            gone: called when the stream has ended.
-            strict: end the stream if its first bytes are not MAVLink.
+            descriptor: non-blocking file descriptor.
+            local: True if its other end is on this machine.
+            adapter: adapter of the vehicle.
+            selector: selector that waits for the descriptor.
+            may_read: returns True if another piece may be read.
+            on_end: called when the stream has ended.
+            strict: True to end the stream if its first bytes are not MAVLink.
         """
         self._descriptor, self._adapter, self._selector = descriptor, adapter, selector
-        self._affords, self._gone = affords, gone
+        self._may_read, self._on_end = may_read, on_end
         self._pending = bytearray()
         self._broken = False
         self._endpoint = adapter.connect(local, False, self._put, strict)
@@ -57,7 +57,7 @@ class ByteStream:
             self._broken = True
 
     def read(self) -> None:
-        """Take what has come, within bounds."""
+        """Read the received bytes, at most `ROUND` pieces."""
         for _ in range(ROUND):
             try:
                 data = b"" if self._broken else os.read(self._descriptor, PIECE)
@@ -67,13 +67,13 @@ class ByteStream:
                 data = b""
             if not data:
                 self.end()
-                self._gone()
+                self._on_end()
                 return
-            if self._affords():
+            if self._may_read():
                 self._adapter.receive(self._endpoint, data)
                 self._broken |= self._endpoint.foreign
 
     def end(self) -> None:
-        """Forget the endpoint."""
+        """Remove the endpoint."""
         self._selector.unregister(self._descriptor)
         self._adapter.disconnect(self._endpoint)

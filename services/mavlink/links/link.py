@@ -9,21 +9,21 @@ from typing import ClassVar
 from lapwing.services.mavlink.adapter import Adapter
 
 ROUND = 64  # pieces of bytes read from one socket before others get their turn
-PIECE = 2048  # [bytes] a piece is no longer
-MAX_RATE = 2000.0  # [1/s] pieces that a link takes; what comes faster is dropped unread
+PIECE = 2048  # [bytes] longest piece
+MAX_RATE = 2000.0  # [1/s] pieces that a link reads; more are dropped
 
 
 class Budget:
     """Rate limit of the pieces that a link reads, with a burst of one second."""
 
     def __init__(self, rate: float = MAX_RATE):
-        self._rate, self._left, self._then = rate, rate, time.monotonic()
+        self._rate, self._left, self._updated = rate, rate, time.monotonic()
 
     def take(self) -> bool:
         """Return True if another piece may be read."""
         now = time.monotonic()
-        self._left = min(self._rate, self._left + (now - self._then) * self._rate)
-        self._then = now
+        self._left = min(self._rate, self._left + (now - self._updated) * self._rate)
+        self._updated = now
         if self._left < 1.0:
             return False
         self._left -= 1.0
@@ -31,13 +31,14 @@ class Budget:
 
 
 class Link:
-    """A socket or a device that endpoints are behind. Subclasses read it when the selector says so."""
+    """Socket or device with endpoints. Subclasses read it when the selector reports data."""
 
     SCHEME: ClassVar[str] = ""
     FORM: ClassVar[str] = ""
+    LISTENS: ClassVar[bool] = False  # True if several vehicles need a port each
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
-        """Open it. `rest` is the URL behind its first word; raises OSError."""
+        """Open the link. `rest` is the URL without its scheme. Raise OSError if it cannot be opened."""
         self.adapter, self.selector, self.budget = adapter, selector, Budget()
 
     @staticmethod
@@ -48,18 +49,18 @@ class Link:
 
     @classmethod
     def for_vehicle_index(cls, rest: str, i: int) -> str:
-        """Return the rest of the URL for vehicle i (from 0); the same for all that send to one station."""
-        return rest
+        """Return the rest of the URL for vehicle i (from 0): the next port if it listens, else the same."""
+        return next_port(rest, i) if cls.LISTENS else rest
 
-    def affords(self) -> bool:
+    def may_read(self) -> bool:
         """Return True if another piece may be read; count it otherwise."""
         if self.budget.take():
             return True
-        self.adapter.counts["faster than a link takes"] += 1
+        self.adapter.counts["above the rate limit"] += 1
         return False
 
     def close(self) -> None:
-        """Close it."""
+        """Close the link."""
         raise NotImplementedError
 
 

@@ -1,4 +1,4 @@
-"""A serial line, as a telemetry radio has it. Whoever is at its other end counts as another machine."""
+"""Serial line, for example of a telemetry radio. Its endpoint counts as another machine."""
 
 import os
 import re
@@ -36,9 +36,9 @@ class Serial(Link):
             termios.tcsetattr(self._descriptor, termios.TCSANOW, settings)
         except termios.error as error:
             os.close(self._descriptor)
-            raise OSError(error.args[0], "is no serial line") from None
+            raise OSError(error.args[0], "is not a serial line") from None
         self._stream: ByteStream | None = ByteStream(
-            self._descriptor, False, adapter, selector, self.affords, self._gone
+            self._descriptor, False, adapter, selector, self.may_read, self._on_end
         )
 
     @staticmethod
@@ -47,7 +47,7 @@ class Serial(Link):
         match = re.fullmatch(r"/.+:(\d+)", rest, re.ASCII)
         return match is not None and hasattr(termios, f"B{match[1]}")
 
-    def _gone(self) -> None:
+    def _on_end(self) -> None:
         self._stream = None
         os.close(self._descriptor)
 
@@ -55,4 +55,4 @@ class Serial(Link):
         """Close the device."""
         if self._stream:
             self._stream.end()
-            self._gone()
+            self._on_end()

@@ -7,21 +7,17 @@ from typing import ClassVar
 from lapwing.services.common.address import is_loopback
 from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.mavlink.links.byte_stream import ByteStream
-from lapwing.services.mavlink.links.link import Link, next_port, socket_address
+from lapwing.services.mavlink.links.link import Link, socket_address
 
 MAX_ENDPOINTS = 8
 
 
 class TcpIn(Link):
-    """A listening socket and those who have come."""
+    """Listening socket and its connections."""
 
     SCHEME: ClassVar[str] = "tcpin"
     FORM: ClassVar[str] = "tcpin:HOST:PORT"
-
-    @classmethod
-    def for_vehicle_index(cls, rest: str, i: int) -> str:
-        """Return the rest of the URL with the port of vehicle i (from 0)."""
-        return next_port(rest, i)
+    LISTENS: ClassVar[bool] = True
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
@@ -33,21 +29,27 @@ class TcpIn(Link):
     def _accept(self) -> None:
         try:
             connection, address = self._server.accept()
-        except OSError:  # gone again meanwhile
+        except OSError:  # the client has disconnected
             return
         if len(self._streams) >= MAX_ENDPOINTS:
-            self.adapter.counts["no room for another endpoint"] += 1
+            self.adapter.counts["too many endpoints"] += 1
             connection.close()
             return
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-        def gone() -> None:
+        def on_end() -> None:
             del self._streams[connection]
             connection.close()
 
         self._streams[connection] = ByteStream(
-            connection.fileno(), is_loopback(address[0]), self.adapter, self.selector, self.affords, gone, strict=True
+            connection.fileno(),
+            is_loopback(address[0]),
+            self.adapter,
+            self.selector,
+            self.may_read,
+            on_end,
+            strict=True,
         )
 
     def close(self) -> None:

@@ -8,26 +8,26 @@ from typing import ClassVar
 from lapwing.services.common.address import is_loopback
 from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.links.link import PIECE, ROUND, Link, next_port, socket_address
+from lapwing.services.mavlink.links.link import PIECE, ROUND, Link, socket_address
 
 MAX_ENDPOINTS = 8
-SILENT = 10.0  # [s] of wall time after which an endpoint makes room for another
+SILENT = 10.0  # [s] of wall time without a message after which another endpoint may replace it
 
 Address = tuple[str, int]
 
 
 class _Udp(Link):
-    """A socket, and the endpoints by their addresses."""
+    """UDP socket, and its endpoints by address."""
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
         self.endpoints: dict[Address, Endpoint] = {}
-        self.heard: dict[Address, float] = {}
+        self.last_received: dict[Address, float] = {}
         selector.register(self.socket, EVENT_READ, self.read)
 
-    def meet(self, address: Address) -> Endpoint:
+    def connect(self, address: Address) -> Endpoint:
         """Return a new endpoint at an address."""
 
         def put(data: bytes) -> None:
@@ -39,7 +39,7 @@ class _Udp(Link):
         return self.adapter.connect(is_loopback(address[0]), True, put, strict=True)
 
     def read(self) -> None:
-        """Take what has come, within bounds."""
+        """Read the received datagrams, at most `ROUND`."""
         for _ in range(ROUND):
             try:
                 data, address = self.socket.recvfrom(PIECE)
@@ -47,11 +47,11 @@ class _Udp(Link):
                 return
             except OSError:  # the reply to a message without a listener
                 continue
-            if self.affords():
-                self.hear(address, data)
+            if self.may_read():
+                self.receive(address, data)
 
-    def hear(self, address: Address, data: bytes) -> None:
-        """Take in a datagram from an address."""
+    def receive(self, address: Address, data: bytes) -> None:
+        """Handle a datagram from an address."""
         raise NotImplementedError
 
     def close(self) -> None:
@@ -61,7 +61,7 @@ class _Udp(Link):
 
 
 class UdpOut(_Udp):
-    """A link to one UDP endpoint, which need not have sent anything."""
+    """Link to one UDP endpoint, which may be silent."""
 
     SCHEME: ClassVar[str] = "udpout"
     FORM: ClassVar[str] = "udpout:HOST:PORT"
@@ -69,27 +69,23 @@ class UdpOut(_Udp):
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         address = socket_address(rest)
-        self.endpoints[address] = self.meet(address)
+        self.endpoints[address] = self.connect(address)
 
-    def hear(self, address: Address, data: bytes) -> None:
-        """Take in a datagram of the endpoint of this link; count those of others."""
+    def receive(self, address: Address, data: bytes) -> None:
+        """Handle a datagram of the endpoint of this link; count those of others."""
         endpoint = self.endpoints.get(address)
         if endpoint:
             self.adapter.receive(endpoint, data)
         else:
-            self.adapter.counts["from a stranger"] += 1
+            self.adapter.counts["from another address"] += 1
 
 
 class UdpIn(_Udp):
-    """A link that listens on a UDP port: every sender of a valid message is an endpoint."""
+    """Link that listens on a UDP port: every sender of a valid message is an endpoint."""
 
     SCHEME: ClassVar[str] = "udpin"
     FORM: ClassVar[str] = "udpin:HOST:PORT"
-
-    @classmethod
-    def for_vehicle_index(cls, rest: str, i: int) -> str:
-        """Return the rest of the URL with the port of vehicle i (from 0)."""
-        return next_port(rest, i)
+    LISTENS: ClassVar[bool] = True
 
     def __init__(self, rest: str, adapter: Adapter, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
@@ -99,29 +95,29 @@ class UdpIn(_Udp):
             self.close()
             raise
 
-    def hear(self, address: Address, data: bytes) -> None:
+    def receive(self, address: Address, data: bytes) -> None:
         """Handle a datagram; a new address becomes an endpoint at its first valid message."""
         endpoint = self.endpoints.get(address)
         now = time.monotonic()
         if endpoint is None:
-            if not self._room(now):
-                self.adapter.counts["no room for another endpoint"] += 1
+            if not self._make_room(now):
+                self.adapter.counts["too many endpoints"] += 1
                 return
-            endpoint = self.meet(address)
+            endpoint = self.connect(address)
             if not self.adapter.receive(endpoint, data):
                 self.adapter.disconnect(endpoint)
                 return
             self.endpoints[address] = endpoint
         else:
             self.adapter.receive(endpoint, data)
-        self.heard[address] = now
+        self.last_received[address] = now
 
-    def _room(self, now: float) -> bool:
+    def _make_room(self, now: float) -> bool:
         if len(self.endpoints) < MAX_ENDPOINTS:
             return True
-        oldest = min(self.heard, key=self.heard.__getitem__)
-        if now - self.heard[oldest] < SILENT:
+        oldest = min(self.last_received, key=self.last_received.__getitem__)
+        if now - self.last_received[oldest] < SILENT:
             return False
         self.adapter.disconnect(self.endpoints.pop(oldest))
-        del self.heard[oldest]
+        del self.last_received[oldest]
         return True

@@ -14,30 +14,30 @@ NO_PROGRESS = 255
 
 
 class Command(NamedTuple):
-    """A command as either message spells it."""
+    """Command of a COMMAND_LONG or COMMAND_INT."""
 
     number: int  # MAV_CMD
     params: tuple[float, ...]  # the first four
     frame: int
-    latitude: float  # [deg], or what else parameter 5 means
+    latitude: float  # [deg], or another meaning of parameter 5
     longitude: float
     altitude: float  # [m]
 
 
 class Request(NamedTuple):
-    """A command for the autopilot."""
+    """Command for the autopilot."""
 
     kind: str
     values: tuple[float, ...] = ()
 
 
 class Reply(NamedTuple):
-    """Accepted: messages that follow the acknowledgement."""
+    """Accepted command with messages that follow the acknowledgement."""
 
     messages: list[Any]
 
 
-Outcome = Request | Reply | int  # int: a MAV_RESULT at once
+Outcome = Request | Reply | int  # int: MAV_RESULT
 Rule = Callable[[Session, Command], Outcome]
 
 RULES: dict[int, Rule] = {}
@@ -47,7 +47,7 @@ READ_ONLY: set[int] = set()
 
 
 def rule(*numbers: int, changes: bool = True) -> Callable[[Rule], Rule]:
-    """Declare what becomes of these commands."""
+    """Declare the function that handles these commands."""
 
     def declare(function: Rule) -> Rule:
         RULES.update(dict.fromkeys(numbers, function))

@@ -20,5 +20,5 @@ def report(session: Session, c: Command) -> Outcome:
     """Ask for a report of the arming checks, which run all the time; it comes with the next status."""
     if not session.vehicle.firmware.EVENTS:
         return UNSUPPORTED
-    session.vehicle.reports_asked += 1
+    session.vehicle.report_requests += 1
     return ACCEPTED

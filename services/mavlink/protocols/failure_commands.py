@@ -21,7 +21,7 @@ _UNITS = {  # by FAILURE_UNIT
 
 @rule(mavlink.MAV_CMD_INJECT_FAILURE)
 def inject_failure(session: Session, c: Command) -> Outcome:
-    """Let a unit fail, or make it sound again."""
+    """Inject a failure of a unit, or repair it."""
     unit, kind = _UNITS.get(int(c.params[0])), int(c.params[1])  # our kinds bear the numbers of FAILURE_TYPE
     if unit is None:
         session.say(f"INJECT_FAILURE: unit {c.params[0]:.0f} unsupported")

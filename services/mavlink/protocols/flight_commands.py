@@ -46,7 +46,7 @@ def do_set_standard_mode(session: Session, c: Command) -> Outcome:
 
 SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; nothing measures the air's
 DEFAULT_ORBIT_SPEED = 1.0  # [m/s]
-FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's word for: whatever the checks say
+FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's parameter to skip the arming checks
 
 
 @rule(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
@@ -144,9 +144,9 @@ def set_home(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_GRIPPER)
 def gripper(session: Session, c: Command) -> Outcome:
-    """Let the payload go; what is gone cannot be grabbed again."""
+    """Release the payload; it cannot be grabbed again."""
     if not session.vehicle.description.gripper:
-        session.say("DO_GRIPPER: there is no payload to let go")
+        session.say("DO_GRIPPER: there is no payload to release")
         return UNSUPPORTED
     return Request("gripper", (0.0,)) if c.params[1] == mavlink.GRIPPER_ACTION_RELEASE else UNSUPPORTED
 

@@ -11,7 +11,7 @@ from lapwing.services.mavlink.telemetry import requested
 @handles("HEARTBEAT")
 def heartbeat(session: Session, m: Any) -> None:
     """Record a heartbeat; select the stream rates of a companion computer."""
-    session.vehicle.reports_asked += session.endpoint.last_heartbeat is None
+    session.vehicle.report_requests += session.endpoint.last_heartbeat is None
     session.endpoint.last_heartbeat = session.clock.now
     session.schedule.set_onboard(m.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER)
 

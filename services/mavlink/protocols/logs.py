@@ -1,4 +1,4 @@
-"""Log transfer: the run's own log; and the console, which this vehicle lacks, and says so."""
+"""Transfer of the run's log, and rejection of console requests."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from lapwing.services.mavlink.session import Session
 
 @handles("LOG_REQUEST_LIST")
 def list_logs(session: Session, m: Any) -> None:
-    """Send the entry of this run's log, as far as it is written; or that there is no log."""
+    """Send the entry of this run's log with its current size, or an empty entry without a log."""
     session.send(session.log.entries(m.start, m.end))
 
 
@@ -28,10 +28,10 @@ def stop(session: Session, m: Any) -> None:
 @handles("LOG_ERASE")
 def refuse_to_erase(session: Session, m: Any) -> None:
     """Reject the erasure of the run's log with a text."""
-    session.say("LOG_ERASE: the log of a run stays")
+    session.say("LOG_ERASE: the log of a run cannot be erased")
 
 
 @handles("SERIAL_CONTROL")
 def refuse_console(session: Session, m: Any) -> None:
-    """Answer a request for a console, which there is none of, with an empty reply."""
+    """Answer a console request with an empty reply: the vehicle has no console."""
     session.send(mavlink.MAVLink_serial_control_message(m.device, mavlink.SERIAL_CONTROL_FLAG_REPLY, 0, 0, 0, [0] * 70))

@@ -1,4 +1,4 @@
-"""The mission protocol's messages: uploads go to the store, downloads are served item by item."""
+"""Messages of the mission protocol: uploads go to the store, downloads are served item by item."""
 
 import math
 from typing import Any
@@ -8,13 +8,13 @@ from lapwing.services.common.mavlink.geo_coordinates import degrees, to_world
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
 
-GUIDED, GUIDED_ALTITUDE = 2, 3  # "current" of an item that is flown to at once, or whose altitude is
-EXACT = 1e7  # whole numbers of MISSION_ITEM_INT to a degree
+GUIDED, GUIDED_ALTITUDE = 2, 3  # "current" of an item that is a guided target, or a guided altitude
+EXACT = 1e7  # [1/deg] resolution of MISSION_ITEM_INT
 
 
 @handles("MISSION_COUNT")
 def count(session: Session, m: Any) -> None:
-    """Begin an upload of so many items; denied to endpoints that are not trusted."""
+    """Begin an upload of `count` items; denied to endpoints that are not trusted."""
     if session.trusted:
         session.missions.begin(session.endpoint, m.mission_type, m.count)
     else:
@@ -37,55 +37,55 @@ def item_int(session: Session, m: Any) -> None:
         return
 
     def acknowledged(a: Any) -> None:
-        taken = a.result == mavlink.MAV_RESULT_ACCEPTED
-        _reply(session, m.mission_type, mavlink.MAV_MISSION_ACCEPTED if taken else mavlink.MAV_MISSION_DENIED)
+        accepted = a.result == mavlink.MAV_RESULT_ACCEPTED
+        _reply(session, m.mission_type, mavlink.MAV_MISSION_ACCEPTED if accepted else mavlink.MAV_MISSION_DENIED)
 
-    nowhere = m.current == GUIDED_ALTITUDE
-    session.command("goto", (math.nan if nowhere else x, math.nan if nowhere else y, z), acknowledged)
+    altitude_only = m.current == GUIDED_ALTITUDE
+    session.command("goto", (math.nan if altitude_only else x, math.nan if altitude_only else y, z), acknowledged)
 
 
 @handles("MISSION_ITEM")
 def item(session: Session, m: Any) -> None:
-    """Take an item with coordinates as floats, as `item_int` takes those with whole numbers."""
+    """Handle an item with floating-point coordinates; see `item_int`."""
     if not (abs(m.x) <= 180.0 and abs(m.y) <= 180.0):
         _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID)
         session.missions.cancel(session.endpoint, m.mission_type)
         return
     fields = m.frame, m.command, m.current, m.autocontinue, m.param1, m.param2, m.param3, m.param4
-    place = round(m.x * EXACT), round(m.y * EXACT), m.z
-    exact = mavlink.MAVLink_mission_item_int_message(
-        m.target_system, m.target_component, m.seq, *fields, *place, m.mission_type
+    position = round(m.x * EXACT), round(m.y * EXACT), m.z
+    integer_item = mavlink.MAVLink_mission_item_int_message(
+        m.target_system, m.target_component, m.seq, *fields, *position, m.mission_type
     )
-    item_int(session, exact)
+    item_int(session, integer_item)
 
 
 @handles("MISSION_REQUEST_LIST")
 def request_list(session: Session, m: Any) -> None:
     """Start a download."""
     session.missions.forget(session.endpoint, m.mission_type)
-    held = session.missions.held.get(m.mission_type)
-    if held is None:
+    items = session.missions.items.get(m.mission_type)
+    if items is None:
         _reply(session, m.mission_type, mavlink.MAV_MISSION_UNSUPPORTED)
     else:
-        session.send(mavlink.MAVLink_mission_count_message(*session.address, len(held), m.mission_type))
+        session.send(mavlink.MAVLink_mission_count_message(*session.address, len(items), m.mission_type))
 
 
 @handles("MISSION_REQUEST_INT", "MISSION_REQUEST")
 def request_item(session: Session, m: Any) -> None:
     """Send an item of a download."""
-    held = session.missions.held.get(m.mission_type, [])
-    if m.seq >= len(held):
+    items = session.missions.items.get(m.mission_type, [])
+    if m.seq >= len(items):
         _reply(session, m.mission_type, mavlink.MAV_MISSION_INVALID_SEQUENCE)
         return
-    i = held[m.seq]
+    i = items[m.seq]
     fields = i.command, int(session.vehicle.status.mission_current == m.seq), i.autocontinue
     params = i.param1, i.param2, i.param3, i.param4
     to = *session.address, m.seq, i.frame
     if m.get_type() == "MISSION_REQUEST_INT":
         reply = mavlink.MAVLink_mission_item_int_message(*to, *fields, *params, i.x, i.y, i.z, m.mission_type)
     else:
-        place = i.x / EXACT, i.y / EXACT, i.z
-        reply = mavlink.MAVLink_mission_item_message(*to, *fields, *params, *place, m.mission_type)
+        position = i.x / EXACT, i.y / EXACT, i.z
+        reply = mavlink.MAVLink_mission_item_message(*to, *fields, *params, *position, m.mission_type)
     session.send(reply)
 
 
@@ -97,7 +97,7 @@ def acknowledged(session: Session, m: Any) -> None:
 
 @handles("MISSION_CLEAR_ALL")
 def clear(session: Session, m: Any) -> None:
-    """Forget a mission, a fence, the rally points, or all of them."""
+    """Delete a mission, a fence, the rally points, or all of them."""
     if session.trusted:
         session.missions.clear(session.endpoint, m.mission_type)
     else:

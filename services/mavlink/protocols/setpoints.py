@@ -158,7 +158,7 @@ def _send(session: Session, m: Any, kind: str, values: tuple[float, ...]) -> Non
     else:
         session.offboard(kind, values)
     if guided and kind != "goto" and session.vehicle.status.mode != "offboard":
-        session.command("offboard")  # ArduPilot's GUIDED follows setpoints at once
+        session.command("offboard")  # ArduPilot's GUIDED follows setpoints immediately
 
 
 def _guided(session: Session, m: Any) -> bool:

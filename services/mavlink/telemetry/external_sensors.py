@@ -64,13 +64,13 @@ def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaterni
 @stream("DISTANCE_SENSOR", 5.0, 10.0)
 def distance_sensors(v: VehicleCache) -> Any:
     """Return the distance of each sensor; out of range reads just above the maximum."""
-    found = []
+    messages = []
     if (sonar := v.get(SONAR)) is not None:
-        found.append(_distance(v, sonar, SONAR_ID, mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND, DOWN))
+        messages.append(_distance(v, sonar, SONAR_ID, mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND, DOWN))
     if (laser := v.get(RANGEFINDER)) is not None:
         towards = orientation(*v.description.ray_deg)
-        found.append(_distance(v, laser, RANGEFINDER_ID, mavlink.MAV_DISTANCE_SENSOR_LASER, towards))
-    return [message for message in found if message is not None]
+        messages.append(_distance(v, laser, RANGEFINDER_ID, mavlink.MAV_DISTANCE_SENSOR_LASER, towards))
+    return [message for message in messages if message is not None]
 
 
 def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[int, Quaternion]) -> Any:

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 from lapwing.services.common.mavlink.dialect import id_of
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-Builder = Callable[[VehicleCache], Any]  # the message, None while there is nothing to say, or a list of several
+Builder = Callable[[VehicleCache], Any]  # returns a message, None, or a list of messages
 
 
 class Stream(NamedTuple):
-    """A message that is sent again and again, or on request only where its rates are 0."""
+    """Message that is sent periodically, or on request only if its rates are 0."""
 
     name: str
     ground: float  # [Hz] to a ground station, as PX4 sends it there
@@ -19,14 +19,14 @@ class Stream(NamedTuple):
 
     def messages(self, vehicle: VehicleCache) -> list[Any]:
         """Return the current messages."""
-        found = self.build(vehicle)
-        if found is None:
+        result = self.build(vehicle)
+        if result is None:
             return []
-        return found if isinstance(found, list) else [found]
+        return result if isinstance(result, list) else [result]
 
 
 STREAMS: dict[int, Stream] = {}
-"""Every stream by the number of its message: what the dialect lacks is not here."""
+"""Streams by message id, without messages that the dialect lacks."""
 
 
 Requested = Callable[[VehicleCache, float], list[Any]]  # the messages for parameter 2 of the request
@@ -36,7 +36,7 @@ ON_REQUEST: dict[int, Requested] = {}
 
 
 def on_request(name: str) -> Callable[[Requested], Requested]:
-    """Declare the builder of messages that a request's second parameter chooses."""
+    """Declare the builder of messages that the second parameter of a request selects."""
 
     def declare(build: Requested) -> Requested:
         number = id_of(name)

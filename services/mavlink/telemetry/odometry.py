@@ -1,4 +1,4 @@
-"""Pose and velocity in one message, with what the estimator thinks of its own error."""
+"""Pose and velocity in one message, with the covariance of the estimator."""
 
 import math
 from typing import Any
@@ -14,10 +14,10 @@ _GOOD, _BAD = 100, -1  # quality [%], -1: failed
 
 def _triangle(*variances: float) -> list[float]:
     """Return the upper triangle of a covariance with known first diagonal entries."""
-    found = [math.nan] * 21
+    covariance = [math.nan] * 21
     for index, variance in zip(_DIAGONAL, variances, strict=False):
-        found[index] = variance
-    return found
+        covariance[index] = variance
+    return covariance
 
 
 @stream("ODOMETRY", 0.0, 30.0)

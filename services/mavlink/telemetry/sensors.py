@@ -12,7 +12,7 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 GAUSS, HECTOPASCAL, MILLI_G = 1e-4, 100.0, 9.80665e-3
-FIX_TYPES = {  # by what the receiver says of itself
+FIX_TYPES = {  # by the status of the receiver
     NavSatStatus.STATUS_FIX: mavlink.GPS_FIX_TYPE_3D_FIX,
     NavSatStatus.STATUS_SBAS_FIX: mavlink.GPS_FIX_TYPE_DGPS,
     NavSatStatus.STATUS_GBAS_FIX: mavlink.GPS_FIX_TYPE_RTK_FIXED,

@@ -32,7 +32,7 @@ _SENSORS = {  # with the name that the estimator has for them
     mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: (good_baro, "barometer"),
     mavlink.MAV_SYS_STATUS_SENSOR_GPS: (good_gps, "gps"),
 }
-_OPTIONAL = {  # by the sensors that they stand for, and only where one of them is fitted
+_OPTIONAL = {  # by sensor; reported only if one of the sensors is fitted
     ("sonar", "rangefinder"): (mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION, good_distance, "sonar"),  # any distance
     ("optical_flow",): (mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW, good_flow, "optical_flow"),
     ("airspeed",): (mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE, good_airspeed, "airspeed"),

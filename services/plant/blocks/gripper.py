@@ -1,4 +1,4 @@
-"""A gripper that lets the payload go when the autopilot says so."""
+"""Gripper that releases the payload on command of the autopilot."""
 
 from collections.abc import Callable
 

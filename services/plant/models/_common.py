@@ -1,4 +1,4 @@
-"""From a scene to the plant's set-up: what the models of services/plant/models have in common."""
+"""Resolution of a scene into the plant's configuration: common parts of all models."""
 
 import math
 from types import ModuleType
@@ -68,7 +68,7 @@ def autonomous(
     scene: Scene,
     p: Any,
     start: Any,
-    told: TrueState,
+    truth: TrueState,
     bodies: Any = None,
     names: tuple[str, ...] = (),
     controlled: bool = False,
@@ -79,17 +79,19 @@ def autonomous(
         scene: resolved scene.
         p: parameters of the system.
         start: its state at tick 0.
-        told: prototype of its output.
+        truth: prototype of its output.
         bodies: parameters of the block of its bodies, or None.
         names: names of the bodies.
         controlled: control the error of each step, for systems with contacts.
     """
-    how, steps, step = method(scene)
+    solver, steps, step = method(scene)
     if controlled:
-        how = integrators.StepDoubling(how, scene[Solver].part_tolerance)
-    core = AutonomousPlant(p, how, steps, step, scene[Communication].interval, last_tick(scene))
-    given = (Port(ports.TRUTH, told), *([bodies_port(scene, len(names))] if bodies else []))
-    return ServiceConfig(PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), given)
+        solver = integrators.StepDoubling(solver, scene[Solver].part_tolerance)
+    core = AutonomousPlant(p, solver, steps, step, scene[Communication].interval, last_tick(scene))
+    outputs = (Port(ports.TRUTH, truth), *([bodies_port(scene, len(names))] if bodies else []))
+    return ServiceConfig(
+        PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), outputs
+    )
 
 
 def noise_key(seed: int, vehicle: str) -> Key:
@@ -107,12 +109,12 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     p = p._replace(tolerance=scene[Solver].contact_tolerance)
     core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
     start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
-    told = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
+    truth = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
     delay = exchange.loop_delay
     return ServiceConfig(
         PlantSetup("rigid_body", core, start, wiring(scene, odometry=True, battery=frame.battery)),
         (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay)),
-        (Port(ports.TRUTH, told), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
+        (Port(ports.TRUTH, truth), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
     )
 
 

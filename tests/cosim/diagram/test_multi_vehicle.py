@@ -7,7 +7,7 @@ import pytest
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.compiled_block import Block
-from lapwing.cosim.diagram.multi_vehicle import joined_service, member, members
+from lapwing.cosim.diagram.multi_vehicle import member, members, merge_services
 from lapwing.cosim.executors.single_process import PAGE
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.cosim.scene import SceneError
@@ -131,7 +131,7 @@ def test_fleet_config_survives_text_and_another_seed(setup):
 
 def test_invalid_state_error_names_vehicle(setup):
     part = Block("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
-    joined = joined_service("plant", [(member(setup, "right"), Service("plant", [part], []))])
+    joined = merge_services("plant", [(member(setup, "right"), Service("plant", [part], []))])
     error = joined.parts[0].failure(3)
     assert (type(error), str(error)) == (DivergedError, "right: not finite at tick 3")
 
@@ -151,17 +151,17 @@ def test_topics_of_vehicle_of_fleet():
 
 
 WRONG = {
-    "vehicle.7.name=x": "--set vehicle.7.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
+    "vehicle.7.name=x": "--set vehicle.7.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
     "vehicle.left.initial_position=[0,0]": (
-        "--set vehicle.left.initial_position=[0,0]: which vehicle? expected vehicle.N.initial_position, N from 0 to 2"
+        "--set vehicle.left.initial_position=[0,0]: no such vehicle; expected vehicle.N.initial_position, N from 0 to 2"
     ),
     "vehicle.left.airframe.mass.total=3": (
-        "--set vehicle.left.airframe.mass.total=3: which vehicle? expected vehicle.N.airframe.mass.total, N from 0 to 2"
+        "--set vehicle.left.airframe.mass.total=3: no such vehicle; expected vehicle.N.airframe.mass.total, N from"
     ),
-    "vehicle.name=x": "--set vehicle.name=x: which vehicle? expected vehicle.N.name, N from 0 to 2",
-    "vehicle.1.run.seed=3": "--set vehicle.1.run.seed: all vehicles share it; expected a table [run] of the scene",
-    "vehicle.1.name=left": "--set vehicle.1.name: left is also that of vehicle.0; expected another",
-    "vehicle.1.mavlink.system_id=1": "--set vehicle.1.mavlink.system_id: 1 is also that of vehicle.0; expected another",
+    "vehicle.name=x": "--set vehicle.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
+    "vehicle.1.run.seed=3": "--set vehicle.1.run.seed: all vehicles share this table; expected a table [run]",
+    "vehicle.1.name=left": "--set vehicle.1.name: left is already used by vehicle.0; expected another value",
+    "vehicle.1.mavlink.system_id=1": "--set vehicle.1.mavlink.system_id: 1 is already used by vehicle.0",
     "vehicle.2.autopilot.gains=x": "--set vehicle.2.autopilot.gains: unknown gain set 'x'",
     "vehicle.0.nam=3": "--set vehicle.0.nam: unknown key 'nam'; did you mean name?",
     "vehicle.0.airframe.mass.total=-3": "--set vehicle.0.airframe.mass.total: expected a number above 0 [kg], got -3",
@@ -176,18 +176,21 @@ def test_fault_names_vehicle_and_key(override):
 
 
 @pytest.mark.parametrize(
-    ("entry", "said"),
+    ("entry", "message"),
     [
-        ("[vehicle.communication]\nrate = 100\n", "many.toml:15: vehicle.0.communication: all vehicles share it"),
+        (
+            "[vehicle.communication]\nrate = 100\n",
+            "many.toml:15: vehicle.0.communication: all vehicles share this table",
+        ),
         ("[vehicle.effects.gravty]\n", "many.toml:15: vehicle.0.effects.gravty: unknown effect 'gravty'"),
         ("[[vehicle]]\nairframe = 3\n", "many.toml:16: vehicle.1.airframe: expected a text, got 3"),
         ("[[vehicle]]\n" * 50, "vehicle: 51 vehicles; expected 1 to 50"),
     ],
 )
-def test_fault_names_line(entry, said, tmp_path):
+def test_fault_names_line(entry, message, tmp_path):
     with pytest.raises(SceneError) as error:
         parse(tmp_path / "many.toml", COMMON + '[[vehicle]]\nairframe = "delivery_drone"\n' + entry)
-    assert said in str(error.value)
+    assert message in str(error.value)
 
 
 def test_function_for_single_vehicle_rejects_fleet():

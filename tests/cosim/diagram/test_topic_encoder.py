@@ -13,7 +13,7 @@ from lapwing.cosim.diagram.topic_encoder import TopicEncoder, due_ticks, encode
 from lapwing.kernels.row_packing import pack_row, row_unpacker
 from lapwing.messages import Setpoint, header
 from lapwing.messages.cdr_arrays import stamp_columns
-from lapwing.messages.topics import EVENTS, SETPOINT, TOPICS, WALL_TIME, of_all
+from lapwing.messages.topics import EVENTS, SETPOINT, TOPICS, WALL_TIME, template_topic
 from lapwing.services.autopilot.commander.commander_output import Status as Words
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
@@ -120,7 +120,9 @@ def test_scenes_cover_all_topics():
     clouds = load("bridge", ["sensors.lidar.preset=vlp16", "sensors.depth_camera.preset=ideal"])
     rings = load("bridge", ["sensors.lidar.preset=rplidar_a2"])
     scenes = [*map(load, SCENES), requested, clouds, rings]
-    spoken = {of_all(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics}
+    spoken = {
+        template_topic(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics
+    }
     assert spoken == set(TOPICS) - {WALL_TIME, EVENTS}
 
 

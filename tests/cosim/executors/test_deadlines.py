@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from lapwing import Flight
-from lapwing.cosim.executors.deadlines import MISSED, WORST, Deadlines, Lateness, entries, lateness
+from lapwing.cosim.executors.deadlines import MISSED, WORST, Deadlines, Lateness, lateness, metadata_entries
 from lapwing.cosim.log import LogReader
 from lapwing.studies.report.flight_header import facts
 
@@ -18,11 +18,11 @@ def test_ticks_that_are_late_are_counted_and_worst_is_kept():
     for late in (-1e-3, 2e-3, 0.0, 5e-3, 1e-3):
         deadlines.note(late)
     assert lateness(deadlines.to_text()) == Lateness(3, 5e-3)
-    assert entries({"plant": Lateness(3, 5e-3), "autopilot": Lateness(0, 0.0)}) == {
+    assert metadata_entries({"plant": Lateness(3, 5e-3), "autopilot": Lateness(0, 0.0)}) == {
         MISSED: "autopilot 0, plant 3",
         WORST: "autopilot 0.00 ms, plant 5.00 ms",
     }
-    assert entries({}) == {}
+    assert metadata_entries({}) == {}
 
 
 @pytest.mark.parametrize("told", ["", "1", "[1]", "[1, 2, 3]", '["a", 1]', "null"])

@@ -88,7 +88,7 @@ def test_starvation_counts_from_last_message(monkeypatch):
 @pytest.fixture
 def watch():
     """A watch of two services that has heard nothing yet."""
-    bus = SimpleNamespace(receive=lambda senders: None, watch_alive=lambda key, seen: None)
+    bus = SimpleNamespace(receive=lambda senders: None, watch_liveliness=lambda key, seen: None)
     return RunMonitor(bus, PublisherIds("test"), ["plant", "sensors"])
 
 

@@ -37,7 +37,7 @@ class Run:
     """A supervised run of three required processes and an optional one."""
 
     def __init__(self, monkeypatch, external=()):
-        bus = SimpleNamespace(receive=lambda senders: None, watch_alive=lambda key, seen: None)
+        bus = SimpleNamespace(receive=lambda senders: None, watch_liveliness=lambda key, seen: None)
         self.now = 100.0
         monkeypatch.setattr("lapwing.cosim.processes.run_monitor.time.monotonic", lambda: self.now)
         self.monitor = RunMonitor(bus, PublisherIds("test"), NAMES)

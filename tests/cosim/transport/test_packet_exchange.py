@@ -34,7 +34,7 @@ class Bus:
     def inbox(self, key, sender):
         return SimpleNamespace(get=lambda timeout: self.messages[key].popleft())
 
-    def has_audience(self, keys):
+    def has_subscribers(self, keys):
         return False
 
 

@@ -5,14 +5,14 @@ import time
 
 import pytest
 
-from lapwing.cosim.transport.packet_exchange import LOOK, PublishWatchdog
+from lapwing.cosim.transport.packet_exchange import WATCH_PERIOD, PublishWatchdog
 
 PATIENCE = 0.5  # [s]
 
 
 @pytest.fixture
 def delivery(request):
-    """One that watches, and what it has said."""
+    """Return a watchdog and the list of its reports."""
     output = []
     delivery = PublishWatchdog(lambda: output.append(threading.current_thread()), getattr(request, "param", PATIENCE))
     yield delivery, output
@@ -32,7 +32,7 @@ def test_blocked_publisher_is_reported_repeatedly(delivery):
 @pytest.mark.parametrize("delivery", [60.0], indirect=True)  # [s] for which a busy machine does not stop a thread
 def test_fast_publication_is_not_reported(delivery):
     watched, output = delivery
-    until = time.monotonic() + 2 * LOOK
+    until = time.monotonic() + 2 * WATCH_PERIOD
     while time.monotonic() < until:
         with watched:
             pass
@@ -43,5 +43,5 @@ def test_watchdog_is_silent_without_publications(delivery):
     watched, output = delivery
     with watched:
         pass
-    time.sleep(PATIENCE + 2 * LOOK)
+    time.sleep(PATIENCE + 2 * WATCH_PERIOD)
     assert not output

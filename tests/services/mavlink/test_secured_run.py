@@ -125,7 +125,7 @@ def test_http_post_to_tcp_link_is_closed_and_does_not_arm(tmp_path):
                 while page.recv(4096):
                     pass
         text, _ = process.communicate(timeout=600)
-    assert "1 no MAVLink" in text
+    assert "1 not MAVLink" in text
     assert commands(process.log) <= {"link"}
 
 

@@ -186,7 +186,7 @@ def test_stalled_upload_is_retried_then_cancelled():
     bench.step(200)
     assert 5 <= len(client.all("MISSION_REQUEST_INT")) <= 10
     assert client.last("MISSION_ACK").type == mavlink.MAV_MISSION_OPERATION_CANCELLED
-    assert bench.counts["upload that stopped"] == 1
+    assert bench.counts["upload timed out"] == 1
 
 
 def test_acknowledgement_is_repeated_for_repeated_item():

@@ -100,6 +100,6 @@ def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
 
 @pytest.mark.parametrize(("start", "away"), [("[0.0, 0.0]", "0"), ("[0.0, 0.9]", "0.9")])
 def test_vehicles_that_touch_at_start_are_refused(tmp_path, start, away):
-    output = f"vehicle.1.initial_position: expected at least 1.55 m between them, got a place {away} m from above"
+    output = f"vehicle.1.initial_position: expected at least 1.55 m between them, got a position {away} m from above"
     with pytest.raises(ValueError, match=output):
         resolve(scene(tmp_path, f"vehicle.1.initial_position={start}"))

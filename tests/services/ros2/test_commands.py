@@ -71,7 +71,7 @@ def test_all_commands_are_accepted_with_source(commands):
     values = (OperatorCommand("goto", "255/190", 7, (1.0, 2.0, 3.0)), OperatorCommand("land", "", 8))
     result = commands.read("/drone1/command/operator", OperatorInput(header(0, "world"), values).encode())
     assert result == (values[0]._replace(source="ros2/255/190"), values[1]._replace(source="ros2/"))
-    assert commands.report() == "2 commands taken"
+    assert commands.report() == "2 commands accepted"
 
 
 def test_unknown_message_is_counted_and_ignored(commands):
@@ -79,5 +79,5 @@ def test_unknown_message_is_counted_and_ignored(commands):
     assert commands.read("/drone1/command/arm", b"no message") == ()
     assert commands.read("/drone1/command/pose", elsewhere.encode()) == ()
     assert commands.report() == (
-        "0 commands taken, 2 messages refused, the last: /drone1/command/pose: frame base_link: expected world"
+        "0 commands accepted, 2 messages rejected, the last one: /drone1/command/pose: frame base_link: expected world"
     )

@@ -143,7 +143,7 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
     finally:
         run.kill()
     assert run.returncode == 0, output
-    assert "commands taken\n" in output
+    assert "commands accepted\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
         types = {topic: [kind] for topic, kind in log.topics().items()}
         recorded = [PoseStamped.decode(payload) for *_, payload in log.messages(["/drone1/pose"])]
@@ -207,7 +207,7 @@ def test_ros_nodes_observe_fleet_and_command_one_vehicle(tmp_path, port, graph):
     finally:
         run.kill()
     assert run.returncode == 0, output
-    assert "ros2: right: 2 commands taken\n" in output
+    assert "ros2: right: 2 commands accepted\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
         types = {topic: [kind] for topic, kind in log.topics().items()}
         inputs = {
@@ -262,7 +262,7 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
             process.kill()
             process.communicate()
     assert (run.returncode, node.returncode) == (0, 0), output
-    assert "1 commands taken\n" in reported
+    assert "1 commands accepted\n" in reported
     with LogReader(tmp_path / "a.mcap") as log:
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     assert [(c.source, c.kind) for message in inputs for c in message.commands] == [(SOURCE, "arm")]
@@ -370,7 +370,7 @@ def test_ros2_installation_observes_and_commands_run(tmp_path, port):
         if target:
             target.kill()
     assert run.returncode == 0, output
-    assert "commands taken\n" in output
+    assert "commands accepted\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
         _, flown = log.history("/drone1/pose")
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]

@@ -132,7 +132,7 @@ def test_part_counts_its_own_runs(flown, tmp_path):
     assert (code, "2 of 2 flights" in output, "3 shards missing" in output) == (0, True, True)
     again = ["run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process"]
     reported = {run: lapwing(*again, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
-    assert f"run 0 of {tmp_path / 'c'}: not flown there yet" in reported[0]
+    assert f"run 0 of {tmp_path / 'c'}: not recorded in the campaign yet" in reported[0]
     assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in reported[1]
     code, output = lapwing(*words)
     assert (code, "3 of 3 flights" in output) == (0, True)
