@@ -228,7 +228,8 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
 
 
 # u-blox ZED-F9P data sheet: 0.01 m + 1 ppm, 0.05 m/s; about 2 cm on a moving multirotor, of which part wanders with the
-# multipath: chosen shares.
+# multipath: chosen shares. Distances to satellites: the same horizontal error at the mean HDOP of the default
+# constellation, 1.2.
 RTK = Gps(
     noise_horizontal_m_per_sqrt_hz=0.003,
     noise_vertical_m_per_sqrt_hz=0.005,
@@ -236,12 +237,15 @@ RTK = Gps(
     correlated_error_horizontal=0.010,
     correlated_error_vertical=0.013,
     correlation_time=60.0,
+    range_noise_m_per_sqrt_hz=0.0035,
+    range_correlated_error=0.012,
     fix_status=2,
     latency_samples=1,
 )
 
 # u-blox NEO-M8 data sheet: 2.5 m circular error probable, 0.05 m/s; vertical about 1.5 times the horizontal error,
 # nearly all of it (ionosphere, orbits, multipath) wandering over minutes; latency and shares: chosen.
+# Distances: as above.
 STANDARD = Gps(
     noise_horizontal_m_per_sqrt_hz=0.1,
     noise_vertical_m_per_sqrt_hz=0.2,
@@ -249,6 +253,8 @@ STANDARD = Gps(
     correlated_error_horizontal=2.1,
     correlated_error_vertical=3.2,
     correlation_time=200.0,
+    range_noise_m_per_sqrt_hz=0.12,
+    range_correlated_error=2.4,
     latency_samples=2,
 )
 

@@ -117,6 +117,16 @@ def test_errors_are_least_squares_of_range_errors():
     np.testing.assert_allclose(np.square(errors).mean(axis=0), expected, rtol=0.15)
 
 
+@pytest.mark.parametrize("preset", ["rtk", "standard"])
+def test_preset_has_its_horizontal_error_by_satellites_too(preset):
+    """Root mean square over a day, to 10 %."""
+    p = gps.PRESETS[preset]
+    result = readings(p._replace(constellation=GALILEO, latency_samples=0, rate=1.0 / 600.0), 144)
+    variance = np.mean([r.hdop**2 for r in result]) * np.square((p.range_correlated_error, p.range_noise_m_per_sqrt_hz))
+    stated = np.square((p.correlated_error_horizontal, p.noise_horizontal_m_per_sqrt_hz))
+    assert np.sqrt(0.5 * variance) == pytest.approx(np.sqrt(stated), rel=0.1)
+
+
 def test_position_jumps_when_a_satellite_leaves():
     """The jump is the difference of the two least-squares solutions; in between the errors only wander."""
     p = gps.Gps(constellation=GALILEO, range_correlated_error=3.0, correlation_time=1e9, rate=0.1)
