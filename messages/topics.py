@@ -14,6 +14,7 @@ from lapwing.messages.types import (
     Estimate,
     EstimateCovariance,
     FluidPressure,
+    GPSFix,
     Image,
     Imu,
     LaserScan,
@@ -70,6 +71,7 @@ IMU = Topic("{vehicle}/imu", Imu, rate="sensors.imu.rate")
 MAG = Topic("{vehicle}/mag", MagneticField, rate="sensors.magnetometer.rate")
 GPS = Topic("{vehicle}/gps/fix", NavSatFix, rate="sensors.gps.rate")
 GPS_VELOCITY = Topic("{vehicle}/gps/velocity", TwistWithCovarianceStamped, rate="sensors.gps.rate")
+GPS_DETAILS = Topic("{vehicle}/gps/details", GPSFix, rate="sensors.gps.rate")
 BARO = Topic("{vehicle}/baro", FluidPressure, rate="sensors.barometer.rate")
 SONAR = Topic("{vehicle}/sonar", Range, rate="sensors.sonar.rate")
 AIRSPEED = Topic("{vehicle}/differential_pressure", FluidPressure, rate="sensors.airspeed.rate")

@@ -100,6 +100,6 @@ def services(setup: RunConfig) -> list[Service]:
     own: SimulatorSetup = given.parameters
     client = SimulatorClient(own.host, own.port)
     receiver = Receiver(own, client, given.ports)
-    first = Service(f"{NAME}.receive", [receiver], encoders.wires(setup, None, 0))
+    first = Service(f"{NAME}.receive", [receiver], encoders.wires(setup, None, encoders.GpsWiring()))
     last = Service(f"{NAME}.send", [Sender(own, client, receiver)], [])
     return [first, *(create(setup, name) for name in setup.order if name != NAME), last]

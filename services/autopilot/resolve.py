@@ -17,7 +17,7 @@ from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot
 from lapwing.services.autopilot.service_config import AutopilotSetup, CustomCode
 from lapwing.services.common import autopilot_parameters, ports, user_modules
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
-from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.environment_schema import environment, known_magnetic_field
 from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.ports import AutopilotStatus, EstimateCovariance, MotorCommand, Setpoint
 from lapwing.services.common.run_schema import follows_trajectory
@@ -114,7 +114,7 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
         home=surroundings.home,
         gravity=gravity(scene),
         atmosphere=surroundings.atmosphere,
-        magnetic_field_world=surroundings.magnetic_field_world,
+        magnetic_field_world=known_magnetic_field(scene),
         ground_height=ground,
         sonar_height_max=preset.sonar_height_max if level else 0.0,  # the filter assumes level ground
     )

@@ -13,6 +13,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.environment import FIRST_YEAR, LAST_YEAR, STANDARD, Environment, magnetic_field
 from lapwing.dynamics.geodesy import Home, normal_gravity
 from lapwing.dynamics.terrain import Level, Relief, relief
+from lapwing.dynamics.vector import Vec3
 from lapwing.services.common import height_file
 
 Length = Annotated[float, Field(gt=0.0, le=1e4)]
@@ -117,6 +118,7 @@ class EnvironmentTable(SceneTable):
     gravity_model: Literal["standard", "wgs84"] = "standard"  # 9.80665 m/s^2, or from home's latitude
     gravity: float | None = Field(default=None, ge=0.0, le=30.0)  # [m/s^2] at sea level, instead of the model's
     magnetic_field: MagneticField | None = None  # [T] east, north, up; default: the World Magnetic Model at home
+    magnetic_anomaly: MagneticField = (0.0, 0.0, 0.0)  # [T] east, north, up, on top of it; unknown to the autopilot
     home: Home = STANDARD.home
     atmosphere: Atmosphere = STANDARD.atmosphere
     terrain: Terrain = Terrain()
@@ -167,11 +169,18 @@ def _resolved(table: EnvironmentTable) -> Environment:
         terrain = table.terrain.ground()
     except ConfigError as error:
         raise error.with_prefix("terrain") from None
-    field = table.magnetic_field or magnetic_field(table.home, _day(table.date))
+    east, north, up = _known_field(table)
+    anomaly = table.magnetic_anomaly
+    field = (east + anomaly[0], north + anomaly[1], up + anomaly[2])
     gravity = table.gravity
     if gravity is None:
         gravity = normal_gravity(table.home.latitude_deg) if table.gravity_model == "wgs84" else STANDARD.gravity
     return Environment(table.home, table.atmosphere, gravity, field, terrain)
+
+
+def _known_field(table: EnvironmentTable) -> Vec3:
+    """Return the field [T] without the anomaly."""
+    return table.magnetic_field or magnetic_field(table.home, _day(table.date))
 
 
 def _day(date: str) -> datetime.date:
@@ -204,3 +213,8 @@ def _points(grid: Grid, key: str) -> int:
 def environment(scene: Scene) -> Environment:
     """Return the environment that all services of the scene share."""
     return _resolved(scene[EnvironmentTable])
+
+
+def known_magnetic_field(scene: Scene) -> Vec3:
+    """Return the field [T], east, north, up, that an autopilot knows: the model's at home, without the anomaly."""
+    return _known_field(scene[EnvironmentTable])

@@ -16,6 +16,8 @@ TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "
 ESTIMATE_COVARIANCE = "estimate_covariance"
 LIFT = "lift"
 
+GPS_SINGLE, GPS_SBAS, GPS_FLOAT, GPS_RTK = 1, 2, 3, 4  # `GpsReading.fix`: alone, augmented, RTK float and fixed
+
 PerRotor = tuple[float, ...]
 
 
@@ -95,6 +97,11 @@ class GpsReading(NamedTuple):
     velocity_variance: float = 0.0  # [(m/s)^2] per axis
     age: float = 0.0  # [s]
     valid: bool = False
+    fix: int = 0  # GPS_SINGLE, GPS_SBAS, GPS_FLOAT or GPS_RTK; 0: not modelled
+    used: int = 0  # satellites of the fix; 0: not modelled
+    visible: int = 0  # satellites above the mask
+    hdop: float = 0.0  # horizontal dilution of precision; 0: unknown
+    vdop: float = 0.0  # vertical dilution of precision; 0: unknown
 
 
 class BarometerReading(NamedTuple):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import math
 from lapwing.services.common.mavlink.frames import saturated, swap_world
-from lapwing.services.common.ports import DistanceReading, GpsReading
+from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, DistanceReading, GpsReading
 from lapwing.services.px4.framing import Layout
 
 HIL_SENSOR = Layout(107, 108, struct.Struct("<Q13fIB"))
@@ -25,6 +25,7 @@ LOCK_STEP = 1  # flag of HIL_ACTUATOR_CONTROLS
 ARMED = 128  # mode of HIL_ACTUATOR_CONTROLS
 TEMPERATURE = 25.0  # [degC] of the sensors, which are not modelled
 NO_FIX, FIX_3D = 0, 3
+FIX_TYPES = {0: FIX_3D, GPS_SINGLE: FIX_3D, GPS_SBAS: 4, GPS_FLOAT: 5, GPS_RTK: 6}  # GPS_FIX_TYPE by kind of fix
 SATELLITES = 12  # reported with a fix
 UNKNOWN = 65535
 DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
@@ -88,8 +89,8 @@ def gps_values(time_us: int, r: GpsReading) -> tuple:
         saturated(100.0 * ve, 16),
         saturated(100.0 * vd, 16),
         course,
-        FIX_3D,
-        SATELLITES,
+        FIX_TYPES[int(r.fix)],
+        int(r.visible) or SATELLITES,
         0,
         0,
     )  # fmt: skip

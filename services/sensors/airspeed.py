@@ -86,4 +86,11 @@ def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
 # in PX4's and ArduPilot's drivers. Chosen: zero point, span and noise (the sheet's tables were not at hand).
 SDP33 = Airspeed(noise_pa_per_sqrt_hz=0.05, turn_on_bias_pa=0.2, scale_error=0.03, range_pa=1500.0, resolution_pa=0.05)
 
-PRESETS = {"sdp33": SDP33, "ideal": Airspeed()}
+# TE 4525DO data sheet: 14 bits, 1 psi differential, total error band below 1 % of the span. Counts 1638 to 14745 for
+# -1 to 1 psi (10 to 90 % of the counts). Chosen: the error band is two deviations of the zero point; noise of one count
+# in a sample.
+MS4525DO = Airspeed(
+    noise_pa_per_sqrt_hz=0.21, turn_on_bias_pa=69.0, scale_error=0.0025, range_pa=6894.757, resolution_pa=1.052
+)
+
+PRESETS = {"sdp33": SDP33, "ms4525do": MS4525DO, "ideal": Airspeed()}

@@ -1,6 +1,5 @@
 """Readings as messages. A reading that is not there is said in each type's own way, never by silence."""
 
-import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
@@ -10,9 +9,12 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
+from lapwing.kernels import math
 from lapwing.kernels.row_packing import row_width
 from lapwing.messages import (
     FluidPressure,
+    GPSFix,
+    GPSStatus,
     Imu,
     MagneticField,
     NavSatFix,
@@ -26,6 +28,13 @@ from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common import ports
 from lapwing.services.common.ports import BarometerReading, DistanceReading, GpsReading, ImuReading, MagnetometerReading
+
+# by `GpsReading.fix`
+_NAV_SAT = np.array([0, *(getattr(NavSatStatus, f"STATUS_{name}FIX") for name in ("", "SBAS_", "GBAS_", "GBAS_"))])
+_GPS_STATUS = np.array(
+    [0, *(getattr(GPSStatus, f"STATUS_{name}") for name in ("FIX", "SBAS_FIX", "RTK_FLOAT", "RTK_FIX"))]
+)
+_NORMAL_95 = 1.959964  # standard deviations
 
 UNKNOWN = -1.0  # first element of a covariance: there is no such measurement
 
@@ -41,14 +50,22 @@ class SonarWiring(NamedTuple):
     range_max: float  # [m]
 
 
-def wires(setup: RunConfig, sonar: SonarWiring | None, fix: int) -> list[TopicEncoder]:
-    """Return the encoders of the vehicle's sensors in `PORTS`; `fix` is the NavSatStatus of a GPS fix."""
+class GpsWiring(NamedTuple):
+    """Constants of a satellite receiver's messages."""
+
+    fix: int = NavSatStatus.STATUS_FIX  # NavSatStatus of its fixes
+    detailed: bool = False  # kind of fix, satellites and dilution of precision are modelled
+
+
+def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[TopicEncoder]:
+    """Return the encoders of the vehicle's sensors in `PORTS`."""
     frame, given = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
         (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
         (topic.MAG, ports.MAGNETOMETER, _magnetometer, MagneticField(header(0, frame))),
-        (topic.GPS, ports.GPS, partial(_gps, fix), _gps_sample(frame)),
+        (topic.GPS, ports.GPS, partial(_gps, gps.fix), _gps_sample(frame)),
         (topic.GPS_VELOCITY, ports.GPS, _gps_velocity, TwistWithCovarianceStamped(header(0, "world"))),
+        *([(topic.GPS_DETAILS, ports.GPS, _gps_details, _details_sample(frame))] if gps.detailed else []),
         (topic.BARO, ports.BAROMETER, _barometer, FluidPressure(header(0, frame))),
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
@@ -129,14 +146,49 @@ def _gps_sample(frame: str) -> Any:
 
 def _gps(fix: int, r: GpsReading, time_ns: np.ndarray) -> Fields:
     """Return a fix, stamped with the time for which it is valid; without a reading, no fix."""
-    valid = np.asarray(r.valid) != 0.0
+    valid, kind = np.asarray(r.valid) != 0.0, np.asarray(r.fix).astype(int)
     return {
         **stamp_columns(_late(r, time_ns)),
-        "status.status": np.where(valid, fix, NavSatStatus.STATUS_NO_FIX),
+        "status.status": np.where(valid, _NAV_SAT[kind] + (kind == 0) * fix, NavSatStatus.STATUS_NO_FIX),
         "latitude": r.latitude_deg,
         "longitude": r.longitude_deg,
         "altitude": r.height,
         "position_covariance": diagonal(np.asarray(r.position_variance)),
+    }
+
+
+def _details_sample(frame: str) -> Any:
+    return GPSFix(
+        header(0, frame),
+        GPSStatus(header(0, frame), status=GPSStatus.STATUS_NO_FIX, position_source=GPSStatus.SOURCE_GPS),
+        position_covariance_type=GPSFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
+    )
+
+
+def _gps_details(r: GpsReading, time_ns: np.ndarray) -> Fields:
+    """Return kind of fix, satellites, dilution of precision and motion; uncertainties are of 95 %."""
+    valid, kind = np.asarray(r.valid) != 0.0, np.asarray(r.fix).astype(int)
+    velocity, variance = np.asarray(r.velocity_world), np.asarray(r.position_variance)
+    hdop, vdop = np.asarray(r.hdop), np.asarray(r.vdop)
+    stamp = stamp_columns(_late(r, time_ns))
+    return {
+        **stamp,
+        **{f"status.{name}": value for name, value in stamp.items()},
+        "status.status": np.where(valid, _GPS_STATUS[kind], GPSStatus.STATUS_NO_FIX),
+        "status.satellites_used": r.used,
+        "status.satellites_visible": r.visible,
+        "latitude": r.latitude_deg,
+        "longitude": r.longitude_deg,
+        "altitude": r.height,
+        "track": np.array([math.degrees(math.atan2(east, north)) % 360.0 for east, north, _ in velocity]),
+        "speed": np.sqrt(np.square(velocity[:, :2]).sum(axis=1)),
+        "climb": velocity[:, 2],
+        "pdop": np.sqrt(hdop * hdop + vdop * vdop),
+        "hdop": hdop,
+        "vdop": vdop,
+        "err_horz": _NORMAL_95 * np.sqrt(variance[:, 0] + variance[:, 1]),
+        "err_vert": _NORMAL_95 * np.sqrt(variance[:, 2]),
+        "position_covariance": diagonal(variance),
     }
 
 

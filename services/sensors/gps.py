@@ -9,18 +9,28 @@ from lapwing.dynamics.geodesy import enu_to_geodetic
 from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import IDENTITY, ZERO, Mat3, Vec3, add, apply, cross, multiply, scale
-from lapwing.kernels import always_inline, kernel, math, python_function
-from lapwing.services.common.ports import GpsReading
+from lapwing.kernels import always_inline, kernel, math
+from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GpsReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
+from lapwing.services.sensors.rtk import Rtk, RtkState, check_rtk, ratio, solved
+from lapwing.services.sensors.satellites import (
+    NO_ERRORS,
+    Constellation,
+    RangeErrors,
+    Satellite,
+    Solution,
+    check_constellation,
+    check_sky,
+    first_errors,
+    geometry,
+    next_errors,
+    solution,
+)
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 CHANNELS = ("position", "velocity")
-FEWEST = 4  # satellites of a fix
-WORST = 50.0  # dilution of precision of a fix
-FLATTEST = 1e-9  # determinant of the directions' spread from which a position is computed
-NO_POSITION: Mat3 = (math.nan,) * 9  # type: ignore[assignment]
-
+RTK_STATUS = 2  # `Gps.fix_status` of a fix with a ground station
 
 Distance = Annotated[float, Ge(-1e6), Le(1e6)]
 
@@ -33,13 +43,6 @@ class Outage(NamedTuple):
     radius: Annotated[float, Gt(0), Le(1e6)]  # [m]
 
 
-class Satellite(NamedTuple):
-    """Direction of a satellite as seen from home."""
-
-    azimuth_deg: Annotated[float, Ge(-360), Le(360)]  # [deg] from north towards east
-    elevation_deg: Annotated[float, Ge(0), Le(90)]  # [deg] over the horizon
-
-
 class Gps(NamedTuple):
     """Parameters; horizontal figures are per axis."""
 
@@ -50,12 +53,15 @@ class Gps(NamedTuple):
     correlated_error_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
     correlation_time: Annotated[float, Gt(0)] = 60.0  # [s] its correlation time
     sky: tuple[Satellite, ...] | None = None  # satellites in view: position errors are theirs, not those above
-    range_noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] of the distance to a satellite of `sky`
+    constellation: Constellation | None = None  # satellites on their orbits, instead of `sky`
+    range_noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] of the distance to a satellite
     range_correlated_error: Annotated[float, Ge(0)] = 0.0  # [m] of the same, correlated in time
     fix_status: Annotated[int, Ge(0), Le(2)] = 0  # of NavSatStatus: 0 alone, 1 SBAS, 2 with a ground station (RTK)
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
     antenna: Place | None = None  # [m] body; the centre of mass if left out
+    rtk: Rtk | None = None  # single, float and fixed solutions; always as `fix_status` says if left out
+    time_to_first_fix: Annotated[float, Ge(0), Le(1e5)] = 0.0  # [s] from the start of the run
     outages: tuple[Outage, ...] | None = None  # [m] circles without a fix: { x, y, radius }
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
@@ -67,11 +73,14 @@ class GpsState(NamedTuple):
     geometry: Mat3  # factor L of the covariance L L^T of a position, east, north, up, by distances of unit deviation
     position_line: Line
     velocity_line: Line
+    ranges: RangeErrors  # of the satellites of a constellation
+    rtk: RtkState
+    samples: int  # since the start
 
 
 def blank() -> GpsState:
     """Return a placeholder state, replaced at the first tick."""
-    return GpsState(ZERO, IDENTITY, BLANK, BLANK)
+    return GpsState(ZERO, IDENTITY, BLANK, BLANK, NO_ERRORS, RtkState(), 0)
 
 
 @always_inline
@@ -80,61 +89,40 @@ def _deviations(p: Gps) -> Vec3:
     return (p.correlated_error_horizontal, p.correlated_error_horizontal, p.correlated_error_vertical)
 
 
-@kernel
-def geometry(sky: tuple[Satellite, ...] | None) -> Mat3:
-    """Return the factor L of `GpsState`; NaN if the satellites do not determine a position (theory.md, eq. (3.42))."""
-    if sky is None:
-        return IDENTITY
-    x = y = z = xx = xy = xz = yy = yz = zz = 0.0
-    for satellite in sky:
-        azimuth, elevation = math.radians(satellite.azimuth_deg), math.radians(satellite.elevation_deg)
-        e, n = math.cos(elevation) * math.sin(azimuth), math.cos(elevation) * math.cos(azimuth)
-        u = math.sin(elevation)
-        x, y, z = x + e, y + n, z + u
-        xx, xy, xz, yy, yz, zz = xx + e * e, xy + e * n, xz + e * u, yy + n * n, yz + n * u, zz + u * u
-    # what is common to all distances is the receiver's clock
-    k = 1.0 / len(sky)
-    xx, xy, xz = xx - k * x * x, xy - k * x * y, xz - k * x * z
-    yy, yz, zz = yy - k * y * y, yz - k * y * z, zz - k * z * z
-    a, b, c = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-    determinant = xx * a + xy * b + xz * c
-    if determinant < FLATTEST:
-        return NO_POSITION
-    over = 1.0 / determinant
-    l11 = math.sqrt(a * over)
-    l21, l31 = b * over / l11, c * over / l11
-    l22 = math.sqrt((xx * zz - xz * xz) * over - l21 * l21)
-    l32 = ((xy * xz - xx * yz) * over - l31 * l21) / l22
-    return (l11, 0.0, 0.0, l21, l22, 0.0, l31, l32, math.sqrt((xx * yy - xy * xy) * over - l31 * l31 - l32 * l32))
+@always_inline
+def _range_deviations(p: Gps, worse: float) -> tuple[float, float]:
+    """Return the standard deviations of a distance [m]: white and correlated."""
+    noise = error_models.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate)
+    return noise, worse * p.range_correlated_error
 
 
 def check(p: Gps) -> None:
-    """Raise ConfigError if the visible satellites do not determine a position."""
-    if p.sky is None:
-        return
-    dilution = (
-        math.sqrt(math.total(x * x for x in python_function(geometry)(p.sky))) if len(p.sky) >= FEWEST else math.inf
-    )
-    if not dilution < WORST:
-        said = f"got {len(p.sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
-        raise ConfigError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")
+    """Raise ConfigError if the visible satellites do not determine a position, or options exclude each other."""
+    check_constellation(p.constellation)
+    check_rtk(p.rtk)
+    check_sky(p.sky)
+    if p.sky is not None and p.constellation is not None:
+        raise ConfigError("constellation", "is given with sky", "one of them")
 
 
 @always_inline
-def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3) -> tuple[Vec3, Vec3]:
-    """Return error [m] and variance [m^2], both east, north, up."""
+def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3, fix: Solution, worse: float) -> tuple[Vec3, Vec3]:
+    """Return error [m] and variance [m^2], both east, north, up; correlated errors are `worse` times their figure."""
+    if p.constellation is not None:
+        noise, wandering = _range_deviations(p, worse)
+        return fix.error, scale(noise * noise + wandering * wandering, fix.variance)
     if p.sky is None:
-        w = _deviations(p)
+        w = scale(worse, _deviations(p))
         across = error_models.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
         up = error_models.white_deviation(p.noise_vertical_m_per_sqrt_hz, p.rate)
         horizontal = across * across + w[0] * w[0]
         error = add(multiply(w, wander), multiply((across, across, up), white))
         return error, (horizontal, horizontal, up * up + w[2] * w[2])
-    noise, L = error_models.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate), s.geometry
-    square = noise * noise + p.range_correlated_error * p.range_correlated_error
+    (noise, wandering), L = _range_deviations(p, worse), s.geometry
+    square = noise * noise + wandering * wandering
     east, north = L[0] * L[0], L[3] * L[3] + L[4] * L[4]
     variance = (square * east, square * north, square * (L[6] * L[6] + L[7] * L[7] + L[8] * L[8]))
-    return apply(L, add(scale(p.range_correlated_error, wander), scale(noise, white))), variance
+    return apply(L, add(scale(wandering, wander), scale(noise, white))), variance
 
 
 @kernel
@@ -158,17 +146,45 @@ def _under_sky(outages: tuple[Outage, ...] | None, position: Vec3) -> bool:
     return free
 
 
+@always_inline
+def _solution(p: Gps, s: GpsState, antenna: Vec3, truth: Truth, key: Key, tick: int) -> Solution:
+    """Return the fix by a constellation."""
+    fix = _fix_now(p.rtk, s.rtk, p.fix_status)
+    white, correlated = _range_deviations(p, ratio(p.rtk, fix))
+    return solution(
+        p.constellation, truth.home, truth.terrain, antenna, s.samples / p.rate, s.ranges, correlated, white,
+        fix >= GPS_FLOAT, key, tick,
+    )  # fmt: skip
+
+
+@kernel
+def _fix_now(rtk: Rtk | None, s: RtkState, fix_status: int) -> int:
+    """Return the kind of fix, as in `GpsReading`."""
+    if rtk is None:
+        return GPS_RTK if fix_status == RTK_STATUS else fix_status + 1
+    return s.fix
+
+
+@always_inline
+def _modelled(c: Constellation | None, rtk: Rtk | None) -> bool:
+    return c is not None or rtk is not None
+
+
 @kernel
 def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
     """Return the state before the first sample: the receiver has run here for its latency."""
     wander = normal3(key, TURN_ON, 0)
     position, velocity = _seen(p.antenna, truth)
-    s = GpsState(wander, geometry(p.sky), BLANK, BLANK)
-    error, _ = _position_error(p, s, wander, ZERO)
-    s = GpsState(wander, s.geometry, new_delay_line(add(position, error)), new_delay_line(velocity))
+    ranges, rtk = first_errors(p.constellation, key, TURN_ON), RtkState(math.inf, 0.0, GPS_RTK)
+    s = GpsState(wander, geometry(p.sky), BLANK, BLANK, ranges, rtk, 0)
+    fix = _solution(p, s, position, truth, key, TURN_ON)
+    error, _ = _position_error(p, s, wander, ZERO, fix, 1.0)
+    s = GpsState(wander, s.geometry, new_delay_line(add(position, error)), new_delay_line(velocity), ranges, rtk, 0)
     for k in range(p.latency_samples):
         s, _ = sample(p, s, key, TURN_ON - 1 - k, truth)
-    return s
+    converged = 0.0 if p.time_to_first_fix > 0.0 else s.rtk.converged
+    rtk = RtkState(converged, s.rtk.age, s.rtk.fix)
+    return GpsState(s.wander, s.geometry, s.position_line, s.velocity_line, s.ranges, rtk, 0)
 
 
 @kernel
@@ -176,8 +192,14 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
     """Return the next state and the reading. See `imu.sample` for arguments."""
     v = error_models.white_deviation(p.noise_velocity_m_per_s_per_sqrt_hz, p.rate)
     wander = error_models.walk(s.wander, 1.0, p.correlation_time, p.rate, normal3(key, tick, 0))
-    error, variance = _position_error(p, s, wander, normal3(key, tick, 1))
+    ranges = next_errors(p.constellation, s.ranges, p.correlation_time, p.rate, key, tick)
     position, velocity = _seen(p.antenna, truth)
+    time = s.samples / p.rate
+    s = GpsState(wander, s.geometry, s.position_line, s.velocity_line, ranges, s.rtk, s.samples)
+    kind, fix = _fix_now(p.rtk, s.rtk, p.fix_status), _solution(p, s, position, truth, key, tick)
+    on = time >= p.time_to_first_fix and fix.found and _under_sky(p.outages, truth.position_world)
+    rtk = solved(p.rtk, s.rtk, 1.0 / p.rate, time, fix.used, on)
+    error, variance = _position_error(p, s, wander, normal3(key, tick, 1), fix, ratio(p.rtk, kind))
     position = add(position, error)
     velocity = add(velocity, multiply((v, v, v), normal3(key, tick, 2)))
     position_line, position, seen = apply_delay_and_faults(
@@ -195,13 +217,19 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
         velocity,
         v * v,
         p.latency_samples / p.rate,
-        seen and moving and _under_sky(p.outages, truth.position_world),
+        seen and moving and on,
+        kind if _modelled(p.constellation, p.rtk) else 0,
+        fix.used,
+        fix.visible,
+        math.sqrt(fix.variance[0] + fix.variance[1]),
+        math.sqrt(fix.variance[2]),
     )
-    return GpsState(wander, s.geometry, position_line, velocity_line), reading
+    return GpsState(wander, s.geometry, position_line, velocity_line, ranges, rtk, s.samples + 1), reading
 
 
 # u-blox ZED-F9P data sheet: 0.01 m + 1 ppm, 0.05 m/s; about 2 cm on a moving multirotor, of which part wanders with the
-# multipath: chosen shares.
+# multipath: chosen shares. Distances to satellites: the same horizontal error at the mean HDOP of the default
+# constellation, 1.2.
 RTK = Gps(
     noise_horizontal_m_per_sqrt_hz=0.003,
     noise_vertical_m_per_sqrt_hz=0.005,
@@ -209,12 +237,15 @@ RTK = Gps(
     correlated_error_horizontal=0.010,
     correlated_error_vertical=0.013,
     correlation_time=60.0,
+    range_noise_m_per_sqrt_hz=0.0035,
+    range_correlated_error=0.012,
     fix_status=2,
     latency_samples=1,
 )
 
 # u-blox NEO-M8 data sheet: 2.5 m circular error probable, 0.05 m/s; vertical about 1.5 times the horizontal error,
 # nearly all of it (ionosphere, orbits, multipath) wandering over minutes; latency and shares: chosen.
+# Distances: as above.
 STANDARD = Gps(
     noise_horizontal_m_per_sqrt_hz=0.1,
     noise_vertical_m_per_sqrt_hz=0.2,
@@ -222,6 +253,8 @@ STANDARD = Gps(
     correlated_error_horizontal=2.1,
     correlated_error_vertical=3.2,
     correlation_time=200.0,
+    range_noise_m_per_sqrt_hz=0.12,
+    range_correlated_error=2.4,
     latency_samples=2,
 )
 

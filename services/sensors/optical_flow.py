@@ -122,4 +122,8 @@ PMW3901 = OpticalFlow(
     range_max=30.0,
 )
 
-PRESETS = {"pmw3901": PMW3901, "ideal": OpticalFlow()}
+# PixArt PAW3902, as PX4's page of the ARK Flow cites it: 7.4 rad/s at the most, from 80 mm to 30 m; gyroscopes of that
+# board: BMI088 (`imu`). Noise, focal length: chosen, as above.
+PAW3902 = PMW3901._replace(gyro_noise_dps_per_sqrt_hz=0.016)
+
+PRESETS = {"pmw3901": PMW3901, "paw3902": PAW3902, "ideal": OpticalFlow()}

@@ -11,14 +11,15 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.noise import stream_key
-from lapwing.messages import NavSatStatus
+from lapwing.dynamics.terrain.ray_casting import as_relief, steepness
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication, ticks
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, gravity
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import SonarWiring
+from lapwing.services.sensors.encoders import GpsWiring, SonarWiring
+from lapwing.services.sensors.gps import Gps
 from lapwing.services.sensors.imu import Imu
 from lapwing.services.sensors.registry import module_of, parameters
 from lapwing.services.sensors.rotor_vibration import Damage
@@ -41,20 +42,21 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if not tables:
         return None
     instruments, given = [], []
-    sonar, fix = None, NavSatStatus.STATUS_FIX
+    sonar, gps = None, GpsWiring()
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Communication].interval)
         if name == ports.IMU:
             p = _with_damage(scene, p)
+        elif name == ports.GPS:
+            p = _with_terrain(scene, p)
+            gps = GpsWiring(p.fix_status, p.constellation is not None or p.rtk is not None)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
         reading = READINGS[name] if name in READINGS else _reading(name, table, p)
         given.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         if name == ports.SONAR:
             sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
-        elif name == ports.GPS:
-            fix = p.fix_status
-    return ServiceConfig(SensorsSetup(tuple(instruments), sonar, fix), (InputPort(ports.TRUTH),), tuple(given))
+    return ServiceConfig(SensorsSetup(tuple(instruments), sonar, gps), (InputPort(ports.TRUTH),), tuple(given))
 
 
 def _with_damage(scene: Scene, p: Imu) -> Imu:
@@ -65,6 +67,14 @@ def _with_damage(scene: Scene, p: Imu) -> Imu:
     start = math.ceil(damage.get("time", 0.0) / scene[Communication].interval - 1e-9)
     of_one = Damage(damage["rotor"] - 1, start, 1.0 - damage.get("remaining_thrust", 0.0))
     return p._replace(rotor_vibration=p.rotor_vibration._replace(damage=of_one))
+
+
+def _with_terrain(scene: Scene, p: Gps) -> Gps:
+    """Return the receiver with the steepness of the ground that shades satellites."""
+    if p.constellation is None:
+        return p
+    steep = steepness(as_relief(environment(scene).terrain))
+    return p._replace(constellation=p.constellation._replace(steepness=steep))
 
 
 def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:

@@ -9,7 +9,7 @@ from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.kernels.cell import Cell
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import PORTS, SonarWiring, own_wire, wires
+from lapwing.services.sensors.encoders import PORTS, GpsWiring, SonarWiring, own_wire, wires
 
 NAME = "sensors"
 
@@ -19,7 +19,7 @@ class SensorsSetup(NamedTuple):
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
     sonar: SonarWiring | None  # None where no sonar is carried
-    fix: int  # NavSatStatus of a satellite receiver's fixes
+    gps: GpsWiring
 
 
 def create(setup: RunConfig) -> Service:
@@ -30,7 +30,7 @@ def create(setup: RunConfig) -> Service:
         Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), given.inputs, (port,), port.period)
         for p, port in zip(s.instruments, given.ports, strict=True)
     ]
-    return Service(NAME, parts, _other_wires(setup, s) + wires(setup, s.sonar, s.fix))
+    return Service(NAME, parts, _other_wires(setup, s) + wires(setup, s.sonar, s.gps))
 
 
 def _other_wires(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:

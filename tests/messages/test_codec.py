@@ -15,12 +15,13 @@ FOLDER = Path(lapwing.messages.__file__).parent / "msg"
 
 
 def published_store():
-    """The standard types as the rosbags library ships them; only our own from our text."""
+    """The standard types as the rosbags library ships them; only those that it does not have from our text."""
     store = get_typestore(Stores.LATEST)
+    shipped = set(store.fielddefs)
     for name, cls in TYPES.items():
-        if name.startswith("lapwing_msgs/"):
+        if name not in shipped:
             types = get_types_from_msg(cls.schema_text, name)
-            store.register({key: value for key, value in types.items() if key.startswith("lapwing_msgs/")})
+            store.register({key: value for key, value in types.items() if key not in shipped})
     return store
 
 

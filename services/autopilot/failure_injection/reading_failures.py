@@ -119,7 +119,7 @@ def _gps_kind(faults: Faults) -> int:
 def _wrong_gps(r: GpsReading) -> GpsReading:
     return GpsReading(
         r.latitude_deg + NORTH, r.longitude_deg, r.height, r.position_variance,
-        r.velocity_world, r.velocity_variance, r.age, r.valid,
+        r.velocity_world, r.velocity_variance, r.age, r.valid, r.fix, r.used, r.visible, r.hdop, r.vdop,
     )  # fmt: skip
 
 
@@ -128,7 +128,7 @@ def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
     x, y, z = garbage(key, tick, 0, 1.0)
     return GpsReading(
         90.0 * x, 180.0 * y, HEIGHTS * z, r.position_variance,
-        garbage(key, tick, 1, SPEEDS), r.velocity_variance, r.age, r.valid,
+        garbage(key, tick, 1, SPEEDS), r.velocity_variance, r.age, r.valid, r.fix, r.used, r.visible, r.hdop, r.vdop,
     )  # fmt: skip
 
 

@@ -1,10 +1,11 @@
 """Sensor readings; ideal ones if the vehicle flies on the true state."""
 
+from collections.abc import Sequence
 from typing import Any
 
 from lapwing.kernels import math
-from lapwing.messages import NavSatStatus
-from lapwing.messages.topics import BARO, GPS, GPS_VELOCITY, IMU, MAG
+from lapwing.messages import GPSStatus, NavSatStatus
+from lapwing.messages.topics import BARO, GPS, GPS_DETAILS, GPS_VELOCITY, IMU, MAG
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import compass, saturated, swap_body
 from lapwing.services.mavlink.px4_facts import SATELLITES
@@ -17,7 +18,13 @@ FIX_TYPES = {  # by the status of the receiver
     NavSatStatus.STATUS_SBAS_FIX: mavlink.GPS_FIX_TYPE_DGPS,
     NavSatStatus.STATUS_GBAS_FIX: mavlink.GPS_FIX_TYPE_RTK_FIXED,
 }
-UNKNOWN_16 = 0xFFFF
+DETAILED_FIX_TYPES = {
+    GPSStatus.STATUS_FIX: mavlink.GPS_FIX_TYPE_3D_FIX,
+    GPSStatus.STATUS_SBAS_FIX: mavlink.GPS_FIX_TYPE_DGPS,
+    GPSStatus.STATUS_RTK_FLOAT: mavlink.GPS_FIX_TYPE_RTK_FLOAT,
+    GPSStatus.STATUS_RTK_FIX: mavlink.GPS_FIX_TYPE_RTK_FIXED,
+}
+UNKNOWN_8, UNKNOWN_16 = 0xFF, 0xFFFF
 
 
 def good_imu(v: VehicleCache) -> bool:
@@ -95,14 +102,24 @@ def gps_raw(v: VehicleCache) -> Any:
     fix, moving = v.get(GPS), v.get(GPS_VELOCITY)
     if fix is None or moving is None:
         return None
+    details = v.get(GPS_DETAILS)
     if not good_gps(v):
+        visible = details.status.satellites_visible if details else 0
         return mavlink.MAVLink_gps_raw_int_message(
-            v.boot_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, *(UNKNOWN_16,) * 4, 0
+            v.boot_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, *(UNKNOWN_16,) * 4, visible
         )
     east, north, _ = moving.twist.twist.linear
     spread = math.sqrt(fix.position_covariance[0]), math.sqrt(fix.position_covariance[8])
     place = (fix.latitude, fix.longitude, fix.altitude)
-    return _fix(v, FIX_TYPES[fix.status.status], place, (north, east), spread, moving.twist.covariance[0])
+    velocity = (north, east)
+    if details is None or details.status.status not in DETAILED_FIX_TYPES:
+        return _fix(v, FIX_TYPES[fix.status.status], place, velocity, spread, moving.twist.covariance[0])
+    kind = DETAILED_FIX_TYPES[details.status.status]
+    dilution = [
+        saturated(100.0 * d, 16, unsigned=True) if d > 0.0 else UNKNOWN_16 for d in (details.hdop, details.vdop)
+    ]
+    satellites = details.status.satellites_visible or UNKNOWN_8
+    return _fix(v, kind, place, velocity, spread, moving.twist.covariance[0], dilution, satellites)
 
 
 def _estimated(v: VehicleCache) -> Any:
@@ -112,7 +129,14 @@ def _estimated(v: VehicleCache) -> Any:
 
 
 def _fix(
-    v: VehicleCache, fix_type: int, place: Any, moving: Any, spread: tuple[float, float], speed_variance: float
+    v: VehicleCache,
+    fix_type: int,
+    place: Any,
+    moving: Any,
+    spread: tuple[float, float],
+    speed_variance: float,
+    dilution: Sequence[int] = (100, 100),  # of precision, in hundredths
+    satellites: int = SATELLITES,
 ) -> Any:
     latitude, longitude, altitude = place
     north, east = moving
@@ -123,10 +147,10 @@ def _fix(
         saturated(latitude * 1e7, 32),
         saturated(longitude * 1e7, 32),
         height,
-        *(100, 100),  # dilution of precision, in hundredths
+        *dilution,
         saturated(100.0 * math.hypot(north, east), 16, unsigned=True),
         compass(math.atan2(east, north)),
-        SATELLITES,
+        satellites,
         height,
         *[saturated(1e3 * s, 32, unsigned=True) for s in spread],
         saturated(1e3 * math.sqrt(max(0.0, speed_variance)), 32, unsigned=True),

@@ -8,6 +8,8 @@ from adapter_harness import Bench
 
 from lapwing.messages import (
     FluidPressure,
+    GPSFix,
+    GPSStatus,
     LaserScan,
     NavSatFix,
     NavSatStatus,
@@ -15,12 +17,15 @@ from lapwing.messages import (
     PointCloud2,
     PointField,
     Range,
+    TwistWithCovarianceStamped,
     header,
 )
 from lapwing.messages.topics import (
     AIRSPEED,
     AIRSPEED_RECEIVED,
     GPS,
+    GPS_DETAILS,
+    GPS_VELOCITY,
     LASER_SCAN,
     OPTICAL_FLOW,
     POINT_CLOUD,
@@ -178,3 +183,35 @@ def test_obstacles_of_point_cloud_leave_ground_out():
     cloud = PointCloud2(HEAD, 1, 3, fields, False, 12, 36, tuple(points.tobytes()), False)
     m = shown((POINT_CLOUD, cloud)).last("OBSTACLE_DISTANCE")
     assert (m.distances[0], m.distances[36]) == (400, 0xFFFF)
+
+
+@pytest.mark.parametrize(
+    ("status", "fix_type"),
+    [
+        (GPSStatus.STATUS_FIX, mavlink.GPS_FIX_TYPE_3D_FIX),
+        (GPSStatus.STATUS_SBAS_FIX, mavlink.GPS_FIX_TYPE_DGPS),
+        (GPSStatus.STATUS_RTK_FLOAT, mavlink.GPS_FIX_TYPE_RTK_FLOAT),
+        (GPSStatus.STATUS_RTK_FIX, mavlink.GPS_FIX_TYPE_RTK_FIXED),
+    ],
+)
+def test_receiver_tells_kind_of_fix_dilution_and_satellites(status, fix_type):
+    details = GPSFix(
+        HEAD, GPSStatus(HEAD, satellites_used=7, satellites_visible=9, status=status), hdop=0.92, vdop=1.37
+    )
+    station = shown(
+        (GPS, NavSatFix(HEAD, NavSatStatus(NavSatStatus.STATUS_GBAS_FIX), 40.0, 14.0, 300.0)),
+        (GPS_VELOCITY, TwistWithCovarianceStamped(HEAD)),
+        (GPS_DETAILS, details),
+    )
+    m = station.last("GPS_RAW_INT")
+    assert (m.fix_type, m.eph, m.epv, m.satellites_visible) == (fix_type, 92, 137, 9)
+
+
+def test_receiver_without_fix_tells_satellites_in_view():
+    station = shown(
+        (GPS, NavSatFix(HEAD, NavSatStatus(NavSatStatus.STATUS_NO_FIX))),
+        (GPS_VELOCITY, TwistWithCovarianceStamped(HEAD)),
+        (GPS_DETAILS, GPSFix(HEAD, GPSStatus(HEAD, satellites_visible=3, status=GPSStatus.STATUS_NO_FIX))),
+    )
+    m = station.last("GPS_RAW_INT")
+    assert (m.fix_type, m.satellites_visible) == (mavlink.GPS_FIX_TYPE_NO_FIX, 3)

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from lapwing.dynamics.environment import STANDARD
-from lapwing.services.common.ports import GpsReading
+from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, GpsReading
 from lapwing.services.px4.framing import frame
 from lapwing.services.px4.messages import (
     HIL_GPS,
@@ -104,6 +104,12 @@ def test_gps_units():
 )
 def test_gps_course_counts_from_north_to_east(velocity, course):
     assert gps(GpsReading(valid=True, velocity_world=velocity)).cog == course
+
+
+@pytest.mark.parametrize(("kind", "fix_type"), [(GPS_SINGLE, 3), (GPS_SBAS, 4), (GPS_FLOAT, 5), (GPS_RTK, 6)])
+def test_gps_kind_of_fix_and_satellites(kind, fix_type):
+    result = gps(GpsReading(valid=True, fix=kind, used=7, visible=9))
+    assert (result.fix_type, result.satellites_visible) == (fix_type, 9)
 
 
 def test_gps_outage_has_no_fix():

@@ -8,7 +8,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel
-from lapwing.services.sensors import barometer, gps, imu, magnetometer, sonar
+from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
 from lapwing.services.sensors.sensor_inputs import Truth
 
 REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, *STANDARD[:2], STANDARD.magnetic_field_world)
@@ -56,12 +56,40 @@ def record_gps(p, key, truth, out):
         out[k, 3], out[k, 4], out[k, 5] = r.velocity_world
 
 
+@kernel
+def record_rangefinder(p, key, truth, out):
+    s = rangefinder.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = rangefinder.sample(p, s, key, k, truth)
+        out[k, 0] = r.range
+
+
+@kernel
+def record_airspeed(p, key, truth, out):
+    s = airspeed.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = airspeed.sample(p, s, key, k, truth)
+        out[k, 0] = r.pressure
+
+
+@kernel
+def record_optical_flow(p, key, truth, out):
+    s = optical_flow.initial(p, key, truth)
+    for k in range(len(out)):
+        s, r = optical_flow.sample(p, s, key, k, truth)
+        out[k, 0], out[k, 1] = r.flow
+        out[k, 2], out[k, 3] = r.rate
+
+
 RECORD = {
     "imu": (record_imu, 6),
     "magnetometer": (record_magnetometer, 3),
     "barometer": (record_barometer, 1),
     "sonar": (record_sonar, 1),
     "gps": (record_gps, 6),
+    "rangefinder": (record_rangefinder, 1),
+    "airspeed": (record_airspeed, 1),
+    "optical_flow": (record_optical_flow, 4),
 }
 
 

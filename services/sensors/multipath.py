@@ -1,0 +1,142 @@
+"""Shadow and reflections of satellite signals at obstacles of the terrain (theory.md, eqs. (3.57) to (3.59))."""
+
+from typing import Annotated, Any, NamedTuple
+
+from annotated_types import Ge, Gt, Le, Lt
+from numba import types
+
+from lapwing.dynamics.terrain import Level
+from lapwing.dynamics.terrain.ray_casting import cast
+from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import always_inline, kernel, math
+from lapwing.kernels.codegen import overload_for
+
+SPEED_OF_LIGHT = 299_792_458.0  # [m/s]
+WAVELENGTH = SPEED_OF_LIGHT / 1575.42e6  # [m] of L1 and E1
+CHIP = SPEED_OF_LIGHT / 1.023e6  # [m] of the C/A code
+FARTHEST = 1000.0  # [m] that obstacles are looked for
+
+
+class Reflections(NamedTuple):
+    """Multipath: each wall of a box reflects like a mirror."""
+
+    amplitude: Annotated[float, Gt(0), Lt(1)] = 0.5  # of the reflected signal over the direct one
+    spacing: Annotated[float, Gt(0), Le(CHIP)] = 0.1 * CHIP  # [m] between early and late correlator
+    phase_deg: Annotated[float, Ge(-360), Le(360)] = 180.0  # [deg] by which a wall turns the carrier
+
+
+def in_shadow(terrain: Any, position: Vec3, towards: Vec3, steepness: float) -> bool:
+    """Return True if an obstacle or the ground is between a position and a satellite; compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@always_inline
+def _never(terrain: Any, position: Vec3, towards: Vec3, steepness: float) -> bool:
+    return False
+
+
+@always_inline
+def _behind_relief(terrain: Any, position: Vec3, towards: Vec3, steepness: float) -> bool:
+    return cast(terrain, position, towards, steepness, FARTHEST) < math.inf
+
+
+@overload_for(in_shadow, inline=True)
+def _in_shadow(terrain: types.Type, position: types.Type, towards: types.Type, steepness: types.Type) -> Any:
+    return _never if terrain.instance_class is Level else _behind_relief
+
+
+@kernel
+def detour(box: Any, position: Vec3, towards: Vec3, across: bool) -> float:
+    """Return the further way [m] of a signal by a wall of a box; 0 without a reflection (theory.md, eq. (3.57)).
+
+    Args:
+        box: row of `Relief.boxes`.
+        position: [m] of the antenna.
+        towards: unit vector to the satellite.
+        across: True for the walls across the box's width, False for those at the ends of its length.
+    """
+    x, y, c, s = position[0] - box[0], position[1] - box[1], box[2], box[3]
+    place, other = c * x + s * y, c * y - s * x
+    speed, aside = c * towards[0] + s * towards[1], c * towards[1] - s * towards[0]
+    half, wide = box[4], box[5]
+    if across:
+        place, other, speed, aside, half, wide = other, place, aside, speed, wide, half
+    if place < 0.0:
+        place, speed = -place, -speed
+    distance = place - half
+    if distance <= 0.0 or speed <= 0.0:
+        return 0.0
+    way = distance / speed
+    if abs(other + way * aside) > wide or position[2] + way * towards[2] > box[6]:
+        return 0.0
+    return 2.0 * distance * speed
+
+
+@kernel
+def code_delay(r: Reflections, further: float) -> float:
+    """Return the error [m] of a code measurement by a reflection with this detour [m] (theory.md, eq. (3.58))."""
+    q = r.amplitude * math.cos(2.0 * math.pi * further / WAVELENGTH + math.radians(r.phase_deg))
+    half = 0.5 * r.spacing
+    if further < (1.0 + q) * half:
+        return further * q / (1.0 + q)
+    if further < CHIP - (1.0 - q) * half:
+        return q * half
+    if further < CHIP + half:
+        return q * (CHIP + half - further) / (2.0 - q)
+    return 0.0
+
+
+@kernel
+def phase_delay(r: Reflections, further: float) -> float:
+    """Return the error [m] of a carrier phase by a reflection with this detour [m] (theory.md, eq. (3.59))."""
+    if further > CHIP:
+        return 0.0
+    sine, cosine = math.sincos(2.0 * math.pi * further / WAVELENGTH + math.radians(r.phase_deg))
+    return WAVELENGTH / (2.0 * math.pi) * math.atan2(r.amplitude * sine, 1.0 + r.amplitude * cosine)
+
+
+def code_error(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
+    """Return the error [m] of a code measurement by all walls; compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+def phase_error(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
+    """Return the error [m] of a carrier phase by all walls; compiled code only."""
+    raise NotImplementedError("compiled code only")
+
+
+@always_inline
+def _no_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
+    return 0.0
+
+
+@kernel
+def _code_at_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
+    result = 0.0
+    for i in range(terrain.boxes.shape[0]):
+        for across in (False, True):
+            further = detour(terrain.boxes[i], position, towards, across)
+            if further > 0.0:
+                result += code_delay(r, further)
+    return result
+
+
+@kernel
+def _phase_at_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
+    result = 0.0
+    for i in range(terrain.boxes.shape[0]):
+        for across in (False, True):
+            further = detour(terrain.boxes[i], position, towards, across)
+            if further > 0.0:
+                result += phase_delay(r, further)
+    return result
+
+
+@overload_for(code_error, inline=True)
+def _code_error(r: types.Type, terrain: types.Type, position: types.Type, towards: types.Type) -> Any:
+    return _no_walls if terrain.instance_class is Level else _code_at_walls
+
+
+@overload_for(phase_error, inline=True)
+def _phase_error(r: types.Type, terrain: types.Type, position: types.Type, towards: types.Type) -> Any:
+    return _no_walls if terrain.instance_class is Level else _phase_at_walls

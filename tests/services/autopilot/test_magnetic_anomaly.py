@@ -1,0 +1,45 @@
+"""Declination: the autopilot knows the World Magnetic Model at home, and no local anomaly."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from lapwing.dynamics.environment import STANDARD
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.flight_data import FlightData
+
+ANOMALY = "environment.magnetic_anomaly=[2e-6,-1e-6,3e-6]"
+
+
+def test_sensors_feel_anomaly_that_autopilot_does_not_know():
+    services = resolve(load("quad_x", [ANOMALY])).services
+    felt = services["sensors"].parameters.instruments[0].around.magnetic_field_world
+    known = services["autopilot"].parameters.estimator.magnetic_field_world
+    assert known == STANDARD.magnetic_field_world
+    assert np.subtract(felt, known) == pytest.approx((2e-6, -1e-6, 3e-6))
+
+
+def yaw(q):
+    w, x, y, z = q
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("given", [[], [ANOMALY]])
+def test_command_flies_with_heading_wrong_by_unknown_declination(tmp_path, given):
+    """The heading is wrong by the angle between the horizontal fields: that of the model less that of the place."""
+    ideal = [f"sensors.{name}.preset=ideal" for name in ("imu", "magnetometer")]  # a tilt would turn the field, too
+    sets = [*given, *ideal, "run.duration=1.0", "success.require=[]"]
+    command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process"]
+    command += ["--log", str(tmp_path / "a.mcap"), *(part for text in sets for part in ("--set", text))]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    flight = FlightData.read(tmp_path / "a.mcap")
+    estimate, truth = flight.topic("estimate"), flight.topic("ground_truth")
+    east, north, _ = STANDARD.magnetic_field_world
+    expected = math.atan2(north, east) - math.atan2(north - 1e-6, east + 2e-6) if given else 0.0
+    wrong = yaw(estimate["pose.orientation"][5][[3, 0, 1, 2]]) - yaw(truth["pose.orientation"][5][[3, 0, 1, 2]])
+    assert wrong == pytest.approx(expected, abs=2e-3)

@@ -1,0 +1,105 @@
+"""Presets of real parts: spectrum of the readings, and the figures of the data sheets."""
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from record import REST, record
+from scipy.signal import welch
+
+from lapwing.services.sensors import registry
+from lapwing.services.sensors.airspeed import PRESETS as AIRSPEEDS
+from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
+from lapwing.services.sensors.optical_flow import PRESETS as FLOWS
+from lapwing.services.sensors.rangefinder import PRESETS as RANGEFINDERS
+from lapwing.services.sensors.sonar import PRESETS as SONARS
+
+DPS, MG, PSI = math.radians(1.0), 1e-3 * 9.80665, 6894.757
+UP = REST._replace(position_world=(0.0, 0.0, 2.0))
+DENSITIES = {  # one-sided densities of the channels, and what to replace for readings without rounding
+    "barometer": lambda p: ([p.noise_pa_per_sqrt_hz], {"resolution_pa": 0.0}),
+    "sonar": lambda p: ([p.noise_m_per_sqrt_hz], {"resolution": 0.0}),
+    "rangefinder": lambda p: ([p.noise_m_per_sqrt_hz], {"resolution": 0.0}),
+    "airspeed": lambda p: ([p.noise_pa_per_sqrt_hz], {"resolution_pa": 0.0}),
+    "magnetometer": lambda p: ([1e-9 * p.noise_nt_per_sqrt_hz] * 3, {"resolution_nt": 0.0}),
+    "optical_flow": lambda p: (
+        [p.noise_rad_per_s_per_sqrt_hz] * 2 + [DPS * p.gyro_noise_dps_per_sqrt_hz] * 2, {}
+    ),
+    "gps": lambda p: (
+        [p.noise_horizontal_m_per_sqrt_hz] * 2
+        + [p.noise_vertical_m_per_sqrt_hz]
+        + [p.noise_velocity_m_per_s_per_sqrt_hz] * 3,
+        {},
+    ),
+    "imu": lambda p: (
+        [DPS * p.gyro.noise_dps_per_sqrt_hz] * 3 + [MG * p.accelerometer.noise_mg_per_sqrt_hz] * 3,
+        {"warm_up_rise": 0.0},
+    ),
+}  # fmt: skip
+PARTS = [(name, part) for name in DENSITIES for part in registry.sensors()[name].PRESETS if part != "ideal"]
+
+
+def test_each_sensor_has_two_real_parts():
+    for name in DENSITIES:
+        assert len([part for sensor, part in PARTS if sensor == name]) >= 2, name
+
+
+@pytest.mark.parametrize(("name", "part"), PARTS)
+def test_spectrum_above_wander_is_stated_density(name, part):
+    """The one-sided power spectral density from a quarter of the Nyquist frequency on, to 4 %."""
+    p = registry.sensors()[name].PRESETS[part]
+    densities, fine = DENSITIES[name](p)
+    f, power = welch(record(name, p._replace(**fine), 60_000, truth=UP), p.rate, nperseg=512, axis=0)
+    assert np.sqrt(power[f > p.rate / 8].mean(axis=0)) == pytest.approx(np.array(densities), rel=0.04)
+
+
+def deviation(density, p):
+    return density * math.sqrt(0.5 * p.rate)
+
+
+def test_barometer_of_data_sheet():
+    p = BAROMETERS["dps422"]
+    assert deviation(p.noise_pa_per_sqrt_hz, p._replace(rate=10.0)) == pytest.approx(0.5, rel=0.05)
+    assert 2.0 * p.turn_on_bias_pa == 100.0
+    assert 2.0 * p.temperature_pa_per_k <= 0.5
+
+
+def test_sonar_of_data_sheet():
+    p = SONARS["hc_sr04"]
+    assert 2.0 * deviation(p.noise_m_per_sqrt_hz, p) == pytest.approx(3e-3, rel=0.05)
+    assert (p.range_min, p.range_max, 2.0 * p.half_beam_deg) == (0.02, 4.0, 15.0)
+
+
+@pytest.mark.parametrize(("distance", "accuracy"), [(6.0, 0.04), (12.0, 0.06)])
+def test_rangefinder_of_data_sheet(distance, accuracy):
+    p = RANGEFINDERS["tfmini"]
+    noise = deviation(p.noise_m_per_sqrt_hz, p)
+    assert 2.0 * math.hypot(noise, p.scale_error * distance) == pytest.approx(accuracy, rel=0.1)
+    assert (p.range_min, p.range_max, p.resolution, p.beam_deg) == (0.3, 12.0, 0.005, 2.3)
+
+
+def test_airspeed_sensor_of_data_sheet():
+    p = AIRSPEEDS["ms4525do"]
+    assert p.range_pa == pytest.approx(PSI)
+    assert p.resolution_pa == pytest.approx(2.0 * PSI / (0.8 * 16384), rel=1e-3)
+    assert 2.0 * p.turn_on_bias_pa == pytest.approx(0.01 * 2.0 * PSI, rel=0.01)
+
+
+def test_flow_camera_of_data_sheet():
+    p = FLOWS["paw3902"]
+    assert (p.flow_max, p.range_min, p.range_max) == (7.4, 0.08, 30.0)
+
+
+@pytest.mark.long
+def test_command_flies_with_second_parts(tmp_path):
+    parts = {
+        "barometer": "dps422", "sonar": "hc_sr04", "rangefinder": "tfmini", "airspeed": "ms4525do",
+        "optical_flow": "paw3902", "gps": "standard", "magnetometer": "hmc5883l", "imu": "bmi088",
+    }  # fmt: skip
+    given = [f"sensors.{name}.preset={part}" for name, part in parts.items()]
+    sets = [part for text in (*given, "run.duration=1.0", "success.require=[]") for part in ("--set", text)]
+    command = [sys.executable, "-m", "lapwing", "run", "quad_x", *sets, "--mode", "single-process"]
+    done = subprocess.run([*command, "--log", str(tmp_path / "a.mcap")], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
