@@ -87,8 +87,9 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
                 _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
                 ticks[m] += 1
             split, alike = _parts(like, memory, base, h), True
-            for lane in range(1, WIDTH):
+            for lane in range(WIDTH):
                 alike = alike and _parts(like, memory, base + lane, h) == split
+                alike = alike and not _breaks(like, memory, base + lane, n * h, h / split)
             part, i = h / split, 0
             while alike and i < n * split and _all_asleep(like, memory, base, part):
                 for lane in range(WIDTH):
@@ -150,6 +151,14 @@ def advance_along(method, like, memory, columns, keys, ticks, commands, motions,
 @always_inline
 def _parts(like, memory, at, h):
     return multirotor_stepper.parts(take(like, memory, at).parameters.layout, h)
+
+
+@always_inline
+def _breaks(like, memory, at, interval, h):
+    """Return True if a member has a breakpoint in its communication step."""
+    m = take(like, memory, at)
+    end = m.start + interval
+    return multirotor_stepper.next_break(m.parameters, m.memory, m.start, interval, end, h) < math.inf
 
 
 @always_inline

@@ -26,7 +26,11 @@ Hooks between evaluations:
                          its first integrator step; s and rotors exclude effects that can sleep
     is_sleeping          (e, memory, motion, h) -> bool              True if the effect cannot act in the next step
     substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
-    memory_rate          (e, memory, motion) -> rate of its memory   of a stiff effect, integrated with the motion
+    wrench_and_rate      (e, memory, motion) -> (force_world, torque_body, rate of its memory)    of a stiff effect
+                         whose memory is integrated with the motion; the force is that of its wrench
+    timed_update         (e, memory, t) -> memory                    of an effect that changes at a moment of its own
+    break_time           (e, memory, t, h, value) -> the lesser of value and the first time after t [s] at which the
+                         loads jump or have a kink: steps, of at most h [s], end and timed updates are made there
     contact              (e, memory, s) -> bool                      True if the vehicle touches the ground
     contact_forces       (e, memory, motion) -> ((place [m], force [N]) of each contact point), world
     wind                 (e, memory, wind) -> wind                   [m/s] world, for the log only
@@ -38,12 +42,12 @@ The discrete state of an effect is a tuple of floats, at first `initial_discrete
 """
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.core.errors import TypingError
 
 from lapwing.dynamics.effects._axes import beside, in_world
-from lapwing.dynamics.vector import add, apply
+from lapwing.dynamics.vector import Vec3, add, apply
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import compile_source, generated_overload
 
@@ -76,7 +80,9 @@ wrench_body = _hook("wrench_body")
 torque = _hook("torque")
 field = _hook("field")
 discrete_update = _hook("discrete_update")
-memory_rate = _hook("memory_rate")
+timed_update = _hook("timed_update")
+break_time = _hook("break_time")
+wrench_and_rate = _hook("wrench_and_rate")
 substeps = _hook("substeps")
 contact = _hook("contact")
 contact_forces = _hook("contact_forces")
@@ -188,6 +194,12 @@ all_discrete_updates = _written_out(
     "m{i} = f{i}(effects[{i}], memory[{i}], s, rotors, key, tick, interval)",
     "memory",
 )
+all_timed_updates = _written_out(
+    "all_timed_updates", "timed_update", "t", "m{i} = f{i}(effects[{i}], memory[{i}], t)", "memory"
+)
+next_breakpoint = _written_out(
+    "next_breakpoint", "break_time", "t, h, value", "value = f{i}(effects[{i}], memory[{i}], t, h, value)", "value"
+)
 all_substeps = _written_out(
     "all_substeps",
     "substeps",
@@ -257,32 +269,55 @@ without_sleepers = generated_overload(
 )
 
 
-def _with_rate(template: str) -> Callable:
-    """Return a generator of the tuple of `template` for each effect whose memory has a rate."""
+class KnownWrench(NamedTuple):
+    """Stands for an effect whose wrench has been evaluated together with the rate of its memory."""
 
-    def generate(effects: Any, *_rest: Any) -> Callable:
-        rates = HOOKS["memory_rate"]
-        active = [(i, e.instance_class) for i, e in enumerate(effects.types) if e.instance_class in rates]
-        names = {f"f{i}": rates[parameters] for i, parameters in active}
-        members = "".join(f"{template.format(i=i)}, " for i, _ in active)
-        return compile_source("integrated(effects, memory, motion)", names, f"return ({members})")
-
-    return generate
+    force_world: Vec3  # [N]
+    torque_body: Vec3  # [N m]
 
 
-all_memory_rates = generated_overload(
-    "all_memory_rates(effects, memory, motion)",
-    _with_rate("f{i}(effects[{i}], memory[{i}], motion)"),
-    "Rates of the memories that have one.",
+@wrench(KnownWrench)
+def known_wrench(e, memory, s, rotors):
+    """Return the wrench."""
+    return e.force_world, e.torque_body
+
+
+def _integrated(effects: Any) -> list[tuple[int, Callable]]:
+    """Return (number, hook) of each effect whose memory has a rate."""
+    rates = HOOKS["wrench_and_rate"]
+    return [(i, rates[e.instance_class]) for i, e in enumerate(effects.types) if e.instance_class in rates]
+
+
+def _with_rates(effects: Any, *_rest: Any) -> Callable:
+    active = dict(_integrated(effects))
+    names = {"known": KnownWrench, **{f"f{i}": hook for i, hook in active.items()}}
+    lines = [f"force{i}, torque{i}, rate{i} = f{i}(effects[{i}], memory[{i}], motion)" for i in active]
+    count = len(effects.types)
+    kept = "".join(f"known(force{i}, torque{i}), " if i in active else f"effects[{i}], " for i in range(count))
+    rates = "".join(f"rate{i}, " for i in active)
+    return compile_source("with_rates(effects, memory, motion)", names, *lines, f"return ({kept}), ({rates})")
+
+
+with_rates = generated_overload(
+    "with_rates(effects, memory, motion)",
+    _with_rates,
+    "Return (effects, with the wrenches of those that have one in their place; rates of their memories).",
     inline=True,
 )
+
+
+def _all_integrated(effects: Any, *_rest: Any) -> Callable:
+    members = "".join(f"memory[{i}], " for i, _ in _integrated(effects))
+    return compile_source("all_integrated(effects, memory)", {}, f"return ({members})")
+
+
 all_integrated = generated_overload(
-    "all_integrated(effects, memory, motion)", _with_rate("memory[{i}]"), "Memories that have a rate.", inline=True
+    "all_integrated(effects, memory)", _all_integrated, "Memories that have a rate.", inline=True
 )
 
 
 def _with_integrated(effects: Any, *_rest: Any) -> Callable:
-    integrated = [i for i, e in enumerate(effects.types) if e.instance_class in HOOKS["memory_rate"]]
+    integrated = [i for i, _ in _integrated(effects)]
     members = [
         f"integrated[{integrated.index(i)}]" if i in integrated else f"memory[{i}]" for i in range(len(effects.types))
     ]

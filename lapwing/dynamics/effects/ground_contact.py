@@ -14,9 +14,9 @@ from lapwing.dynamics.effects._hooks import (
     contact,
     contact_forces,
     is_sleeping,
-    memory_rate,
     substeps,
     wrench,
+    wrench_and_rate,
 )
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import over_plane, summit, surface
@@ -161,24 +161,45 @@ def far_smooth(e, memory, motion, h):
 
 
 @always_inline
-def _stretching_four(c, feet, memory):
+def _loaded_four(c, feet, memory):
+    """Return (reach, force, torque, rates of the elements) of four feet; all but the rates in lanes."""
     e, stance = c
     feet_body, deflection = interleave(feet), interleave(memory)
     relaxing = scale(-e.tangential_stiffness / e.tangential_damping, deflection)
     reached = in_reach(stance, feet_body)
     if not any_above(reached):
-        return deinterleave(relaxing)
+        return reached, feet_body, feet_body, deinterleave(relaxing)  # no loads, `_added` leaves them out
     foot = footing(e, stance, feet_body)
+    friction, rate = _element(e, deflection, foot)
+    force = add(scale(foot.press, foot.normal), friction)
     pressing = select(reached, foot.press, 0.0)
-    return deinterleave(select_vector(pressing, _element(e, deflection, foot)[1], relaxing))
+    push, turn = select_vector(pressing, force, ZERO), select_vector(pressing, cross(foot.arm, force), ZERO)
+    return reached, push, turn, deinterleave(select_vector(pressing, rate, relaxing))
 
 
-@memory_rate(GroundContact)
-def stretching(e, memory, motion):
-    """Rate [m/s] at which the friction elements stretch; in the air they relax."""
-    stance = stance_of(e, motion, rotation_matrix(motion.attitude))
-    feet, fours = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
-    return unchunk4(map_tuple(_stretching_four, (e, stance), feet, fours), memory)
+@always_inline
+def _added(_, before, four, __):
+    reached, force, torque, _ = four
+    if not any_above(reached):
+        return before
+    return _in_turn(before[0], force), _in_turn(before[1], torque)
+
+
+@always_inline
+def _rates_of(_, four, __):
+    return four[3]
+
+
+@wrench_and_rate(GroundContact)
+def loads_and_stretching(e, memory, motion):
+    """Return the wrench of `ground_contact` and the rate [m/s] at which the elements stretch; in the air they relax."""
+    R_world_body = rotation_matrix(motion.attitude)
+    stance = stance_of(e, motion, R_world_body)
+    feet, deflections = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
+    fours = map_tuple(_loaded_four, (e, stance), feet, deflections)
+    force, torque_world = reduce_tuple(_added, 0.0, (ZERO, ZERO), fours, fours)
+    rates = unchunk4(map_tuple(_rates_of, 0.0, fours, fours), memory)
+    return force, apply_transposed(R_world_body, torque_world), rates
 
 
 @substeps(GroundContact)

@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked, reject
-from lapwing.dynamics.effects._hooks import discrete_update, mass_properties
+from lapwing.dynamics.effects._hooks import break_time, mass_properties, timed_update
 from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -77,10 +77,16 @@ RELEASED = (1.0,)
 """Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
 
 
-@discrete_update(PayloadRelease)
-def release(e, memory, s, rotors, key, tick, interval):
+@break_time(PayloadRelease)
+def moment(e, memory, t, h, value):
+    """Return the moment of the release if it is to come."""
+    return min(value, e.release_time) if t < e.release_time else value
+
+
+@timed_update(PayloadRelease)
+def release(e, memory, t):
     """Let go when the time has come."""
-    return (1.0,) if s.t >= e.release_time else memory
+    return (1.0,) if t >= e.release_time else memory
 
 
 @mass_properties(PayloadRelease)

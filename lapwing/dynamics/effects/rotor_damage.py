@@ -6,7 +6,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import discrete_update, load_factors
+from lapwing.dynamics.effects._hooks import break_time, load_factors, timed_update
 from lapwing.dynamics.effects._types import Factors, PerRotor
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
@@ -58,10 +58,16 @@ def _product(_, a, b):
     return a * b
 
 
-@discrete_update(RotorDamage)
-def strike(e, memory, s, rotors, key, tick, interval):
-    """Return the fractions for the next interval."""
-    return (e.remaining_thrust, e.remaining_torque) if s.t >= e.time else memory
+@break_time(RotorDamage)
+def moment(e, memory, t, h, value):
+    """Return the moment of the damage if it is to come."""
+    return min(value, e.time) if t < e.time else value
+
+
+@timed_update(RotorDamage)
+def strike(e, memory, t):
+    """Return the fractions from a time on."""
+    return (e.remaining_thrust, e.remaining_torque) if t >= e.time else memory
 
 
 @load_factors(RotorDamage)

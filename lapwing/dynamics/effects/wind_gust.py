@@ -4,7 +4,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._hooks import air
+from lapwing.dynamics.effects._hooks import air, break_time
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.vector import add, scale
 from lapwing.kernels import math
@@ -22,6 +22,18 @@ class WindGust(NamedTuple):
     peak: tuple[Speed, Speed, Speed]  # [m/s] world
     start: Annotated[float, Ge(0)]  # [s] simulation time
     duration: Annotated[float, Gt(0)]  # [s] from nothing to nothing
+
+
+FEWEST = 16.0  # steps in a gust
+
+
+@break_time(WindGust)
+def edges(e, memory, t, h, value):
+    """Return the next edge of the gust; of one that is short beside a step the next end of a part."""
+    parts = FEWEST if e.duration < FEWEST * h else 1.0
+    part = e.duration / parts
+    number = max(math.floor((t - e.start) / part) + 1.0, 0.0)
+    return min(value, e.start + number * part) if number <= parts else value
 
 
 @air(WindGust)

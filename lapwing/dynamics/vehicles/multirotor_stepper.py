@@ -20,6 +20,7 @@ from lapwing.kernels import noinline as never_inlined
 from lapwing.kernels.codegen import map_tuple, overload_for
 from lapwing.kernels.state_tree import axpy, finite, normalise, relative_difference
 
+BREAK_ROUNDING = 1e-6  # of a communication step: breakpoints so close to its ends are there
 FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
 
 
@@ -89,10 +90,10 @@ def _remembering(drive, x):
 
 @kernel
 def _awake_rate(drive, t, x):
-    drive = _remembering(drive, x)
-    p = drive.parameters
-    stretching = hooks.all_memory_rates(p.effects, drive.memory, seen(p.layout, x.motion))
-    return AwakeState(_rate_of_form(drive, t, x.motion), stretching)
+    p, body, memory, voltage = _remembering(drive, x)
+    effects, rates = hooks.with_rates(p.effects, memory, seen(p.layout, x.motion))
+    known = MultirotorParameters(p.body, p.layout, effects, p.tolerance)
+    return AwakeState(_rate_of_form(MultirotorDrive(known, body, memory, voltage), t, x.motion), rates)
 
 
 @always_inline
@@ -134,7 +135,7 @@ def _stiff_steps(method, drive, t, x, h, end):
     p, memory = drive.parameters, drive.memory
     allowed, part = p.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
-    x = AwakeState(x, hooks.all_integrated(p.effects, memory, x))
+    x = AwakeState(x, hooks.all_integrated(p.effects, memory))
     while True:
         left = end - t
         part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, seen(p.layout, x), h))
@@ -167,6 +168,7 @@ def begin(p, key, tick, state, command, interval):
     before = _airborne(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
     s, rotors, _, _ = evaluate(before, tick * interval, seen(layout, state.motion))
     memory = hooks.all_discrete_updates(p.effects, memory, s, rotors, key, tick, interval)
+    memory = hooks.all_timed_updates(p.effects, memory, (tick + BREAK_ROUNDING) * interval)
     return MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
 
 
@@ -183,16 +185,46 @@ def airborne_step(method, drive, t, x, h):
 
 
 @always_inline
+def next_break(p, memory, start, interval, end, h):
+    """Return the first breakpoint [s] after `start` and before `end`, both of which it is not near; infinity if none.
+
+    `interval` [s] is the communication step, h [s] the longest step.
+    """
+    rounding = BREAK_ROUNDING * interval
+    at = hooks.next_breakpoint(p.effects, memory, start + rounding, h, math.inf)
+    return at if start + rounding < at < end - rounding else math.inf
+
+
+@always_inline
 def steps(method, drive, x, start, end, h, first, n):
-    """Return (motion, discrete state) at the `end` [s] of an interval from `start`, from step `first` of its n."""
+    """Return (motion, discrete state) at the `end` [s] of an interval from `start`, from step `first` of its n.
+
+    Steps end at the effects' breakpoints. The parts of the interval are divided into steps of at most h.
+    """
     p, body, memory, voltage = drive
-    layout, airborne = p.layout, _airborne(p, body, memory, voltage)
-    for i in range(first, n):
-        if hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
-            x = _step(method, airborne, start + i * h, x, h)
-            continue
-        if not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
-            x, memory = _stiff_steps(method, drive, start + i * h, x, h, end)
-            break
-        x = _step(method, drive, start + i * h, x, h)
-    return x, memory
+    interval, longest = end - start, h
+    stop = next_break(p, memory, start, interval, end, longest)
+    while True:
+        if stop < end:
+            n = max(1, math.ceil((stop - start) / longest - BREAK_ROUNDING))
+            h = (stop - start) / n
+        until = min(stop, end)
+        layout, airborne = p.layout, _airborne(p, body, memory, voltage)
+        for i in range(first, n):
+            if hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
+                x = _step(method, airborne, start + i * h, x, h)
+                continue
+            if not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
+                drive = MultirotorDrive(p, body, memory, voltage)
+                x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
+                break
+            x = _step(method, MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
+        if not stop < end:
+            return x, memory
+        memory = hooks.all_timed_updates(p.effects, memory, stop)
+        body = hooks.all_mass_properties(p.effects, memory, p.body)
+        start = stop
+        stop = next_break(p, memory, start, interval, end, longest)
+        if not stop < end:
+            n = max(1, math.ceil((end - start) / longest - BREAK_ROUNDING))
+            h = (end - start) / n

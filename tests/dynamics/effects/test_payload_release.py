@@ -20,11 +20,11 @@ def test_mass_and_inertia_with_and_without(drone):
     assert np.multiply(empty.inertia, empty.inverse_inertia) == pytest.approx(np.ones(3))
 
 
-def test_lets_go_at_its_time_and_never_again(drone, situation, rotors):
+def test_lets_go_at_its_time_and_never_again(drone):
     e = make(drone, release_time=3.0)
-    assert release.py_func(e, (0.0,), situation(t=2.999), rotors(), (0, 0), 0, 0.004) == (0.0,)
-    assert release.py_func(e, (0.0,), situation(t=3.0), rotors(), (0, 0), 0, 0.004) == (1.0,)
-    assert release.py_func(make(drone), RELEASED, situation(t=9.0), rotors(), (0, 0), 0, 0.004) == (1.0,)
+    assert release.py_func(e, (0.0,), 2.999) == (0.0,)
+    assert release.py_func(e, (0.0,), 3.0) == (1.0,)
+    assert release.py_func(make(drone), RELEASED, 9.0) == (1.0,)
 
 
 @pytest.mark.parametrize(

@@ -5,13 +5,13 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.rotor_damage import rotor_damage, strike
 
 
-def test_one_rotor_from_its_time(drone, situation, rotors):
+def test_one_rotor_from_its_time(drone, situation):
     (e,) = effects.from_scene(
         {"rotor_damage": {"rotor": 2, "time": 4.0, "remaining_thrust": 0.6, "remaining_torque": 1.1}}, drone
     )
-    memory = strike.py_func(e, e.initial_discrete_state(), situation(t=3.99), rotors(), (0, 0), 0, 0.004)
+    memory = strike.py_func(e, e.initial_discrete_state(), 3.99)
     assert rotor_damage.py_func(e, memory, situation(), NO_FACTORS) == NO_FACTORS
-    memory = strike.py_func(e, memory, situation(t=4.0), rotors(), (0, 0), 0, 0.004)
+    memory = strike.py_func(e, memory, 4.0)
     hurt = rotor_damage.py_func(e, memory, situation(), NO_FACTORS)
     assert hurt == ((1.0, 0.6, 1.0, 1.0), (1.0, 1.1, 1.0, 1.0))
 
