@@ -5,6 +5,7 @@ packet followed by the wait for the next one.
 """
 
 import socket
+import struct
 import time
 
 from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
@@ -12,6 +13,7 @@ from lapwing.services.ardupilot.modes import CONVENTIONS
 from lapwing.services.ardupilot.resolve import LOOP_RATE, ArduPilotSetup
 from lapwing.services.ardupilot.sample import extras, vehicle_state
 from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttle
+from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.ardupilot.state_message import encode
 from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
@@ -46,11 +48,14 @@ class ArduPilotLink:
         self._socket: socket.socket | None = None
         self._client: MissionClient | None = None
         self._status: FlightStatus | None = None
+        self._simulated: SimulatedSensors | None = None
         self._peer: tuple[str, int] | None = None
         self._sent = 0.0  # [s] of the wall clock at the last answer
         self._answer = b""  # last state message
         self._time = 0.0  # [s] of the simulation
         self._packet: ServoPacket | None = None
+        self._pulses: tuple[int, ...] = ()  # [us] of the motors
+        self._motors: tuple[float, ...] = ()  # outputs for these pulses
 
     @property
     def address(self) -> tuple[str, int]:
@@ -73,6 +78,7 @@ class ArduPilotLink:
             TcpTransport(setup.host, port), CONVENTIONS, mission_messages(items, self._own.datum), parameters
         )
         self._status = FlightStatus("ardupilot", self._client)
+        self._simulated = SimulatedSensors(self._own, self._client)
         patience = Patience(setup.start_timeout, self._program.pid if self._program else None)
         while self._packet is None:
             waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
@@ -109,9 +115,13 @@ class ArduPilotLink:
                 self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
         self.report.waiting += time.perf_counter() - begun
         assert self._status is not None
+        assert self._simulated is not None
         self._status.poll(self._time)
         self.report.version = self._status.version
-        motors = tuple(throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS])
+        if (pulses := self._packet.pwm[:OUTPUTS]) != self._pulses:  # its loop is slower than the exchange
+            self._pulses, self._motors = pulses, tuple(throttle(pulse, PWM_MIN, PWM_MAX) for pulse in pulses)
+        motors = self._motors
+        self._simulated.update(self._time, read, motors)
         return self._status.output(motors, running=max(motors) > 0.0)  # a heartbeat comes only once a second
 
     def cpu(self) -> float:
@@ -199,5 +209,6 @@ def _claim(setup: FirmwareSetup) -> socket.socket:
         result.close()
         message = f"ardupilot: cannot listen on udp {address[0]}:{address[1]} ({error.strerror})"
         raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
-    result.settimeout(WAIT)
+    # the time-out of the system, not of Python, which would wait by a call of its own before each receipt
+    result.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 0, round(1e6 * WAIT)))
     return result

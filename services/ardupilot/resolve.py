@@ -38,6 +38,7 @@ class ArduPilotSetup(NamedTuple):
     imu: bool  # rates and specific force of the IMU, otherwise ground truth
     range_port: str  # port of the distance sensor; "": none
     airspeed: bool
+    gps: bool  # outages of the scene's receiver
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -65,7 +66,9 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         imu,
         distance,
         ports.AIRSPEED in carried,
+        ports.GPS in carried,
     )
     inputs = [ports.TRUTH, *([ports.IMU] if imu else []), *([distance] if distance else [])]
     inputs += [ports.AIRSPEED] if own.airspeed else []
+    inputs += [ports.GPS] if own.gps else []
     return with_mission(scene, ArduPilot, firmware_config(scene, tuple(inputs), 1, LAYOUT, own))

@@ -1,8 +1,9 @@
 """Link to Betaflight SITL: real time, UDP for state, RC and motors, MSP for status.
 
 The firmware would set the rate of its clock by the wall time between two packets of increasing time, which on a busy
-machine jumps by a factor of 100. All packets therefore carry the same time, and its clock keeps to the wall's. A late
-packet shifts all later ones: a simulation that catches up would be faster than the firmware.
+machine jumps by a factor of 100. All packets therefore carry the same time, and its clock keeps to the wall's, or to
+`betaflight.clock_rate` of it, which is set and measured before the first tick. A late packet shifts all later ones: a
+simulation that catches up would be faster than the firmware.
 """
 
 import math
@@ -11,6 +12,7 @@ import time
 from contextlib import suppress
 
 from lapwing.services.betaflight import boot, msp
+from lapwing.services.betaflight.clock import slow_down
 from lapwing.services.betaflight.packets import (
     Ports,
     parse_motors,
@@ -26,7 +28,7 @@ from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
-TIME = 1.0  # [s] in all packets
+TIME = 1.0  # [s] in all packets, unless the clock is slowed down
 RC_EVERY = 0.01  # [s]
 STARTS = 3  # starts of the program while it does not receive RC channels
 STATUS_EVERY = 0.2  # [s]
@@ -55,6 +57,9 @@ class BetaflightLink:
         self._armed = False
         self._next = self._sent = self._heard = 0.0  # [s] of the wall clock
         self._intervals = [0.0, 0.0, 0.0]  # count, sum [s], sum of squares [s^2] of the time between packets
+        self._clock_rate = pilot.clock_rate
+        self._stamp = TIME  # [s] in all packets
+        self._rate = 1.0  # of the firmware's clock
         self._rc_at = self._asked_at = -math.inf  # [s] simulation time
         self._sticks = OFF
 
@@ -64,6 +69,16 @@ class BetaflightLink:
         self._socket = _bound(setup.host, self._ports.motors)
         self._program = boot.start(setup, waits)
         self._calibrate(waits)
+        if self._clock_rate < 1.0:
+            assert self._msp is not None
+            self._rate, self._stamp = slow_down(self._clock_rate, self._msp, self._feed, waits, TIME)
+            self.report.note(f"the firmware's clock runs at {self._rate:.3g} of real time")
+
+    def _feed(self, stamp: float) -> None:
+        """Send the state at rest with a time [s], and RC channels; discard the outputs."""
+        self._stamp = stamp
+        self._send(OFF)
+        self._drain(0.0)
 
     def _calibrate(self, waits: Waits) -> None:
         """Connect to the firmware and calibrate it; start it again if it does not receive RC channels."""
@@ -100,7 +115,7 @@ class BetaflightLink:
         t = tick * interval
         motion = self._source.update(t, read)
         self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), motion)
-        self._pace(interval)
+        self._pace(interval / self._rate)
         self._drain(0.0)  # what has come since the last reply is older than this tick
         if t >= self._rc_at + RC_EVERY:
             self._rc_at = t
@@ -130,7 +145,7 @@ class BetaflightLink:
         self._program = self._msp = self._socket = None
 
     def _pace(self, interval: float) -> None:
-        """Wait for the time of the packet, and count its lateness."""
+        """Wait for the time of the packet, `interval` [s] of wall time after the last, and count its lateness."""
         now = time.monotonic()
         if self._sent == 0.0:
             self._next = now
@@ -139,7 +154,7 @@ class BetaflightLink:
             now = time.monotonic()
         if now - self._next > LATE * interval:
             self.report.late += 1
-        self.report.skew_max = max(self.report.skew_max, now - self._next)
+        self.report.skew_max = max(self.report.skew_max, self._rate * (now - self._next))
         if self._sent > 0.0:
             gap = now - self._sent
             n, total, squares = self._intervals
@@ -152,9 +167,9 @@ class BetaflightLink:
     def _send(self, sticks: Sticks | None) -> None:
         assert self._socket is not None
         with suppress(OSError):  # it is not there yet, or gone: silence shows that
-            self._socket.sendto(state_packet(TIME, self._source.state), (self._setup.host, self._ports.state))
+            self._socket.sendto(state_packet(self._stamp, self._source.state), (self._setup.host, self._ports.state))
             if sticks:
-                self._socket.sendto(rc_packet(TIME, tuple(sticks)), (self._setup.host, self._ports.rc))
+                self._socket.sendto(rc_packet(self._stamp, tuple(sticks)), (self._setup.host, self._ports.rc))
 
     def _drain(self, timeout: float) -> bool:
         """Take in the motor outputs that have come, and wait for one at most `timeout` [s]; False if none came."""

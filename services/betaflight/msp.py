@@ -1,11 +1,13 @@
 """MSP version 1 over TCP: status of the firmware; and its command line, by which it is configured."""
 
 import contextlib
+import functools
+import operator
 import socket
 import struct
 from typing import NamedTuple
 
-VERSION, STATUS = 3, 150  # MSP_FC_VERSION, MSP_STATUS_EX
+STATUS, SET_RTC, RTC = 150, 246, 247  # MSP_STATUS_EX, MSP_SET_RTC, MSP_RTC
 ARM = 1  # bit of the flight mode flags
 BLOCKERS = (
     "no gyro", "failsafe", "no RC signal", "not disarmed", "failsafe switch", "runaway take-off", "crash detected",
@@ -25,9 +27,23 @@ class FirmwareStatus(NamedTuple):
     load: float  # fraction of the CPU time of its scheduler
 
 
-def request(command: int) -> bytes:
-    """Return a request without payload."""
-    return b"$M<" + bytes((0, command, command))
+def request(command: int, payload: bytes = b"") -> bytes:
+    """Return a request."""
+    body = bytes((len(payload), command)) + payload
+    return b"$M<" + body + bytes((_checksum(body),))
+
+
+def _checksum(body: bytes) -> int:
+    return functools.reduce(operator.xor, body, 0)
+
+
+def parse_time(payload: bytes) -> float:
+    """Return the time of day [s] in an MSP_RTC reply, 0 if the firmware has no date."""
+    try:
+        hours, minutes, seconds, millis = struct.unpack_from("<3BH", payload, 4)
+    except struct.error:
+        return 0.0
+    return float(3600 * hours + 60 * minutes + seconds + 1e-3 * millis)
 
 
 def parse_status(payload: bytes) -> FirmwareStatus:
@@ -71,10 +87,7 @@ class Msp:
             if len(self._data) < i + 6 + size:
                 break
             body = self._data[i + 3 : i + 5 + size]
-            check = 0
-            for byte in body:
-                check ^= byte
-            if check == self._data[i + 5 + size]:
+            if _checksum(body) == self._data[i + 5 + size]:
                 result.append((body[1], body[2:]))
                 self._data = self._data[i + 6 + size :]
             else:

@@ -36,6 +36,7 @@ class PilotSetup(NamedTuple):
     velocity_gain: float  # [1/s]
     integral_gain: float  # [1/s^3]
     yaw_gain: float  # [1/s]
+    clock_rate: float  # seconds of the firmware's clock per second of wall time, at most 1
     hover_output: float  # motor output in hover, 0 to 1
     gravity: float  # [m/s^2]
     gps: bool  # position and velocity of the receiver, otherwise ground truth

@@ -28,7 +28,7 @@ class FirmwareBlock:
         self._none = FirmwareCommand((0.0,) * len(setup.order))
         self.outputs = (Port(COMMAND, self._none, LATCHED),)
         self.words = StatusWords()
-        self._before: FirmwareCommand | None = None
+        self._before: FirmwareOutput | None = None
         self._waits: Waits = lambda text: None
         self._opened = False
         self._cpu = self._own_cpu = 0.0  # [s] before the first exchange
@@ -71,10 +71,9 @@ class FirmwareBlock:
         output = self._link.step(tick, lambda port: graph.latest(port, tick), self._waits)
         report.wall += time.perf_counter() - begun
         report.steps += 1
-        command = self._command(tick, output)
-        if command != self._before:
-            graph.put(COMMAND, tick, command)
-            self._before = command
+        if output != self._before:
+            graph.put(COMMAND, tick, self._command(tick, output))
+            self._before = output
         return tick + self._setup.period
 
     def _command(self, tick: int, output: FirmwareOutput) -> FirmwareCommand:

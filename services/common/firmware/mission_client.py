@@ -129,6 +129,16 @@ class MissionClient:
         for message in self._codec.parse_buffer(self._filter.select(self._transport.receive())) or ():
             self._handle(message)
 
+    @property
+    def connected(self) -> bool:
+        """Return True once the firmware has sent a heartbeat."""
+        return self._target != 0
+
+    def send_parameter(self, name: str, value: float) -> None:
+        """Set a parameter of the type float, without waiting for its confirmation."""
+        kind = mavlink.MAV_PARAM_TYPE_REAL32
+        self._send(mavlink.MAVLink_param_set_message(self._target, 1, name.encode(), value, kind))
+
     def send_battery(self, voltage: float, current: float, charge: float) -> None:
         """Send the state of the battery [V], [A], fraction, as a battery of the same vehicle does."""
         if not self._target:

@@ -15,7 +15,7 @@ from lapwing.services.common.ports import BatteryReading, TrueState
 from tests.services.ardupilot.peer import ArduPilotPeer, servo_packet
 from tests.services.firmware_links import Background, firmware_setup, free_instance, never
 
-OWN = ArduPilotSetup(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False)
+OWN = ArduPilotSetup(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False, False)
 
 
 def read(port):

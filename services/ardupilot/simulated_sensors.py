@@ -1,0 +1,36 @@
+"""GPS outages and battery of the scene for ArduPilot's own sensor models, which the JSON interface does not reach.
+
+They are set by parameters of the simulation while it runs. Sources: ArduPilot, SITL.cpp and SITL_State_common.cpp.
+"""
+
+from lapwing.kernels import math
+from lapwing.services.ardupilot.resolve import ArduPilotSetup
+from lapwing.services.common import ports
+from lapwing.services.common.firmware.link import Read
+from lapwing.services.common.firmware.mission_client import MissionClient
+
+EVERY = 0.5  # [s] between two settings of the battery
+SAG = 0.7  # [V] that ArduPilot subtracts at full throttle
+
+
+class SimulatedSensors:
+    """Sets the parameters when they change."""
+
+    def __init__(self, own: ArduPilotSetup, client: MissionClient):
+        """Create it before the first step."""
+        self._own, self._client = own, client
+        self._fix = True  # as ArduPilot starts
+        self._next = 0.0  # [s] of the battery
+
+    def update(self, time: float, read: Read, motors: tuple[float, ...]) -> None:
+        """Set the parameters at simulation `time` [s]; `motors`: outputs, 0 to 1."""
+        if not self._client.connected:
+            return
+        if self._own.gps and (fix := read(ports.GPS).valid) != self._fix:
+            self._fix = fix
+            self._client.send_parameter("SIM_GPS_DISABLE", float(not fix))  # up to 4.5
+            self._client.send_parameter("SIM_GPS1_ENABLE", float(fix))
+        if time >= self._next and math.isfinite((battery := read(ports.BATTERY)).charge):
+            self._next = time + EVERY
+            throttle = math.total(motors) / len(motors)
+            self._client.send_parameter("SIM_BATT_VOLTAGE", battery.voltage + SAG * throttle)
