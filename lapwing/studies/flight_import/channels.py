@@ -28,6 +28,8 @@ class Channels:
         specific_force: [m/s^2] body.
         duty: shares of full throttle of each motor.
         battery: [V], and [A] as a second column where measured.
+        setpoint: of position and its derivatives, in the columns of `Recording.setpoint`.
+        attitude_setpoint: [rad] roll, pitch, yaw.
         readings: of sensors, by the field of `SENSORS` in `write_log`.
         notes: facts of the import, a line each.
         unknown: names of topics without a counterpart.
@@ -40,6 +42,8 @@ class Channels:
     specific_force: Series | None = None
     duty: Series | None = None
     battery: Series | None = None
+    setpoint: Series | None = None
+    attitude_setpoint: Series | None = None
     readings: dict[str, Series] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     unknown: Sequence[str] = ()
@@ -101,10 +105,15 @@ def to_recording(path: Path, channels: Channels, motors: str, rates: str) -> Rec
     }
     volts = duty * np.where(np.isfinite(battery), battery, 1.0)[:, None]
     readings = {name: Series(s.time - begin, s.values) for name, s in channels.readings.items()}
+    desired = {
+        name: s.latest(grid)
+        for name in ("setpoint", "attitude_setpoint")
+        if (s := getattr(channels, name)) is not None and len(s.time)
+    }
     return Recording(
         path.stem, 1.0 / RATE, position, quaternion, velocity, omega, values("specific_force", 3), volts, battery,
         valid & finite, power, faults={cause: count for cause, count in faults.items() if count},
-        notes=tuple(notes), readings=readings, unknown=tuple(channels.unknown),
+        notes=tuple(notes), readings=readings, unknown=tuple(channels.unknown), **desired,
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from scipy.ndimage import median_filter
 from lapwing.studies.flight_import.channels import check_density, check_rate_unit
 from lapwing.studies.flight_import.column_mapping import SCALES, Mapping, Motors, Scalar, Vector
 from lapwing.studies.flight_import.csv_table import read_columns
-from lapwing.studies.flight_import.recording import GYRO_LIMIT, LONGEST_GAP, Recording, widen
+from lapwing.studies.flight_import.recording import GYRO_LIMIT, LONGEST_GAP, SETPOINT_WIDTH, Recording, widen
 from lapwing.studies.flight_import.rotation_arrays import (
     body_rate,
     continuous,
@@ -101,7 +101,10 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
     power = table[mapping.power.column] if mapping.power else np.full(len(time), np.nan)
     name = path.name.removesuffix(".gz").removesuffix(".csv")
     desired = _vector(table, mapping.setpoint)
-    setpoint = nothing[:0] if desired is None else desired
+    setpoint = np.empty((0, SETPOINT_WIDTH))
+    if desired is not None:
+        setpoint = np.full((len(time), SETPOINT_WIDTH), np.nan)
+        setpoint[:, :3] = desired
     plain: tuple[np.ndarray, ...] = position, attitude, velocity, omega, force, voltage, battery
     if np.abs(np.diff(time) - interval).max() > 0.1 * interval:
         check_density(path, time[-1] / interval if interval > 0.0 else np.inf, len(time))
@@ -111,8 +114,8 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
             setpoint = np.column_stack([np.interp(grid, time, column) for column in setpoint.T])
     position, attitude, velocity, omega, force, voltage, battery = plain
     return Recording(
-        name, interval, position, attitude, velocity, omega, force, voltage, battery, valid, power, setpoint, faults,
-        tuple(notes),
+        name, interval, position, attitude, velocity, omega, force, voltage, battery, valid, power, setpoint,
+        faults=faults, notes=tuple(notes),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.messages.topics import ACTUATORS, BARO, GPS, IMU, MAG, SETPOINT, TRUTH
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.flight_import.recording import Recording, Series
+from lapwing.studies.flight_import.recording import SETPOINT_WIDTH, Recording, Series
 from lapwing.studies.flight_import.rotation_arrays import continuous, unit
 
 RATE = 100.0  # [Hz] of the recording
@@ -59,8 +59,10 @@ def _power(grid: np.ndarray, times: np.ndarray, truth: Any) -> np.ndarray:
 
 def _setpoint(grid: np.ndarray, flight: FlightData) -> np.ndarray:
     if not flight.has("setpoint") or len(flight.setpoint) < 2:
-        return np.empty((0, 3))
-    return _sampled(grid, flight.times("setpoint"), flight.setpoint.position)
+        return np.empty((0, SETPOINT_WIDTH))
+    names = ("position", "velocity", "acceleration", "yaw", "yaw_rate")
+    columns = np.column_stack([np.asarray(getattr(flight.setpoint, name)) for name in names])
+    return Series.of(flight.times("setpoint"), columns).latest(grid)
 
 
 def _readings(flight: FlightData, begin: float) -> dict[str, Series]:

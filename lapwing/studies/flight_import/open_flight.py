@@ -1,5 +1,6 @@
 """Recordings from files of any known format."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from lapwing.studies.flight_import.column_mapping import load_mapping
@@ -10,7 +11,7 @@ FORMATS = ".ulg, .bin, .log, .tlog, .mcap, a rosbag2 folder, .csv and .csv.gz wi
 
 
 def open_flight(path: Path, mapping: str | None = None) -> Recording:
-    """Read a flight. See `FORMATS` for the formats, which the file's ending names.
+    """Read a flight, and note if it never leaves the ground. See `FORMATS` for the formats, which the ending names.
 
     Args:
         path: of the file; of the folder for a rosbag2.
@@ -19,6 +20,14 @@ def open_flight(path: Path, mapping: str | None = None) -> Recording:
     Raises:
         ValueError: unknown format, no mapping for a CSV file, or an invalid file.
     """
+    flight = _read(path, mapping)
+    if reason := flight.grounded:
+        note = f"never leaves the ground, {reason}: the flight cannot be validated"
+        return replace(flight, notes=(*flight.notes, note))
+    return flight
+
+
+def _read(path: Path, mapping: str | None) -> Recording:
     from lapwing.studies.flight_import import csv_flight, usd_log
 
     if path.is_dir():

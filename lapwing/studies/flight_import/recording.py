@@ -9,6 +9,9 @@ import numpy as np
 LONGEST_GAP = 0.035  # [s] between two samples that interpolation bridges
 LONGEST_HOLD = 0.5  # [s] between two messages over which interpolation counts as valid
 GYRO_LIMIT = 35.0  # [rad/s] range of the usual gyroscopes, 2000 deg/s
+LOWEST = 0.3  # [m] above the ground, from which a vehicle is in the air
+RESOLUTION = 1e-6  # [s] of time stamps
+SETPOINT_WIDTH = 11  # columns of a setpoint
 LARGEST_STEP = 12.0  # times the median absolute step of a channel above which a sample is an outlier
 
 
@@ -40,6 +43,13 @@ class Series:
         """Interpolate linearly, shape (len(grid), k)."""
         return np.column_stack([np.interp(grid, self.time, column) for column in self.values.T])
 
+    def latest(self, grid: np.ndarray) -> np.ndarray:
+        """Return the last values before each instant, shape (len(grid), k); NaN if older than `LONGEST_HOLD`."""
+        row = np.searchsorted(self.time, grid + RESOLUTION, side="right") - 1
+        values = self.values[np.maximum(row, 0)].copy()
+        values[(row < 0) | (grid - self.time[np.maximum(row, 0)] > LONGEST_HOLD)] = np.nan
+        return values
+
     def near(self, grid: np.ndarray) -> np.ndarray:
         """Return where both neighbours of an instant are at most `LONGEST_HOLD` apart."""
         right = np.clip(np.searchsorted(self.time, grid), 1, len(self.time) - 1)
@@ -62,7 +72,10 @@ class Recording:
         battery_voltage: [V], shape (n,).
         valid: samples that every channel measured soundly, bool, shape (n,).
         power: [W] taken from the battery, shape (n,); NaN where not measured.
-        setpoint: [m] world, desired position, shape (n, 3); NaN where there is none, empty if not recorded.
+        setpoint: desired position [m], velocity [m/s] and acceleration [m/s^2] in the world, yaw [rad] and its rate
+            [rad/s], shape (n, 11); NaN where there is none, empty if not recorded.
+        attitude_setpoint: [rad] desired roll, pitch and yaw, shape (n, 3); NaN where there is none, empty if not
+            recorded.
         faults: number of samples marked invalid by cause.
         notes: time offset and other facts of the import, a line each.
         readings: other sensors by name (see `write_log.SENSORS`), at their own rates, as far as the log has them.
@@ -80,7 +93,8 @@ class Recording:
     battery_voltage: np.ndarray
     valid: np.ndarray
     power: np.ndarray = field(default_factory=lambda: np.empty(0))
-    setpoint: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    setpoint: np.ndarray = field(default_factory=lambda: np.empty((0, SETPOINT_WIDTH)))
+    attitude_setpoint: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
     faults: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     readings: Mapping[str, Series] = field(default_factory=dict)
@@ -93,6 +107,16 @@ class Recording:
     def rotors(self) -> int:
         """Number of rotors."""
         return int(self.motor_voltage.shape[1])
+
+    @property
+    def grounded(self) -> str:
+        """Why the vehicle cannot have left the ground; empty if it may have."""
+        if not np.nanmax(self.motor_voltage, initial=0.0) > 0.0:
+            return "the motors do not run"
+        height = self.position[self.valid & np.isfinite(self.position[:, 2]), 2]
+        if len(height) and height.max() < LOWEST and np.ptp(height) < LOWEST:
+            return f"the height changes by {np.ptp(height):.2f} m"
+        return ""
 
 
 def widen(invalid: np.ndarray, samples: int) -> np.ndarray:

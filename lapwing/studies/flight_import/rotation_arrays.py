@@ -77,6 +77,14 @@ def from_euler(angles: np.ndarray) -> np.ndarray:
     )
 
 
+def to_euler(q: np.ndarray) -> np.ndarray:
+    """Return roll, pitch and yaw [rad], shape (n, 3), of unit quaternions; inverse of `from_euler`."""
+    w, x, y, z = q.T
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    return np.column_stack([roll, pitch, np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))])
+
+
 def ned_to_enu(v: np.ndarray) -> np.ndarray:
     """Return vectors of NED in ENU, shape (n, 3)."""
     return v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]

@@ -12,7 +12,7 @@ import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.recording import Recording, Series
-from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, ned_to_enu
+from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us] of a PWM output
 GAUSS = 1e-4  # [T]
@@ -23,7 +23,8 @@ DATA_BEGINS = (b"A", b"L", b"C")
 MAPPED = {
     "vehicle_attitude", "vehicle_local_position", "vehicle_angular_velocity", "sensor_combined", "actuator_motors",
     "actuator_outputs", "battery_status", "vehicle_gps_position", "sensor_gps", "vehicle_air_data", "sensor_baro",
-    "vehicle_magnetometer", "sensor_mag", "distance_sensor", "differential_pressure",
+    "vehicle_magnetometer", "sensor_mag", "distance_sensor", "differential_pressure", "trajectory_setpoint",
+    "vehicle_local_position_setpoint", "vehicle_attitude_setpoint", "vehicle_optical_flow",
 }  # fmt: skip
 
 
@@ -72,6 +73,8 @@ def read_ulog_flight(path: Path) -> Recording:
     channels.specific_force = moved(three("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
     channels.battery = series("battery_status", "voltage_v", "current_a")
     channels.duty = _duty(topics, series, channels)
+    channels.setpoint = _setpoint(series, three)
+    channels.attitude_setpoint = _attitude_setpoint(series)
     channels.readings = _readings(series, three)
     return to_recording(
         path, channels, "actuator_motors, actuator_outputs", "vehicle_angular_velocity, sensor_combined"
@@ -113,6 +116,43 @@ def _duty(topics: dict[str, dict[str, Any]], series: Any, channels: Channels) ->
     return Series(source.time, (source.values - PULSE_LOW) / PULSE_SPAN if pulses else source.values, source.dropped)
 
 
+def _setpoint(series: Any, three: Any) -> Series | None:
+    """Return desired position, velocity, acceleration, yaw and yaw rate in the columns of `Recording.setpoint`."""
+    for topic in ("trajectory_setpoint", "vehicle_local_position_setpoint"):  # single fields until PX4 1.13
+        place = three(topic, "position") or series(topic, "x", "y", "z")
+        speed = three(topic, "velocity") or series(topic, "vx", "vy", "vz")
+        change = three(topic, "acceleration") or series(topic, "acc_x", "acc_y", "acc_z")
+        turn = series(topic, "yaw", "yawspeed")
+        if place is not None and speed is not None and turn is not None:
+            unset = np.full((len(place.time), 3), np.nan)
+            vectors = [ned_to_enu(v) for v in (place.values, speed.values, change.values if change else unset)]
+            yaw, yaw_rate = turn.values.T
+            heading = np.arctan2(np.cos(yaw), np.sin(yaw))  # from east, counterclockwise
+            return Series(place.time, np.column_stack([*vectors, heading, -yaw_rate]), place.dropped)
+    return None
+
+
+def _attitude_setpoint(series: Any) -> Series | None:
+    """Return desired roll, pitch and yaw of FLU axes in ENU."""
+    topic = "vehicle_attitude_setpoint"
+    quaternion = series(topic, *(f"q_d[{k}]" for k in range(4)))
+    euler = series(topic, "roll_body", "pitch_body", "yaw_body")
+    if quaternion is not None and np.linalg.norm(quaternion.values, axis=1).all():
+        return Series(quaternion.time, to_euler(from_ned_frd(unit(quaternion.values))))
+    return euler and Series(euler.time, to_euler(from_ned_frd(from_euler(euler.values))))
+
+
+def _optical_flow(series: Any) -> Series | None:
+    """Return flow and own rate [rad/s] about body x and y, and distance [m]."""
+    topic = "vehicle_optical_flow"
+    turned = series(topic, "pixel_flow[0]", "pixel_flow[1]", "delta_angle[0]", "delta_angle[1]", "distance_m")
+    span = series(topic, "integration_timespan_us")
+    if turned is None or span is None:
+        return None
+    rates = turned.values[:, :4] * [1.0, -1.0, 1.0, -1.0] / (span.values * 1e-6)
+    return Series(turned.time, np.column_stack([rates, turned.values[:, 4]]), turned.dropped)
+
+
 def _readings(series: Any, three: Any) -> dict[str, Series]:
     """Sensors, each from the topic that the estimator used where there is one, else from the driver's."""
 
@@ -124,6 +164,10 @@ def _readings(series: Any, three: Any) -> dict[str, Series]:
             series(topic, "lat", "lon", "alt"), 1e-7, 1e-7, 1e-3
         )
 
+    def gps_velocity(topic: str) -> Series | None:
+        source = series(topic, "vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
+        return source and Series(source.time, ned_to_enu(source.values), source.dropped)
+
     driver = series("sensor_baro", "pressure")
     if driver and np.median(driver.values) < HIGHEST_HPA:  # hPa until PX4 1.13
         driver = scaled(driver, 100.0)
@@ -133,9 +177,11 @@ def _readings(series: Any, three: Any) -> dict[str, Series]:
     result = {
         "imu": scaled(series("sensor_combined", *raw), *FLU, *FLU),
         "gps": gps("vehicle_gps_position") or gps("sensor_gps"),
+        "gps_velocity": gps_velocity("vehicle_gps_position") or gps_velocity("sensor_gps"),
         "baro": series("vehicle_air_data", "baro_pressure_pa") or driver,
         "mag": scaled(field, *FLU * GAUSS),
         "rangefinder": series("distance_sensor", "current_distance"),
+        "optical_flow": _optical_flow(series),
         "airspeed": series("differential_pressure", "differential_pressure_pa")
         or series("differential_pressure", "differential_pressure_raw_pa"),
     }

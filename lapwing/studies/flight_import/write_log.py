@@ -8,7 +8,21 @@ from typing import Any
 import numpy as np
 
 from lapwing.cosim.log import LogWriter
-from lapwing.messages.topics import ACTUATORS, AIRSPEED, BARO, BATTERY, GPS, IMU, MAG, RANGEFINDER, TRUTH, Topic
+from lapwing.messages.topics import (
+    ACTUATORS,
+    AIRSPEED,
+    BARO,
+    BATTERY,
+    GPS,
+    GPS_VELOCITY,
+    IMU,
+    MAG,
+    OPTICAL_FLOW,
+    RANGEFINDER,
+    SETPOINT,
+    TRUTH,
+    Topic,
+)
 from lapwing.messages.types import (
     Actuators,
     BatteryState,
@@ -18,11 +32,16 @@ from lapwing.messages.types import (
     MagneticField,
     NavSatFix,
     NavSatStatus,
+    OpticalFlow,
     Point,
     Pose,
     Quaternion,
     Range,
+    Setpoint,
     Time,
+    Twist,
+    TwistWithCovariance,
+    TwistWithCovarianceStamped,
     Vector3,
     VehicleState,
 )
@@ -31,12 +50,13 @@ from lapwing.studies.flight_import.recording import Recording
 VEHICLE = "drone1"
 FRAME = "world"
 BATTERY_INTERVAL = 0.1  # [s]
+UNSET = Vector3(math.nan, math.nan, math.nan)
 SPINNING = 0.05  # share of the highest motor voltage above which motors count as armed
 
 
 SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
     # topic and message of each sensor's readings: rad/s and m/s^2 in body axes, degrees and metres, pascals, teslas in
-    # body axes, metres, pascals
+    # body axes, metres, pascals; m/s in the world, rad/s about body x and y of flow and camera and metres
     "imu": (
         IMU,
         lambda header, v: Imu(header=header, angular_velocity=Vector3(*v[:3]), linear_acceleration=Vector3(*v[3:])),
@@ -47,9 +67,17 @@ SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
             header, NavSatStatus(NavSatStatus.STATUS_FIX, NavSatStatus.SERVICE_GPS), v[0], v[1], v[2]
         ),
     ),
+    "gps_velocity": (
+        GPS_VELOCITY,
+        lambda header, v: TwistWithCovarianceStamped(header, TwistWithCovariance(Twist(linear=Vector3(*v)))),
+    ),
     "baro": (BARO, lambda header, v: FluidPressure(header, v[0])),
     "mag": (MAG, lambda header, v: MagneticField(header, Vector3(*v))),
     "rangefinder": (RANGEFINDER, lambda header, v: Range(header, Range.INFRARED, range=v[0])),
+    "optical_flow": (
+        OPTICAL_FLOW,
+        lambda header, v: OpticalFlow(header, flow=tuple(v[:2]), rate=tuple(v[2:4]), distance=v[4], variance=math.nan),
+    ),
     "airspeed": (AIRSPEED, lambda header, v: FluidPressure(header, v[0])),
 }
 
@@ -83,6 +111,7 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
     acceleration = np.gradient(flight.velocity, flight.interval, axis=0)
     highest = max(float(np.nanmax(flight.motor_voltage, initial=0.0)), 1e-9)
     located = np.isfinite(np.column_stack([flight.position, flight.attitude])).all(axis=1)
+    desired = bool(np.isfinite(flight.setpoint[:, :3]).any())
     battery_ticks = max(round(BATTERY_INTERVAL / flight.interval), 1)
     for k in range(len(flight)):
         time_ns = round(k * flight.interval * 1e9)
@@ -100,7 +129,11 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
             if "imu" not in flight.readings and np.isfinite(flight.specific_force[k]).all():
                 rates, force = _vector(flight.omega[k]), _vector(flight.specific_force[k])
                 yield time_ns, IMU, Imu(header=header, angular_velocity=rates, linear_acceleration=force)
-            yield time_ns, ACTUATORS, Actuators(header, volts, max(volts) > SPINNING * highest)
+            lean = _vector(flight.attitude_setpoint[k]) if len(flight.attitude_setpoint) else UNSET
+            armed = max(volts) > SPINNING * highest
+            yield time_ns, ACTUATORS, Actuators(header, volts, armed, attitude_reference=lean)
+            if desired:
+                yield time_ns, SETPOINT, _setpoint(header, flight.setpoint[k].tolist())
         if k % battery_ticks == 0 and math.isfinite(flight.battery_voltage[k]):
             battery = BatteryState(header=header, voltage=float(flight.battery_voltage[k]), present=True)
             yield time_ns, BATTERY, battery
@@ -113,6 +146,10 @@ def _readings(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
         for time, values in zip(series.time.tolist(), series.values.tolist(), strict=True):
             if time >= 0.0 and all(map(math.isfinite, values)):
                 yield (time_ns := round(time * 1e9)), topic, message(_header(time_ns), values)
+
+
+def _setpoint(header: Header, v: Sequence[float]) -> Setpoint:
+    return Setpoint(header, Vector3(*v[:3]), Vector3(*v[3:6]), Vector3(*v[6:9]), v[9], v[10])
 
 
 def _header(time_ns: int) -> Header:

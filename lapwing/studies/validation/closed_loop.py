@@ -15,8 +15,7 @@ from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies import simulate
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.validation.windows import LOWEST
+from lapwing.studies.flight_import.recording import LOWEST, Recording
 
 SHORTEST = 3.0  # [s] of setpoints that are worth flying
 TABLE_STEP = 0.04  # [s] between two points of the trajectory
@@ -57,7 +56,7 @@ def fly_setpoints(scene: Scene | str | Path, flight: Recording, overrides: Overr
         return None
     ground = flight.position[np.flatnonzero(flight.valid)[0]]
     floor = np.array([0.0, 0.0, ground[2] if ground[2] < RESTING_HEIGHT else 0.0])
-    desired = flight.setpoint[span]
+    desired = flight.setpoint[span, :3]
     points = desired - floor
     length = (len(points) - 1) * flight.interval
     lead = CLIMB + APPROACH + HOVER

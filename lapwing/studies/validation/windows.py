@@ -6,12 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.flight_import.recording import LOWEST, Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotate, rotation_vector
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 from lapwing.studies.validation.start_states import StartStates
 
-LOWEST = 0.3  # [m] above the ground, below which a window is left out
 PAST = 20  # samples before a window that must be valid, for the rotor speeds and the trim
 POWER, WIDTH = MOTION + 3, MOTION + 4  # column of the power, and number of columns, of a prediction
 BATCH = 16_384  # windows stepped at once

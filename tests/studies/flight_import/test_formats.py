@@ -10,6 +10,7 @@ import pytest
 from flight_recordings import BATTERY, real_flights
 from scipy.spatial.transform import Rotation
 
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotation_vector
@@ -205,7 +206,55 @@ def write_rosbag(path, flight):
         writer.write(connections["/note"], ns, note)
 
 
-WRITERS = {"f.bin": write_bin, "f.log": write_text, "f.tlog": write_tlog, "log07": write_usd, "bag": write_rosbag}
+ULOG = {  # topic: fields beside the time stamp, of PX4 1.14
+    "vehicle_attitude": "float[4] q;",
+    "vehicle_local_position": "float x;float y;float z;float vx;float vy;float vz;",
+    "sensor_combined": "float[3] gyro_rad;float[3] accelerometer_m_s2;",
+    "actuator_motors": "float[4] control;",
+    "battery_status": "float voltage_v;float current_a;",
+    "trajectory_setpoint": "float[3] position;float[3] velocity;float[3] acceleration;float yaw;float yawspeed;",
+    "vehicle_attitude_setpoint": "float[4] q_d;",
+    "vehicle_rates_setpoint": "float roll;float pitch;float yaw;",
+    "sensor_gps": "float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;",
+    "vehicle_optical_flow": "float[2] pixel_flow;float[3] delta_angle;float distance_m;"
+    "uint32_t integration_timespan_us;",
+}
+
+
+def write_ulog(path, flight):
+    """Write a ULog file; the setpoints are the flight itself."""
+
+    def message(kind, content):
+        return struct.pack("<HB", len(content), ord(kind)) + content
+
+    v = ned(flight)
+    acceleration = np.gradient(v["velocity"], INTERVAL, axis=0)
+    yaw = v["euler"][:, 2]
+    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    out += b"".join(message("F", f"{t}:uint64_t timestamp;{f}".encode()) for t, f in ULOG.items())
+    out += b"".join(message("A", struct.pack("<BH", 0, k) + t.encode()) for k, t in enumerate(ULOG))
+    for k in range(len(flight)):
+        rows = [
+            v["quaternion"][k], [*v["position"][k], *v["velocity"][k]], [*v["omega"][k], *v["force"][k]], v["duty"][k],
+            [BATTERY, 2.0], [*v["position"][k], *v["velocity"][k], *acceleration[k], yaw[k], -0.8],
+            v["quaternion"][k], v["omega"][k], v["velocity"][k],
+        ]  # fmt: skip
+        stamp = struct.pack("<Q", round(k * INTERVAL * 1e6) + 5_000_000)
+        for number, row in enumerate(rows):
+            out += message("D", struct.pack("<H", number) + stamp + struct.pack(f"<{len(row)}f", *row))
+        flow = struct.pack("<6fI", 0.01, 0.02, 0.03, 0.04, 0.05, 2.0, 10_000)
+        out += message("D", struct.pack("<H", len(rows)) + stamp + flow)
+    path.write_bytes(out)
+
+
+WRITERS = {
+    "f.ulg": write_ulog,
+    "f.bin": write_bin,
+    "f.log": write_text,
+    "f.tlog": write_tlog,
+    "log07": write_usd,
+    "bag": write_rosbag,
+}
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -224,6 +273,53 @@ def test_format_returns_flight(tmp_path, flight, name):
     assert result.specific_force == pytest.approx(flight.specific_force[:n], abs=2e-3)
     assert result.motor_voltage == pytest.approx(flight.motor_voltage[:n], abs=5e-3)
     assert result.battery_voltage == pytest.approx(np.full(n, BATTERY), abs=1e-3)
+
+
+def test_ulog_setpoints_are_those_of_the_trajectory(tmp_path, flight):
+    write_ulog(tmp_path / "f.ulg", flight)
+    result = open_flight(tmp_path / "f.ulg")
+    n = len(result)
+    angles = Rotation.from_quat(flight.attitude[:n, [1, 2, 3, 0]]).as_euler("ZYX")[:, ::-1]
+    assert result.setpoint[:, :3] == pytest.approx(flight.position[:n], abs=1e-5)
+    assert result.setpoint[:, 3:6] == pytest.approx(flight.velocity[:n], abs=1e-5)
+    assert result.setpoint[1:-1, 6:9] == pytest.approx(
+        np.gradient(flight.velocity[:n], INTERVAL, axis=0)[1:-1], abs=1e-4
+    )
+    assert np.cos(result.setpoint[:, 9] - angles[:, 2]) == pytest.approx(np.ones(n), abs=1e-6)
+    assert result.setpoint[:, 10] == pytest.approx(np.full(n, 0.8))
+    assert result.attitude_setpoint[:, :2] == pytest.approx(angles[:, :2], abs=1e-5)
+    assert result.readings["gps_velocity"].values[:n] == pytest.approx(flight.velocity[:n], abs=1e-5)
+    assert result.readings["optical_flow"].values[0] == pytest.approx([1.0, -2.0, 3.0, -4.0, 2.0])
+    assert result.unknown == ("vehicle_rates_setpoint",)
+
+
+def test_setpoints_of_single_fields_are_read(tmp_path, flight, monkeypatch):
+    single = {
+        **ULOG,
+        "trajectory_setpoint": "float x;float y;float z;float vx;float vy;float vz;float acc_x;float acc_y;float acc_z;"
+        "float yaw;float yawspeed;",
+    }
+    write_ulog(tmp_path / "new.ulg", flight)
+    monkeypatch.setitem(globals(), "ULOG", single)
+    write_ulog(tmp_path / "old.ulg", flight)
+    new, old = (open_flight(tmp_path / name).setpoint for name in ("new.ulg", "old.ulg"))
+    assert np.array_equal(new, old)
+
+
+def test_imported_setpoints_are_in_the_log(tmp_path, flight):
+    write_ulog(tmp_path / "f.ulg", flight)
+    done = run("import", tmp_path / "f.ulg", "--out", tmp_path / "f.mcap")
+    assert done.returncode == 0, done.stderr
+    assert "topics without a counterpart: vehicle_rates_setpoint\n" in done.stdout
+    log = FlightData.read(tmp_path / "f.mcap")
+    n = len(log.setpoint)
+    assert log.setpoint.position == pytest.approx(flight.position[:n], abs=1e-5)
+    assert np.cos(log.setpoint.yaw - log.truth.attitude[:, 2]) == pytest.approx(np.ones(n), abs=1e-6)
+    assert max(log.rmse.values()) < 1e-5
+    assert len(log.topic("gps/velocity")) >= n
+    assert log.topic("optical_flow").flow[0] == pytest.approx([1.0, -2.0])
+    again = open_flight(tmp_path / "f.mcap")
+    assert again.setpoint[1:, :3] == pytest.approx(flight.position[1 : len(again)], abs=1e-5)
 
 
 def test_unknown_topics_are_listed(tmp_path, flight):

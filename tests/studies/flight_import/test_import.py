@@ -1,6 +1,7 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,3 +74,36 @@ def test_ulog_of_real_vehicle_has_consistent_axes(tmp_path):
     assert "cpuload" in result.unknown
     assert "correlation 1.00" in result.notes[-1] or "correlation 0.9" in result.notes[-1]
     assert np.median(result.specific_force[:, 2]) == pytest.approx(9.8, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("height", "share", "reason"), [(0.05, 1.0, "height changes by"), (2.0, 0.0, "motors do not run")]
+)
+def test_flight_on_the_ground_is_reported_in_one_line(flight, tmp_path, height, share, reason):
+    grounded = replace(
+        flight, position=np.full_like(flight.position, height), motor_voltage=share * flight.motor_voltage
+    )
+    source, out = write_csv(tmp_path / "flight.csv", grounded), tmp_path / "flight.mcap"
+    done = run("import", source, "--mapping", "nanobench", "--out", out)
+    assert done.returncode == 0, done.stderr
+    lines = [line for line in done.stdout.splitlines() if line.startswith("never leaves the ground")]
+    assert len(lines) == 1
+    assert reason in lines[0]
+    refused = run("validate", "crazyflie_21", out)
+    assert refused.returncode == 2
+    assert refused.stderr.count("\n") == 1
+    assert "leave the ground" in refused.stderr
+
+
+def test_setpoint_of_csv_is_in_the_log(flight, tmp_path):
+    desired = flight.position + 0.1
+    source = write_csv(tmp_path / "flight.csv", flight)
+    lines = source.read_text().splitlines()
+    lines[0] += ",sp_ctrltarget_x,sp_ctrltarget_y,sp_ctrltarget_z"
+    lines[1:] = [f"{line},{','.join(map(str, p))}" for line, p in zip(lines[1:], desired.tolist(), strict=True)]
+    source.write_text("\n".join(lines) + "\n")
+    recording = open_flight(source, "nanobench")
+    write_log(tmp_path / "flight.mcap", recording, source.name)
+    result = open_flight(tmp_path / "flight.mcap")
+    assert result.setpoint[1:, :3] == pytest.approx(desired[1 : len(result)], abs=1e-9)
+    assert np.isnan(result.setpoint[:, 3:]).all()
