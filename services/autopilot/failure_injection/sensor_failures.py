@@ -59,8 +59,8 @@ def lost(r: Any) -> Any:
 
 @overload_for(lost, inline=True)
 def _lost_by(r: types.Type) -> Callable:
-    kept = "".join(f"r.{field}, " for field in r.fields if field != "valid")  # `valid` is the last of every reading
-    return compile_source("lost(r)", {"Reading": r.instance_class}, f"return Reading({kept}False)")
+    fields = ", ".join("False" if field == "valid" else f"r.{field}" for field in r.fields)
+    return compile_source("lost(r)", {"Reading": r.instance_class}, f"return Reading({fields})")
 
 
 @always_inline
