@@ -99,7 +99,7 @@ OF_ONE = {
 
 @pytest.mark.parametrize("name", OF_ONE)
 def test_python_api_for_one_vehicle_rejects_fleet(name):
-    with pytest.raises(lapwing.SceneError, match="vehicle: there are 3; expected a scene of one vehicle"):
+    with pytest.raises(lapwing.SceneError, match="vehicle: there are 3; expected a scene with one vehicle"):
         OF_ONE[name]("fleet")
 
 
@@ -107,5 +107,5 @@ def test_command_for_one_vehicle_rejects_fleet_in_one_line():
     command = [sys.executable, "-m", "lapwing", "tune", "fleet"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2, done.stderr
-    assert "vehicle: there are 3; expected a scene of one vehicle" in done.stderr
+    assert "vehicle: there are 3; expected a scene with one vehicle" in done.stderr
     assert len(done.stderr.splitlines()) == 1

@@ -194,5 +194,5 @@ def test_fault_names_line(entry, message, tmp_path):
 
 
 def test_function_for_single_vehicle_rejects_fleet():
-    with pytest.raises(SceneError, match=r"vehicle: there are 3; expected a scene of one vehicle"):
+    with pytest.raises(SceneError, match=r"vehicle: there are 3; expected a scene with one vehicle"):
         load("fleet").tables("effects")

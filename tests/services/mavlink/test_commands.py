@@ -185,7 +185,7 @@ def test_every_setpoint_is_followed_or_refused_by_name(name, firmware):
         for mask in [*range(0, 4096, 7), 4095 & ~512]:
             kinds.clear()
             station.got.clear()
-            station.bench.adapter.sessions[station.endpoint]._said.clear()
+            station.bench.adapter.sessions[station.endpoint]._sent_texts.clear()
             position_target(station, name, frame, mask)
             bench.vehicle.mode, bench.vehicle.position = "hold", [0.0, 0.0, 3.0]
             bench.step()
