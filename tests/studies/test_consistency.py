@@ -5,9 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import lapwing
-from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.filter_state import SIZE
-from lapwing.services.sensors import imu
 from lapwing.studies import consistency
 from lapwing.studies.metrics import metrics
 
@@ -50,13 +48,6 @@ def vertical_speed_sigmas(flight):
     rows = np.searchsorted(t.times, e.times - 1e-6)
     late = e.times > 2.0
     return np.abs((t.velocity[rows, 2] - e.velocity[:, 2]) / e.velocity_std[:, 2])[late].max()
-
-
-def test_gyro_scale_figure_is_that_of_presets():
-    """An axis reads s of its own rate and phi of the two others' wrongly: mean over axes (s^2 + 2 phi^2) / 3."""
-    for preset in (imu.MPU6000, imu.BMI088):
-        s, phi = preset.gyro.scale_error, np.radians(preset.gyro.misalignment_deg)
-        assert Estimator().gyro_scale_std == pytest.approx(np.sqrt((s * s + 2.0 * phi * phi) / 3.0), rel=0.01)
 
 
 @pytest.mark.long

@@ -25,7 +25,7 @@ class Estimator(NamedTuple):
     attitude_std: Annotated[float, Gt(0)] = 0.1  # [rad] of the initial attitude
     gyro_bias_std: Annotated[float, Gt(0)] = 1.9e-3  # [rad/s] at the start
     gyro_bias_walk: Annotated[float, Ge(0)] = 1e-5  # [rad/s/sqrt(s)], instability and warm-up
-    gyro_scale_std: Annotated[float, Ge(0)] = 9.2e-4  # root mean square over the axes of scale and misalignment
+    gyro_scale_std: Annotated[float, Ge(0)] = 1.2e-3  # scale and misalignment, ratio
     accelerometer_bias_std: Annotated[float, Gt(0)] = 0.031  # [m/s^2] at the start, with scale and misalignment
     accelerometer_bias_walk: Annotated[float, Ge(0)] = 1e-4  # [m/s^2/sqrt(s)]
     barometer_walk: Annotated[float, Ge(0)] = 0.02  # [m/sqrt(s)], with the weather
