@@ -1,4 +1,4 @@
-"""Moving picture of the delivery mission's last turn and landing: python docs/pictures/flight.py [FILE.webp] (needs chromium)."""
+"""Film of the mission's last turn and landing: python docs/pictures/flight.py [FILE.webp] (needs chromium)."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ import lapwing
 from lapwing.studies.view3d.render import Shot, render
 
 HERE = Path(__file__).parent
-SHOT = Shot(start=44.0, stop=68.0, rate=15.0, speed=2.5, size=(800, 450), place=(-1.5, 0.6, -1.05))
+SHOT = Shot(start=44.0, stop=68.0, rate=12.0, speed=2.5, size=(800, 450), place=(-1.5, 0.6, -1.05))
 
 
 def main(target: Path, shot: Shot = SHOT) -> None:

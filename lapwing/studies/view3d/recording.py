@@ -79,7 +79,8 @@ def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle
     paths = [sample(flight, vehicle.motion, along) for flight, vehicle in zip(shown, vehicles, strict=True)]
     errors = [path.error for path in paths if path.error is not None]
     most = float(max(np.quantile(error, 0.995) for error in errors)) if errors else 0.0
-    pieces = [_trail(vehicle, path, most) for vehicle, path in zip(vehicles, paths, strict=True)]
+    span = tuple(int(k) for k in np.searchsorted(along, times[[0, -1]]))
+    pieces = [_trail(vehicle, path, span, most) for vehicle, path in zip(vehicles, paths, strict=True)]
     samples = [sample(flight, vehicle.motion, times) for flight, vehicle in zip(shown, vehicles, strict=True)]
     for vehicle, result in zip(vehicles, samples, strict=True):
         vehicle.show(result, 0)
@@ -94,10 +95,13 @@ def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle
     return recording, most
 
 
-def _trail(vehicle: Vehicle, path: Samples, most: float) -> list[tuple[float, Any]]:
-    """Add the desired path, and hidden pieces of the flown one; return the times [s] of their ends with their nodes."""
-    last = len(path.times) - 1
-    cuts = np.unique(np.linspace(0, last, min(PIECES, last) + 1).round().astype(int))
+def _trail(vehicle: Vehicle, path: Samples, span: tuple[int, ...], most: float) -> list[tuple[float, Any]]:
+    """Add the desired path, and hidden pieces of the flown one; return the times [s] of their ends with their nodes.
+
+    One piece leads to the first frame; `span` has the indices of the first and the last frame.
+    """
+    first, last = span
+    cuts = np.unique([0, *np.linspace(first, last, min(PIECES, last - first) + 1).round().astype(int)])
     step = max(1, -(-len(path.times) // POINTS))
     if path.desired is not None:
         vehicle.desired_path(path.desired[::step])

@@ -136,7 +136,7 @@ def write_film(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
         return
     timing = {"save_all": True, "duration": round(1000.0 / shot.rate), "loop": 0}
     if target.suffix == ".webp":
-        first.save(target, append_images=pictures, quality=QUALITY, method=6, **timing)
+        first.save(target, append_images=pictures, quality=QUALITY, method=3, **timing)
         return
     rest = (picture.quantize(128, dither=0) for picture in pictures)  # each has its own colours
     first.quantize(128, dither=0).save(target, append_images=rest, **timing)
