@@ -1,4 +1,4 @@
-"""Size of the mission's report and time until it answers, first live picture, frames a second of the 3D view.
+"""Size of the mission's report and time until it answers, first live picture, film, frames a second of the 3D view.
 
     python -m benchmarks.pages [LOG]      (of the delivery mission, where none is named)
 
@@ -26,6 +26,7 @@ from lapwing.studies.report import write
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.view3d.headless import Browser
 from lapwing.studies.view3d.recording import page
+from lapwing.studies.view3d.render import Shot, render
 
 VEHICLES, APART = 8, 3.0  # [m] between neighbours
 SECONDS = 10.0  # of which frames are counted
@@ -36,6 +37,7 @@ for (;;) {
   await new Promise((done) => setTimeout(done, 5));
 }
 """
+FILM = 180.0  # [s]
 READY = "while (!window.lapwingView?.ready) await new Promise((done) => setTimeout(done, 5));"
 RATE = f"""
 {READY}
@@ -60,6 +62,14 @@ def rows(log):
             yield Row(f"first plot of that report {name} 3D view", wall, "s", 1.0)
             yield Row(f"the same {name} 3D view, processor time of its thread", cpu, "s", 1.0)
         yield Row("first picture of --view after the first tick", first_picture(), "s", 1.0)
+        start = time.monotonic()
+        render([flight], [flight.vehicle], Path(folder, "film.mp4"), Shot())
+        yield Row(
+            "film of the mission, {}x{}, {:g} pictures a second".format(*Shot().size, Shot().rate),
+            time.monotonic() - start,
+            "s",
+            FILM,
+        )
         for count in (1, VEHICLES):
             view = Path(folder, "view.html")
             view.write_text(page([fleet(flight, count)], [flight.vehicle]), encoding="utf-8")

@@ -73,12 +73,12 @@ def render(
         Path | None, typer.Option("--with", metavar="FILE", help="second log, drawn translucent in the same scene")
     ] = None,
     camera: Annotated[str, typer.Option(metavar="follow|orbit|top|onboard", help="place of the camera")] = "follow",
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="pixels, even numbers")] = "1280x720",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="pixels, even numbers")] = "960x540",
     start: Annotated[
         float | None, typer.Option("--from", metavar="S", help="first time; of a picture its time [middle]")
     ] = None,
     stop: Annotated[float | None, typer.Option("--to", metavar="S", help="last time of a film")] = None,
-    fps: Annotated[float, typer.Option(metavar="N", help="pictures a second of a film")] = 25.0,
+    fps: Annotated[float, typer.Option(metavar="N", help="pictures a second of a film")] = 20.0,
     speed: Annotated[float, typer.Option(metavar="N", help="simulated seconds in a second of a film")] = 1.0,
 ) -> None:
     """Write a film or a picture of a log's 3D view.

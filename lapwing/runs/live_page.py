@@ -11,13 +11,17 @@ from typing import Any, Self
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
+from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.report.style import COLOURS, FLOWN
+from lapwing.studies.topic_view import TopicView
+from lapwing.studies.view3d.bodies import LEVEL
 from lapwing.studies.view3d.local_server import serving
 from lapwing.studies.view3d.recording import with_bridge
 from lapwing.studies.view3d.samples import Samples, sample
-from lapwing.studies.view3d.stage import Vehicle
+from lapwing.studies.view3d.stage import Vehicle, add_shaders
 from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
 
@@ -43,6 +47,8 @@ class LivePage:
         self._stack = ExitStack()
         self._server = self._stack.enter_context(serving(token, lambda html: with_bridge(html, facts)))
         self.address = f"http://127.0.0.1:{self._server.get_port()}/{token}/"
+        add_surroundings(self._server.scene, _before_start(members(setup)[0]))
+        add_shaders(self._server.scene)
         self._vehicles: list[Vehicle] = []
         self._pieces: deque[Any] = deque()
         self._frames: deque[tuple[float, list[Samples], int]] = deque()  # wall time [s], samples, index
@@ -58,7 +64,6 @@ class LivePage:
     def show(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
         """Show the new steps and events of every vehicle."""
         if not self._vehicles:
-            add_surroundings(self._server.scene, steps[0])
             for k, (step, colour) in enumerate(zip(steps, self._colours, strict=True)):
                 self._vehicles.append(Vehicle(self._server.scene, k, step, step.vehicle, colour))
         now = time.monotonic()
@@ -125,3 +130,10 @@ class LivePage:
             self._server.flush()
             time.sleep(FAREWELL)
         self._stack.close()
+
+
+def _before_start(setup: RunConfig) -> FlightData:
+    """Return a flight of one sample, at the start [m]."""
+    place = Origin.of_setup(setup).scene.get("vehicle", {}).get("initial_position") or (0.0, 0.0)
+    columns = {"pose.position": np.array([[*place[:2], 0.0]]), "pose.orientation": np.array([LEVEL])}
+    return FlightData({"ground_truth": TopicView(np.zeros(1, np.int64), columns)}, Origin.of_setup(setup))

@@ -1,6 +1,7 @@
 """The report against a flight made by formula: its figures are known without the code under test."""
 
 import base64
+import gzip
 import importlib
 import json
 import math
@@ -140,14 +141,14 @@ class Page(HTMLParser):
             self.ids.append(result["id"])
         self.addresses += [v for k, v in attrs if k in ("src", "href", "srcset", "data", "action")]
         if tag not in ("meta", "link", "input"):
-            self._open.append("json" if result.get("type") == "application/json" else tag)
+            self._open.append("plot" if result.get("type") == "application/gzip" else tag)
 
     def handle_endtag(self, tag):
-        assert self._open.pop() in (tag, "json")
+        assert self._open.pop() in (tag, "plot")
 
     def handle_data(self, data):
-        if self._open[-1:] == ["json"]:
-            self.plots[self.ids[-1]] = json.loads(data)
+        if self._open[-1:] == ["plot"]:
+            self.plots[self.ids[-1]] = json.loads(gzip.decompress(base64.b64decode(data, validate=True)))
         elif data.strip() and self._open[-1] not in ("script", "style"):
             self.texts.append(data.strip())
 
@@ -172,7 +173,9 @@ def values(array):
         return np.array(array, float)
     if "bdata" in array:
         return np.frombuffer(base64.b64decode(array["bdata"], validate=True), "<f4")
-    steps = np.frombuffer(base64.b64decode(array["steps"], validate=True), "<i2").astype(float)
+    planes = np.frombuffer(base64.b64decode(array["steps"], validate=True), np.uint8).reshape(2, -1)
+    changes = planes[0] + 256 * planes[1].astype(int)
+    steps = np.cumsum(changes).astype(np.int16).astype(float)
     return np.where(steps == -32768, np.nan, array["low"] + (steps + 32767) * array["step"])
 
 

@@ -22,8 +22,12 @@
   // Numbers in 16-bit steps of their range: see _array of plotly_traces.py. Typed arrays of plotly.js stay.
   function numbers(given) {
     if (given?.steps === undefined) return given;
-    const bytes = Uint8Array.from(atob(given.steps), (c) => c.charCodeAt(0));
-    return Float64Array.from(new Int16Array(bytes.buffer), (n) => (n === -32768 ? NaN : given.low + (n + 32767) * given.step));
+    const bytes = Uint8Array.from(atob(given.steps), (c) => c.charCodeAt(0)), count = bytes.length / 2;
+    let n = 0;
+    return Float64Array.from({ length: count }, (_, k) => {
+      n = ((n + bytes[k] + 256 * bytes[k + count]) << 16) >> 16; // as 16-bit numbers overflow
+      return n === -32768 ? NaN : given.low + (n + 32767) * given.step;
+    });
   }
 
   const scheme = matchMedia("(prefers-color-scheme: dark)");
@@ -49,7 +53,7 @@
   async function draw(figure) {
     if (figure.dataset.drawn) return;
     figure.dataset.drawn = "yes";
-    const { data, layout, timed, narrow } = JSON.parse(coloured(figure.querySelector("script").textContent));
+    const { data, layout, timed, narrow } = JSON.parse(coloured(texts.get(figure) ?? (await unpacked(figure.querySelector("script")))));
     if (narrow && figure.clientWidth < NARROW) stack(layout, narrow);
     for (const trace of data) for (const axis of ["x", "y"]) trace[axis] = numbers(trace[axis]);
     const box = figure.querySelector("div");
@@ -65,6 +69,8 @@
 
   // A closed section is not near the window, and is drawn when it opens.
   const figures = [...document.querySelectorAll("figure.plot")];
+  const texts = new Map(); // of figures that are unpacked: a page that is printed cannot wait for them
+  figures.forEach(async (figure) => texts.set(figure, await unpacked(figure.querySelector("script"))));
   const near = new IntersectionObserver(
     (entries) => entries.filter((entry) => entry.isIntersecting).forEach((entry) => draw(entry.target)),
     { rootMargin: "600px" },

@@ -10,6 +10,7 @@ from lapwing.studies.report import plots
 from lapwing.studies.report.overlay import overlay
 from lapwing.studies.report.plot import NotRecordedError, Plot, in_hours
 from lapwing.studies.report.plotly_figure import to_json
+from lapwing.studies.report.plotly_script import compressed
 
 LONG = 3 * 3600.0  # [s] from which on time is told in hours
 
@@ -23,9 +24,9 @@ class Section(NamedTuple):
     missing: str = ""
 
     @property
-    def json(self) -> str:
+    def packed(self) -> str:
         """The plot for a browser."""
-        return to_json(self.plot) if self.plot else ""
+        return compressed(to_json(self.plot)) if self.plot else ""
 
 
 def sections(flights: Sequence[FlightData]) -> Iterator[Section]:

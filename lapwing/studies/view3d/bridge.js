@@ -7,6 +7,17 @@
   window.__THREE_DEVTOOLS__ = tools;
   window.__VISER_EMBED_CONFIG__ = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
 
+  // A renderer without a graphics processor gets cheaper pictures: see `simplify`.
+  const probe = document.createElement("canvas").getContext("webgl2");
+  const device = probe?.getExtension("WEBGL_debug_renderer_info");
+  const slow = /swiftshader|llvmpipe|softpipe|basic render/i.test(device ? probe.getParameter(device.UNMASKED_RENDERER_WEBGL) : "");
+  const smooth = location.hash === "#smooth"; // asked for by pictures, which take the time
+  probe?.getExtension("WEBGL_lose_context")?.loseContext();
+  const context = HTMLCanvasElement.prototype.getContext;
+  HTMLCanvasElement.prototype.getContext = function (kind, options) {
+    return context.call(this, kind, slow && kind === "webgl2" ? { ...options, antialias: smooth } : options);
+  };
+
   const view = { mode: "follow", vehicle: 0, fresh: true, time: null };
   window.lapwingView = view;
   const scene = () => observed.find((one) => one.isScene && one.__r3f);
@@ -29,10 +40,37 @@
     return { place: [m[12], m[13], m[14]], ahead: [m[0], m[1], m[2]], up: [m[8], m[9], m[10]] };
   }
 
-  function steer() {
+  function simplify(now, at) { // one small shadow around the vehicle that is followed, in the place of three
+    const lights = scene().children.filter((one) => one.isDirectionalLight && one.castShadow);
+    if (!lights.length) return;
+    const [light, ...others] = lights, half = 3 * facts.size, height = 200;
+    for (const other of others) {
+      light.intensity += other.intensity;
+      other.castShadow = other.visible = false;
+      other.intensity = 0;
+    }
+    const fresh = !light.shadow.around;
+    light.shadow.around = at.place;
+    if (fresh) {
+      if (!smooth) now.gl.shadowMap.type = 0; // a hard edge
+      const update = light.shadow.updateMatrices; // three.js calls it before it draws the map
+      light.shadow.updateMatrices = function (one) {
+        const [x, y, z] = this.around, { camera } = this, toward = camera.position.clone();
+        toward.set(0.2, 1, 0.2).normalize().multiplyScalar(0.5 * height);
+        one.matrixWorld.makeTranslation(x - toward.x, y + toward.y, z - toward.z);
+        one.target.matrixWorld.makeTranslation(x, y, z);
+        Object.assign(camera, { left: -half, right: half, bottom: -half, top: half, near: 0.1, far: height });
+        camera.updateProjectionMatrix();
+        update.call(this, one);
+      };
+    }
+  }
+
+  function follow() {
     const now = state();
     const at = now?.controls && pose();
     if (at) {
+      if (slow) simplify(now, at);
       const { controls } = now, [x, y, z] = at.place, far = Math.max(0.5, facts.size);
       if (view.mode === "onboard") {
         const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * far, back = 0.9 * far;
@@ -55,6 +93,10 @@
         if (parent !== window) parent.postMessage({ lapwing: "time", time }, "*");
       }
     } else if (facts.live) view.shown = true;
+  }
+  function steer() {
+    if (view.filming) return;
+    follow();
     requestAnimationFrame(steer);
   }
 
@@ -74,17 +116,44 @@
   };
   view.frames = () => state().gl.info.render.frame; // that have been drawn
   view.look = (mode, vehicle = view.vehicle, place = null) => Object.assign(view, { mode, vehicle, place, fresh: true });
-  view.bare = () => document.getElementById("lapwing").remove();
-  view.settle = async (time) => { // until the scene of a time has been drawn
-    const frames = async (count) => {
-      for (let k = 0; k < count; k++) await new Promise((done) => requestAnimationFrame(done));
+  const { port1: asked, port2: answered } = new MessageChannel(), waiting = [];
+  answered.onmessage = () => waiting.shift()();
+  const turn = () => new Promise((done) => { // of the event loop, without the 4 ms of a timer
+    waiting.push(done);
+    asked.postMessage(0);
+  });
+  view.film = async (times, kind, quality) => { // pictures at times [s], as data URLs; the page stands still from now on
+    const now = state(), canvas = now.gl.domElement, { render } = now.gl, pictures = [];
+    if (!view.filming) {
+      view.filming = true;
+      now.setFrameloop("never");
+      document.getElementById("lapwing").remove();
+      canvas.style.visibility = "hidden"; // the page need not be put together
+      view.seek(facts.start + 1e6); // the player stops, also before it is sent to where it already is
+      await turn();
+    }
+    const pass = (drawn) => {
+      now.gl.render = drawn ? render : () => {};
+      state().advance(performance.now() / 1000);
     };
-    view.seek(time);
-    for (let k = 0; k < 400 && !(Math.abs(view.time - time) < 2e-3); k++) await frames(1);
-    state().invalidate();
-    await frames(3);
-    state().invalidate();
-    await frames(2);
+    for (const time of times) {
+      view.seek(time);
+      for (let k = 0; k < 100 && !(Math.abs(view.time - time) < 2e-3); k++) {
+        await turn();
+        follow();
+      }
+      pass(false); // viser handles the messages of this time
+      await turn(); // its page takes them over
+      pass(false); // and moves the bodies
+      if (canvas.width !== innerWidth || canvas.height !== innerHeight) { // with a play bar, or made coarser by viser
+        now.setDpr(1);
+        now.setSize(innerWidth, innerHeight);
+      }
+      follow();
+      pass(true);
+      pictures.push(canvas.toDataURL(kind, quality)); // toBlob would wait for the page to be idle
+    }
+    return pictures;
   };
 
   function select(name, options, chosen) {

@@ -12,7 +12,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import COLOURS
 from lapwing.studies.view3d import require
 from lapwing.studies.view3d.local_server import serving
-from lapwing.studies.view3d.samples import sample
+from lapwing.studies.view3d.samples import Samples, sample
 from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
 from lapwing.studies.view3d.surroundings import add_surroundings
 
@@ -23,14 +23,13 @@ PIECES = 100  # of a trail, which appear one after the other
 POINTS = 1500  # of a trail
 
 
-def page(flights: Sequence[FlightData], names: Sequence[str], rate: float = RATE, frames: int = FRAMES) -> str:
+def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray | None = None) -> str:
     """Return the page of a flight with its fleet, or of flights that are compared.
 
     Args:
         flights: one flight; or several, of which all but the first are drawn translucent.
         names: their names, as they are shown.
-        rate: frames a second.
-        frames: the largest count of frames.
+        times: of the frames [s], shape (k,), rising; None: `RATE` frames a second of the whole flights.
 
     Raises:
         ValueError: viser is not installed.
@@ -44,10 +43,8 @@ def page(flights: Sequence[FlightData], names: Sequence[str], rate: float = RATE
     else:
         order = list(flights[0].fleet)
         colours = [COLOURS[order.index(name) % len(COLOURS)] for name in titles]
-    start = min(float(flight.truth.times[0]) for flight in shown)
-    stop = max(float(flight.truth.times[-1]) for flight in shown)
-    count = min(frames, FLEET_FRAMES // len(shown), max(2, round((stop - start) * rate) + 1))
-    times = np.linspace(start, stop, count)
+    if times is None:
+        times = _frame_times(shown)
     with serving() as server, server.atomic():  # no client is connected, so nothing has to be sent
         add_surroundings(server.scene, shown[0])
         vehicles = [
@@ -60,42 +57,61 @@ def page(flights: Sequence[FlightData], names: Sequence[str], rate: float = RATE
         "names": titles,
         "colours": colours,
         "size": max(reach(vehicle.motion) for vehicle in vehicles),
-        "start": start,
+        "start": float(times[0]),
         "error": most,
         "live": False,
     }
     return with_bridge(html, facts)
 
 
+def _frame_times(shown: Sequence[FlightData]) -> np.ndarray:
+    """Return times [s] from the first to the last of all flights."""
+    start = min(float(flight.truth.times[0]) for flight in shown)
+    stop = max(float(flight.truth.times[-1]) for flight in shown)
+    count = min(FRAMES, FLEET_FRAMES // len(shown), max(2, round((stop - start) * RATE) + 1))
+    return np.linspace(start, stop, count)
+
+
 def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle], times: np.ndarray) -> Any:
     """Record all frames; return the recording and the error [m] at the end of the colour scale."""
-    samples = [sample(flight, vehicle.motion, times) for flight, vehicle in zip(shown, vehicles, strict=True)]
-    errors = [result.error for result in samples if result.error is not None]
+    whole = _frame_times(shown)
+    along = np.unique(np.concatenate([whole[whole < times[0]], times, whole[whole > times[-1]]]))
+    paths = [sample(flight, vehicle.motion, along) for flight, vehicle in zip(shown, vehicles, strict=True)]
+    errors = [path.error for path in paths if path.error is not None]
     most = float(max(np.quantile(error, 0.995) for error in errors)) if errors else 0.0
-    pieces: list[list[Any]] = []
-    step = max(1, -(-len(times) // POINTS))
-    for vehicle, result in zip(vehicles, samples, strict=True):
-        cuts = np.unique(np.linspace(0, len(times) - 1, min(PIECES, len(times) - 1) + 1).round().astype(int))
-        path = result.bodies[0].position
-        if result.desired is not None:
-            vehicle.desired_path(result.desired[::step])
-        parts = []
-        for i, (a, b) in enumerate(pairwise(cuts)):
-            rows = np.unique(np.append(np.arange(a, b, step), b))
-            error = None if result.error is None else result.error[rows]
-            parts.append((int(b), vehicle.trail(str(i), path[rows], error, most, visible=False)))
-        pieces.append(parts)
+    span = tuple(int(k) for k in np.searchsorted(along, times[[0, -1]]))
+    pieces = [_trail(vehicle, path, span, most) for vehicle, path in zip(vehicles, paths, strict=True)]
+    samples = [sample(flight, vehicle.motion, times) for flight, vehicle in zip(shown, vehicles, strict=True)]
     for vehicle, result in zip(vehicles, samples, strict=True):
         vehicle.show(result, 0)
     recording = server.get_scene_serializer()
     for k in range(len(times)):
         for vehicle, result, parts in zip(vehicles, samples, pieces, strict=True):
             vehicle.show(result, k)
-            while parts and parts[0][0] <= k:
+            while parts and parts[0][0] <= times[k]:
                 parts.pop(0)[1].visible = True
         if k + 1 < len(times):
             recording.insert_sleep(float(times[k + 1] - times[k]))
     return recording, most
+
+
+def _trail(vehicle: Vehicle, path: Samples, span: tuple[int, ...], most: float) -> list[tuple[float, Any]]:
+    """Add the desired path, and hidden pieces of the flown one; return the times [s] of their ends with their nodes.
+
+    One piece leads to the first frame; `span` has the indices of the first and the last frame.
+    """
+    first, last = span
+    cuts = np.unique([0, *np.linspace(first, last, min(PIECES, last - first) + 1).round().astype(int)])
+    step = max(1, -(-len(path.times) // POINTS))
+    if path.desired is not None:
+        vehicle.desired_path(path.desired[::step])
+    parts = []
+    for i, (a, b) in enumerate(pairwise(cuts)):
+        rows = np.unique(np.append(np.arange(a, b, step), b))
+        error = None if path.error is None else path.error[rows]
+        piece = vehicle.trail(str(i), path.bodies[0].position[rows], error, most, visible=False)
+        parts.append((float(path.times[b]), piece))
+    return parts
 
 
 def with_bridge(html: str, facts: dict[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """Pictures and films of the 3D view, drawn by a headless browser."""
 
+import base64
 import io
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -15,8 +16,9 @@ from lapwing.studies.view3d.headless import Browser
 
 FORMATS = (".mp4", ".webp", ".gif", ".png")
 QUALITY = 80  # of WebP, 0 to 100
+JPEG = 0.95  # quality of the pictures that the browser hands over, 0 to 1
+BATCH = 16  # pictures of one call of the browser
 CAMERAS = ("follow", "orbit", "top", "onboard")
-PLAYER = 40  # [pixel] of the play bar below the scene
 SMALLEST, LARGEST = 64, 3840  # [pixel]
 START = """
 const until = async (holds) => {
@@ -24,7 +26,6 @@ const until = async (holds) => {
   if (!holds()) throw new Error(`never: ${holds}`);
 };
 await until(() => window.lapwingView?.ready);
-lapwingView.bare();
 """
 
 
@@ -33,10 +34,10 @@ class Shot(NamedTuple):
 
     start: float | None = None  # None: of the whole flight; of a picture its middle
     stop: float | None = None
-    rate: float = 25.0  # [1/s] pictures of a film
+    rate: float = 20.0  # [1/s] pictures of a film
     speed: float = 1.0  # simulated seconds in a second of the film
     camera: str = "follow"
-    size: tuple[int, int] = (1280, 720)  # [pixel]
+    size: tuple[int, int] = (960, 540)  # [pixel]
     place: tuple[float, float, float] | None = None  # of the camera from the vehicle, in its sizes; None: as usual
 
 
@@ -79,13 +80,14 @@ def render(
     times = _times(flights[0], target, shot)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "view.html"
-        path.write_text(page(flights, names), encoding="utf-8")
-        width, height = shot.size
-        with Browser(path, size=(width, height + PLAYER)) as browser:
+        shown = times if len(times) > 1 else times + np.array([0.0, 1.0])  # the player needs a length
+        path.write_text(page(flights, names, shown), encoding="utf-8")
+        address = path.resolve().as_uri() + ("" if target.suffix == ".mp4" else "#smooth")
+        with Browser(address, size=shot.size) as browser:
             browser.run(f"{START} lapwingView.look({shot.camera!r}, 0, {_list(shot.place)});")
-            pictures = _pictures(browser, times, shot.size, progress)
+            pictures = _pictures(browser, times, target.suffix == ".png", progress)
             try:
-                _write(target, pictures, shot)
+                write_film(target, pictures, shot)
             except OSError as fault:
                 with suppress(OSError):
                     target.unlink(missing_ok=True)
@@ -104,22 +106,25 @@ def _times(flight: FlightData, target: Path, shot: Shot) -> np.ndarray:
     return start + shot.speed / shot.rate * np.arange(max(1, int((stop - start) / shot.speed * shot.rate) + 1))
 
 
-def _pictures(browser: Browser, times: np.ndarray, size: tuple[int, int], progress: Any) -> Iterator[Any]:
+def _pictures(browser: Browser, times: np.ndarray, lossless: bool, progress: Any) -> Iterator[Any]:
     from PIL import Image
 
-    width, height = size
-    for k, time in enumerate(times):
-        browser.run(f"await lapwingView.settle({float(time)!r});")
-        image = Image.open(io.BytesIO(browser.picture())).convert("RGB")
-        progress(k + 1, len(times))
-        yield image.crop((0, 0, width, height))
+    kind, quality = ("png", 1.0) if lossless else ("jpeg", JPEG)
+    for k in range(0, len(times), BATCH):
+        some = times[k : k + BATCH].tolist()
+        for i, address in enumerate(browser.run(f"return lapwingView.film({some}, 'image/{kind}', {quality});")):
+            picture = Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB")
+            progress(k + i + 1, len(times))
+            yield picture
 
 
-def _write(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
+def write_film(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
+    """Write pictures of PIL as a film, or the first one as a picture."""
     if target.suffix == ".mp4":
         import imageio_ffmpeg
 
-        writer = imageio_ffmpeg.write_frames(str(target), shot.size, fps=shot.rate, quality=7, macro_block_size=2)
+        options = {"quality": 7, "macro_block_size": 2, "output_params": ["-preset", "veryfast"]}
+        writer = imageio_ffmpeg.write_frames(str(target), shot.size, fps=shot.rate, **options)
         writer.send(None)
         for picture in pictures:
             writer.send(np.ascontiguousarray(picture))
@@ -131,7 +136,7 @@ def _write(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
         return
     timing = {"save_all": True, "duration": round(1000.0 / shot.rate), "loop": 0}
     if target.suffix == ".webp":
-        first.save(target, append_images=pictures, quality=QUALITY, method=6, **timing)
+        first.save(target, append_images=pictures, quality=QUALITY, method=3, **timing)
         return
     rest = (picture.quantize(128, dither=0) for picture in pictures)  # each has its own colours
     first.quantize(128, dither=0).save(target, append_images=rest, **timing)

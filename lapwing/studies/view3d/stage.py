@@ -16,6 +16,8 @@ from lapwing.studies.view3d.surroundings import add_solid, rgb
 from lapwing.studies.view3d.vehicle_bodies import motion
 
 BLADE, WIND, THRUST, FORCE, REFERENCE, ESTIMATE = "#20262B", "#56B4E9", "#009E73", BOUND, QUIET, "#CC79A7"
+DESIRED = "#4A5560"
+FLOWN_WIDTH, DESIRED_WIDTH, CABLE_WIDTH = 4.0, 2.0, 2.5  # [pixel]
 WIND_SCALE = 0.12  # [m] of arrow for 1 m/s
 SIGMAS = 3.0  # of the drawn ellipsoid
 SAG = 12  # parts of a drawn cable
@@ -149,7 +151,7 @@ class Vehicle:
         if link.length > apart and (second.force is None or not np.any(second.force[k])):
             points += _sag(start, stop, link.length)
         pairs = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
-        handle = self._node(f"link {link.second}", lambda name: _lines(self._scene, name, pairs, BLADE, 0.012))
+        handle = self._node(f"link {link.second}", lambda name: _lines(self._scene, name, pairs, BLADE, CABLE_WIDTH))
         handle.points = pairs
 
     def _lengthen(self, handle: Any, length: float) -> None:
@@ -174,15 +176,22 @@ class Vehicle:
         """Add a piece of the flown path, coloured by the error [m] up to `most`; return its handle."""
         points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
         if error is None or most <= 0.0:
-            return _lines(self._scene, f"{self._root}/trail/{name}", points, self.colour, 0.03, visible)
+            return _lines(self._scene, f"{self._root}/trail/{name}", points, self.colour, FLOWN_WIDTH, visible)
         colours = error_colours(error / most)
         pairs = np.stack([colours[:-1], colours[1:]], axis=1)
-        return _lines(self._scene, f"{self._root}/trail/{name}", points, pairs, 0.03, visible)
+        return _lines(self._scene, f"{self._root}/trail/{name}", points, pairs, FLOWN_WIDTH, visible)
 
     def desired_path(self, path: np.ndarray) -> None:
         """Add the desired path, shape (n, 3) [m], as a thin line."""
         points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
-        _lines(self._scene, f"{self._root}/desired path", points[::2], "#FFFFFF", 0.015)
+        _lines(self._scene, f"{self._root}/desired path", points[::2], DESIRED, DESIRED_WIDTH)
+
+
+def add_shaders(scene: Any) -> None:
+    """Add specks that are drawn as vehicles are: a browser compiles for seconds what it draws for the first time."""
+    for k, opacity in enumerate((1.0, 0.5)):
+        add_solid(scene, f"/speck {k}", box((0.0, 0.0, 0.0), (1e-4,) * 3, BLADE, opacity))
+    _lines(scene, "/speck line", np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1e-4]]], np.float32), BLADE, CABLE_WIDTH)
 
 
 def reach(moved: Motion) -> float:
@@ -206,7 +215,7 @@ def vehicle_colours(count: int, compared: bool) -> Sequence[str]:
 
 def _lines(scene: Any, name: str, points: np.ndarray, colour: Any, width: float, visible: bool = True) -> Any:
     colours = rgb(colour) if isinstance(colour, str) else colour
-    return scene.add_line_segments(name, points, colours, thickness=width, thickness_units="world", visible=visible)
+    return scene.add_line_segments(name, points, colours, thickness=width, thickness_units="screen", visible=visible)
 
 
 def _sag(start: np.ndarray, stop: np.ndarray, length: float) -> np.ndarray:

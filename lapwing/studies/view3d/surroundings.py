@@ -16,6 +16,7 @@ from lapwing.studies.view3d.solids import Solid, ball, box, merged, rod
 SKY = ((126, 170, 205), (226, 236, 242))  # red, green, blue at the top and at the horizon
 SOIL, LINE, WIDE_LINE = (214, 219, 215), (190, 197, 193), (160, 168, 164)
 OBSTACLE, EARTH = "#8C9BA5", "#B9C2B4"
+DAYLIGHT = 2.4  # from the sky, beside the sun
 POINTS = 81  # of the terrain along each side
 MARGIN = 15.0  # [m] of terrain around the flight
 FENCE_HEIGHT = 12.0  # [m] of the drawn walls
@@ -27,6 +28,8 @@ def add_ground(scene: Any, low: float) -> None:
     scene.world_axes.visible = False
     share = np.linspace(0.0, 1.0, 128)[:, None, None] ** 0.8
     sky = (1.0 - share) * np.array(SKY[0]) + share * np.array(SKY[1])
+    scene.configure_environment_map(None)  # it would light the same, for half of the time of a picture
+    scene.add_light_hemisphere("/daylight", sky_color=(235, 243, 255), ground_color=(190, 186, 178), intensity=DAYLIGHT)
     scene.set_background_image(np.repeat(sky, 8, axis=1).astype(np.uint8), format="png")
     scene.add_grid(
         "/ground",
