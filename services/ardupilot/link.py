@@ -5,7 +5,6 @@ packet followed by the wait for the next one.
 """
 
 import socket
-import struct
 import time
 
 from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
@@ -54,8 +53,6 @@ class ArduPilotLink:
         self._answer = b""  # last state message
         self._time = 0.0  # [s] of the simulation
         self._packet: ServoPacket | None = None
-        self._pulses: tuple[int, ...] = ()  # [us] of the motors
-        self._motors: tuple[float, ...] = ()  # outputs for these pulses
 
     @property
     def address(self) -> tuple[str, int]:
@@ -118,9 +115,7 @@ class ArduPilotLink:
         assert self._simulated is not None
         self._status.poll(self._time)
         self.report.version = self._status.version
-        if (pulses := self._packet.pwm[:OUTPUTS]) != self._pulses:  # its loop is slower than the exchange
-            self._pulses, self._motors = pulses, tuple(throttle(pulse, PWM_MIN, PWM_MAX) for pulse in pulses)
-        motors = self._motors
+        motors = tuple(throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS])
         self._simulated.update(self._time, read, motors)
         return self._status.output(motors, running=max(motors) > 0.0)  # a heartbeat comes only once a second
 
@@ -209,6 +204,5 @@ def _claim(setup: FirmwareSetup) -> socket.socket:
         result.close()
         message = f"ardupilot: cannot listen on udp {address[0]}:{address[1]} ({error.strerror})"
         raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
-    # the time-out of the system, not of Python, which would wait by a call of its own before each receipt
-    result.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("ll", 0, round(1e6 * WAIT)))
+    result.settimeout(WAIT)
     return result

@@ -9,9 +9,7 @@ from typing import NamedTuple
 
 MAGIC_16, MAGIC_32 = 18458, 29569
 _HEAD = struct.Struct("<HHI")
-_LAYOUTS = {
-    struct.pack("<H", magic): struct.Struct(text) for magic, text in ((MAGIC_16, "<HHI16H"), (MAGIC_32, "<HHI32H"))
-}
+_LAYOUTS = {MAGIC_16: struct.Struct("<HHI16H"), MAGIC_32: struct.Struct("<HHI32H")}
 PULSE_MAX = 3000  # [us] longest plausible pulse; 0: the channel is unused
 
 
@@ -31,14 +29,13 @@ def decode(data: bytes) -> ServoPacket:
     """
     if len(data) < _HEAD.size:
         raise ValueError(f"{len(data)} bytes, a servo packet has 40 or 72")
-    layout = _LAYOUTS.get(data[:2])
+    magic, rate, count = _HEAD.unpack_from(data)
+    layout = _LAYOUTS.get(magic)
     if layout is None:
-        raise ValueError(f"magic number {_HEAD.unpack_from(data)[0]}, expected {MAGIC_16} or {MAGIC_32}")
+        raise ValueError(f"magic number {magic}, expected {MAGIC_16} or {MAGIC_32}")
     if len(data) != layout.size:
-        magic = _HEAD.unpack_from(data)[0]
         raise ValueError(f"{len(data)} bytes with magic number {magic}, expected {layout.size}")
-    _, rate, count, *channels = layout.unpack(data)
-    pwm = tuple(channels)
+    pwm = layout.unpack(data)[3:]
     if rate == 0:
         raise ValueError("frame rate 0")
     if max(pwm) > PULSE_MAX:

@@ -9,7 +9,7 @@ from lapwing.services.common import ports
 from lapwing.services.common.firmware.link import Read
 from lapwing.services.common.firmware.mission_client import MissionClient
 
-EVERY = 0.5  # [s] between two settings of the battery
+EVERY = 0.2  # [s] between two looks at the samples
 SAG = 0.7  # [V] that ArduPilot subtracts at full throttle
 
 
@@ -20,17 +20,17 @@ class SimulatedSensors:
         """Create it before the first step."""
         self._own, self._client = own, client
         self._fix = True  # as ArduPilot starts
-        self._next = 0.0  # [s] of the battery
+        self._next = 0.0  # [s] of the next look
 
     def update(self, time: float, read: Read, motors: tuple[float, ...]) -> None:
         """Set the parameters at simulation `time` [s]; `motors`: outputs, 0 to 1."""
-        if not self._client.connected:
+        if time < self._next or not self._client.connected:
             return
+        self._next = time + EVERY
         if self._own.gps and (fix := read(ports.GPS).valid) != self._fix:
             self._fix = fix
             self._client.send_parameter("SIM_GPS_DISABLE", float(not fix))  # up to 4.5
             self._client.send_parameter("SIM_GPS1_ENABLE", float(fix))
-        if time >= self._next and math.isfinite((battery := read(ports.BATTERY)).charge):
-            self._next = time + EVERY
+        if math.isfinite((battery := read(ports.BATTERY)).charge):
             throttle = math.total(motors) / len(motors)
             self._client.send_parameter("SIM_BATT_VOLTAGE", battery.voltage + SAG * throttle)

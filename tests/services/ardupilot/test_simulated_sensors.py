@@ -63,8 +63,8 @@ def test_outage_before_connection_is_set_later():
     assert flown((0.0, 1.0), gps=False) == [("SIM_GPS_DISABLE", 1.0), ("SIM_GPS1_ENABLE", 0.0)]
 
 
-def test_battery_voltage_is_set_every_half_second():
-    result = flown((0.0, 0.1, 0.2, 0.7, 0.8), charge=0.5, throttle=0.5)
+def test_battery_voltage_is_set_every_fifth_of_second():
+    result = flown((0.0, 0.1, 0.2, 0.35, 0.4), charge=0.5, throttle=0.5)
     assert result == [("SIM_BATT_VOLTAGE", 11.35)] * 2  # ArduPilot subtracts 0.7 V times the throttle
 
 
