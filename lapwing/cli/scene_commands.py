@@ -1,14 +1,18 @@
 """Scenes listed, checked and precompiled; autopilot parameters."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
+from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import warn_of_gains, with_solver_selected
+
+if TYPE_CHECKING:
+    from lapwing.cosim.scene import Scene
 
 
 @app.command()
@@ -36,14 +40,27 @@ def scenes(
 
 
 @app.command()
-def check(scene: SceneFile, set_: Overrides = None) -> None:
-    """Validate a scene and show what it contains."""
+def check(
+    scene: SceneFile,
+    accuracy: Annotated[
+        bool, typer.Option("--accuracy", help="fly it, and compare the error with solver.accuracy")
+    ] = False,
+    json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the errors of --accuracy as JSON")] = None,
+    set_: Overrides = None,
+) -> None:
+    """Validate a scene and show what it contains.
+
+    With --accuracy the exit code is 1 if the error is larger than solver.accuracy.
+    """
     from lapwing.services.common.communication_schema import Communication
     from lapwing.services.common.run_schema import Run
     from lapwing.services.common.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
 
     with user_errors():
+        if json and not accuracy:
+            raise ValueError("--json: holds the errors of a flight; give --accuracy, too")
+        claim(json)
         loaded = with_solver_selected(scene, set_ or [])
         setup = resolve(loaded)
         exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
@@ -59,6 +76,20 @@ def check(scene: SceneFile, set_: Overrides = None) -> None:
         lines.append(("services", f"{', '.join(setup.order)}; {exchange.rate} Hz, {exchange.coupling}"))
         for label, line in lines:
             typer.echo(f"  {label:<9} {line}")
+        if accuracy and not _accuracy_met(loaded, json):
+            raise SystemExit(1)
+
+
+def _accuracy_met(scene: "Scene", json: Path | None) -> bool:
+    """Print and write the error of the scene's flight. Return True if it is at most what the scene asks for."""
+    from lapwing.studies.accuracy import flight_accuracy
+    from lapwing.studies.terminal import console
+
+    result = flight_accuracy.measure(scene)
+    flight_accuracy.show(console(), result)
+    if json:
+        flight_accuracy.write_json(json, result)
+    return result.worst.error <= result.asked
 
 
 @app.command()

@@ -15,6 +15,8 @@ SHORT = "--set run.duration=0.2 --set success.require=[]"
 COMMANDS = {  # run here, in this order, in one folder
     "run": f"run hover {SHORT} --mode single-process --speed max --log a.mcap --report a.pdf --json a.json",
     "check": "check hover --set run.seed=2",
+    "check --accuracy": "check hover --accuracy --json check.json --set solver.accuracy=1e-3 --set solver.step=0.004"
+    " --set run.duration=1",
     "campaign": "campaign hover --set run.duration=0.2 --runs 4 --seed 2 --vary vehicle.mass=normal(10.4,0.1)"
     " --design lhs --out c --csv --json c.json --report c.html --workers 1",
     "sweep": "campaign hover --set run.duration=0.2 --sweep sweep.csv --out d --ci-half-width 0.9 --workers 1",

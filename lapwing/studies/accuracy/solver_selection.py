@@ -18,6 +18,8 @@ from lapwing.services.plant.schema import Solver
 from lapwing.studies.accuracy import scenes
 from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
 
+IMPACT_SHARE = 3e-3  # of the accuracy: an impact turns an error of position into one of velocity 300 times as large
+
 
 def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     """Return the overrides that meet the scene's accuracy at the least cost; none if it sets a step.
@@ -37,12 +39,19 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     if "integrator" in solver.model_fields_set:
         points = [p for p in points if p.way == solver.integrator]
     try:
-        chosen = cheapest(points, solver.accuracy)
+        chosen = cheapest(points, _share(scene, points, solver.accuracy))
     except ConfigError as error:
         message = f"{solver.accuracy:g}: {error.message}"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
     # the step that `Solver.check` takes for a divisor of the interval
     return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
+
+
+def _share(scene: Scene, points: list[Point], accuracy: float) -> float:
+    """Return the error allowed in the air: all of it, or the share for impacts if a point reaches that."""
+    strict = IMPACT_SHARE * accuracy
+    impacts = "ground_contact" in scene.tables("effects") and any(p.error <= strict for p in points)
+    return strict if impacts else accuracy
 
 
 def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:

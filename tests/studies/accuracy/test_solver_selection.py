@@ -40,6 +40,18 @@ def measured(monkeypatch, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("overrides", "step"),
+    [(["solver.accuracy=1e-3"], 0.004), (["solver.accuracy=1e-3", "solver.integrator=rkmk2"], 0.002)],
+)
+def test_scene_that_lands_gets_share_for_impacts(overrides, step, measured, monkeypatch):
+    """An impact amplifies errors of the flight before it; an integrator that cannot reach the share meets the rest."""
+    points = [Point("rkmk2", 2, "s", 0.002, 9e-4, 1e-5, 1, {}), Point("rk4", 4, "s", 0.004, 2e-6, 1.5e-5, 1, {})]
+    monkeypatch.setattr(solver_selection, "measure", lambda problem: points)
+    result = solver_selection.overrides(load(ROOT / "lapwing/scenes/hover.toml", overrides), lambda text: None)
+    assert result[1] == f"solver.step={step!r}"
+
+
+@pytest.mark.parametrize(
     ("solver", "chosen"),
     [
         ("accuracy = 1e-4", ['solver.integrator="rkmk4"', "solver.step=0.004"]),

@@ -16,7 +16,7 @@ from lapwing.kernels import kernel
 
 TOLERANCE = 1e-12  # relative to 1 + size, of a step
 LONGEST = 1e-3  # [s] of a step, so that no foot touches and leaves within one
-GRAZING = 2e-5  # [m] of the ground, within which a step is searched for a touch
+GRAZING = 2e-3  # [m] of the ground, within which a step is searched for a touch
 FULL, SLOW = 1, 4  # other rows of the cases: 0 in the ground, 2 pressing, 3 sliding
 
 

@@ -1,0 +1,147 @@
+"""Error of a scene's own flight: flown as it is and with much finer steps, and compared at every tick.
+
+Both flights are closed loops with the same random numbers. Their difference is the error of the solver, in the state of
+each vehicle as it is recorded, with all that the autopilot makes of it.
+"""
+
+import json
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
+from lapwing.messages.topics import BATTERY, TRUTH
+from lapwing.services.common.communication_schema import Communication
+from lapwing.services.plant.schema import Solver
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.accuracy.coordinates import matrices
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.simulate import fly_each
+
+FINER = 8  # times as many steps in a communication step
+STRICTER = 1e-3  # times the accuracy, in contact
+STRICTEST = 1e-12  # that a scene can ask for
+BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState; its current jumps where a motor is switched off
+
+
+class Quantity(NamedTuple):
+    """Largest error of one part of a vehicle's state, of its numbers relative to 1 + their size."""
+
+    vehicle: str
+    name: str
+    error: float
+    time: float  # [s] of the moment
+
+
+class FlightAccuracy(NamedTuple):
+    """Accuracy of a flight."""
+
+    asked: float
+    integrator: str
+    step: float  # [s]
+    reference_step: float  # [s]
+    duration: float  # [s] that both flights last
+    quantities: list[Quantity]
+
+    @property
+    def worst(self) -> Quantity:
+        """Quantity with the largest error."""
+        return max(self.quantities, key=lambda quantity: quantity.error)
+
+
+def measure(scene: Scene) -> FlightAccuracy:
+    """Return the accuracy of a scene with a selected solver.
+
+    Raises:
+        SceneError: the scene asks for no accuracy.
+        ValueError: a flight fails.
+    """
+    solver = (scene.vehicles or (scene,))[0][Solver]
+    if solver.accuracy is None:
+        message = "missing; set the error to compare with, e.g. --set solver.accuracy=1e-4"
+        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path))
+    interval = scene[Communication].interval
+    step = interval / (FINER * solver.steps(scene[Communication]))
+    strict = max(STRICTER * solver.accuracy, STRICTEST)
+    finer = load(scene.path, [*scene.overrides, f"solver.step={step!r}", f"solver.accuracy={strict!r}"])
+    coarse, fine = _flights(scene), _flights(finer)
+    quantities = [q for pair in zip(coarse, fine, strict=True) for q in differences(*pair)]
+    duration = min(flight.truth.times[-1] for flight in (*coarse, *fine))
+    return FlightAccuracy(solver.accuracy, solver.integrator, FINER * step, step, float(duration), quantities)
+
+
+def _flights(scene: Scene) -> list[FlightData]:
+    flights = fly_each(resolve(scene), (TRUTH, BATTERY))
+    for flight in flights:
+        if flight.failure:
+            raise ValueError(f"{scene.path}: {flight.failure}")
+    return flights
+
+
+def differences(flight: FlightData, exact: FlightData) -> list[Quantity]:
+    """Return the largest error of each part of the state, at the ticks that both flights have."""
+    pairs: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+    times = flight.truth.times
+    for name, field in (
+        ("position", "position"),
+        ("attitude", "orientation"),
+        ("velocity", "velocity"),
+        ("body rates", "angular_velocity"),
+        ("rotor speed", "rotor_speed"),
+    ):
+        a, b = np.asarray(getattr(flight.truth, field)), np.asarray(getattr(exact.truth, field))
+        pairs[name] = times, *((matrices(a), matrices(b)) if field == "orientation" else (a, b))
+    if flight.has("battery"):
+        for field in BATTERY_FIELDS:
+            a, b = (np.asarray(getattr(each.topic("battery"), field)) for each in (flight, exact))
+            pairs[f"battery {field}"] = flight.times("battery"), a, b
+    return [
+        Quantity(flight.vehicle, name, *largest)
+        for name, (at, a, b) in pairs.items()
+        if (largest := _largest(at, a, b)) is not None
+    ]
+
+
+def _largest(times: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[float, float] | None:
+    """Return (largest error, its time [s]); None of what the vehicle does not have."""
+    n = min(len(a), len(b))
+    a, b = a[:n].reshape(n, -1), b[:n].reshape(n, -1)
+    if not a.size or not np.isfinite(b).all():
+        return None
+    errors = (np.abs(a - b) / (1.0 + np.abs(b))).max(axis=1)
+    return float(errors.max()), float(times[errors.argmax()])
+
+
+def show(console: Console, found: FlightAccuracy) -> None:
+    """Print the errors as one table."""
+    fleet = len({quantity.vehicle for quantity in found.quantities}) > 1
+    table = Table(box=SIMPLE, pad_edge=False)
+    for name in ("quantity", "largest error", "got / asked", "at (s)"):
+        table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
+    for q in found.quantities:
+        label = f"{q.vehicle}: {q.name}" if fleet else q.name
+        table.add_row(label, f"{q.error:.1e}", f"{q.error / found.asked:.2g}", f"{q.time:.3f}")
+    console.print(
+        f"{found.integrator}, step {1e3 * found.step:g} ms, against steps of {1e3 * found.reference_step:g} ms; "
+        f"{found.duration:g} s, errors relative to 1 + size",
+        highlight=False,
+    )
+    console.print(table)
+    worst = found.worst
+    verdict = "met" if worst.error <= found.asked else "missed"
+    console.print(
+        f"accuracy {verdict}: asked {found.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)",
+        highlight=False,
+    )
+
+
+def write_json(path: Path, found: FlightAccuracy) -> None:
+    """Write the errors."""
+    data: dict[str, Any] = found._asdict()
+    data["quantities"] = [quantity._asdict() for quantity in found.quantities]
+    data["got"], data["worst"] = found.worst.error, found.worst._asdict()
+    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")

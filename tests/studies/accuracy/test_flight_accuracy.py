@@ -1,0 +1,74 @@
+"""`lapwing check --accuracy`: error of a scene's own flight, asked and got."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lapwing.studies.accuracy.flight_accuracy import differences
+
+ROOT = Path(__file__).parents[3]
+
+
+def check(folder, *options):
+    command = [sys.executable, "-m", "lapwing", "check", "hover", *options]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+
+
+SHORT = ("--set", "run.duration=1", "--set", "solver.step=0.004", "--set", "solver.integrator=rk4_renormalised")
+
+
+@pytest.mark.parametrize(("accuracy", "code", "verdict"), [(1e-4, 0, "met"), (1e-12, 1, "missed")])
+def test_command_compares_asked_and_got(tmp_path, accuracy, code, verdict):
+    result = check(tmp_path, "--accuracy", "--json", "a.json", "--set", f"solver.accuracy={accuracy}", *SHORT)
+    assert result.returncode == code, result.stderr
+    assert f"accuracy {verdict}: asked {accuracy:g}" in result.stdout
+    found = json.loads((tmp_path / "a.json").read_text())
+    names = {quantity["name"] for quantity in found["quantities"]}
+    assert {"position", "attitude", "velocity", "body rates", "rotor speed"} <= names
+    assert found["got"] == max(quantity["error"] for quantity in found["quantities"])
+    assert (found["got"] > accuracy) == (code == 1)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--accuracy", *SHORT), "solver.accuracy: missing; set the error to compare with"),
+        (("--json", "a.json"), "--json: holds the errors of a flight; give --accuracy, too"),
+    ],
+)
+def test_command_rejects_incomplete_request(tmp_path, options, message):
+    result = check(tmp_path, *options)
+    assert result.returncode == 2
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not (tmp_path / "a.json").exists()
+
+
+def test_error_is_relative_to_size_at_its_moment():
+    times = np.array([0.0, 0.1, 0.2])
+
+    def flight(position, turned):
+        half = 0.5 * np.array([0.0, turned, 0.0])
+        truth = SimpleNamespace(
+            times=times,
+            position=np.array(position),
+            velocity=np.zeros((3, 3)),
+            angular_velocity=np.zeros((3, 3)),
+            orientation=np.column_stack([np.cos(half), np.sin(half), 0.0 * half, 0.0 * half]),
+            rotor_speed=np.zeros((3, 0)),
+        )
+        return SimpleNamespace(truth=truth, vehicle="a", has=lambda topic: False)
+
+    exact = flight([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [9.0, 0.0, 0.0]], 0.0)
+    other = flight([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [9.1, 0.0, 0.0]], 1e-3)
+    result = {q.name: q for q in differences(other, exact)}
+    assert (result["position"].error, result["position"].time) == (pytest.approx(0.01), 0.2)
+    assert (result["attitude"].error, result["attitude"].time) == (pytest.approx(1e-3, rel=1e-3), 0.1)
+    assert "rotor speed" not in result
