@@ -111,7 +111,7 @@ def write_airframe(path: Path, scene: Scene | str | Path, found: Identification,
         first, _, rest = key.partition(".")
         if first == "airframe":
             _put(table, rest.split("."), value)
-        else:
+        elif not is_flight_parameter(key):
             others[key] = value
     lines = [
         f"# Identified by output error from {len(found.used)} flights: {', '.join(found.used)}.",
