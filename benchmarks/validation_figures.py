@@ -45,6 +45,7 @@ def main(errors: str, folder: str) -> None:
     right.plot([], [], "s", color=COLOURS["linear fit"], label="attitude [rad]")
     right.set_yticks(range(len(families)), families, fontsize=8)
     right.set_xlim(left=0.0)
+    right.set_xlabel(f"mean absolute error after {last['time']:g} s [rad], [rad/s]")
     right.set_title("each flight, plant")
     right.legend(fontsize=8)
     figure.savefig(Path(folder) / "validation_errors.png", dpi=110)

@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lapwing.studies.identification.procedure import Identification
+from lapwing.studies.validation.console_output import UNITS
 from lapwing.studies.validation.prediction_metrics import FIELDS
 
 RELATED = 0.8  # correlation of two estimates from which it is printed
@@ -31,7 +32,8 @@ def show(console: Console, found: Identification) -> None:
     judged = f"{len(found.held_out)} held-out flights" if found.held_out else "the same flights"
     console.print(f"error after 0.5 s on {judged}, before and after:", highlight=False)
     for name, before, after in zip(FIELDS, found.before, found.after, strict=True):
-        console.print(f"  {name.replace('_', ' ')}: {before:.3g}, {after:.3g}", highlight=False)
+        if np.isfinite(before):  # measured by a held-out flight
+            console.print(f"  {name.replace('_', ' ')} [{UNITS[name]}]: {before:.3g}, {after:.3g}", highlight=False)
 
 
 def write_json(path: Path, found: Identification) -> None:

@@ -165,30 +165,24 @@ class OutputError:
         return self._fit(solution.x, jacobian(solution.x))
 
     def _fit(self, x: np.ndarray, jacobian: np.ndarray) -> Fit:
-        """Return the fit with standard errors by the jackknife over clusters of windows.
-
-        Each cluster is left out in turn, and the change of the estimate is linearised. With few clusters the sandwich
-        estimator gives too small standard errors, because a cluster pulls the estimate towards its own errors
-        (MacKinnon, Nielsen and Webb, Cluster-robust inference, Journal of Econometrics 232, 2023).
-        """
+        """Return the fit with standard errors by the sandwich estimator over clusters of windows."""
         residual = _flat(self.residuals([x * self.scale])[0])
         square = 1.0 + (residual / LOSS_SCALE) ** 2
+        information = jacobian.T @ (jacobian * (square**-1.5)[:, None])  # second derivative of the loss
+        score = (jacobian * (residual * square**-0.5)[:, None]).reshape(len(self.clusters()), -1, len(x)).sum(axis=1)
         names = self.clusters()
-        rows = jacobian.reshape(len(names), -1, len(x))
-        curvature = (rows * (square**-1.5).reshape(len(names), -1, 1)).transpose(0, 2, 1) @ rows
-        score = (jacobian * (residual * square**-0.5)[:, None]).reshape(rows.shape).sum(axis=1)
         count = int(names.max()) + 1
-        total, own = np.zeros((count, len(x))), np.zeros((count, len(x), len(x)))
+        total = np.zeros((count, len(x)))
         np.add.at(total, names, score)
-        np.add.at(own, names, curvature)
-        information = own.sum(axis=0)  # second derivative of the loss
+        total -= total.mean(axis=0)
         size = np.diag(information)
         dead = size <= NO_INFLUENCE * size.max(initial=0.0)
         scale = np.sqrt(np.where(dead, 1.0, size))
-        values, vectors = np.linalg.eigh((information - own) / np.outer(scale, scale))
-        along = (vectors.transpose(0, 2, 1) @ (total / scale)[:, :, None]) / np.maximum(values, 1e-12)[:, :, None]
-        moved = (vectors @ along)[:, :, 0] / scale
-        covariance = moved.T @ moved * (count - 1) / count
+        normal = information / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(normal)
+        inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
+        middle = total.T @ total * count / max(count - len(x), 1)
+        covariance = inverse @ middle @ inverse
         deviation = np.where(dead, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
         spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
         correlation = np.where(dead | dead[:, None], np.eye(len(x)), covariance / np.outer(spread, spread))

@@ -18,7 +18,7 @@ from lapwing.studies.identification.flight_parameters import apply_flight_parame
 from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import magnitudes
+from lapwing.studies.validation.prediction_metrics import magnitudes, pooled
 from lapwing.studies.validation.procedure import read_flights
 from lapwing.studies.validation.start_states import TrimMemory, start_states
 from lapwing.studies.validation.windows import compare, predict, window_starts
@@ -111,7 +111,7 @@ def write_airframe(path: Path, scene: Scene | str | Path, found: Identification,
         first, _, rest = key.partition(".")
         if first == "airframe":
             _put(table, rest.split("."), value)
-        else:
+        elif not is_flight_parameter(key):
             others[key] = value
     lines = [
         f"# Identified by output error from {len(found.used)} flights: {', '.join(found.used)}.",
@@ -186,7 +186,7 @@ def _errors(
         starts = window_starts(flight, HORIZON[-1], 10)
         predicted = predict(plant, flight, starts, state, HORIZON)
         result.append(magnitudes(compare(flight, starts, HORIZON, predicted))[:, 0])
-    return np.nanmean(np.concatenate(result), axis=0)
+    return np.array([m.mean for m in pooled([values[:, None] for values in result])[0]])
 
 
 def _put(table: Any, keys: list[str], value: float) -> None:

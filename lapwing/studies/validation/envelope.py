@@ -50,7 +50,9 @@ def trends(found: Validation) -> list[Trend]:
         index = np.digitize(values, edges) - 1
         kept = [k for k in range(BINS) if (index == k).sum() >= FEWEST]
         if kept:
-            means = np.array([np.nanmean(errors[index == k], axis=0) for k in kept])
+            with np.errstate(invalid="ignore"):  # quantities that were not measured are NaN
+                sums = [np.nansum(errors[index == k], axis=0) for k in kept]
+                means = np.array(sums) / [np.isfinite(errors[index == k]).sum(axis=0) for k in kept]
             out.append(Trend(label, 0.5 * (edges[:-1] + edges[1:])[kept], means))
     return out
 

@@ -8,8 +8,8 @@ import pytest
 from flight_recordings import INTERVAL, simulated, write_csv
 
 from lapwing.services.scene_resolver import load_one
-from lapwing.studies.identification.output_error import OutputError
-from lapwing.studies.identification.procedure import identify, start_value
+from lapwing.studies.identification.output_error import Fit, OutputError
+from lapwing.studies.identification.procedure import Identification, identify, start_value, write_airframe
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
@@ -68,6 +68,16 @@ def test_grounded_flights_are_rejected(plant, tmp_path):
         identify(SCENE, [path], "nanobench", list(TRUE), NO_TRIM)
 
 
+def test_parameters_of_recordings_are_not_for_the_scene(tmp_path):
+    keys = ("flight.command_delay", "effects.h_force.coefficient")
+    fit = Fit(keys, np.zeros(2), np.array([0.01, 1e-6]), np.ones(2), np.eye(2), 1.0, 1, ())
+    result = Identification(SCENE, fit, ("a",), (), np.zeros(6), np.zeros(6))
+    write_airframe(tmp_path / "mine.toml", SCENE, result)
+    lines = (tmp_path / "mine.toml").read_text().splitlines()
+    assert "#   effects.h_force.coefficient = 1e-06" in lines
+    assert not any(line.startswith("#   flight.") for line in lines)
+
+
 def test_toml_of_nested_tables_reads_back():
     tables = {"mesh": "a.stl", "mass": {"total": 1.5e-3, "inertia": [1e-5, 2.0, 3.0], "deep": {"flag": True}}}
     assert tomllib.loads(dump(tables)) == tables
@@ -88,6 +98,9 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
         "--set", "airframe.motor.time_constant=0.08",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    assert not done.stderr
+    assert "rate [rad/s]: " in done.stdout
+    assert "nan" not in done.stdout  # of power, which no flight has measured
     true = TRUE["airframe.motor.time_constant"]
     assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(true, rel=0.1)
     assert "Identified by output error from 2 flights" in out.read_text()
