@@ -1,16 +1,14 @@
 """Python block that steps one FMU at every tick."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
-
-import numpy as np
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.fmu.host_process import HostError, HostProcess
-from lapwing.services.fmu.service_config import FmuConfig, own_port
+from lapwing.services.fmu.service_config import Connection, FmuConfig
 
 
 class FmuBlock:
@@ -32,14 +30,19 @@ class FmuBlock:
         )
         self._fmu, self._ports = fmu, {port: own.name for port, own in outputs.items()}
         self._where = f"services.{fmu.name}: {Path(fmu.path).name}"
-        self._width = sum(each.port == own_port(fmu.name) for each in fmu.outputs)
         self._host: HostProcess | None = None
 
     def bind(self, graph: BlockDiagram) -> None:
         """Store the diagram; the process of the FMU starts at the first tick."""
-        self._graph = graph
+        self._graph, fmu = graph, self._fmu
         self._interval = graph.setup.interval
-        self._read = {each.port: max(1, graph.ports[each.port].period) for each in self._fmu.inputs}
+        self._read = [
+            (port, max(1, graph.ports[port].period), _places(fmu.inputs, port))
+            for port in dict.fromkeys(each.port for each in fmu.inputs)
+        ]
+        self._write = [
+            (port, own, graph.ports[own].period, _places(fmu.outputs, port)) for port, own in self._ports.items()
+        ]
 
     def on_tick(self, tick: int) -> int:
         """Step the FMU to `tick`.
@@ -52,32 +55,39 @@ class FmuBlock:
             if self._host is None:
                 self._host = HostProcess(self._fmu)
             begin, step = ((tick - 1) * self._interval, self._interval) if tick else (0.0, -1.0)
-            result = self._host.step(begin, step, self._inputs(tick))
+            self._set_inputs(tick, self._host.inputs)
+            self._host.step(begin, step)
         except HostError as error:
             raise LockStepError(f"{self._where}: {error} at t = {time:.3f} s") from None
-        self._publish(tick, result, time)
+        self._publish(tick, self._host.outputs.tolist(), time)
         return tick + 1
 
-    def _inputs(self, tick: int) -> list[float]:
-        """Return columns of the newest samples of ports in the units of the FMU; zeros before the first."""
-        graph, stamp = self._graph, tick - self._fmu.delay
+    def _set_inputs(self, tick: int, inputs: memoryview) -> None:
+        """Write the newest samples of ports in the units of the FMU; the inputs are 0 before the first."""
+        stamp = tick - self._fmu.delay
         if stamp < 0:
-            return [0.0] * len(self._fmu.inputs)
-        rows = {port: graph.row(port, stamp - stamp % period) for port, period in self._read.items()}
-        return [float(rows[each.port][each.column]) * each.factor for each in self._fmu.inputs]
+            return
+        for port, period, places in self._read:
+            row = self._graph.row(port, stamp - stamp % period).tolist()
+            for index, column, factor in places:
+                inputs[index] = row[column] * factor
 
-    def _publish(self, tick: int, result: Sequence[float], time: float) -> None:
+    def _publish(self, tick: int, outputs: list[float], time: float) -> None:
         """Write the ports that are due, with the outputs of the FMU in their columns."""
-        graph, rows = self._graph, {}
-        for port, own in self._ports.items():
-            if port == own:
-                rows[port] = np.zeros(self._width)
-            elif tick % graph.ports[port].period == 0:
-                rows[port] = np.array(graph.row(port, tick))
-        for each, value in zip(self._fmu.outputs, result, strict=True):
-            if not math.isfinite(value):
-                raise LockStepError(f"{self._where}: output {each.element.variable} is {value} at t = {time:.3f} s")
-            if each.port in rows:
-                rows[each.port][each.column] = value * each.factor
-        for port, row in rows.items():
-            graph.put_row(self._ports[port], tick, row)
+        if not all(map(math.isfinite, outputs)):
+            for each, value in zip(self._fmu.outputs, outputs, strict=True):
+                if not math.isfinite(value):
+                    name = each.element.variable
+                    raise LockStepError(f"{self._where}: output {name} is {value} at t = {time:.3f} s")
+        for port, own, period, places in self._write:
+            if tick % period == 0:
+                row = self._graph.row(own, tick)
+                if port != own:
+                    row[:] = self._graph.row(port, tick)
+                for index, column, factor in places:
+                    row[column] = outputs[index] * factor
+
+
+def _places(connections: tuple[Connection, ...], port: str) -> list[tuple[int, int, float]]:
+    """Return (index among the connections, column, factor) of the connections of a port."""
+    return [(k, each.column, each.factor) for k, each in enumerate(connections) if each.port == port]

@@ -11,15 +11,17 @@ LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of status in FMI 2.0
 class CoSimulation(FmuInstance):
     """An FMU that steps itself."""
 
-    def __init__(self, spec: dict[str, Any], model: Any, fmu: Any):
+    def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
         self._event_mode = spec["version"] == 3 and bool(model.coSimulation.hasEventMode)
-        super().__init__(spec, model, fmu)
+        super().__init__(spec, model, fmu, inputs, outputs)
         self._do_step = self.function("DoStep")
+        if self._event_mode:
+            self._enter_event_mode, self._enter_step_mode = map(self.function, ("EnterEventMode", "EnterStepMode"))
         self._time, self._size, self._reached = (ctypes.c_double() for _ in range(3))
         flags = [ctypes.c_bool() for _ in range(3)]
         self._event_needed, self._terminate, self._early = flags
-        begin = ctypes.c_void_p(self.address), self._time, self._size
+        begin = self.component, self._time, self._size
         results = [*map(ctypes.byref, flags), ctypes.byref(self._reached)]
         self._arguments = (*begin, ctypes.c_bool(True), *results) if self.is_3 else (*begin, ctypes.c_int(1))
 
@@ -31,14 +33,14 @@ class CoSimulation(FmuInstance):
         """Settle the discrete states, and enter step mode."""
         if self._event_mode:
             self.update_discrete_states(0.0)
-            self.fmu.enterStepMode()
+            self.call(self._enter_step_mode)
 
-    def advance(self, time: float, step: float, inputs: tuple[float, ...]) -> None:
+    def advance(self, time: float, step: float) -> None:
         """Set inputs at `time`, and step the FMU by `step` [s]."""
         if not self._event_mode:
-            self.set(inputs)
-        elif inputs != self.last_inputs:
-            self._event(time, inputs)
+            self.set_inputs()
+        elif self.inputs_changed:
+            self._event(time, True)
         if not self.is_3:
             self._step2(time, step)
             return
@@ -46,7 +48,7 @@ class CoSimulation(FmuInstance):
         for _ in range(UPDATES):
             reached = self._step3(at, stop - at)
             if self._event_mode and self._event_needed.value:
-                self._event(reached, None)
+                self._event(reached)
             if reached >= stop - 1e-9 * step or self.ended is not None:
                 return
             if reached <= at and not self._event_needed.value:
@@ -73,9 +75,9 @@ class CoSimulation(FmuInstance):
             self.ended = reached
         return reached
 
-    def _event(self, time: float, inputs: tuple[float, ...] | None) -> None:
-        self.fmu.enterEventMode()
-        if inputs is not None:
-            self.set(inputs)
+    def _event(self, time: float, with_inputs: bool = False) -> None:
+        self.call(self._enter_event_mode)
+        if with_inputs:
+            self.set_inputs()
         self.update_discrete_states(time)
-        self.fmu.enterStepMode()
+        self.call(self._enter_step_mode)

@@ -1,10 +1,13 @@
-"""Process of one FMU: `python -m lapwing.services.fmu.host SOCKET`. It obeys `host_process.HostProcess`."""
+"""Process of one FMU: `python -m lapwing.services.fmu.host REQUESTS REPLIES`. It obeys `host_process.HostProcess`.
+
+The arguments are file descriptors of pipes. Inputs and outputs of type double stay where the pipes put and take them.
+"""
 
 import base64
+import ctypes
 import hashlib
 import json
 import os
-import socket
 import struct
 import sys
 from pathlib import Path
@@ -17,11 +20,12 @@ from lapwing.services.fmu.service_config import CO_SIMULATION
 LENGTH = struct.Struct("<q")
 
 
-def instantiated(spec: dict[str, Any]) -> FmuInstance:
+def instantiated(spec: dict[str, Any], inputs: Any, outputs: Any) -> FmuInstance:
     """Extract, load and instantiate an FMU.
 
     Args:
         spec: its `FmuConfig` as a dictionary, and `folder` to extract it.
+        inputs, outputs: see `FmuInstance`.
 
     Raises:
         ValueError: the file has changed, or the FMU cannot be instantiated.
@@ -45,53 +49,59 @@ def instantiated(spec: dict[str, Any]) -> FmuInstance:
     identifier = interface.modelIdentifier
     fmu = kind(guid=model.guid, unzipDirectory=str(folder), instanceName=spec["name"], modelIdentifier=identifier)
     if spec["interface"] == CO_SIMULATION:
-        return CoSimulation(spec, model, fmu)
+        return CoSimulation(spec, model, fmu, inputs, outputs)
     from lapwing.services.fmu.model_exchange import ModelExchange  # imports numba
 
-    return ModelExchange(spec, model, fmu)
+    return ModelExchange(spec, model, fmu, inputs, outputs)
 
 
-def _step(instance: FmuInstance, time: float, step: float, inputs: tuple[float, ...]) -> list[float]:
-    """Set inputs, step or (if `step` is negative) initialise, and return the outputs.
+def _step(instance: FmuInstance, time: float, step: float) -> None:
+    """Set inputs, step or (if `step` is negative) initialise, and read the outputs.
 
     Raises:
         ValueError: the FMU reports an error; the text has its last message.
     """
     if step < 0.0:
-        instance.initialise(inputs)
+        instance.initialise()
     else:
         if instance.ended is not None:
             raise ValueError(f"asked to end the simulation (t = {instance.ended:g} s)")
-        instance.advance(time, step, inputs)
-    return instance.outputs()
+        instance.advance(time, step)
+    instance.get_outputs()
 
 
-def serve(channel: socket.socket) -> None:
+def serve(requests: int, replies: int) -> None:
     """Run the FMU until the other end closes."""
-    (size,) = LENGTH.unpack(_read(channel, LENGTH.size))
-    spec = json.loads(_read(channel, size))
-    request = struct.Struct(f"<{2 + len(spec['inputs'])}d")
-    reply = struct.Struct(f"<q{len(spec['outputs'])}d")
+    (size,) = LENGTH.unpack(_read(requests, bytearray(LENGTH.size)))
+    spec = json.loads(_read(requests, bytearray(size)))
+    n, m = len(spec["inputs"]), len(spec["outputs"])
+    request, reply = bytearray(8 * (2 + n)), bytearray(8 * (1 + m))
+    moment, inputs = (ctypes.c_double * 2).from_buffer(request), (ctypes.c_double * n).from_buffer(request, 16)
+    status, outputs = ctypes.c_int64.from_buffer(reply), (ctypes.c_double * m).from_buffer(reply, 8)
     instance: FmuInstance | None = None
     while True:
-        time, step, *inputs = request.unpack(_read(channel, request.size))
+        _read(requests, request)
         try:
-            instance = instance or instantiated(spec)
-            channel.sendall(reply.pack(0, *_step(instance, time, step, tuple(inputs))))
+            instance = instance or instantiated(spec, inputs, outputs)
+            _step(instance, *moment)
+            os.write(replies, reply)
         except Exception as error:  # FMPy raises many
             text = (" ".join(str(error).split()) or type(error).__name__).encode()[:500]
-            channel.sendall(reply.pack(len(text), *([0.0] * len(spec["outputs"]))) + text)
+            status.value = len(text)
+            os.write(replies, reply + text)
+            status.value = 0
 
 
-def _read(channel: socket.socket, size: int) -> bytes:
-    data = channel.recv(size)
-    while len(data) < size:
-        part = channel.recv(size - len(data))
+def _read(channel: int, data: bytearray) -> bytearray:
+    """Fill `data` from a pipe, and return it."""
+    size = os.readv(channel, [data])
+    while size < len(data):
+        part = os.readv(channel, [memoryview(data)[size:]])
         if not part:
             os._exit(0)  # the run is over; foreign code is not asked
-        data += part
+        size += part
     return data
 
 
 if __name__ == "__main__":
-    serve(socket.socket(fileno=int(sys.argv[1])))
+    serve(*map(int, sys.argv[1:]))

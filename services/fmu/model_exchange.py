@@ -16,12 +16,14 @@ SLACK = 1e-9  # of a step: a time event this close to its end belongs to it
 class ModelExchange(FmuInstance):
     """An FMU whose states Lapwing integrates."""
 
-    def __init__(self, spec: dict[str, Any], model: Any, fmu: Any):
+    def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
-        super().__init__(spec, model, fmu)
+        super().__init__(spec, model, fmu, inputs, outputs)
         self._needs_completed = bool(model.modelExchange.needsCompletedIntegratorStep)
         self._method = integrators.get(spec["integrator"]).Method()
         self._status = ctypes.c_int64()
+        modes = "EnterEventMode", "EnterContinuousTimeMode"
+        self._enter_event_mode, self._enter_continuous_time_mode = map(self.function, modes)
         derivatives = "GetContinuousStateDerivatives" if self.is_3 else "GetDerivatives"
         set_time, set_states, get = map(self._address, ("SetTime", "SetContinuousStates", derivatives))
         self._functions = FmuFunctions(set_time, set_states, get, self.address, ctypes.addressof(self._status))
@@ -32,22 +34,22 @@ class ModelExchange(FmuInstance):
     def after_initialisation(self) -> None:
         """Settle the discrete states, and enter continuous-time mode."""
         self._next_event = self.update_discrete_states(0.0)
-        self.fmu.enterContinuousTimeMode()
+        self.call(self._enter_continuous_time_mode)
         states, indicators = self.model.numberOfContinuousStates, self.model.numberOfEventIndicators
         if self.is_3:
             states, indicators = self.fmu.getNumberOfContinuousStates(), self.fmu.getNumberOfEventIndicators()
         self._states, self._indicators = (ctypes.c_double * states)(), (ctypes.c_double * indicators)()
 
-    def advance(self, time: float, step: float, inputs: tuple[float, ...]) -> None:
+    def advance(self, time: float, step: float) -> None:
         """Set inputs at `time`, which is an event if they differ, and integrate over `step` [s]."""
         end, slack = time + step, SLACK * step
-        if inputs != self.last_inputs:
-            self._event(time, inputs)
+        if self.inputs_changed:
+            self._event(time, True)
         for _ in range(UPDATES):
             if self.ended is not None:
                 return
             if self._next_event <= time:
-                self._event(time, None)
+                self._event(time)
             elif time >= end - slack and self._next_event > end + slack:
                 return
             else:
@@ -77,7 +79,7 @@ class ModelExchange(FmuInstance):
             if terminate:
                 self.ended = end
         if event:
-            self._event(end, None)
+            self._event(end)
         return end
 
     def _integrate(self, begin: float, x: tuple[float, ...], end: float) -> tuple[float, ...]:
@@ -109,9 +111,9 @@ class ModelExchange(FmuInstance):
     def _positive(self) -> tuple[bool, ...]:
         return tuple(value > 0.0 for value in self._read(self._indicators, "GetEventIndicators"))
 
-    def _event(self, time: float, inputs: tuple[float, ...] | None) -> None:
-        self.fmu.enterEventMode()
-        if inputs is not None:
-            self.set(inputs)
+    def _event(self, time: float, with_inputs: bool = False) -> None:
+        self.call(self._enter_event_mode)
+        if with_inputs:
+            self.set_inputs()
         self._next_event = self.update_discrete_states(time)
-        self.fmu.enterContinuousTimeMode()
+        self.call(self._enter_continuous_time_mode)

@@ -37,6 +37,18 @@ class _Fmu(NamedTuple):
     outputs: dict[str, str]
 
 
+class _End(NamedTuple):
+    element: str  # name of a component or system
+    connector: str
+
+
+class _Content(NamedTuple):
+    parts: dict[str, _Part]
+    fmus: dict[str, _Fmu]
+    systems: set[str]  # names of the systems in the system
+    sources: dict[_End, _End]  # start of each connection by its end
+
+
 class _Package:
     """An open package."""
 
@@ -90,22 +102,18 @@ def _tables(package: _Package, parse: Callable[[Path, str], Any]) -> dict[str, A
     if not re.match(r"[12]\.", version := root.get("version", "")):
         raise package.error(f"SSP version {version or 'missing'}", "version 1.0 or 2.0")
     system = root.find("d:System", _NAMES)
-    elements = system.find("d:Elements", _NAMES) if system is not None else None
-    if system is None or elements is None:
+    if system is None or system.find("d:Elements", _NAMES) is None:
         raise package.error("has no components", "a system of FMUs and Lapwing parts")
-    parts: dict[str, _Part] = {}
-    fmus: dict[str, _Fmu] = {}
-    for component in elements:
-        name = component.get("name", "")
-        if component.tag != f"{{{DESCRIPTION}}}Component":
-            raise package.error(f"{name} is a {component.tag.rpartition('}')[2]}", "components, without systems in it")
-        _sort(package, component, name, parts, fmus)
+    content = _Content({}, {}, set(), {})
+    _flatten(package, system, "", content)
+    parts, fmus = content.parts, content.fmus
     scenes = dict.fromkeys(part.scene for part in parts.values())
     if len(scenes) != 1:
         number = f"{len(scenes)} scenes" if scenes else "no Lapwing part"
         raise package.error(f"has {number}", "Lapwing parts of one scene, such as `lapwing export-ssp` writes")
-    for connection in system.iterfind("d:Connections/d:Connection", _NAMES):
-        _connect(package, connection, parts, fmus)
+    for end, start in content.sources.items():
+        if end.element not in content.systems:
+            _connect(_component_source(package, content, start), end, fmus)
     (scene,) = scenes
     tree = _scene(package, scene, parse)
     for name, fmu in fmus.items():
@@ -115,6 +123,29 @@ def _tables(package: _Package, parse: Callable[[Path, str], Any]) -> dict[str, A
         content = base64.b64encode(package.read(fmu.source)).decode()
         tree.setdefault("services", {})[name] = {"fmu": f"{package.path}/{fmu.source}", "content": content, **own}
     return tree
+
+
+def _flatten(package: _Package, system: Xml.Element, prefix: str, content: _Content) -> None:
+    """Enter the components and connections of a system and of the systems in it; `prefix` is the name of the system."""
+    for element in system.iterfind("d:Elements/*", _NAMES):
+        name, tag = _joined(prefix, element.get("name", "")), element.tag.rpartition("}")[2]
+        if name in {*content.parts, *content.fmus, *content.systems}:
+            raise package.error(f"two elements have the name {name}", "different names")
+        if tag == "Component":
+            _sort(package, element, name, content.parts, content.fmus)
+        elif tag != "System":
+            raise package.error(f"{name} is a {tag}", "components and systems")
+        elif element.find("d:ParameterBindings", _NAMES) is not None:
+            raise package.error(f"system {name} has parameter bindings", "parameters of its components")
+        else:
+            content.systems.add(name)
+            _flatten(package, element, name, content)
+    _connections(package, system, prefix, content)
+
+
+def _joined(prefix: str, name: str) -> str:
+    """Return the name of an element of a system: "drive_motor" for the component `motor` of the system `drive`."""
+    return "_".join(filter(None, (prefix, name)))
 
 
 def _sort(package: _Package, component: Xml.Element, name: str, parts: dict[str, _Part], fmus: dict[str, _Fmu]) -> None:
@@ -150,22 +181,42 @@ def _start(package: _Package, component: Xml.Element) -> dict[str, float]:
     return result
 
 
-def _connect(package: _Package, connection: Xml.Element, parts: dict[str, _Part], fmus: dict[str, _Fmu]) -> None:
-    """Enter a connection into the table of its FMU; those between Lapwing parts are those of the scene."""
-    start, end = connection.get("startElement", ""), connection.get("endElement", "")
-    source, target = connection.get("startConnector", ""), connection.get("endConnector", "")
-    for element in (start, end):
-        if element not in parts and element not in fmus:
-            message = f"a connection of {element or 'the system itself'}"
-            raise package.error(message, "connections between the components")
-    if any(child.tag.endswith("Transformation") for child in connection):
-        raise package.error(
-            f"the connection to {end}.{target} transforms values", "a connection without transformation"
+def _connections(package: _Package, system: Xml.Element, prefix: str, content: _Content) -> None:
+    """Enter the connections of a system."""
+    for connection in system.iterfind("d:Connections/d:Connection", _NAMES):
+        start, end = (
+            _End(_joined(prefix, connection.get(f"{side}Element", "")), connection.get(f"{side}Connector", ""))
+            for side in ("start", "end")
         )
-    if end in fmus:
-        fmus[end].inputs[target] = f"{start}.{source}" if start in fmus else _column(source)
-    elif start in fmus:
-        fmus[start].outputs[_column(target)] = source
+        for each in (start, end):
+            if each.element not in {*content.parts, *content.fmus, *content.systems}:
+                message = f"a connection of {each.element or 'the system itself'}"
+                raise package.error(message, "connections between the components")
+        if any(child.tag.endswith("Transformation") for child in connection):
+            message = f"the connection to {end.element}.{end.connector} transforms values"
+            raise package.error(message, "a connection without transformation")
+        content.sources[end] = start
+
+
+def _component_source(package: _Package, content: _Content, start: _End) -> _End:
+    """Return the output of a component that a connection begins at, also through connectors of systems."""
+    passed = set()
+    while start.element in content.systems:
+        if start not in content.sources or start in passed:
+            message = f"connector {start.connector} of system {start.element} has no source"
+            raise package.error(message, "a connection from a component")
+        passed.add(start)
+        start = content.sources[start]
+    return start
+
+
+def _connect(start: _End, end: _End, fmus: dict[str, _Fmu]) -> None:
+    """Enter a connection into the table of its FMU; those between Lapwing parts are those of the scene."""
+    if end.element in fmus:
+        source = f"{start.element}.{start.connector}" if start.element in fmus else _column(start.connector)
+        fmus[end.element].inputs[end.connector] = source
+    elif start.element in fmus:
+        fmus[start.element].outputs[_column(end.connector)] = start.connector
 
 
 def _column(connector: str) -> str:

@@ -1,5 +1,6 @@
 """Samples of all ports of a scene, from the diagram that `lapwing run --mode single-process` executes."""
 
+import random
 from collections.abc import Iterator
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.services import scene_resolver
-from lapwing.services.process_table import create_all
+from lapwing.services.process_table import create, create_all
 
 
 def scene_config(name: str, **overrides: Any) -> RunConfig:
@@ -40,3 +41,27 @@ class RecordedPorts:
 
     def all_ticks(self) -> Iterator[int]:
         return iter(range(self.ticks))
+
+
+class DrivenPlant(RecordedPorts):
+    """The plant of a scene under random inputs, where the autopilot is a program that does not run here."""
+
+    def __init__(self, setup: RunConfig):
+        self.setup, rng = setup, random.Random(1)
+        plant = create(setup, "plant")
+        own = {port.name for part in plant.parts for port in part.outputs}
+        read = {i.port for part in plant.parts for i in part.inputs} - own
+        self.diagram = BlockDiagram(setup, [plant], 1, whole=own | read)
+        for tick in range(setup.last_tick + 1):
+            for name in read:
+                if tick % self.diagram.ports[name].period == 0:
+                    self.diagram.put(name, tick, _random(self.diagram.ports[name].like, rng))
+            self.diagram.advance(tick + 1)
+        self.ticks = self.diagram.tick
+
+
+def _random(like: Any, rng: random.Random) -> Any:
+    """Return a tree of the types of `like`: volts, and booleans that are true."""
+    if isinstance(like, tuple):
+        return tuple(_random(item, rng) for item in like)
+    return type(like)(rng.uniform(0.0, 8.0)) if not isinstance(like, bool) else True

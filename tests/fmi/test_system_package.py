@@ -2,6 +2,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from xml.etree import ElementTree as Xml
 
 import pytest
 
@@ -96,6 +97,44 @@ def test_fmu_in_package_takes_place_of_part(folder: Path, fmi: int) -> None:
     assert done.returncode == 0, done.stderr
 
 
+def nested(package: Path, out: Path) -> Path:
+    """Write a package whose autopilot is in a system of its own, which has connectors of the autopilot's names."""
+    kind = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+    with zipfile.ZipFile(package) as archive:
+        root = Xml.fromstring(archive.read(STRUCTURE))
+    system = root.find(f"{kind}System")
+    elements, connections = system.find(f"{kind}Elements"), system.find(f"{kind}Connections")
+    pilot = next(each for each in elements if each.get("name") == "autopilot")
+    elements.remove(pilot)
+    inner = Xml.SubElement(elements, f"{kind}System", {"name": "control"})
+    Xml.SubElement(inner, f"{kind}Elements").append(pilot)
+    pilot.set("name", "pilot")
+    own = Xml.SubElement(inner, f"{kind}Connections")
+    for each in connections:
+        for side, other in (("start", "end"), ("end", "start")):
+            if each.get(f"{side}Element") == "autopilot":
+                each.set(f"{side}Element", "control")
+                name = each.get(f"{side}Connector")
+                inside = {f"{side}Element": "pilot", f"{side}Connector": name, f"{other}Connector": name}
+                Xml.SubElement(own, f"{kind}Connection", inside)
+    with zipfile.ZipFile(package) as source, zipfile.ZipFile(out, "w") as archive:
+        for name in source.namelist():
+            archive.writestr(name, Xml.tostring(root) if name == STRUCTURE else source.read(name))
+    return out
+
+
+def test_system_in_system_flies_like_flat_one(folder: Path, tmp_path: Path) -> None:
+    flat = changed(folder / "hover3.ssp", tmp_path / "flat.ssp", foreign("autopilot"))
+    package, log = nested(flat, tmp_path / "nested.ssp"), tmp_path / "nested.mcap"
+    done = run_command("run", str(package), "--log", str(log), *HOVER)
+    assert done.returncode == 2
+    assert "services.control_pilot: an FMU is machine code of its author" in done.stderr
+    ports = 'services.control_pilot.outputs={"actuators.armed"="actuators.armed"}'
+    done = run_command("run", str(package), "--allow-code", "--log", str(log), *HOVER, "--set", ports)
+    assert done.returncode == 0, done.stderr
+    assert truth(log) == truth(folder / "plain.mcap")
+
+
 def test_structure_satisfies_schema_of_fmpy(folder: Path) -> None:
     system = read_ssd(str(folder / "hover2.ssp")).system
     assert [element.name for element in system.elements] == ["plant", "trajectory", "autopilot"]
@@ -121,7 +160,20 @@ def test_fmpy_flies_package(folder: Path) -> None:
         ([(' type="application/x-fmu-sharedlibrary"', ' type="application/x-dll"'), foreign("plant")], "has the type"),
         ([('name="plant" type', 'name="a plant" type'), foreign("plant")], "a connection of plant"),
         ([('startElement="plant"', 'startElement="wing"')], "a connection of wing; expected connections between"),
-        ([("<ssd:Elements>", '<ssd:Elements><ssd:System name="inner" />')], "inner is a System"),
+        ([("<ssd:Elements>", '<ssd:Elements><ssd:SignalDictionaryReference name="a" />')], "a is a SignalDictionaryRe"),
+        ([("<ssd:Elements>", '<ssd:Elements><ssd:System name="plant" />')], "two elements have the name plant"),
+        (
+            [("<ssd:Elements>", '<ssd:Elements><ssd:System name="a"><ssd:ParameterBindings /></ssd:System>')],
+            "system a has parameter bindings; expected parameters of its components",
+        ),
+        (
+            [
+                ("<ssd:Elements>", '<ssd:Elements><ssd:System name="inner" />'),
+                ('startElement="trajectory"', 'startElement="inner"'),
+                foreign("autopilot"),
+            ],
+            "of system inner has no source; expected a connection from a component",
+        ),
         ([('name="plant" />', 'name="plant" ')], "SystemStructure.ssd is not XML"),
         ([("<ssd:System name", "<!DOCTYPE a><ssd:System name")], "declares a document type"),
     ],

@@ -10,10 +10,11 @@ from rich.console import Console
 from lapwing.kernels import statistics
 from lapwing.services.common.vehicle_schema import Effects
 from lapwing.studies import terminal
-from lapwing.studies.accuracy import console_output, error_budget, scenes
+from lapwing.studies.accuracy import console_output, error_budget, round_off, scenes
 from lapwing.studies.accuracy import work_precision_plot as picture
 from lapwing.studies.accuracy.error_budget import Part
 from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.round_off import RoundOff
 from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure
 from lapwing.studies.effects.cost import costs
@@ -30,6 +31,7 @@ class Study(NamedTuple):
     points: list[Point]
     chosen: Point | None  # the cheapest that meets the goal
     parts: list[Part]  # the errors of a scene's flight
+    rounding: RoundOff | None  # None for a problem whose steps cannot be made in extended precision
     cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, standing
 
 
@@ -66,21 +68,23 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
         chosen = None if goal is None else cheapest(points, goal)
         parts = error_budget.errors(scene) if scene else []
         cost = costs(scene, [scene[Effects].tables])[0][:2] if scene and error_budget.touches(scene) else None
-        return Study(target, problem, points, chosen, parts, cost)
+        return Study(target, problem, points, chosen, parts, round_off.measure(problem), cost)
     finally:
         notice.cancel()
 
 
 def show(screen: Console, found: Study) -> None:
     """Print the table, and that of the errors of a scene's flight."""
-    console_output.show(screen, found.problem, found.points, found.chosen)
+    console_output.show(screen, found.problem, found.points, found.chosen, found.rounding)
     if found.parts:
         console_output.show_parts(screen, found.parts, found.cost)
 
 
 def write_json(path: Path, found: Study) -> None:
     """Write all points for other programs."""
-    console_output.write_json(path, found.target, found.problem, found.points, found.chosen, found.parts, found.cost)
+    console_output.write_json(
+        path, found.target, found.problem, found.points, found.chosen, found.parts, found.rounding, found.cost
+    )
 
 
 def plot(path: Path, found: Study) -> None:

@@ -9,6 +9,7 @@ from rich.table import Table
 
 from lapwing.studies.accuracy.error_budget import Part
 from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.round_off import RoundOff
 from lapwing.studies.accuracy.work_precision import Point, pareto_points
 
 LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors whose cheapest points are shown
@@ -27,8 +28,10 @@ def sentence(point: Point, unit: str) -> str:
     return f"{point.way}, {what} {text}: error {point.error:.1e}, {1e3 * point.time:.3g} ms{cost}"
 
 
-def show(console: Console, problem: Problem, points: list[Point], chosen: Point | None) -> None:
-    """Return print, of each method, its cheapest points at a few errors."""
+def show(
+    console: Console, problem: Problem, points: list[Point], chosen: Point | None, rounding: RoundOff | None = None
+) -> None:
+    """Print the cheapest points of each method at a few errors, and the round-off error."""
     console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
     table = Table(box=None, pad_edge=False, collapse_padding=True)
     table.add_column("method (order)\n    step")
@@ -46,6 +49,11 @@ def show(console: Console, problem: Problem, points: list[Point], chosen: Point 
         )  # fmt: skip
         before = point.way
     console.print(table)
+    if rounding is not None:
+        text = (
+            f"round-off: {rounding.error:.1e}, the same {rounding.steps} steps of {rounding.way} in extended precision"
+        )
+        console.print(text, highlight=False)
     if chosen is not None:
         console.print(f"cheapest: {sentence(chosen, problem.unit)}", highlight=False)
 
@@ -82,6 +90,7 @@ def write_json(
     points: list[Point],
     chosen: Point | None,
     parts: list[Part],
+    rounding: RoundOff | None = None,
     cost: tuple[float, float] | None = None,
 ) -> None:
     """Write all points, and of a scene its errors and what a step of its plant costs, for other programs."""
@@ -93,6 +102,7 @@ def write_json(
         "reference": problem.source,
         "points": [p._asdict() for p in points],
         "cheapest": chosen._asdict() if chosen else None,
+        "round_off": rounding._asdict() if rounding else None,
         "apart": [p._asdict() for p in parts],
         "step_ns": dict(zip(("hovering", "in contact"), cost, strict=True)) if cost else None,
     }

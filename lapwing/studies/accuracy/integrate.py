@@ -12,6 +12,7 @@ from lapwing.kernels import kernel, python_function
 from lapwing.kernels.state_tree import flatten, unflatten
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.problem import SolverMethod, SolverRun
+from lapwing.studies.accuracy.round_off import end_in_extended_precision
 
 ADAPTIVE = "rkmk54"  # the method that `integrate_adaptive` runs
 SAMPLES = 8  # parts of a run after which its invariants are looked at; every count of steps is a multiple
@@ -87,8 +88,9 @@ def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> SolverM
     settings = [duration / (coarsest * 2**k) for k in range(HALVINGS)]
     start = np.empty((1, width))
     return SolverMethod(
-        name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start)
-    )
+        name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start),
+        lambda h: end_in_extended_precision(method, p, x, duration / steps(h), steps(h)),
+    )  # fmt: skip
 
 
 def _adaptive(p: Any, x: Any, duration: float) -> SolverMethod:

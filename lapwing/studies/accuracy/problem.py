@@ -30,6 +30,7 @@ class SolverMethod(NamedTuple):
     prepare: Callable[[float], Callable[[], Any]]
     read: Callable[[float, Any], SolverRun | None]
     idle: Callable[[], Any]
+    extended: Callable[[float], np.ndarray] | None = None  # coordinates at the end by the steps in extended precision
 
 
 class Problem(NamedTuple):

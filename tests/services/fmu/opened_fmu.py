@@ -22,13 +22,20 @@ class OpenedFmu:
         elements = [element for name in inputs for element in fmu.description.elements("inputs", name, "input")]
         config = config._replace(inputs=tuple(Connection("u", k, each, 1.0) for k, each in enumerate(elements)))
         self.interface, self._host, self.time = config.interface, HostProcess(config), 0.0
+        self._columns = [each.column for each in config.outputs]
 
     def initialise(self, *inputs: float) -> tuple[float, ...]:
         """Return the outputs at time 0."""
-        return self._host.step(0.0, -1.0, inputs)
+        return self._step(0.0, -1.0, inputs)
 
     def advance(self, end: float, *inputs: float) -> tuple[float, ...]:
         """Step to a time and return the outputs."""
-        result = self._host.step(self.time, end - self.time, inputs)
+        result = self._step(self.time, end - self.time, inputs)
         self.time = end
         return result
+
+    def _step(self, time: float, step: float, inputs: Sequence[float]) -> tuple[float, ...]:
+        for k, value in enumerate(inputs):
+            self._host.inputs[k] = value
+        self._host.step(time, step)
+        return tuple(value for _, value in sorted(zip(self._columns, self._host.outputs, strict=True)))

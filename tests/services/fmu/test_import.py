@@ -270,6 +270,18 @@ def test_fmu_reads_output_of_other_fmu(folder: Path, plain_log: Path) -> None:
     assert len(payloads(log, "/custom_sensor/fmu_first")) == 251
 
 
+def test_crash_of_one_of_two_fmus_is_named_in_multi_process_mode(folder: Path) -> None:
+    scene, log = folder / "two.toml", folder / "two.mcap"
+    chain = CHAIN.format(delay=0, source=COLUMN, outputs=f'"{COLUMN}" = "y"')
+    chain = chain.replace("[services.second]", f"[services.second]\nstart = {{ fault = {CRASH} }}")
+    scene.write_text(HOVER.read_text() + chain)
+    done = run_command("run", str(scene), "--allow-code", "--log", str(log), "--set", "run.duration=1.0")
+    assert done.returncode == 1
+    assert "services.second: small.fmu: crashed (SIGSEGV) at t = 0.500 s" in done.stderr
+    assert "services.first" not in done.stderr
+    assert len(payloads(log, "/ground_truth")) >= 124
+
+
 @pytest.mark.parametrize("delay", [0, 1])
 def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> None:
     scene = folder / f"loop{delay}.toml"

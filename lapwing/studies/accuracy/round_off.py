@@ -1,0 +1,172 @@
+"""Round-off error: the same steps in double and in extended precision.
+
+Both runs execute the source of the same kernels with the same step and the same coefficients, so that their difference
+is the rounding of doubles alone. Extended numbers are numpy's `longdouble`: 64 bits of mantissa on x86-64 (2048 times
+as fine as a double), 113 on aarch64.
+"""
+
+import inspect
+from collections.abc import Callable
+from types import FunctionType, ModuleType, SimpleNamespace
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+from numba.core.typing.templates import builtin_registry
+
+from lapwing.dynamics.integrators import RATES
+from lapwing.kernels import math
+from lapwing.studies.accuracy.coordinates import coordinates, error
+from lapwing.studies.accuracy.problem import Problem
+
+Number = np.longdouble
+FINER = 1000.0  # times as fine as a double, at least: a long double of other systems is a double
+STEPS = 500  # at least
+METHOD = "rk4_renormalised"
+_FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "expm1", "log", "log1p", "tanh", "hypot", "cbrt", "floor")
+_MATH = SimpleNamespace(
+    **{name: getattr(np, name) for name in _FUNCTIONS},
+    **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan", "atan2")},
+    pow=np.power,
+    sincos=lambda x: (np.sin(x), np.cos(x)),
+    pi=math.pi,
+    tau=math.tau,
+    inf=math.inf,
+    isfinite=np.isfinite,
+    copysign=np.copysign,
+    square=np.square,
+)
+
+
+class RoundOff(NamedTuple):
+    """Round-off error at the end of a run."""
+
+    way: str
+    steps: int
+    error: float  # largest difference of coordinates, relative to 1 + size
+
+
+def is_available() -> bool:
+    """Return True if this machine has numbers finer than doubles."""
+    return bool(np.finfo(float).eps > FINER * np.finfo(Number).eps)
+
+
+def measure(problem: Problem) -> RoundOff | None:
+    """Return the round-off error of a problem, None if its methods or this machine have no extended numbers."""
+    way = next((way for way in problem.ways if way.name == METHOD), None)
+    if way is None or way.extended is None or not is_available():
+        return None
+    settings = [h for h in way.settings if round(problem.duration / h) >= STEPS]
+    outcome = way.read(settings[0], way.prepare(settings[0])()) if settings else None
+    if outcome is None or not np.isfinite(outcome.samples).all():
+        return None
+    exact = way.extended(settings[0])
+    return RoundOff(METHOD, round(problem.duration / settings[0]), error(outcome.samples[-1].astype(Number), exact))
+
+
+def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, steps: int) -> np.ndarray:
+    """Return the coordinates at the end of a run in extended numbers, shape (n,).
+
+    Args:
+        method: integrator.
+        p: parameters of the system (its class is in `RATES`).
+        x: state at time 0.
+        h: step.
+        steps: number of steps.
+
+    Raises:
+        TypeError: part of the system does not compute in extended precision.
+    """
+    step, rate = extended(method.step), extended(RATES[type(p)])
+    state = in_extended_precision(x)
+    for n in range(steps):
+        state = step(rate, p, Number(n * h), state, Number(h))
+    numbers = _numbers(state)
+    if not all(isinstance(number, Number) for number in numbers):
+        raise TypeError(f"{type(p).__name__}: a step returns doubles for extended numbers")
+    return coordinates(x, np.array([numbers], Number))[0]
+
+
+def in_extended_precision(tree: Any) -> Any:
+    """Return a tree with its doubles as extended numbers."""
+    return _mapped(float, Number, tree)
+
+
+def extended(function: Any) -> Callable[..., Any]:
+    """Return the Python function of a kernel, in which all that it calls computes with extended numbers."""
+    return _extended(function, {})
+
+
+def _extended(function: Any, known: dict[int, Any]) -> Any:
+    if function is math:
+        return _MATH
+    if isinstance(function, ModuleType) and function.__name__.startswith("lapwing"):
+        return _Module(function, known)
+    generate = _generator(function)
+    python = getattr(function, "py_func", function)
+    is_own = python is not function or (getattr(python, "__module__", None) or "lapwing").startswith("lapwing")
+    if not isinstance(python, FunctionType) or not is_own:
+        return function
+    if id(python) in known:
+        return known[id(python)]
+    if generate is not None:
+        result: Any = _generated(generate, known)
+        known[id(python)] = result
+        return result
+    names = dict(python.__globals__)
+    result = FunctionType(python.__code__, names, python.__name__, python.__defaults__, python.__closure__)
+    known[id(python)] = result
+    names |= {name: _extended(names[name], known) for name in python.__code__.co_names if name in names}
+    return result
+
+
+class _Module:
+    """A module whose functions compute with extended numbers."""
+
+    def __init__(self, module: ModuleType, known: dict[int, Any]):
+        self._module, self._known = module, known
+
+    def __getattr__(self, name: str) -> Any:
+        return _extended(getattr(self._module, name), self._known)
+
+
+def _generator(function: Any) -> Callable[..., Any] | None:
+    """Return the generator of a function that compiled code alone has, for the types of its arguments."""
+    if not isinstance(function, FunctionType):
+        return None
+    if "NotImplementedError" not in function.__code__.co_names:
+        return inspect.getclosurevars(function).nonlocals.get("generate")
+    for value, kind in builtin_registry.globals:
+        if value is function:
+            return inspect.getclosurevars(kind.templates[0].generic).nonlocals["choose"]  # type: ignore[no-any-return]
+    return None
+
+
+def _generated(generate: Callable[..., Any], known: dict[int, Any]) -> Callable[..., Any]:
+    variants: dict[Any, Any] = {}
+
+    def call(*values: Any) -> Any:
+        key = tuple(map(_shape, values))
+        if key not in variants:
+            variants[key] = _extended(
+                generate(*(numba.typeof(_mapped(Number, float, value)) for value in values)), known
+            )
+        return variants[key](*values)
+
+    return call
+
+
+def _shape(value: Any) -> Any:
+    return (type(value), *map(_shape, value)) if isinstance(value, tuple) else type(value)
+
+
+def _mapped(source: type, target: Callable[[Any], Any], tree: Any) -> Any:
+    """Return a tree with `target(leaf)` in place of each leaf of type `source`."""
+    if not isinstance(tree, tuple):
+        return target(tree) if isinstance(tree, source) else tree
+    items = [_mapped(source, target, item) for item in tree]
+    return type(tree)(*items) if hasattr(tree, "_fields") else tuple(items)
+
+
+def _numbers(tree: Any) -> list[Any]:
+    return [leaf for item in tree for leaf in _numbers(item)] if isinstance(tree, tuple) else [tree]

@@ -1,0 +1,86 @@
+"""The round-off error that the study reports, against arithmetic of 50 digits."""
+
+from typing import NamedTuple
+
+import mpmath
+import numpy as np
+import pytest
+
+from lapwing.dynamics.integrators import RATES, rk4
+from lapwing.kernels import always_inline, math
+from lapwing.studies.accuracy import round_off
+from lapwing.studies.accuracy.integrate import fixed_ways
+from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.round_off import end_in_extended_precision, extended
+from lapwing.studies.accuracy.systems import problems
+
+STEPS, DURATION = 1000, 10.0
+pytestmark = pytest.mark.skipif(not round_off.is_available(), reason="no extended numbers on this machine")
+
+
+class LinearOscillator(NamedTuple):
+    stiffness: float
+    damping: float
+
+
+@always_inline
+def oscillator_rate(p, t, x):
+    return (x[1], -p.stiffness * x[0] - p.damping * x[1])
+
+
+RATES[LinearOscillator] = oscillator_rate
+P, START = LinearOscillator(7.3, 0.11), (0.7, -0.3)
+
+
+def end_in_digits(steps: int, h: float) -> list[mpmath.mpf]:
+    """Return the end of the steps of RK4, whose rounding error is below 1e-45."""
+    with mpmath.workdps(50):
+        A = mpmath.matrix([[0, 1], [-mpmath.mpf(P.stiffness), -mpmath.mpf(P.damping)]]) * mpmath.mpf(h)
+        one_step = mpmath.eye(2) + A + A**2 / 2 + A**3 / 6 + A**4 / 24  # RK4 of a linear system
+        return list(one_step**steps * mpmath.matrix(START))
+
+
+def test_end_of_linear_system_has_digits_of_extended_precision() -> None:
+    h = DURATION / STEPS
+    exact = end_in_digits(STEPS, h)
+    end = end_in_extended_precision(rk4, P, START, h, STEPS)
+    assert end.dtype == np.longdouble
+    for value, digits in zip(end, exact, strict=True):
+        with mpmath.workdps(50):
+            assert abs(mpmath.mpf(np.format_float_positional(value, precision=30)) - digits) < 3e-17
+
+
+def test_round_off_of_linear_system_is_that_of_digits() -> None:
+    ways = fixed_ways(P, START, DURATION, 8)
+    result = round_off.measure(Problem("oscillator", "s", DURATION, ways, lambda: np.zeros(2), "", {}))
+    (way,) = (way for way in ways if way.name == round_off.METHOD)
+    h = DURATION / result.steps
+    double = way.read(h, way.prepare(h)()).samples[-1]
+    with mpmath.workdps(50):
+        digits = end_in_digits(result.steps, h)
+        expected = max(abs(mpmath.mpf(float(a)) - b) / (1 + abs(b)) for a, b in zip(double, digits, strict=True))
+    assert result.steps >= round_off.STEPS
+    assert 1e-17 < expected < 1e-13
+    assert result.error == pytest.approx(float(expected), rel=0.05)
+
+
+@always_inline
+def elementary(x):
+    sine, cosine = math.sincos(x)
+    return sine * math.exp(x) + math.sqrt(cosine) + math.hypot(x, 2.0) + math.atan2(x, 3.0)
+
+
+def test_elementary_functions_have_extended_precision() -> None:
+    value = extended(elementary)(np.longdouble(0.3))
+    with mpmath.workdps(50):
+        x = mpmath.mpf(0.3)
+        exact = mpmath.sin(x) * mpmath.exp(x) + mpmath.sqrt(mpmath.cos(x)) + mpmath.hypot(x, 2) + mpmath.atan2(x, 3)
+        assert abs(mpmath.mpf(np.format_float_positional(value, precision=30)) - exact) < 2e-18
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["free_rigid_body", "multirotor", "os4_experiment_4"])
+def test_round_off_of_flight_is_above_that_of_one_step_and_small(name: str) -> None:
+    result = round_off.measure(problems()[name])
+    assert result is not None
+    assert 2.0**-54 < result.error < 1e-11
