@@ -1,7 +1,7 @@
 """Python block that steps one FMU at every tick."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
@@ -62,7 +62,7 @@ class FmuBlock:
         self._publish(tick, self._host.outputs.tolist(), time)
         return tick + 1
 
-    def _set_inputs(self, tick: int, inputs: memoryview) -> None:
+    def _set_inputs(self, tick: int, inputs: "memoryview[float]") -> None:
         """Write the newest samples of ports in the units of the FMU; the inputs are 0 before the first."""
         stamp = tick - self._fmu.delay
         if stamp < 0:
@@ -72,7 +72,7 @@ class FmuBlock:
             for index, column, factor in places:
                 inputs[index] = row[column] * factor
 
-    def _publish(self, tick: int, outputs: list[float], time: float) -> None:
+    def _publish(self, tick: int, outputs: Sequence[float], time: float) -> None:
         """Write the ports that are due, with the outputs of the FMU in their columns."""
         if not all(map(math.isfinite, outputs)):
             for each, value in zip(self._fmu.outputs, outputs, strict=True):

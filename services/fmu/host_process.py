@@ -41,7 +41,8 @@ class HostProcess:
         self._request, self._reply = bytearray(8 * (2 + len(fmu.inputs))), bytearray(8 * (1 + len(fmu.outputs)))
         numbers = memoryview(self._request).cast("d")
         self._moment, self.inputs = numbers[:2], numbers[2:]
-        self._status, self.outputs = memoryview(self._reply).cast("q")[:1], memoryview(self._reply).cast("d")[1:]
+        self._status = memoryview(self._reply).cast("q")[:1]
+        self.outputs = memoryview(self._reply).cast("d")[1:]
         folder = tempfile.mkdtemp(prefix="lapwing-fmu-")
         child_requests, self._requests = os.pipe()
         self._replies, child_replies = os.pipe()

@@ -120,8 +120,8 @@ def _tables(package: _Package, parse: Callable[[Path, str], Any]) -> dict[str, A
         if not name.isidentifier():
             raise package.error(f"component {name!r}", "names of letters, digits and underscores")
         own = {key: value for key, value in fmu._asdict().items() if key != "source" and value}
-        content = base64.b64encode(package.read(fmu.source)).decode()
-        tree.setdefault("services", {})[name] = {"fmu": f"{package.path}/{fmu.source}", "content": content, **own}
+        encoded = base64.b64encode(package.read(fmu.source)).decode()
+        tree.setdefault("services", {})[name] = {"fmu": f"{package.path}/{fmu.source}", "content": encoded, **own}
     return tree
 
 

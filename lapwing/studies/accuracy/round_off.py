@@ -19,7 +19,7 @@ from lapwing.kernels import math
 from lapwing.studies.accuracy.coordinates import coordinates, error
 from lapwing.studies.accuracy.problem import Problem
 
-Number = np.longdouble
+Number: type = np.longdouble
 FINER = 1000.0  # times as fine as a double, at least: a long double of other systems is a double
 STEPS = 500  # at least
 METHOD = "rk4_renormalised"
