@@ -11,6 +11,7 @@ from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.services.common.communication_schema import Communication
 
 CONTACT_SHARE = 3e-5  # of solver.accuracy, for one part of a step in contact: bounces amplify its errors
+LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 
 PART_SHARE, PART_TOLERANCE = 0.1, 1e-5  # the same of systems with contacts of their own, and where nobody asks
 
@@ -42,7 +43,9 @@ class Solver(SceneTable):
     @property
     def contact_tolerance(self) -> float:
         """Error of a part of a step in contact that leaves the accuracy to a whole flight; the usual one without."""
-        return CONTACT_TOLERANCE if self.accuracy is None else CONTACT_SHARE * self.accuracy
+        return (
+            CONTACT_TOLERANCE if self.accuracy is None else max(CONTACT_SHARE * self.accuracy, LEAST_CONTACT_TOLERANCE)
+        )
 
     @property
     def part_tolerance(self) -> float:

@@ -24,7 +24,7 @@ from lapwing.studies.simulate import fly_each
 
 FINER = 8  # times as many steps in a communication step
 STRICTER = 1e-3  # times the accuracy, in contact
-STRICTEST = 1e-12  # that a scene can ask for
+STRICTEST = 1e-10  # beyond which contact is limited by round-off
 BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState; its current jumps where a motor is switched off
 
 
