@@ -24,10 +24,10 @@ def show(console: Console, found: Validation) -> None:
         table.add_column(f"{name.replace('_', ' ')} [{UNITS[name]}]", justify="right")
     for k, steps in enumerate(found.horizons):
         after = f"{steps * found.interval:g} s"
-        table.add_row(after, "plant", *(_with_interval(found.plant[k][f]) for f in shown))
+        table.add_row(after, "plant", *(with_interval(found.plant[k][f]) for f in shown))
         for name, rows in found.baselines.items():
             last = name == list(found.baselines)[-1]
-            table.add_row("", name.replace("_", " "), *(_plain(rows[k][f].mean) for f in shown), end_section=last)
+            table.add_row("", name.replace("_", " "), *(plain(rows[k][f].mean) for f in shown), end_section=last)
     console.print(table)
     for flight in found.closed_loop:
         console.print(closed_loop_line(flight), highlight=False, soft_wrap=True)
@@ -54,13 +54,15 @@ def closed_loop_line(flight: ClosedLoop) -> str:
     )
 
 
-def _with_interval(metric: Metric) -> str:
+def with_interval(metric: Metric) -> str:
+    """Return mean and interval as text; a dash without measurement, no interval of fewer than three flights."""
     if not math.isfinite(metric.mean):
         return "-"
     if not math.isfinite(metric.low):
-        return _plain(metric.mean)
-    return f"{_plain(metric.mean)} ({_plain(metric.low)} to {_plain(metric.high)})"
+        return plain(metric.mean)
+    return f"{plain(metric.mean)} ({plain(metric.low)} to {plain(metric.high)})"
 
 
-def _plain(value: float) -> str:
+def plain(value: float) -> str:
+    """Return the value as text; a dash if it is not finite."""
     return f"{value:.3g}" if math.isfinite(value) else "-"

@@ -8,7 +8,7 @@ from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.sections import Section
 from lapwing.studies.tune.console_output import Rows
-from lapwing.studies.validation.console_output import UNITS
+from lapwing.studies.validation.console_output import UNITS, plain, with_interval
 from lapwing.studies.validation.envelope import CHANNELS, explanations, residual_spectra, trends
 from lapwing.studies.validation.prediction_metrics import FIELDS
 from lapwing.studies.validation.procedure import Validation
@@ -44,9 +44,9 @@ def _errors(found: Validation) -> Rows:
     table = Rows("Mean absolute error", "after, by", *heads)
     for k, steps in enumerate(found.horizons):
         after = f"{steps * found.interval:g} s"
-        table.add(f"{after}, plant", *(f"{m.mean:.3g} ({m.low:.3g} to {m.high:.3g})" for m in found.plant[k]))
+        table.add(f"{after}, plant", *map(with_interval, found.plant[k]))
         for name, rows in found.baselines.items():
-            table.add(f"{after}, {name.replace('_', ' ')}", *(f"{m.mean:.3g}" for m in rows[k]))
+            table.add(f"{after}, {name.replace('_', ' ')}", *(plain(m.mean) for m in rows[k]))
     return table
 
 
