@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from page_texts import page_text
 
 import lapwing
 from lapwing import Flight
@@ -46,12 +47,12 @@ def test_fleet_summary_has_outcomes_and_separation(flown):
 
 def test_report_shows_all_paths(flown):
     folder, _, _ = flown
-    text = (folder / "a.html").read_text()
+    text = page_text(folder / "a.html")
     assert "All vehicles from above" in text
     assert all(f'"name":"{name}"' in text for name in ("left", "right", "scout"))
     page = folder / "scout.html"
     command("report", folder / "a.mcap", "--vehicle", "scout", "--out", page)
-    assert "quad_x" in page.read_text()
+    assert "quad_x" in page_text(page)
 
 
 def test_info_verify_and_refly_take_its_log(flown):

@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from page_texts import page_text
 
 from lapwing.file_schemas.key_units import key_units
 
@@ -31,7 +32,7 @@ def test_campaign_report_has_units_of_parameters(tmp_path):
     command = [sys.executable, "-m", "lapwing", "campaign", "hover", "--runs", "12", "--workers", "1", "--out", "c"]
     command += ["--vary", "vehicle.mass=uniform(10.0,10.8)", "--report", "c.html"]
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, env=os.environ | {"PYTHONPATH": os.getcwd()})
-    page = (tmp_path / "c.html").read_text()
+    page = page_text(tmp_path / "c.html")
     assert '"text":"vehicle.mass [kg]"' in page
     command[command.index("c.html")] = "c.pdf"
     subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, env=os.environ | {"PYTHONPATH": os.getcwd()})

@@ -69,7 +69,7 @@ def test_film_has_its_pictures_and_length(log):
     done = run(log.parent, log, "--out", "a.mp4", *SMALL, *span)
     assert done.returncode == 0, done.stderr
     film = imageio.get_reader(log.parent / "a.mp4")
-    pictures = list(film)
+    pictures = list(film.iter_data())
     assert [picture.shape for picture in pictures] == [(120, 160, 3)] * 5
     assert film.get_meta_data()["duration"] == pytest.approx(2.5, abs=0.05)
     sky = pictures[0][2, 80].astype(float)

@@ -5,6 +5,7 @@ import sysconfig
 from pathlib import Path
 
 import pytest
+from page_texts import page_text
 
 from lapwing.studies.view3d import headless
 
@@ -54,14 +55,14 @@ def test_comparison_is_small_and_has_every_plot(folder):
 def test_report_of_modelled_battery_has_its_margin(folder):
     battery = ("--set", "effects.battery={initial_charge=0.3}", "--log", "battery.mcap")
     run(folder, "run", "delivery_mission", "--mode", "single-process", *battery)
-    written = (folder / "battery.html").read_text(encoding="utf-8")
+    written = page_text(folder / "battery.html")
     run(folder, "report", "battery.mcap", "--out", "again.html")
-    again = (folder / "again.html").read_text(encoding="utf-8")
+    again = page_text(folder / "again.html")
     for text in (written, again):
         assert "energy drawn [W h]" in text
         assert "% of the charge is left" in text
         assert "above 15 % (warning)" in text
-    assert "the scene models no battery" in (folder / "a.html").read_text(encoding="utf-8")
+    assert "the scene models no battery" in page_text(folder / "a.html")
 
 
 @needs_chromium

@@ -127,8 +127,8 @@ def _array(values: np.ndarray, log: bool = False, shown: tuple[float, float] | N
         data = np.ascontiguousarray(values, dtype="<f4").tobytes()
         return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
     counts = np.zeros(len(values)) if step == 0.0 else np.round((np.where(finite, values, low) - low) / step) - STEPS
-    steps = np.diff(np.where(finite, counts, -STEPS - 1).astype("<i2"), prepend=np.int16(0)).astype("<i2")
-    planes = steps.view(np.uint8).reshape(-1, 2).T.tobytes()
+    changes = np.diff(np.where(finite, counts, -STEPS - 1).astype("<i2"), prepend=np.int16(0)).astype("<i2")
+    planes = changes.view(np.uint8).reshape(-1, 2).T.tobytes()
     return {"low": low, "step": step, "steps": base64.b64encode(planes).decode("ascii")}
 
 

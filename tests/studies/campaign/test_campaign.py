@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
+from page_texts import page_text
 from typer.testing import CliRunner
 
 from lapwing.cli.main import app
@@ -241,7 +242,7 @@ def test_report_json_and_run_flown_again_to_bit(flown, tmp_path, monkeypatch):
     assert 0 < good < RUNS
     reported = json.loads((tmp_path / "c.json").read_text())
     assert (reported["runs"], len(reported["failed"]), reported["digest"]) == (RUNS, RUNS - good, digest)
-    page = (folder.path / "report.html").read_text()
+    page = page_text(folder.path / "report.html")
     assert all(text in page for text in ("Probability of success", "Which parameter matters", "normal(10.4, 0.3)"))
     worst = Results(folder).worst(1)[0]["run"]
     command = f"lapwing run {SCENE} --run {worst} --campaign {folder.path}"

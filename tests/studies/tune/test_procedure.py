@@ -1,6 +1,7 @@
 from pathlib import Path
 
 import pytest
+from page_texts import page_text
 from rich.console import Console
 from typer.testing import CliRunner
 
@@ -57,7 +58,7 @@ def test_perturbed_vehicles_land(found):
 def test_page_and_tables(found, tmp_path):
     path = tmp_path / "tune.html"
     tuning_report.write(path, found)
-    page = path.read_text()
+    page = page_text(path)
     assert page.count('<figure class="plot">') == 2
     assert "Open loops" in page
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flight_recordings import INTERVAL, simulated
+from page_texts import page_text
 
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.validation.closed_loop import fly_setpoints
@@ -71,4 +72,4 @@ def test_command_overlays_closed_loop(log, tmp_path):
     assert "closed loop: flown" in done.stdout
     (flight,) = json.loads(out.read_text())["closed_loop"]
     assert flight["difference"] < 0.05
-    assert "the recorded setpoints, flown" in page.read_text()
+    assert "the recorded setpoints, flown" in page_text(page)

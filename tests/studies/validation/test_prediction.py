@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from flight_recordings import INTERVAL, real_flights, simulated, write_csv
+from page_texts import page_text
 
 from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
@@ -116,7 +117,7 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     assert last["windows"] > 50
     assert 0.0 < last["position"] < last["baselines"]["constant_velocity"]["position"]
     assert set(last["baselines"]) == {"constant_velocity", "linear_fit"}
-    assert "Errors over the envelope" in page.read_text()
+    assert "Errors over the envelope" in page_text(page)
 
 
 @pytest.mark.parametrize(
