@@ -12,6 +12,8 @@ from lapwing.messages import (
     Estimate,
     EstimateCovariance,
     FluidPressure,
+    GPSFix,
+    GPSStatus,
     Imu,
     MagneticField,
     NavSatFix,
@@ -39,6 +41,7 @@ from lapwing.messages import (
     topics,
 )
 from lapwing.messages.types import OpticalFlow
+from lapwing.services.common import ports
 
 UNKNOWN = (-1.0,) + (0.0,) * 8
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer", "optical_flow")
@@ -144,7 +147,13 @@ def magnetometer(given, time_ns, r):
 
 
 def gps(given, time_ns, r):
-    status = NavSatStatus.STATUS_GBAS_FIX if r.valid else NavSatStatus.STATUS_NO_FIX
+    kinds = {
+        ports.GPS_SINGLE: NavSatStatus.STATUS_FIX,
+        ports.GPS_SBAS: NavSatStatus.STATUS_SBAS_FIX,
+        ports.GPS_FLOAT: NavSatStatus.STATUS_GBAS_FIX,
+        ports.GPS_RTK: NavSatStatus.STATUS_GBAS_FIX,
+    }
+    status = kinds.get(r.fix, NavSatStatus.STATUS_GBAS_FIX) if r.valid else NavSatStatus.STATUS_NO_FIX
     return NavSatFix(
         header(max(time_ns - round(r.age * 1e9), 0), given.vehicle),
         NavSatStatus(status, NavSatStatus.SERVICE_GPS),
@@ -153,6 +162,35 @@ def gps(given, time_ns, r):
         r.height,
         diagonal(*r.position_variance),
         NavSatFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
+    )
+
+
+def gps_details(given, time_ns, r):
+    kinds = {ports.GPS_SINGLE: GPSStatus.STATUS_FIX, ports.GPS_SBAS: GPSStatus.STATUS_SBAS_FIX}
+    head = header(max(time_ns - round(r.age * 1e9), 0), given.vehicle)
+    east, north, up = r.velocity_world
+    return GPSFix(
+        head,
+        GPSStatus(
+            head,
+            satellites_used=r.used,
+            satellites_visible=r.visible,
+            status=kinds.get(r.fix, 0) if r.valid else GPSStatus.STATUS_NO_FIX,
+            position_source=GPSStatus.SOURCE_GPS,
+        ),
+        latitude=r.latitude_deg,
+        longitude=r.longitude_deg,
+        altitude=r.height,
+        track=math.degrees(math.atan2(east, north)) % 360.0,
+        speed=math.sqrt(east * east + north * north),
+        climb=up,
+        pdop=math.sqrt(r.hdop * r.hdop + r.vdop * r.vdop),
+        hdop=r.hdop,
+        vdop=r.vdop,
+        err_horz=1.959964 * math.sqrt(r.position_variance[0] + r.position_variance[1]),
+        err_vert=1.959964 * math.sqrt(r.position_variance[2]),
+        position_covariance=diagonal(*r.position_variance),
+        position_covariance_type=GPSFix.COVARIANCE_TYPE_DIAGONAL_KNOWN,
     )
 
 
@@ -267,6 +305,7 @@ BUILDERS = {
     topics.MAG: magnetometer,
     topics.GPS: gps,
     topics.GPS_VELOCITY: gps_velocity,
+    topics.GPS_DETAILS: gps_details,
     topics.BARO: barometer,
     topics.SONAR: sonar,
     topics.AIRSPEED: airspeed,

@@ -22,6 +22,7 @@ from tests.cosim.scalar_encoding import BUILDERS
 
 SCENES = sorted((Path(__file__).parents[3] / "lapwing/scenes").glob("*.toml"))
 FIRST, COUNT = 10_000, 40  # ticks
+SATELLITES = "sensors.gps.constellation={}"
 WORDS = (
     Words("mission", "", False, False, "", 0, 0, 65535, 1, False, (), (0.0, 0.0, 0.0), False, 0),
     Words(
@@ -113,13 +114,18 @@ def test_contact_forces_equal_scalar_encoding():
     check_every_topic(resolve(load("hover", ["rates.contact_forces=50"])), np.random.default_rng(5))
 
 
+def test_details_of_satellites_equal_scalar_encoding():
+    check_every_topic(resolve(load("quad_x", [SATELLITES])), np.random.default_rng(5))
+
+
 def test_scenes_cover_all_topics():
     requested = load(
         "bridge", ["autopilot.accept_commands=true", "rates.contact_forces=50"]
     )  # tells what it got of the airspeed, too
     clouds = load("bridge", ["sensors.lidar.preset=vlp16", "sensors.depth_camera.preset=ideal"])
     rings = load("bridge", ["sensors.lidar.preset=rplidar_a2"])
-    scenes = [*map(load, SCENES), requested, clouds, rings]
+    satellites = load("quad_x", [SATELLITES])
+    scenes = [*map(load, SCENES), requested, clouds, rings, satellites]
     spoken = {
         template_topic(topic) for scene in scenes for service in create_all(resolve(scene)) for topic in service.topics
     }
