@@ -38,11 +38,11 @@ def log(tmp_path_factory):
         (("--out", "a.png", "--from", "9"), "expected times of the flight, 0 to 3 s"),
     ],
 )
-def test_render_rejects_wrong_options_in_one_line(log, words, message):
-    done = run(log.parent, log, *words)
+def test_render_rejects_wrong_options_in_one_line(log, tmp_path, words, message):
+    done = run(tmp_path, log, *words)
     assert (done.returncode, done.stderr.count("\n")) == (2, 1), done.stderr
     assert message in done.stderr
-    assert not (log.parent / words[1]).exists()
+    assert not (tmp_path / words[1]).exists()
 
 
 @pytest.mark.long
