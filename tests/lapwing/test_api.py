@@ -146,7 +146,7 @@ def test_campaign_varies_loaded_scene_by_seed_and_run():
     [
         (lambda: lapwing.campaign("hover", [1], {"vehicle.mass": 10.4}), "vehicle.mass: expected a distribution"),
         (lambda: lapwing.campaign("hover", [1], {"vehicle.mas": lapwing.normal(1.0, 0.0)}), "did you mean mass?"),
-        (lambda: lapwing.campaign("hover", []), "seeds: got none; expected at least one"),
+        (lambda: lapwing.campaign("hover", []), "seeds: expected at least one, got none"),
         (lambda: lapwing.fly("hover", seed=-1), "run.seed: expected a whole number at least 0"),
         (lambda: lapwing.fly("hoverr"), "unknown scene 'hoverr'; did you mean hover?"),
         (lambda: lapwing.load_scene("hover", "run.seed=1"), "a list: [\"KEY=VALUE\"], got 'run.seed=1'"),

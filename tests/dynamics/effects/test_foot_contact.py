@@ -32,7 +32,7 @@ def anchored(e, memory, s):
         ground_contact.ground_contact(e, memory, s, 0.0),
         ground_contact.forces(e, memory, s.motion),
         ground_contact.touches(e, memory, s),
-        ground_contact.stretching(e, memory, s.motion),
+        ground_contact.loads_and_stretching(e, memory, s.motion),
     )
 
 
@@ -125,6 +125,6 @@ def test_feet_are_independent(drone, law, ground):
         assert touches == any(foot.press > 0.0 for foot in feet)
         if law == "stick_slip":
             each = [foot.element(deflection) for foot, deflection in zip(feet, memory, strict=True)]
-            assert settled == [tuple(rate for _, rate, _ in each)]
+            assert settled == [(force, torque, tuple(rate for _, rate, _ in each))]
             kinds |= {kind for *_, kind in each}
     assert law == "regularised" or kinds == {"flies", "sticks", "slides"}
