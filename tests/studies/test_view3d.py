@@ -224,7 +224,7 @@ def test_contact_forces_are_drawn_at_their_points():
         ("rangefinder", {"elevation_deg": 30.0, "position": [0.0, 0.0, 0.0]}, (0.0, 0.0, 0.0), (0.75**0.5, 0.0, 0.5)),
     ],
 )
-def test_beam_reaches_from_its_sensor_to_what_it_sees(name, table, origin, direction):
+def test_drawn_beam_starts_at_sensor_and_ends_at_surface(name, table, origin, direction):
     ranges = np.where(T < 2.0, 1.5, np.inf)
     whole = flight(scene={"airframe": AIRFRAME, "sensors": {name: table}})
     reading = TopicView(np.arange(TICKS) * 10**7, {"range": ranges, "field_of_view": np.full(TICKS, 0.5)})

@@ -110,7 +110,7 @@ class Recording:
 
     @property
     def grounded(self) -> str:
-        """Why the vehicle cannot have left the ground; empty if it may have."""
+        """Return the reason why the vehicle cannot have left the ground, or ""."""
         if not np.nanmax(self.motor_voltage, initial=0.0) > 0.0:
             return "the motors do not run"
         height = self.position[self.valid & np.isfinite(self.position[:, 2]), 2]

@@ -86,7 +86,7 @@ def test_rotors_fluctuate_independently(oscillation):
 
 
 def test_oscillation_does_not_depend_on_step(drone, situation, rotors):
-    """The same deviation and correlation over a time for another communication step: closed form of the process."""
+    """Compare deviation and correlation at two communication steps with the closed form of the process."""
     e, s = make(drone), situation(speed=(SPEED,) * 4)
     start = ((1.0, 0.0),) * 4
     rows = [oscillate.py_func(e, start, s, rotors(), KEY, tick, 0.02) for tick in range(4000)]
