@@ -24,8 +24,10 @@ MAPPED = {
     "vehicle_attitude", "vehicle_local_position", "vehicle_angular_velocity", "sensor_combined", "actuator_motors",
     "actuator_outputs", "battery_status", "vehicle_gps_position", "sensor_gps", "vehicle_air_data", "sensor_baro",
     "vehicle_magnetometer", "sensor_mag", "distance_sensor", "differential_pressure", "trajectory_setpoint",
-    "vehicle_local_position_setpoint", "vehicle_attitude_setpoint", "vehicle_optical_flow",
+    "vehicle_local_position_setpoint", "vehicle_attitude_setpoint", "vehicle_optical_flow", "vehicle_status",
+    "vehicle_land_detected", "actuator_armed",
 }  # fmt: skip
+ARMED = 2.0  # vehicle_status.arming_state
 
 
 def read_ulog_flight(path: Path) -> Recording:
@@ -76,6 +78,8 @@ def read_ulog_flight(path: Path) -> Recording:
     channels.setpoint = _setpoint(series, three)
     channels.attitude_setpoint = _attitude_setpoint(series)
     channels.readings = _readings(series, three)
+    if (status := _status(series)) is not None:
+        channels.readings["status"] = status
     return to_recording(
         path, channels, "actuator_motors, actuator_outputs", "vehicle_angular_velocity, sensor_combined"
     )
@@ -151,6 +155,26 @@ def _optical_flow(series: Any) -> Series | None:
         return None
     rates = turned.values[:, :4] * [1.0, -1.0, 1.0, -1.0] / (span.values * 1e-6)
     return Series(turned.time, np.column_stack([rates, turned.values[:, 4]]), turned.dropped)
+
+
+def _status(series: Any) -> Series | None:
+    """Return armed, landed, failsafe and navigation state at the times at which one of them is logged."""
+    state = series("vehicle_status", "arming_state", "failsafe", "nav_state")
+    if state is None:
+        return None
+    armed, landed = series("actuator_armed", "armed"), series("vehicle_land_detected", "landed")
+    time = np.unique(np.concatenate([s.time for s in (state, armed, landed) if s is not None]))
+    time = time[time >= state.time[0]]
+
+    def latest(source: Series, column: int) -> np.ndarray:
+        return source.values[np.maximum(np.searchsorted(source.time, time, side="right") - 1, 0), column]
+
+    columns = [
+        latest(armed, 0) if armed else latest(state, 0) == ARMED,
+        latest(landed, 0) if landed else np.zeros(len(time)),
+        latest(state, 1), latest(state, 2),
+    ]  # fmt: skip
+    return Series.of(time, np.column_stack(columns))
 
 
 def _readings(series: Any, three: Any) -> dict[str, Series]:

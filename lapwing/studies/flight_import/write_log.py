@@ -20,6 +20,7 @@ from lapwing.messages.topics import (
     OPTICAL_FLOW,
     RANGEFINDER,
     SETPOINT,
+    STATUS,
     TRUTH,
     Topic,
 )
@@ -38,6 +39,7 @@ from lapwing.messages.types import (
     Quaternion,
     Range,
     Setpoint,
+    Status,
     Time,
     Twist,
     TwistWithCovariance,
@@ -51,12 +53,18 @@ VEHICLE = "drone1"
 FRAME = "world"
 BATTERY_INTERVAL = 0.1  # [s]
 UNSET = Vector3(math.nan, math.nan, math.nan)
+MODES = {  # vehicle_status.nav_state of PX4
+    0: "manual", 1: "altitude", 2: "position", 3: "mission", 4: "hold", 5: "return", 10: "acro", 12: "descend",
+    13: "terminated", 14: "offboard", 15: "stabilized", 17: "takeoff", 18: "land", 19: "follow", 20: "precision land",
+    21: "orbit",
+}  # fmt: skip
 SPINNING = 0.05  # share of the highest motor voltage above which motors count as armed
 
 
 SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
     # topic and message of each sensor's readings: rad/s and m/s^2 in body axes, degrees and metres, pascals, teslas in
-    # body axes, metres, pascals; m/s in the world, rad/s about body x and y of flow and camera and metres
+    # body axes, metres, pascals; m/s in the world, rad/s about body x and y of flow and camera and metres;
+    # armed, landed, failsafe, and the navigation state of PX4
     "imu": (
         IMU,
         lambda header, v: Imu(header=header, angular_velocity=Vector3(*v[:3]), linear_acceleration=Vector3(*v[3:])),
@@ -79,6 +87,12 @@ SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
         lambda header, v: OpticalFlow(header, flow=tuple(v[:2]), rate=tuple(v[2:4]), distance=v[4], variance=math.nan),
     ),
     "airspeed": (AIRSPEED, lambda header, v: FluidPressure(header, v[0])),
+    "status": (
+        STATUS,
+        lambda header, v: Status(
+            header, MODES.get(int(v[3]), f"mode {v[3]:.0f}"), armed=v[0] > 0, landed=v[1] > 0, failsafe=v[2] > 0
+        ),
+    ),
 }
 
 

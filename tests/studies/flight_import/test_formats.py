@@ -218,7 +218,10 @@ ULOG = {  # topic: fields beside the time stamp, of PX4 1.14
     "sensor_gps": "float vel_n_m_s;float vel_e_m_s;float vel_d_m_s;",
     "vehicle_optical_flow": "float[2] pixel_flow;float[3] delta_angle;float distance_m;"
     "uint32_t integration_timespan_us;",
+    "vehicle_status": "uint8_t arming_state;uint8_t nav_state;uint8_t failsafe;",
+    "vehicle_land_detected": "uint8_t landed;",
 }
+ARMED, ALOFT = 100, 150  # samples
 
 
 def write_ulog(path, flight):
@@ -243,7 +246,9 @@ def write_ulog(path, flight):
         for number, row in enumerate(rows):
             out += message("D", struct.pack("<H", number) + stamp + struct.pack(f"<{len(row)}f", *row))
         flow = struct.pack("<6fI", 0.01, 0.02, 0.03, 0.04, 0.05, 2.0, 10_000)
-        out += message("D", struct.pack("<H", len(rows)) + stamp + flow)
+        status = struct.pack("<3B", 2 if k >= ARMED else 1, 3, 0)
+        for number, content in enumerate((flow, status, struct.pack("<B", k < ALOFT)), len(rows)):
+            out += message("D", struct.pack("<H", number) + stamp + content)
     path.write_bytes(out)
 
 
@@ -318,6 +323,10 @@ def test_imported_setpoints_are_in_the_log(tmp_path, flight):
     assert max(log.rmse.values()) < 1e-5
     assert len(log.topic("gps/velocity")) >= n
     assert log.topic("optical_flow").flow[0] == pytest.approx([1.0, -2.0])
+    status, at = log.status, np.arange(n)
+    assert set(status.mode) == {"mission"}
+    assert np.array_equal(status.armed[:n], at >= ARMED)
+    assert np.array_equal(status.landed[:n], at < ALOFT)
     again = open_flight(tmp_path / "f.mcap")
     assert again.setpoint[1:, :3] == pytest.approx(flight.position[1 : len(again)], abs=1e-5)
 
