@@ -7,12 +7,15 @@ Flight Vehicle System Identification, 2015, sections 4 and 9).
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.signal import savgol_filter
 
 from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.flight_import.rotation_arrays import continuous, unit
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
@@ -27,6 +30,7 @@ NO_INFLUENCE = 1e-12  # of the largest information, below which a parameter chan
 TOLERANCE = 1e-8  # of the relative change of loss and parameters; 1e-5 stops a standard error short of the minimum
 LARGEST = 1e3  # residual, in units of its scale
 FIELDS = ("position", "velocity", "attitude", "rate")
+SMOOTHING = 9  # samples of the local parabola whose middle is the start of a window
 
 
 class Window(NamedTuple):
@@ -109,7 +113,7 @@ class OutputError:
             self.plant.set_parameters([{self.keys[k]: float(sets[i][k]) for k in own} for i in members])
             states = start_states(self.plant, flights, self.memory)
             spans = [Span(w.flight, w.starts, j) for j in range(len(members)) for w in self.windows]
-            result = predict_all(self.plant, flights, spans, states, self.horizons)
+            result = predict_all(self.plant, [smoothed(f) for f in flights], spans, states, self.horizons)
             parts = [
                 _stacked(compare(flights[s.flight], s.starts, self.horizons, f))
                 for s, f in zip(spans, result, strict=True)
@@ -192,6 +196,22 @@ class OutputError:
             self.keys, self.start, x * self.scale, deviation * self.scale, correlation, float(np.mean(_loss(residual))),
             self.evaluations, tuple(k for k, a, b in zip(self.keys, vague, mixed, strict=True) if a or b),
         )  # fmt: skip
+
+
+def smoothed(flight: Recording) -> Recording:
+    """Return a flight whose motion is smoothed over neighbouring samples, without delay.
+
+    The noise of a start state enters the prediction and its derivatives alike, which biases time constants and inertia.
+    """
+
+    def smooth(values: np.ndarray) -> np.ndarray:
+        return savgol_filter(values, SMOOTHING, 2, axis=0) if len(values) >= SMOOTHING else values
+
+    return replace(
+        flight,
+        position=smooth(flight.position), attitude=unit(smooth(continuous(flight.attitude))),
+        velocity=smooth(flight.velocity), omega=smooth(flight.omega),
+    )  # fmt: skip
 
 
 def _stacked(e: Errors) -> np.ndarray:
