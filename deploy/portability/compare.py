@@ -5,7 +5,7 @@
 The reference is this interpreter without any change. Variants of the environment are those of `VARIANTS`; another
 system, version of numba or processor is given by the command that starts its Python, e.g.
 
-    --python "debian13=chroot /srv/trixie /usr/bin/env PYTHONPATH=/lapwing:/site python3"
+    --python "debian13=chroot /srv/trixie /usr/bin/env -C /lapwing PYTHONPATH=/lapwing:/site python3"
     --python "aarch64=qemu-aarch64-static -L /srv/arm64 /srv/arm64/usr/bin/python3"
 
 Such a command runs `deploy/portability/digests.py` in this folder; the environment is passed on.

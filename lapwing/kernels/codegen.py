@@ -15,6 +15,9 @@ from numba.core.typing.templates import AbstractTemplate, infer_global
 
 from lapwing.kernels import uncached
 
+GENERATORS: dict[Callable, Callable[..., Any]] = {}
+"""Functions with an implementation of their own in compiled code: its generator, from the numba types of arguments."""
+
 
 def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:
     """Compile a function from source text.
@@ -73,6 +76,7 @@ def overload_for(function: Callable, *, inline: bool = False) -> Callable[[Calla
 
 def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> None:
     chosen: dict[tuple, Any] = {}
+    GENERATORS[function] = choose
 
     class Implementation(AbstractTemplate):
         key = function

@@ -66,6 +66,28 @@ def test_verify_recomputes_digest(lapwing, tmp_path):
     assert f"recorded {'0' * 32}" in err
 
 
+def test_verify_explains_log_of_another_machine(tmp_path):
+    """The command as a process, on a log whose provenance is that of another machine, and on one of another commit."""
+    recorded = {"python": "3.13.5", "packages": "numba 0.61.0", "system": "Linux glibc", "processor": "aarch64 A76"}
+    path = write(tmp_path / "a.mcap", commit="0123456789ab", **recorded)
+
+    def explain():
+        command = [sys.executable, "-m", "lapwing", "verify", str(path), "--explain"]
+        environment = {**os.environ, "LAPWING_COMMIT": "0123456789ab"}
+        return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+
+    result = explain()
+    assert result.returncode == 0, result.stderr
+    lines = {line.split()[0]: line.split(maxsplit=1)[1] for line in result.stdout.splitlines()}
+    assert all(lines[name].startswith(f"{text} (here ") for name, text in recorded.items())
+    assert lines["commit"] == "0123456789ab (same)"
+    assert lines["expected"].startswith("equal: same commit of Lapwing; processor")
+    path.write_bytes(path.read_bytes().replace(b"0123456789ab", b"ba9876543210"))
+    result = explain()
+    assert "commit     ba9876543210 (here 0123456789ab)" in result.stdout
+    assert "expected   not certain: recorded by another commit of Lapwing; check out ba9876543210" in result.stdout
+
+
 def test_verify_finds_first_difference_and_growth(lapwing, tmp_path):
     a, b = write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap", from_tick=200, by=0.001, seed="8")
     code, out, err = lapwing("verify", a, b)

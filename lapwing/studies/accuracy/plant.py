@@ -1,6 +1,5 @@
 """The multirotor of a scene as a problem: its plant with all its effects in the air, under prescribed voltages."""
 
-import math
 from collections.abc import Callable
 from typing import Any
 
@@ -11,10 +10,10 @@ from lapwing.dynamics import integrators
 from lapwing.dynamics.integrators import rkmk54
 from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.noise import Key, stream_key
-from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles import multirotor, multirotor_slung
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
-from lapwing.kernels import always_inline, kernel
+from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.common.communication_schema import Communication
@@ -24,10 +23,12 @@ from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.integrate import SAMPLES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
+from lapwing.studies.accuracy.round_off import Number, extended, extended_coordinates, in_extended_precision
 
 DURATION = 2.0  # [s], about
 HEIGHT = 20.0  # [m] clear of the ground
 FINEST = 64  # steps in an exchange interval, of the reference; the runs that are compared have half as many at most
+EXTENDED = (multirotor, multirotor_slung)  # forms whose steps can be made in extended precision
 TICK = 1000  # of the first exchange, so that random effects have begun
 
 
@@ -83,6 +84,7 @@ def problem(scene: Scene) -> Problem:
     """Return the plant of such a scene as a problem with its solver methods."""
     exchange = scene[Communication]
     (p, state), longest = physics(scene), longest_step(scene)
+    form = model(scene).described(scene)[0]
     motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
     volts = (hover_speed(p) / p.layout.speed_per_volt,) * len(motion.rotor_speed)
     phase = tuple(2.4 * i for i in range(len(volts)))
@@ -106,10 +108,19 @@ def problem(scene: Scene) -> Problem:
             times = np.linspace(0.0, duration, SAMPLES + 1)
             return SolverRun(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
 
+        def extended_flight(step: float) -> np.ndarray:
+            count = round(exchange.interval / step)
+            fly, h = extended(advance), Number(exchange.interval / count)
+            x, numbers = in_extended_precision(state), in_extended_precision(p)
+            for tick in range(TICK, TICK + SAMPLES * every):
+                voltage = map_tuple(_wave, tick * count * float(h), volts, phase)
+                x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)
+            return extended_coordinates(motion, extended(seen)(numbers.layout, x.motion))
+
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return SolverMethod(
             name, method.ORDER, "s", settings, lambda h: flown(method, round(exchange.interval / h)), read,
-            flown(method, 1, rows=1),
+            flown(method, 1, rows=1), extended_flight if form in EXTENDED else None,
         )  # fmt: skip
 
     return Problem(

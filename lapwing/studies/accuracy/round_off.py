@@ -2,26 +2,26 @@
 
 Both runs execute the source of the same kernels with the same step and the same coefficients, so that their difference
 is the rounding of doubles alone. Extended numbers are numpy's `longdouble`: 64 bits of mantissa on x86-64 (2048 times
-as fine as a double), 113 on aarch64.
+as fine as a double), 113 on aarch64. Random numbers are doubles in both runs.
 """
 
-import inspect
 from collections.abc import Callable
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import CellType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from numba.core.typing.templates import builtin_registry
 
+from lapwing.dynamics import noise
 from lapwing.dynamics.integrators import RATES
 from lapwing.kernels import math
+from lapwing.kernels.codegen import GENERATORS
 from lapwing.studies.accuracy.coordinates import coordinates, error
 from lapwing.studies.accuracy.problem import Problem
 
 Number: type = np.longdouble
 FINER = 1000.0  # times as fine as a double, at least: a long double of other systems is a double
-STEPS = 500  # at least
+STEPS = 400  # at least
 METHOD = "rk4_renormalised"
 _FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "expm1", "log", "log1p", "tanh", "hypot", "cbrt", "floor")
 _MATH = SimpleNamespace(
@@ -78,12 +78,25 @@ def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, step
         TypeError: part of the system does not compute in extended precision.
     """
     step, rate = extended(method.step), extended(RATES[type(p)])
-    state = in_extended_precision(x)
+    state, p = in_extended_precision(x), in_extended_precision(p)
     for n in range(steps):
         state = step(rate, p, Number(n * h), state, Number(h))
+    return extended_coordinates(x, state)
+
+
+def extended_coordinates(x: Any, state: Any) -> np.ndarray:
+    """Return the coordinates of a state in extended numbers, shape (n,).
+
+    Args:
+        x: state of the same shape, in doubles.
+        state: state in extended numbers.
+
+    Raises:
+        TypeError: part of the state is a double.
+    """
     numbers = _numbers(state)
     if not all(isinstance(number, Number) for number in numbers):
-        raise TypeError(f"{type(p).__name__}: a step returns doubles for extended numbers")
+        raise TypeError(f"{type(x).__name__}: a step returns doubles for extended numbers")
     return coordinates(x, np.array([numbers], Number))[0]
 
 
@@ -109,13 +122,18 @@ def _extended(function: Any, known: dict[int, Any]) -> Any:
         return function
     if id(python) in known:
         return known[id(python)]
+    if python.__module__ == noise.__name__:
+        return lambda *values: in_extended_precision(function(*_mapped(Number, float, values)))
     if generate is not None:
         result: Any = _generated(generate, known)
         known[id(python)] = result
         return result
     names = dict(python.__globals__)
-    result = FunctionType(python.__code__, names, python.__name__, python.__defaults__, python.__closure__)
+    cells = tuple(CellType() for _ in python.__closure__ or ()) or None
+    result = FunctionType(python.__code__, names, python.__name__, python.__defaults__, cells)
     known[id(python)] = result
+    for cell, original in zip(cells or (), python.__closure__ or (), strict=True):
+        cell.cell_contents = _extended(original.cell_contents, known)
     names |= {name: _extended(names[name], known) for name in python.__code__.co_names if name in names}
     return result
 
@@ -131,15 +149,12 @@ class _Module:
 
 
 def _generator(function: Any) -> Callable[..., Any] | None:
-    """Return the generator of a function that compiled code alone has, for the types of its arguments."""
+    """Return the generator of a function that compiled code alone has, None for a function written in Python."""
     if not isinstance(function, FunctionType):
         return None
-    if "NotImplementedError" not in function.__code__.co_names:
-        return inspect.getclosurevars(function).nonlocals.get("generate")
-    for value, kind in builtin_registry.globals:
-        if value is function:
-            return inspect.getclosurevars(kind.templates[0].generic).nonlocals["choose"]  # type: ignore[no-any-return]
-    return None
+    code = function.__code__
+    is_generated = "NotImplementedError" in code.co_names or "generate" in code.co_freevars
+    return GENERATORS.get(function) if is_generated else None
 
 
 def _generated(generate: Callable[..., Any], known: dict[int, Any]) -> Callable[..., Any]:

@@ -6,13 +6,17 @@ import mpmath
 import numpy as np
 import pytest
 
+from lapwing.dynamics import integrators
 from lapwing.dynamics.integrators import RATES, rk4
+from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.kernels import always_inline, math
-from lapwing.studies.accuracy import round_off
+from lapwing.studies.accuracy import plant, round_off
 from lapwing.studies.accuracy.integrate import fixed_ways
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.round_off import end_in_extended_precision, extended
+from lapwing.studies.accuracy.round_off import end_in_extended_precision, extended, in_extended_precision
 from lapwing.studies.accuracy.systems import problems
+from lapwing.studies.accuracy.targets import scene_of
 
 STEPS, DURATION = 1000, 10.0
 pytestmark = pytest.mark.skipif(not round_off.is_available(), reason="no extended numbers on this machine")
@@ -84,3 +88,49 @@ def test_round_off_of_flight_is_above_that_of_one_step_and_small(name: str) -> N
     result = round_off.measure(problems()[name])
     assert result is not None
     assert 2.0**-54 < result.error < 1e-11
+
+
+def climb_in_digits(p, volts: float, height: float, speed: float, h: float, steps: int) -> list[mpmath.mpf]:
+    """Return (height, climb rate, rotor speed) after the steps of RK4 of a level multirotor, in 50 digits."""
+    gravity, rotor = (next(e for e in p.effects if type(e).__name__ == name) for name in ("Gravity", "RotorThrust"))
+    with mpmath.workdps(50):
+        h, lag, target = mpmath.mpf(h), mpmath.mpf(p.layout.lag_rate), mpmath.mpf(volts) * p.layout.speed_per_volt
+        lift = 4 * mpmath.mpf(rotor.thrust_constant) * STANDARD_DENSITY * p.body.inverse_mass  # 1/m is a double
+        weight = mpmath.mpf(gravity.acceleration) * p.body.mass * p.body.inverse_mass
+
+        def rates(x):
+            return mpmath.matrix([x[1], lift * x[2] ** 2 - weight, lag * (target - x[2])])
+
+        x = mpmath.matrix([height, 0, speed])
+        for _ in range(steps):
+            a = rates(x)
+            b = rates(x + h / 2 * a)
+            c = rates(x + h / 2 * b)
+            x += h / 6 * (a + 2 * b + 2 * c + rates(x + h * c))
+        return list(x)
+
+
+def test_multirotor_of_scene_has_digits_of_extended_precision() -> None:
+    scene = scene_of("lapwing/scenes/hover.toml", [])
+    _, p = plant.model(scene).described(scene)
+    volts, speed, h, steps = 12.3, 320.0, 0.004, 20
+    state = in_extended_precision(multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=speed))
+    fly, method = extended(multirotor.advance), integrators.get(round_off.METHOD).Method()
+    numbers, command = in_extended_precision(p), in_extended_precision((volts,) * 4)
+    for tick in range(steps):
+        state = fly(method, numbers, (0, 0), tick, state, command, np.longdouble(h), 1)
+    motion = state.motion
+    values = motion.position_world[2], motion.velocity_world[2], motion.rotor_speed[3]
+    for value, digits in zip(values, climb_in_digits(p, volts, 20.0, speed, h, steps), strict=True):
+        with mpmath.workdps(50):
+            error = mpmath.mpf(np.format_float_positional(value, precision=30)) - digits
+            assert abs(error) < 5e-18 * (1 + abs(digits))  # a double has 1.1e-16
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", ["delivery_mission", "slung_load"])
+def test_round_off_of_scene_is_above_that_of_one_step_and_small(name: str) -> None:
+    result = round_off.measure(plant.problem(scene_of(f"lapwing/scenes/{name}.toml", [])))
+    assert result is not None
+    assert result.steps >= round_off.STEPS
+    assert 2.0**-54 < result.error < 1e-10
