@@ -56,13 +56,14 @@ class Channel:
         self.foreign = False  # the first bytes were not a frame
 
     def encode(self, message: Any) -> bytes:
-        """Return the next frame. Return no bytes, and count it, if a value does not fit its field."""
+        """Return the next frame of a message or `Numbers`. Return no bytes, and count it, if a value does not fit."""
         codec = self._codec
         if self._signature:
             self._signature.advance()
         try:
             data = None if self._signature else frame(message, codec.seq, codec.srcSystem, codec.srcComponent)
-            data = data or message.pack(codec)
+            if data is None:
+                data = (message[0](*message[1]) if type(message) is tuple else message).pack(codec)
         except OverflowError:
             self._counts["value out of range of its field"] += 1
             return b""

@@ -1,5 +1,6 @@
 """Telemetry streams to one endpoint and their due times."""
 
+from heapq import heapify, heappop, heappush
 from typing import Any
 
 from lapwing.services.mavlink.telemetry import streams
@@ -19,6 +20,7 @@ class Schedule:
         self._onboard = False
         self._intervals: dict[int, int] = {}
         self._due: dict[int, int] = {}
+        self._queue: list[tuple[int, int, int]] = []  # heap: due time [ns], rank, message; without those never sent
         self._plan()
 
     def set_onboard(self, onboard: bool) -> None:
@@ -45,14 +47,20 @@ class Schedule:
 
     def due(self, built: dict[int, list[Any]]) -> list[Any]:
         """Return the messages that are due; `built` caches messages of this time for all endpoints."""
-        now, messages = self._vehicle.time_ns, []
-        for number, interval in self._intervals.items():
-            due_ns = self._due[number]
-            if interval and now >= due_ns:
-                self._due[number] = max(due_ns + interval, now - interval)  # keeps the mean rate without bursts
-                if number not in built:
-                    built[number] = streams()[number].messages(self._vehicle)
-                messages += built[number]
+        now, queue = self._vehicle.time_ns, self._queue
+        ready: list[tuple[int, int, int]] = []  # rank, message, due time [ns]
+        while queue and queue[0][0] <= now:
+            due_ns, rank, number = heappop(queue)
+            ready.append((rank, number, due_ns))
+        ready.sort()
+        messages: list[Any] = []
+        for rank, number, due_ns in ready:
+            interval = self._intervals[number]
+            due_ns = self._due[number] = max(due_ns + interval, now - interval)  # the mean rate without bursts
+            heappush(queue, (due_ns, rank, number))
+            if number not in built:
+                built[number] = streams()[number].messages(self._vehicle)
+            messages += built[number]
         return messages
 
     def _plan(self) -> None:
@@ -64,3 +72,6 @@ class Schedule:
             if self._intervals.get(number) != interval:
                 self._intervals[number] = interval
                 self._due[number] = self._vehicle.time_ns
+        ranks = enumerate(self._intervals.items())
+        self._queue = [(self._due[number], rank, number) for rank, (number, interval) in ranks if interval]
+        heapify(self._queue)

@@ -21,7 +21,7 @@ def true_state(v: VehicleCache) -> Any:
     latitude, longitude, altitude = m.geodetic
     air_speed = saturated(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
     acceleration = _to_body(m.attitude, swap_world(tuple(truth.acceleration)))
-    return mavlink.MAVLink_hil_state_quaternion_message(
+    return mavlink.MAVLink_hil_state_quaternion_message, (
         v.boot_us,
         list(m.attitude),
         *m.omega_frd,

@@ -10,13 +10,15 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
+_NO_OFFSET = (0.0, 0.0, 0.0, 0.0)  # of the axes that a display shows from those of the vehicle
+
 
 @stream("ATTITUDE", 50.0)
 def attitude(v: VehicleCache) -> Any:
     """Return Euler angles and body rates."""
     if (m := v.estimate) is None:
         return None
-    return mavlink.MAVLink_attitude_message(v.boot_ms, *m.angles, *m.omega_frd)
+    return mavlink.MAVLink_attitude_message, (v.boot_ms, *m.angles, *m.omega_frd)
 
 
 @stream("ATTITUDE_QUATERNION", 50.0)
@@ -24,7 +26,7 @@ def attitude_quaternion(v: VehicleCache) -> Any:
     """Return the attitude as a quaternion, and body rates."""
     if (m := v.estimate) is None:
         return None
-    return mavlink.MAVLink_attitude_quaternion_message(v.boot_ms, *m.attitude, *m.omega_frd)
+    return mavlink.MAVLink_attitude_quaternion_message, (v.boot_ms, *m.attitude, *m.omega_frd, _NO_OFFSET)
 
 
 @stream("LOCAL_POSITION_NED", 50.0)
@@ -32,7 +34,7 @@ def local_position(v: VehicleCache) -> Any:
     """Return position and velocity in NED from the local origin."""
     if (m := v.estimate) is None:
         return None
-    return mavlink.MAVLink_local_position_ned_message(v.boot_ms, *m.position_ned, *m.velocity_ned)
+    return mavlink.MAVLink_local_position_ned_message, (v.boot_ms, *m.position_ned, *m.velocity_ned)
 
 
 @stream("GLOBAL_POSITION_INT", 50.0)
@@ -41,7 +43,7 @@ def global_position(v: VehicleCache) -> Any:
     if (m := v.estimate) is None:
         return None
     latitude, longitude, altitude = m.geodetic
-    return mavlink.MAVLink_global_position_int_message(
+    return mavlink.MAVLink_global_position_int_message, (
         v.boot_ms,
         saturated(latitude * 1e7, 32),
         saturated(longitude * 1e7, 32),
