@@ -76,16 +76,16 @@ def check(
         lines.append(("services", f"{', '.join(setup.order)}; {exchange.rate} Hz, {exchange.coupling}"))
         for label, line in lines:
             typer.echo(f"  {label:<9} {line}")
-        if accuracy and not _accuracy_met(loaded, json):
+        if accuracy and not _accuracy_met(loaded, loaded.overrides != tuple(set_ or []), json):
             raise SystemExit(1)
 
 
-def _accuracy_met(scene: "Scene", json: Path | None) -> bool:
+def _accuracy_met(scene: "Scene", step_selected: bool, json: Path | None) -> bool:
     """Print and write the error of the scene's flight. Return True if it is at most what the scene asks for."""
     from lapwing.studies.accuracy import flight_accuracy
     from lapwing.studies.terminal import console
 
-    result = flight_accuracy.measure(scene)
+    result = flight_accuracy.measure(scene, step_selected)
     flight_accuracy.show(console(), result)
     if json:
         flight_accuracy.write_json(json, result)

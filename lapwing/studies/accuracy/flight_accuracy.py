@@ -44,6 +44,7 @@ class FlightAccuracy(NamedTuple):
     integrator: str
     step: float  # [s]
     reference_step: float  # [s]
+    step_selected: bool  # False if the scene sets it, whatever accuracy is asked
     duration: float  # [s] that both flights last
     quantities: list[Quantity]
 
@@ -53,8 +54,12 @@ class FlightAccuracy(NamedTuple):
         return max(self.quantities, key=lambda quantity: quantity.error)
 
 
-def measure(scene: Scene) -> FlightAccuracy:
+def measure(scene: Scene, step_selected: bool = False) -> FlightAccuracy:
     """Return the accuracy of a scene with a selected solver.
+
+    Args:
+        scene: any scene.
+        step_selected: True if its step was selected for its accuracy.
 
     Raises:
         SceneError: the scene asks for no accuracy.
@@ -71,7 +76,8 @@ def measure(scene: Scene) -> FlightAccuracy:
     coarse, fine = _flights(scene), _flights(finer)
     quantities = [q for pair in zip(coarse, fine, strict=True) for q in differences(*pair)]
     duration = min(flight.truth.times[-1] for flight in (*coarse, *fine))
-    return FlightAccuracy(solver.accuracy, solver.integrator, FINER * step, step, float(duration), quantities)
+    taken = FINER * step
+    return FlightAccuracy(solver.accuracy, solver.integrator, taken, step, step_selected, float(duration), quantities)
 
 
 def _flights(scene: Scene) -> list[FlightData]:
@@ -137,6 +143,9 @@ def show(console: Console, found: FlightAccuracy) -> None:
         f"accuracy {verdict}: asked {found.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)",
         highlight=False,
     )
+    if verdict == "missed" and not found.step_selected:
+        cause = f"solver.step: set to {found.step:g} s, which does not depend on the accuracy"
+        console.print(f"{cause}; remove it, and a step is selected", highlight=False, soft_wrap=True)
 
 
 def write_json(path: Path, found: FlightAccuracy) -> None:

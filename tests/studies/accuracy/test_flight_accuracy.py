@@ -29,6 +29,7 @@ def test_command_compares_asked_and_got(tmp_path, accuracy, code, verdict):
     result = check(tmp_path, "--accuracy", "--json", "a.json", "--set", f"solver.accuracy={accuracy}", *SHORT)
     assert result.returncode == code, result.stderr
     assert f"accuracy {verdict}: asked {accuracy:g}" in result.stdout
+    assert ("solver.step: set to 0.004 s, which does not depend on" in result.stdout) == (verdict == "missed")
     found = json.loads((tmp_path / "a.json").read_text())
     names = {quantity["name"] for quantity in found["quantities"]}
     assert {"position", "attitude", "velocity", "body rates", "rotor speed"} <= names

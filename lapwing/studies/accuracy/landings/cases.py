@@ -2,6 +2,7 @@
 
 import math
 import time
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ from lapwing.dynamics.effects._contact_parameters import GroundContact
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, multiply
 from lapwing.dynamics.terrain import relief
+from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorParameters, MultirotorState
@@ -20,14 +22,16 @@ from lapwing.kernels.state_tree import flatten
 from lapwing.services.plant.schema import CONTACT_SHARE
 from lapwing.studies.accuracy.coordinates import coordinates, of_state
 from lapwing.studies.accuracy.landings.reference import LandingBody, LandingGround, landing
+from lapwing.studies.accuracy.solver_selection import IMPACT_SHARE
 
 AIRFRAME = Path(lapwing.scenes.__file__).parent / "vehicles/delivery_drone.toml"
 DURATION, INTERVAL = 0.6, 0.004  # [s] flown, and between the moments that are compared
-STEP = 1e-3  # [s]
 ACCURACIES = tuple(10.0**-k for k in range(3, 10))
 GRAVITY = 9.80665
 CLEAR = 2e-3  # [m] the lowest point is above the ground at first
 WAVE = 2.0 * math.pi / 0.7  # [1/m] of bumps
+MOST_STEPS = 64  # in an interval
+HIGH = 50.0  # [m] above the ground, where no foot touches within the duration
 
 
 class Landing(NamedTuple):
@@ -64,6 +68,9 @@ def draw(seed: int) -> Landing:
         (roll, pitch, yaw),
         float(rng.uniform(0.0, 300.0)),
     )
+
+
+FASTEST = Landing((0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0)  # after bounces
 
 
 def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
@@ -111,18 +118,64 @@ def times() -> np.ndarray:
     return np.arange(round(DURATION / INTERVAL) + 1) * INTERVAL
 
 
+@cache
+def airborne_steps(accuracy: float, integrator: str) -> int:
+    """Return the steps in an interval whose error in the air is at most the share that `lapwing run` selects for.
+
+    Raises:
+        ValueError: the integrator needs more than 64.
+    """
+    p, state = plant(FASTEST)
+    x, y, z = state.motion.position_world
+    state = state._replace(motion=state.motion._replace(position_world=(x, y, z + HIGH)))
+    n, coarse = 1, _rows(integrator, p, state, 1)
+    while n <= MOST_STEPS:
+        fine = _rows(integrator, p, state, 2 * n)
+        if errors(coarse, fine).max() <= IMPACT_SHARE * accuracy:
+            return n
+        n, coarse = 2 * n, fine
+    raise ValueError(f"{integrator}: not accurate to {accuracy:g} in the air; use a method of higher order")
+
+
 def flown(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") -> tuple[np.ndarray, float]:
     """Return (states of the plant at the same moments, wall time [s])."""
     p, state = plant(case)
-    p = p._replace(tolerance=CONTACT_SHARE * accuracy)
-    method, n = integrators.get(integrator).Method(), round(INTERVAL / STEP)
-    off = (0.0,) * len(p.layout.x_body)
-    rows, began = [state.motion], time.perf_counter()
+    n = airborne_steps(accuracy, integrator)  # compiles or loads, too
+    began = time.perf_counter()
+    rows = _rows(integrator, p._replace(tolerance=CONTACT_SHARE * accuracy), state, n)
+    return rows, time.perf_counter() - began
+
+
+def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
+    """Return the largest difference of flights at the strictest accuracy whose starts differ by the last bit.
+
+    No accuracy below it can be met: a landing multiplies a difference of its start by up to 3e5.
+    """
+    p, state = plant(case)
+    p, n = p._replace(tolerance=CONTACT_SHARE * ACCURACIES[-1]), airborne_steps(ACCURACIES[-1], integrator)
+    first, *others = (
+        _rows(integrator, p, state._replace(motion=state.motion._replace(velocity_world=velocity)), n)
+        for velocity in _last_bits(state.motion.velocity_world)
+    )
+    return max(float(errors(other, first).max()) for other in others)
+
+
+def _last_bits(v: Vec3) -> list[Vec3]:
+    """Return a vector, and it with one number each at its next double."""
+    moved = np.array([v] * 4)
+    for k in range(3):
+        moved[k + 1, k] = np.nextafter(v[k], np.inf)
+    return [tuple(row) for row in moved.tolist()]
+
+
+def _rows(integrator: str, p: MultirotorParameters, state: MultirotorState, n: int) -> np.ndarray:
+    """Return the coordinates at the moments compared, from n steps in each interval."""
+    method, off = integrators.get(integrator).Method(), (0.0,) * len(p.layout.x_body)
+    motions = [state.motion]
     for tick in range(len(times()) - 1):
-        state = multirotor.advance(method, p, (0, 0), tick, state, off, STEP, n)
-        rows.append(state.motion)
-    seconds = time.perf_counter() - began
-    return coordinates(state.motion, np.array([flatten(m) for m in rows])), seconds
+        state = multirotor.advance(method, p, (0, 0), tick, state, off, INTERVAL / n, n)
+        motions.append(state.motion)
+    return coordinates(motions[0], np.array([flatten(motion) for motion in motions]))
 
 
 def errors(states: np.ndarray, reference: np.ndarray) -> np.ndarray:

@@ -1,6 +1,9 @@
 """Asked against got over many random landings."""
 
+import json
 import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +20,7 @@ class LandingErrors(NamedTuple):
     got: tuple[float, ...]  # largest error over all moments, for each of `cases.ACCURACIES`
     worst: tuple[float, ...]  # [s] the moment of each
     seconds: tuple[float, ...]  # wall time of each
+    round_off: float  # difference that the last bit of the start makes
 
 
 def measured(seed: int) -> LandingErrors:
@@ -30,15 +34,32 @@ def measured(seed: int) -> LandingErrors:
         got.append(float(errors.max()))
         worst.append(float(cases.times()[errors.argmax()]))
         taken.append(seconds)
-    return LandingErrors(seed, events, tuple(got), tuple(worst), tuple(taken))
+    return LandingErrors(seed, events, tuple(got), tuple(worst), tuple(taken), cases.round_off(case))
 
 
-def measure(count: int) -> list[LandingErrors]:
-    """Measure landings 0 to before `count` on all processors."""
-    with workers(max(1, min(count, os.cpu_count() or 1))) as pool:
-        return list(pool.map(measured, range(count)))
+def measure(seeds: Iterable[int], processes: int | None = None) -> Iterator[LandingErrors]:
+    """Yield measured landings in the order of their seeds; by default on all processors."""
+    waiting = list(seeds)
+    if waiting:
+        with workers(max(1, min(len(waiting), processes or os.cpu_count() or 1))) as pool:
+            yield from pool.map(measured, waiting)
 
 
-def ratios(found: list[LandingErrors]) -> np.ndarray:
+def read(path: Path) -> dict[int, LandingErrors]:
+    """Return the landings of a file of `write` by their seeds; none if the file does not exist."""
+    rows = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
+    landings = (LandingErrors(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in rows)
+    return {landing.seed: landing for landing in landings}
+
+
+def write(path: Path, landings: Iterable[LandingErrors]) -> None:
+    """Write landings as JSON, one per line, in the order of their seeds."""
+    rows = [json.dumps(landing._asdict()) for landing in sorted(landings)]
+    complete = path.with_name(f"{path.name}.{os.getpid()}")  # an interrupted write leaves the file as it was
+    complete.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
+    complete.replace(path)
+
+
+def ratios(landings: Iterable[LandingErrors]) -> np.ndarray:
     """Return error got over error asked, shape (landings, accuracies)."""
-    return np.array([landing.got for landing in found]) / np.array(cases.ACCURACIES)
+    return np.array([landing.got for landing in landings]) / np.array(cases.ACCURACIES)

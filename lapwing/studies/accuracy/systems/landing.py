@@ -17,6 +17,7 @@ from lapwing.studies.accuracy.landings.cases import Landing
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 
 METHODS = ("rk4_renormalised", "rkmk4", "rk8_renormalised")
+STEP = 1e-3  # [s], the longest
 EVENTS = "SciPy DOP853 at 1e-13, every transition of every foot a located event, equations written apart"
 TOUCH_DOWNS = {
     "landing_level": Landing((0.0, 0.0), 0.0, 0.1, (0.4, 0.0), (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.0),
@@ -54,14 +55,14 @@ def _way(name: str, case: Landing) -> SolverMethod:
     def flown(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         p, start = cases.plant(case)
         p, off = p._replace(tolerance=CONTACT_SHARE * accuracy), (0.0,) * len(p.layout.x_body)
-        steps = round(cases.INTERVAL / cases.STEP)
+        steps = round(cases.INTERVAL / STEP)
 
         def fly() -> tuple[np.ndarray, np.ndarray]:
             state, motions, at = start, [start.motion], [0]
             for row in range(1, rows):
                 at.append(round(row * ticks / SAMPLES))
                 for tick in range(at[-2], at[-1]):
-                    state = multirotor.advance(method.Method(), p, (0, 0), tick, state, off, cases.STEP, steps)
+                    state = multirotor.advance(method.Method(), p, (0, 0), tick, state, off, STEP, steps)
                 motions.append(state.motion)
             return np.array(at) * cases.INTERVAL, np.array([flatten(m) for m in motions])
 
