@@ -54,7 +54,8 @@ class LivePage:
         self._frames: deque[tuple[float, list[Samples], int]] = deque()  # wall time [s], samples, index
         self._ready, self._over, self._before = threading.Condition(), False, time.monotonic()
         gui = self._server.gui
-        gui.configure_theme(control_layout="collapsible", show_logo=False, show_share_button=False)
+        gui.configure_theme(show_logo=False, show_share_button=False)
+        gui.main_panel.dock_right()
         gui.set_panel_label(setup.scene)
         self._time = gui.add_text("time", "waiting for the flight", disabled=True)
         self._events = gui.add_text("events", "", multiline=True, disabled=True)

@@ -74,6 +74,12 @@ class Run:
         self.time_ns = (before + rows - 1) * self.setup.interval_ns
 
 
+@pytest.mark.filterwarnings("error::DeprecationWarning")
+def test_page_opens_without_deprecated_options_of_viser():
+    with LivePage(Run().setup) as page:
+        assert page.address.startswith("http://127.0.0.1:")
+
+
 def test_page_needs_its_secret_its_host_and_its_origin():
     with LivePage(Run().setup) as page:
         port, token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]{22})/", page.address).groups()

@@ -17,6 +17,7 @@ from lapwing.studies.report import write
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.view3d import headless as chromium
 from lapwing.studies.view3d import sampling, solids, vehicle_bodies
+from lapwing.studies.view3d.recording import _trail
 from lapwing.studies.view3d.samples import sample
 from lapwing.studies.view3d.sampling import along
 from lapwing.studies.view3d.stage import Vehicle, error_colours, reach
@@ -269,6 +270,34 @@ def test_node_is_sent_only_when_it_changes():
     frame.position = None
     vehicle.show(result, 0)
     assert frame.position is None
+
+
+def test_visible_trail_is_flown_path_in_few_lines():
+    times, shown, lines = np.linspace(0.0, 3.99, 350), {}, []
+
+    class Line:
+        visible = False
+
+    class Flown:
+        def trail(self, name, path, *_, visible):
+            line = Line()
+            shown[line] = path
+            return line
+
+        def desired_path(self, path):
+            pass
+
+    values = flight()
+    parts = _trail(Flown(), sample(values, motion(values), times), (0, len(times) - 1), 0.0)
+    for time, appearing, replaced in parts:
+        appearing.visible = True
+        for line in replaced:
+            line.visible = False
+        paths = [path[:, 2] for line, path in shown.items() if line.visible]
+        lines.append(len(paths))
+        length = sum(path[-1] - path[0] for path in paths)
+        assert length == pytest.approx(time, abs=0.01)
+    assert max(lines) <= 20
 
 
 def test_error_colours_run_from_dark_blue_to_orange():

@@ -66,11 +66,24 @@
     }
   }
 
+  let seen = "", changed = 0; // what was drawn last, and when it became so [ms]
+  function moves(now) {
+    const next = `${view.time},${now.camera.matrixWorld.elements}`;
+    if (next !== seen) changed = performance.now();
+    seen = next;
+    return performance.now() - changed < 1500;
+  }
+
   function follow() {
     const now = state();
     const at = now?.controls && pose();
     if (at) {
+      const moving = moves(now);
       if (slow) simplify(now, at);
+      if (slow && !smooth && !view.filming) { // a quarter of the pixels while the picture moves, sharp once it stands still
+        const ratio = devicePixelRatio * (moving ? 0.5 : 1);
+        if (now.viewport.dpr !== ratio) now.setDpr(ratio);
+      }
       const { controls } = now, [x, y, z] = at.place, far = Math.max(0.5, facts.size);
       if (view.mode === "onboard") {
         const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * far, back = 0.9 * far;
@@ -80,7 +93,7 @@
         const [dx, dy, dz] = (view.place ?? usual).map((value) => value * far);
         controls.setLookAt(x + dx, y + dy, z + dz, x, y, z, false);
       } else if (view.mode !== "orbit") controls.moveTo(x, y, z, false);
-      if (view.fresh || view.mode !== "orbit") now.invalidate();
+      if (view.fresh || (view.mode !== "orbit" && moving)) now.invalidate();
       view.fresh = false;
       if (view.shown) view.ready = true;
     }
@@ -169,8 +182,9 @@
     style.textContent = `.mantine-Notifications-root { display: none }
       .mantine-Input-input:disabled { opacity: 1; color: inherit; background: none; border: 0; cursor: auto }
       textarea.mantine-Textarea-input:disabled { height: 55vh !important; max-height: none; font-variant-numeric: tabular-nums }
-      #lapwing { position: fixed; top: 10px; left: 10px; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
+      #lapwing { position: fixed; top: 10px; left: 10px; max-width: calc(100% - 20px); box-sizing: border-box; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
         font: 13px system-ui, sans-serif; color: #1f2328; background: #ffffffd9; border-radius: 6px; padding: 6px 10px }
+      #lapwing span { display: flex; gap: 6px; align-items: center }
       #lapwing select { font: inherit; border: 1px solid #d0d7de; border-radius: 4px; background: #fff; color: inherit; padding: 2px 4px }
       #lapwing i { display: inline-block; width: 90px; height: 8px; border-radius: 4px;
         background: linear-gradient(90deg, #004c8c, #008eaa, #56b46e, #deba28, #e06e14) }
@@ -182,6 +196,7 @@
     document.head.append(style);
     const bar = document.createElement("div");
     bar.id = "lapwing";
+    const label = (...parts) => bar.appendChild(document.createElement("span")).append(...parts);
     const modes = ["follow", "orbit", "top", "onboard"];
     bar.append(select("camera", modes, (k) => view.look(modes[k])));
     if (facts.names.length > 1) {
@@ -189,12 +204,12 @@
       facts.names.forEach((name, k) => {
         const dot = document.createElement("u");
         dot.style.background = facts.colours[k];
-        bar.append(dot, name);
+        label(dot, name);
       });
     }
     if (facts.error > 0) {
       const unit = facts.error < 0.1 ? [1000, "mm"] : [1, "m"];
-      bar.append("error 0", document.createElement("i"), `${Number((facts.error * unit[0]).toPrecision(2))} ${unit[1]}`);
+      label("error 0", document.createElement("i"), `${Number((facts.error * unit[0]).toPrecision(2))} ${unit[1]}`);
     }
     document.body.append(bar);
   });

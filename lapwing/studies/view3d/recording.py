@@ -20,6 +20,7 @@ RATE = 30.0  # [1/s] frames of a recording
 FRAMES = 2000  # of a recording at most; a longer one has fewer a second
 FLEET_FRAMES = 6000  # of all vehicles together
 PIECES = 100  # of a trail, which appear one after the other
+JOINED = 10  # pieces that one line replaces: each line is a draw call
 POINTS = 1500  # of a trail
 
 
@@ -89,14 +90,17 @@ def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle
         for vehicle, result, parts in zip(vehicles, samples, pieces, strict=True):
             vehicle.show(result, k)
             while parts and parts[0][0] <= times[k]:
-                parts.pop(0)[1].visible = True
+                _, appearing, replaced = parts.pop(0)
+                appearing.visible = True
+                for piece in replaced:
+                    piece.visible = False
         if k + 1 < len(times):
             recording.insert_sleep(float(times[k + 1] - times[k]))
     return recording, most
 
 
-def _trail(vehicle: Vehicle, path: Samples, span: tuple[int, ...], most: float) -> list[tuple[float, Any]]:
-    """Add the desired path, and hidden pieces of the flown one; return the times [s] of their ends with their nodes.
+def _trail(vehicle: Vehicle, path: Samples, span: tuple[int, ...], most: float) -> list[tuple[float, Any, list[Any]]]:
+    """Add the desired path, and hidden pieces of the flown one; return when they appear [s], and what they replace.
 
     One piece leads to the first frame; `span` has the indices of the first and the last frame.
     """
@@ -105,12 +109,21 @@ def _trail(vehicle: Vehicle, path: Samples, span: tuple[int, ...], most: float) 
     step = max(1, -(-len(path.times) // POINTS))
     if path.desired is not None:
         vehicle.desired_path(path.desired[::step])
-    parts = []
-    for i, (a, b) in enumerate(pairwise(cuts)):
+
+    def piece(name: str, a: int, b: int) -> Any:
         rows = np.unique(np.append(np.arange(a, b, step), b))
         error = None if path.error is None else path.error[rows]
-        piece = vehicle.trail(str(i), path.bodies[0].position[rows], error, most, visible=False)
-        parts.append((float(path.times[b]), piece))
+        return vehicle.trail(name, path.bodies[0].position[rows], error, most, visible=False)
+
+    parts: list[tuple[float, Any, list[Any]]] = []
+    replaced: list[Any] = []
+    for i, (a, b) in enumerate(pairwise(cuts)):
+        time = float(path.times[b])
+        parts.append((time, piece(str(i), a, b), []))
+        replaced.append(parts[-1][1])
+        if len(replaced) == JOINED:
+            parts.append((time, piece(f"to {i}", int(cuts[i + 1 - JOINED]), b), replaced))
+            replaced = []
     return parts
 
 
