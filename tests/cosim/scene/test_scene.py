@@ -21,8 +21,6 @@ from lapwing.services.trajectory.schema import Trajectory
 
 HOVER, DELIVERY = Path("lapwing/scenes/hover.toml"), Path("lapwing/scenes/delivery_mission.toml")
 TEXT = HOVER.read_text()
-CLIMB = 'z = { kind = "minimum_jerk", to = 1.0, duration = 3.0 }'
-BOUNDED = "a number above 0 and at most 1e+06"
 SCENES = sorted(Path("lapwing/scenes").glob("*.toml"))
 
 
