@@ -21,7 +21,6 @@ from lapwing.studies.accuracy.error_budget import _clean, _exchange
 from lapwing.studies.simulate import fly
 
 FINEST = 2  # times the highest rate
-ATTRIBUTE = {"Float64": "Float64", "Int32": "Int32", "Boolean": "Boolean"}
 
 
 class Part:

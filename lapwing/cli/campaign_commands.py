@@ -132,6 +132,7 @@ def compare(
 ) -> None:
     """Compare two campaigns run by run, with confidence intervals."""
     from lapwing.studies.campaign import campaign_comparison as study
+    from lapwing.studies.json_file import write_json
     from lapwing.studies.terminal import console
 
     with user_errors():
@@ -139,7 +140,7 @@ def compare(
         result = study.compare(one, other)
         study.show(console(), result)
         if json:
-            study.write_json(json, result)
+            write_json(json, result)
 
 
 def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":

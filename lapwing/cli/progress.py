@@ -87,7 +87,7 @@ class Display:
 
     def say(self, line: str) -> None:
         """Print a line."""
-        self._console.print(line, highlight=False, soft_wrap=True)
+        self._console.print(line, soft_wrap=True)
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
         """Show the state at `time_ns`, from the newest payloads of the pose and status topics."""
@@ -104,4 +104,4 @@ class Display:
         elif time.monotonic() >= self._next_line:
             self._next_line = time.monotonic() + LINE_PERIOD
             factor = seconds / max(1e-9, time.monotonic() - self._started)
-            self._console.print(f"t = {seconds:6.1f} s  {factor:5.1f}x  {line}", highlight=False)
+            self._console.print(f"t = {seconds:6.1f} s  {factor:5.1f}x  {line}")

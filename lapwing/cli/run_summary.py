@@ -1,6 +1,5 @@
 """Run summary: the outcome, events and metrics that `lapwing run` prints and writes as JSON."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from lapwing.flight import Flight
 from lapwing.services.common.run_schema import Published
 from lapwing.studies import terminal
 from lapwing.studies.flight_data import SHOWN
+from lapwing.studies.json_file import write_json
 from lapwing.studies.separation import Separation, nearest
 from lapwing.studies.tracking import shown
 
@@ -90,11 +90,6 @@ def _of_fleet(flights: Sequence[Flight]) -> dict[str, Any]:
     }
 
 
-def write_json(path: Path, result: dict[str, Any]) -> None:
-    """Write `result` as JSON."""
-    path.write_text(json.dumps(result, indent=2) + "\n", encoding="utf-8")
-
-
 def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
     """Print the summary of a run."""
     show_events(console, result["events"])
@@ -108,7 +103,7 @@ def show_fleet(console: Console, result: dict[str, Any]) -> None:
     for name, vehicle in result["vehicles"].items():
         _outcome(console, vehicle["outcome"], f"{name}: ")
     if result["separation"]:
-        console.print(str(Separation(**result["separation"])), highlight=False)
+        console.print(str(Separation(**result["separation"])))
     _ending(console, result)
 
 
@@ -121,10 +116,9 @@ def _ending(console: Console, result: dict[str, Any]) -> None:
         console.print(
             f"{result['sim_time_s']:.1f} s simulated in {result['wall_time_s']:.1f} s: "
             f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})",
-            highlight=False,
         )
     for line in result["firmware"]:
-        console.print(line, soft_wrap=True, highlight=False)
+        console.print(line, soft_wrap=True)
     for name in ("digest", "log", "report"):
         if result[name]:
             console.print(f"{name:<7} {result[name]}", soft_wrap=True)

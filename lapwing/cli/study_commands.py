@@ -216,7 +216,7 @@ def tune(
             loaded = load(scene, set_ or [])
 
             def say(text: str) -> None:
-                progress.console.print(text, highlight=False, soft_wrap=True)
+                progress.console.print(text, soft_wrap=True)
 
             with _compiling(loaded, progress, task):
                 result = procedure.tune(

@@ -96,10 +96,10 @@ def _fix_variance(density: float, correlated: float, rate: float) -> float:
 
 def services(setup: RunConfig) -> list[Service]:
     """Return the services of a run on a simulator, in their order."""
-    given = setup.services[NAME]
-    own: SimulatorSetup = given.parameters
+    config = setup.services[NAME]
+    own: SimulatorSetup = config.parameters
     client = SimulatorClient(own.host, own.port)
-    receiver = Receiver(own, client, given.ports)
+    receiver = Receiver(own, client, config.ports)
     first = Service(f"{NAME}.receive", [receiver], encoders.wires(setup, None, encoders.GpsWiring()))
     last = Service(f"{NAME}.send", [Sender(own, client, receiver)], [])
     return [first, *(create(setup, name) for name in setup.order if name != NAME), last]

@@ -39,7 +39,7 @@ def fly_single(
         log: where to record it.
         sources: the files that were resolved, for the log.
         speed: simulated seconds per second, None for as fast as it goes.
-        observer: is notify_on_compile how far the run is.
+        observer: shows the progress.
         operator: returns the commands received until a tick; for several vehicles one function for each, by name.
         last: the tick after which to stop, None for the end of the run.
         recorded: messages of foreign firmwares to fly again, by vehicle name (`process_table.create`).

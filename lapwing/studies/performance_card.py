@@ -1,6 +1,5 @@
 """The performance card of a vehicle: what its models give, beside what others state (theory.md, chapter 2)."""
 
-import json
 import math
 import tomllib
 from collections.abc import Callable
@@ -20,6 +19,7 @@ from lapwing.services.autopilot.allocation import (
 )
 from lapwing.services.common.vehicle_schema import airframe, rotor_constants
 from lapwing.services.scene_resolver import load
+from lapwing.studies.json_file import write_json  # noqa: F401 (part of the interface of a study)
 
 
 class Row(NamedTuple):
@@ -144,8 +144,3 @@ def _number(value: float | None) -> str:
     if value is None:
         return ""
     return f"{value:.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.3g}"
-
-
-def write_json(path: Path, rows: list[Row]) -> None:
-    """Write the card for other programs."""
-    path.write_text(json.dumps([row._asdict() for row in rows], indent=2) + "\n", encoding="utf-8")

@@ -8,8 +8,7 @@ from lapwing.cosim.scene import Files, Scene
 from lapwing.cosim.scene.files import merge_tables, named
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import math
-from lapwing.services.autopilot import motor_limits
-from lapwing.services.autopilot.controller_parameters import build
+from lapwing.services.autopilot.controller_parameters import Airframe, build, hover_thrust, hover_torque
 from lapwing.services.autopilot.gains import FOLDER, GainSet
 from lapwing.services.autopilot.height_sensor import distance_sensor
 from lapwing.services.autopilot.nominal_airframe import known_airframe
@@ -18,6 +17,7 @@ from lapwing.services.common import user_code, user_modules
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.firmware.schema import FIRMWARES, FirmwareKeys, is_foreign
 from lapwing.services.common.parameter_file import parse
+from lapwing.services.common.vehicle_schema import Effects, airframe
 
 ESTIMATORS = ("kalman", "ground_truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors that the filter needs to start
@@ -74,14 +74,14 @@ class Autopilot(FirmwareKeys):
         if not self.follow_trajectory and not self.accept_commands:
             message = "false leaves no source of setpoints; set accept_commands = true too"
             raise ConfigError("autopilot.follow_trajectory", message)
-        told = known_airframe(scene)
+        frame = known_airframe(scene)
         try:
-            build(scene[GainSet].plain(), told)
+            build(scene[GainSet].plain(), frame)
         except ConfigError:
             raise
         except ValueError as error:
             raise ConfigError("airframe", str(error)) from None
-        motor_limits.check(scene, told)
+        _check_motor_limits(scene, frame)
         shipped = self.controller in (None, parameters.PX4_CASCADE)
         for key, unused in (("controller", shipped), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
@@ -102,3 +102,28 @@ class Autopilot(FirmwareKeys):
             if known not in scene.tables("sensors"):
                 message = f"{reference} needs a sensor that the vehicle does not have"
                 raise ConfigError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")
+
+
+def _check_motor_limits(scene: Scene, known: Airframe) -> None:
+    """Check current, power and voltage of a motor in hover if `dc_motor` is active (theory.md, eq. (2.9)).
+
+    Raises:
+        ConfigError: a limit is exceeded.
+    """
+    if "dc_motor" not in scene[Effects].tables:
+        return
+    frame = airframe(scene)
+    motor, constant = frame.motor, frame.motor.rotor_constant
+    speed = math.sqrt(hover_thrust(known) / known.motor.thrust_coefficient)
+    current = hover_torque(known) / (motor.belt_efficiency * constant) + motor.no_load_current
+    voltage = constant * speed + (motor.resistance + motor.esc_resistance) * current
+    for needed, limit, unit in (
+        (current, frame.motor_current_limit, "A"),
+        (current * voltage, motor.power_limit, "W"),
+        (voltage, motor.max_voltage, "V"),
+    ):
+        if needed >= limit:
+            message = f"hovering needs {needed:.1f} {unit} per motor, the limit is {limit:.1f} {unit}"
+            raise ConfigError(
+                "airframe.motor", message, "a lighter vehicle, or higher limits of motor, ESC and battery"
+            )

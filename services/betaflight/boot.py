@@ -5,14 +5,15 @@ import time
 from collections.abc import Callable
 
 from lapwing.services.betaflight import msp
-from lapwing.services.betaflight.cli_lines import lines
 from lapwing.services.betaflight.msp import FirmwareStatus, Msp
 from lapwing.services.betaflight.packets import Ports
+from lapwing.services.betaflight.resolve import PilotSetup
 from lapwing.services.common.firmware.link import FirmwareError, Waits
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
+MODES = ("aux 0 0 0 1700 2100 0 0", "aux 1 1 1 1700 2100 0 0")  # ARM on channel 5, ANGLE on channel 6
 FEED_EVERY = 0.004  # [s] between two packets at rest
 POLL_EVERY = 0.2  # [s]
 IGNORED = ("arm switch", "not disarmed")  # reasons that are none once the arm switch opens
@@ -162,3 +163,27 @@ def _command(link: Msp, line: str, program: Program, waits: Waits) -> str:
             link.send(line.encode())
             sent = time.monotonic()
     return answer
+
+
+def lines(setup: FirmwareSetup) -> list[str]:
+    """Return the lines for the firmware's command line; those of the scene come last, so that they win."""
+    pilot: PilotSetup = setup.own
+    rate = round(pilot.yaw_rate_limit_deg / 10.0)
+    needed = [
+        "map AETR1234",
+        *MODES,
+        "set acc_calibration = 0,0,0,1",  # a virtual sensor has no offset
+        "set yaw_motors_reversed = OFF",
+        "set deadband = 0",
+        "set yaw_deadband = 0",
+        "set rc_smoothing = OFF",
+        # the firmware's derivative assumes its nominal loop time, and is too strong where its loop gets less CPU
+        *(f"set {key}_{axis} = 5" for key in ("d", "d_max") for axis in ("roll", "pitch")),
+        f"set angle_limit = {round(pilot.tilt_limit_deg)}",
+        "rateprofile 0",
+        "set rates_type = ACTUAL",  # linear: equal rate at the centre and at the end, no expo
+        *(f"set {axis}_{key} = {rate}" for axis in ("roll", "pitch", "yaw") for key in ("rc_rate", "srate")),
+        *(f"set {axis}_expo = 0" for axis in ("roll", "pitch", "yaw")),
+    ]
+    own = [line for line in setup.parameter_text.splitlines() if line.strip() and not line.startswith("#")]
+    return needed + own + [f"set {name} = {value:g}" for name, value in setup.parameters.items()]

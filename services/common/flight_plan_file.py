@@ -150,7 +150,7 @@ def _item(number: int, command: int, frame: int, params: list[float], place: lis
         raise ValueError(f"item {number}: unknown command {command}; known: {', '.join(map(str, _ACTIONS))}")
     if frame not in (*_ABOVE_SEA, *_ABOVE_HOME, _NO_PLACE):
         raise ValueError(f"item {number}: unknown frame {frame}; expected 0, 2 or 3")
-    action, told = _ACTIONS[command]
+    action, fields = _ACTIONS[command]
     latitude, longitude, height = place
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0) and action == "waypoint":
         raise ValueError(f"item {number}: expected a latitude and a longitude, got {latitude:g}, {longitude:g}")
@@ -159,8 +159,8 @@ def _item(number: int, command: int, frame: int, params: list[float], place: lis
     else:
         height += datum.ground
     if action in ("waypoint", "land", "takeoff", "loiter_time"):
-        return _item_of(datum, action, latitude, longitude, height, **told(params))
-    return _made(action, (math.nan,) * 3, **told(params))
+        return _item_of(datum, action, latitude, longitude, height, **fields(params))
+    return _made(action, (math.nan,) * 3, **fields(params))
 
 
 def _item_of(datum: _Datum, action: str, latitude: float, longitude: float, height: float = 0.0, **more: Any) -> Any:

@@ -18,7 +18,8 @@ from lapwing.services.autopilot.controller_parameters import rotor_effectiveness
 from lapwing.services.autopilot.controller_parameters import shares as law_shares
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.performance_card import card, show, write_json
+from lapwing.studies.json_file import write_json
+from lapwing.studies.performance_card import card, show
 from lapwing.studies.terminal import console
 
 ROOT = Path(__file__).parents[2]

@@ -139,8 +139,8 @@ def _configuration(own: Path) -> dict[str, Any]:
         "connect_private_key_base64": KEY,
         "connect_certificate_base64": CERTIFICATE,
     }
-    held = {entry: base64.b64encode((own / file).read_bytes()).decode() for entry, file in entries.items()}
-    return {"mode": "client", "transport": {"link": {"tls": {**held, **_LINKS}}}}
+    contents = {entry: base64.b64encode((own / file).read_bytes()).decode() for entry, file in entries.items()}
+    return {"mode": "client", "transport": {"link": {"tls": {**contents, **_LINKS}}}}
 
 
 def _openssl(*arguments: str) -> None:

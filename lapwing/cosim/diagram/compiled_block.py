@@ -126,7 +126,7 @@ def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: t
 
 
 @always_inline
-def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
+def ring_index(stamp: int, period: int, rows: np.ndarray) -> int:
     """Return the index of the sample with the tick `stamp` in a ring of 2^k rows."""
     if period == 1:
         return stamp & (rows.shape[0] - 1)
@@ -134,15 +134,15 @@ def row_of(stamp: int, period: int, rows: np.ndarray) -> int:
 
 
 @always_inline
-def _take(given: InputRing, tick: int) -> InputSample:
-    stamp = due(tick, given.period, given.delay)
-    return InputSample(stamp >= 0, load(given.like, given.rows, row_of(stamp, given.period, given.rows)))
+def _take(ring: InputRing, tick: int) -> InputSample:
+    stamp = due(tick, ring.period, ring.delay)
+    return InputSample(stamp >= 0, load(ring.like, ring.rows, ring_index(stamp, ring.period, ring.rows)))
 
 
 @always_inline
-def _give(value: Any, taken: OutputRing, tick: int) -> None:
-    if due(tick, taken.period, 0) >= 0:
-        store(value, taken.rows, row_of(tick, taken.period, taken.rows))
+def _put(value: Any, ring: OutputRing, tick: int) -> None:
+    if due(tick, ring.period, 0) >= 0:
+        store(value, ring.rows, ring_index(tick, ring.period, ring.rows))
 
 
 def _take_all(inputs: tuple[InputRing, ...], tick: int) -> tuple[InputSample, ...]:
@@ -155,24 +155,24 @@ def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
     return compile_source("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
 
 
-def _give_all(values: tuple, outputs: tuple[OutputRing, ...], tick: int) -> None:
+def _put_all(values: tuple, outputs: tuple[OutputRing, ...], tick: int) -> None:
     raise NotImplementedError("compiled code only")
 
 
-@overload_for(_give_all, inline=True)
-def _give_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
-    calls = [f"give(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
-    return compile_source("give_all(values, outputs, tick)", {"give": _give}, *calls, "return None")
+@overload_for(_put_all, inline=True)
+def _put_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
+    calls = [f"put(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
+    return compile_source("put_all(values, outputs, tick)", {"put": _put}, *calls, "return None")
 
 
 @no_refcount
 def advance(memory: Any, tick: int) -> int:
     """Step the block whose `BlockData` is in the cell `memory`. Return the step status."""
     core = memory.value
-    s, outputs, signal = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
+    s, outputs, status = step(core.parameters, core.state.value, tick, _take_all(core.inputs, tick))
     core.state.value = s
-    _give_all(outputs, core.outputs, tick)
-    return signal
+    _put_all(outputs, core.outputs, tick)
+    return status
 
 
 @kernel

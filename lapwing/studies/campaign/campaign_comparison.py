@@ -1,8 +1,7 @@
 """Two campaigns beside each other, run by run: runs of one number and seed differ in nothing but what was changed."""
 
-import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -82,13 +81,11 @@ def _pairs(found: Results) -> list[tuple[int, int]]:
 def show(console: Console, found: Comparison) -> None:
     """Print the comparison."""
     left_out = f", {found.left_out} left out that only one has flown" if found.left_out else ""
-    console.print(f"{found.pairs} pairs of runs{left_out}", highlight=False)
-    console.print(f"the campaigns differ in: {', '.join(found.differing) or 'nothing'}", highlight=False)
+    console.print(f"{found.pairs} pairs of runs{left_out}")
+    console.print(f"the campaigns differ in: {', '.join(found.differing) or 'nothing'}")
     for name, p in zip(found.names, found.failures, strict=True):
-        console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}", highlight=False)
-    console.print(
-        f"  failed in the first only: {found.only_one}, in the second only: {found.only_other}", highlight=False
-    )
+        console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}")
+    console.print(f"  failed in the first only: {found.only_one}, in the second only: {found.only_other}")
     title = "Means, and the change from the first to the second with its 95 % interval"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     table.add_column("figure", no_wrap=True)
@@ -101,11 +98,3 @@ def show(console: Console, found: Comparison) -> None:
         table.add_row(f"{label}{' *' if d.sure else ''}", *means, *changes)
     console.print(table)
     console.print("*: the interval does not hold 0")
-
-
-def write_json(path: Path, found: Comparison) -> None:
-    """Write the comparison for other programs."""
-    plain: dict[str, Any] = found._asdict()
-    plain["failures"] = [p._asdict() for p in found.failures]
-    plain["differences"] = [{**d._asdict(), "difference": d.difference._asdict()} for d in found.differences]
-    path.write_text(json.dumps(plain, indent=2) + "\n", encoding="utf-8")

@@ -1,6 +1,5 @@
 """A campaign in the terminal, and as JSON."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,6 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.studies import json_file
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.consistency import JOINT, SOURCES, bounds
@@ -23,33 +23,33 @@ LISTED = 10  # failures, refusals
 def show(console: Console, found: Results) -> None:
     """Print the campaign for people."""
     if len(found) == 0:
-        console.print(f"{found.scene}: the scene rejected every run", highlight=False)
+        console.print(f"{found.scene}: the scene rejected every run")
         _list(console, "rejected", found.refused["run"], found.refused["outcome_text"])
         return
     _table(console, "Root-mean-square error of the reference against the truth", "rmse", found)
     if found.on_estimate:
         _table(console, "The same against the vehicle's own estimate", "rmse_estimate", found)
         shares = ", ".join(f"{axis} {found[f'within_3sigma.{axis}'].mean():.2%}" for axis in "xyz")
-        console.print(f"Truth within 3 sigma of the estimate: {shares} of the time", highlight=False)
+        console.print(f"Truth within 3 sigma of the estimate: {shares} of the time")
         least = {axis: found.spread(f"within_3sigma.{axis}") for axis in "xyz"}
         text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
-        console.print(f"Least of a flight: {text}", highlight=False)
+        console.print(f"Least of a flight: {text}")
         for line in consistency_lines(found):
-            console.print(line, highlight=False)
+            console.print(line)
     if found.vehicles:
         _vehicles(console, found)
     if len(found) > 1 and not found.figures:
         console.print("Every run is the same flight: nothing in this scene is random, and nothing varies")
     runs = len(found) + len(found.refused["run"])
-    console.print(f"{found.scene}: {runs} runs: {found.outcome_text}", highlight=False)
+    console.print(f"{found.scene}: {runs} runs: {found.outcome_text}")
     p, failed = found.failure, ~found["success"].astype(bool)
     share = f"{p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
     criteria = " and ".join(found.folder.about["success"]) or "always"
     style = "bold red" if failed.any() else "bold green"
-    console.print(f"Failures: {share} (success: {criteria})", style=style, markup=False, highlight=False)
+    console.print(f"Failures: {share} (success: {criteria})", style=style, markup=False)
     if (farthest := found.spread("target_distance")) and failed.any():
         text = f"median {farthest.median:.1f} m, worst {farthest.worst:.1f} m (run {farthest.run})"
-        console.print(f"Distance from the mission's target at the end: {text}", highlight=False)
+        console.print(f"Distance from the mission's target at the end: {text}")
     _list(console, "run", found["run"][failed], found["outcome_text"][failed])
     _list(console, "rejected: run", found.refused["run"], found.refused["outcome_text"])
 
@@ -82,7 +82,7 @@ def _vehicles(console: Console, found: Results) -> None:
     for vehicle, cells in vehicle_cells(found).items():
         table.add_row(vehicle, *cells)
     console.print(table)
-    console.print(f"Nearest of any two vehicles: {nearest_of(found)}", highlight=False)
+    console.print(f"Nearest of any two vehicles: {nearest_of(found)}")
 
 
 def vehicle_cells(found: Results) -> dict[str, list[str]]:
@@ -106,9 +106,9 @@ def nearest_of(found: Results) -> str:
 
 def _list(console: Console, what: str, runs: Sequence[int], told: Sequence[str]) -> None:
     for run, text in list(zip(runs, told, strict=True))[:LISTED]:
-        console.print(f"  {what} {run}: {text}", highlight=False)
+        console.print(f"  {what} {run}: {text}")
     if len(runs) > LISTED:
-        console.print(f"  and {len(runs) - LISTED} more: the table has all of them", highlight=False)
+        console.print(f"  and {len(runs) - LISTED} more: the table has all of them")
 
 
 def _table(console: Console, title: str, kind: str, found: Results) -> None:
@@ -138,16 +138,16 @@ def digits(value: float) -> str:
 
 
 def write_json(path: Path, found: Results, digest: str) -> None:
-    """Write what the campaign came to for other programs; the table has the single runs."""
+    """Write the results of the campaign; the table has the single runs."""
     spreads = {name: found.spread(name) for name in found.figures}
     data = {
         "scene": found.scene,
         "runs": len(found) + len(found.refused["run"]),
         "outcome_text": found.outcome_text,
-        "failure": found.failure._asdict(),
-        "figures": {name: s._asdict() for name, s in spreads.items() if s},
-        "failed": found["run"][~found["success"].astype(bool)].tolist(),
-        "refused": found.refused["run"].tolist(),
+        "failure": found.failure,
+        "figures": {name: s for name, s in spreads.items() if s},
+        "failed": found["run"][~found["success"].astype(bool)],
+        "refused": found.refused["run"],
         "digest": digest,
     }
-    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    json_file.write_json(path, data)

@@ -1,6 +1,5 @@
 """The study as a table, as JSON and as a plot."""
 
-import json
 import math
 from pathlib import Path
 
@@ -9,6 +8,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.studies import json_file
 from lapwing.studies.effects.influence import Influence
 from lapwing.studies.effects.procedure import Row, Study
 from lapwing.studies.report.matplotlib_figure import styled
@@ -20,18 +20,17 @@ LEAST = 1e-6  # [m] shorter bars are drawn as long as this
 def show(console: Console, found: Study) -> None:
     """Print the study for people."""
     head = f"{found.scene}: a plant step takes {found.airborne:.0f} ns hovering, {found.standing:.0f} ns standing"
-    console.print(head, highlight=False)
+    console.print(head)
     _table(console, "Effects of the scene, and what leaving one out changes", found, active=True)
     _table(console, "Effects that the scene leaves out, and what adding one changes", found, active=False)
     saved = 1.0 - found.smallest_airborne / found.airborne, 1.0 - found.smallest_standing / found.standing
     console.print(
         f"Smallest set within {found.within:g} m: {', '.join(found.smallest) or 'none'} ({found.apart:.2g} m off; "
         f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} standing)",
-        highlight=False,
     )
-    console.print('Costs after "<" are below what this measurement resolves.', highlight=False)
+    console.print('Costs after "<" are below what this measurement resolves.')
     names = ", ".join(row.name for row in found.missing)
-    console.print(f"Left out, and worth more than {found.within:g} m: {names or 'none'}", highlight=False)
+    console.print(f"Left out, and worth more than {found.within:g} m: {names or 'none'}")
 
 
 def _table(console: Console, title: str, found: Study, active: bool) -> None:
@@ -49,7 +48,7 @@ def _table(console: Console, title: str, found: Study, active: bool) -> None:
     console.print(table)
     for row in _of(found, active):
         if row.remark:
-            console.print(f"  not flown: {row.remark}", highlight=False, soft_wrap=True)
+            console.print(f"  not flown: {row.remark}", soft_wrap=True)
 
 
 def _cost(difference: float, noise: float) -> str:
@@ -76,21 +75,8 @@ def _of(found: Study, active: bool) -> list[Row]:
 
 
 def write_json(path: Path, found: Study) -> None:
-    """Write the study for other programs; what is infinite or not known is null."""
-    rows = []
-    for row in found.rows:
-        changes = row.influence._asdict() if row.influence else None
-        rows.append({**row._asdict(), "influence": changes})
-    data = {**found._asdict(), "rows": rows, "missing": [row.name for row in found.missing]}
-    path.write_text(json.dumps(_plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
-
-
-def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _plain(part) for key, part in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(part) for part in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    """Write the study; values that are infinite or unknown are null."""
+    json_file.write_json(path, {**found._asdict(), "missing": [row.name for row in found.missing]})
 
 
 def plot(path: Path, found: Study) -> None:

@@ -1,7 +1,7 @@
 """A recorded flight on a uniform time grid, in SI units, world ENU and body FLU."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +12,6 @@ GYRO_LIMIT = 35.0  # [rad/s] range of the usual gyroscopes, 2000 deg/s
 LOWEST = 0.3  # [m] above the ground, from which a vehicle is in the air
 RESOLUTION = 1e-6  # [s] of time stamps
 SETPOINT_WIDTH = 11  # columns of a setpoint
-LARGEST_STEP = 12.0  # times the median absolute step of a channel above which a sample is an outlier
 
 
 @dataclass(frozen=True)
@@ -54,6 +53,11 @@ class Series:
         """Return where both neighbours of an instant are at most `LONGEST_HOLD` apart."""
         right = np.clip(np.searchsorted(self.time, grid), 1, len(self.time) - 1)
         return np.asarray(self.time[right] - self.time[right - 1] <= LONGEST_HOLD)
+
+
+def converted(source: Series | None, change: Callable[[np.ndarray], np.ndarray]) -> Series | None:
+    """Return a series with converted values, None for None."""
+    return source and replace(source, values=change(source.values))
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
-from lapwing.studies.flight_import.recording import Recording, Series
+from lapwing.studies.flight_import.recording import Recording, Series, converted
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us] of a PWM output
@@ -64,15 +64,12 @@ def read_ulog_flight(path: Path) -> Recording:
     def three(topic: str, field: str) -> Series | None:
         return series(topic, *(f"{field}[{k}]" for k in range(3)))
 
-    def moved(source: Series | None, change: Any) -> Series | None:
-        return source and Series(source.time, change(source.values), source.dropped)
-
-    channels.attitude = moved(series("vehicle_attitude", *(f"q[{k}]" for k in range(4))), from_ned_frd)
-    channels.position = moved(series("vehicle_local_position", "x", "y", "z"), ned_to_enu)
-    channels.velocity = moved(series("vehicle_local_position", "vx", "vy", "vz"), ned_to_enu)
+    channels.attitude = converted(series("vehicle_attitude", *(f"q[{k}]" for k in range(4))), from_ned_frd)
+    channels.position = converted(series("vehicle_local_position", "x", "y", "z"), ned_to_enu)
+    channels.velocity = converted(series("vehicle_local_position", "vx", "vy", "vz"), ned_to_enu)
     rates = three("vehicle_angular_velocity", "xyz") or three("sensor_combined", "gyro_rad")
-    channels.omega = moved(rates, lambda v: v * FLU)
-    channels.specific_force = moved(three("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
+    channels.omega = converted(rates, lambda v: v * FLU)
+    channels.specific_force = converted(three("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
     channels.battery = series("battery_status", "voltage_v", "current_a")
     channels.duty = _duty(topics, series, channels)
     channels.setpoint = _setpoint(series, three)

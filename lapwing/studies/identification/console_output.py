@@ -1,12 +1,12 @@
 """Terminal tables of `lapwing identify`."""
 
-import json
 from pathlib import Path
 
 import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.studies import json_file
 from lapwing.studies.identification.procedure import Identification
 from lapwing.studies.validation.console_output import UNITS
 from lapwing.studies.validation.prediction_metrics import FIELDS
@@ -26,35 +26,31 @@ def show(console: Console, found: Identification) -> None:
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
         if abs(fit.correlations[i, j]) > RELATED:
             text = f"correlated: {fit.keys[i]} and {fit.keys[j]}: {fit.correlations[i, j]:+.2f}"
-            console.print(text, highlight=False, soft_wrap=True)
+            console.print(text, soft_wrap=True)
     for key in fit.undetermined:
-        console.print(f"not determined by these flights: {key}", highlight=False, soft_wrap=True)
+        console.print(f"not determined by these flights: {key}", soft_wrap=True)
     judged = f"{len(found.held_out)} held-out flights" if found.held_out else "the same flights"
-    console.print(f"error after 0.5 s on {judged}, before and after:", highlight=False)
+    console.print(f"error after 0.5 s on {judged}, before and after:")
     for name, before, after in zip(FIELDS, found.before, found.after, strict=True):
         if np.isfinite(before):  # measured by a held-out flight
-            console.print(f"  {name.replace('_', ' ')} [{UNITS[name]}]: {before:.3g}, {after:.3g}", highlight=False)
+            console.print(f"  {name.replace('_', ' ')} [{UNITS[name]}]: {before:.3g}, {after:.3g}")
 
 
 def write_json(path: Path, found: Identification) -> None:
     """Write estimates, standard errors, correlations and errors."""
     fit = found.fit
-    rows = zip(fit.keys, fit.start.tolist(), fit.values.tolist(), fit.standard_errors.tolist(), strict=True)
-    errors = zip(FIELDS, found.before.tolist(), found.after.tolist(), strict=True)
+    rows = zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True)
+    errors = zip(FIELDS, found.before, found.after, strict=True)
     content = {
         "scene": found.scene,
         "parameters": {
-            key: {"start": a, "estimate": b, "standard_error": _number(c), "determined": key not in fit.undetermined}
+            key: {"start": a, "estimate": b, "standard_error": c, "determined": key not in fit.undetermined}
             for key, a, b, c in rows
         },
-        "correlations": fit.correlations.tolist(),
+        "correlations": fit.correlations,
         "loss": fit.cost,
-        "flights": list(found.used),
-        "held_out": list(found.held_out),
-        "held_out_errors": {name: {"before": _number(a), "after": _number(b)} for name, a, b in errors},
+        "flights": found.used,
+        "held_out": found.held_out,
+        "held_out_errors": {name: {"before": a, "after": b} for name, a, b in errors},
     }
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-
-
-def _number(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+    json_file.write_json(path, content)

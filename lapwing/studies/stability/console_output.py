@@ -1,15 +1,14 @@
 """The results as a table and as JSON."""
 
-import json
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from lapwing.studies import json_file
 from lapwing.studies.stability.case_runner import Result
 
 
@@ -76,28 +75,18 @@ def sweeps(console: Console, results: Sequence[Result]) -> None:
             console.print(f"  {escape(name)}: {where}", highlight=False)
 
 
-def as_json(results: Sequence[Result]) -> dict[str, Any]:
-    """Return {"cases": [...]} with an entry for each row; values that are not finite are null."""
-    return {
-        "cases": [
-            {
-                "name": f"{result.case}.{row.name}",
-                "bound": _finite(row.bound),
-                "measured": _finite(row.measured),
-                "verdict": verdict(row.passes),
-                "baseline_measured": _finite(row.baseline_measured),
-                "baseline_verdict": verdict(row.baseline_passes),
-            }
-            for result in results
-            for row in result.found.rows
-        ]
-    }
-
-
 def write_json(path: Path, results: Sequence[Result]) -> None:
-    """Write `as_json` to a file."""
-    path.write_text(json.dumps(as_json(results), indent=1) + "\n", encoding="utf-8")
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+    """Write {"cases": [...]} with an entry for each row; values that are not finite are null."""
+    cases = [
+        {
+            "name": f"{result.case}.{row.name}",
+            "bound": row.bound,
+            "measured": row.measured,
+            "verdict": verdict(row.passes),
+            "baseline_measured": row.baseline_measured,
+            "baseline_verdict": verdict(row.baseline_passes),
+        }
+        for result in results
+        for row in result.found.rows
+    ]
+    json_file.write_json(path, {"cases": cases})

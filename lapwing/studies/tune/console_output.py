@@ -57,7 +57,7 @@ def show(console: Console, found: Tuned) -> None:
             table.add_row(*row, style="bold red" if k in rows.failed else None)
         console.print(table)
     for text in found.failures:
-        console.print(f"new gains fail: {text}", style="bold red", highlight=False, soft_wrap=True)
+        console.print(f"new gains fail: {text}", style="bold red", soft_wrap=True)
 
 
 def cell(m: Margins) -> str:

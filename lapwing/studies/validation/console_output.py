@@ -30,19 +30,18 @@ def show(console: Console, found: Validation) -> None:
             table.add_row("", name.replace("_", " "), *(plain(rows[k][f].mean) for f in shown), end_section=last)
     console.print(table)
     for flight in found.closed_loop:
-        console.print(closed_loop_line(flight), highlight=False, soft_wrap=True)
+        console.print(closed_loop_line(flight), soft_wrap=True)
     memory = found.memory
     console.print(
         f"start: measured state; rotor speeds from past commands; trim from the past {memory.force:g} s (force) and "
         f"{memory.torque:g} s (torque); 95 % intervals over flights",
-        highlight=False,
     )
     for line in found.skipped:
-        console.print(f"left out: {line}", highlight=False)
+        console.print(f"left out: {line}")
     faulty = [(f.recording.name, f.recording.faults) for f in found.flights if f.recording.faults]
     for name, faults in faulty:
         text = ", ".join(f"{cause}: {count}" for cause, count in faults.items())
-        console.print(f"marked samples: {name}: {text}", highlight=False)
+        console.print(f"marked samples: {name}: {text}")
 
 
 def closed_loop_line(flight: ClosedLoop) -> str:

@@ -1,7 +1,5 @@
 """Validation of a scene's plant on recorded flights."""
 
-import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from lapwing.cosim.scene import Overrides, Scene
+from lapwing.studies import json_file
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.validation.closed_loop import ClosedLoop, fly_setpoints
@@ -143,42 +142,34 @@ def write_json(path: Path, found: Validation) -> None:
     for k, steps in enumerate(found.horizons):
         row: dict = {"steps": steps, "time": steps * found.interval, "windows": found.windows}
         row |= _values(found.plant[k])
-        row["confidence_95"] = {
-            name: [_number(m.low), _number(m.high)] for name, m in zip(FIELDS, found.plant[k], strict=True)
-        }
+        row["confidence_95"] = {name: [m.low, m.high] for name, m in zip(FIELDS, found.plant[k], strict=True)}
         row["baselines"] = {name: _values(rows_of[k]) for name, rows_of in found.baselines.items()}
         rows.append(row)
     flights = {f.recording.name: _flight(found, f) for f in found.flights}
     content = {
         "scene": found.scene,
-        "trim": found.memory._asdict(),
+        "trim": found.memory,
         "horizons": rows,
         "flights": flights,
-        "skipped": list(found.skipped),
+        "skipped": found.skipped,
     }
     if found.closed_loop:
         content["closed_loop"] = [
             {
                 "flight": c.name,
-                "seconds": float(c.time[-1]),
+                "seconds": c.time[-1],
                 "difference": c.difference,
                 "tracking_error": {name: c.tracking_error(getattr(c, name)) for name in ("simulated", "recorded")},
             }
             for c in found.closed_loop
         ]
-    path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+    json_file.write_json(path, content)
 
 
 def _flight(found: Validation, flight: FlightErrors) -> dict:
-    means = np.array([m.mean for m in pooled([magnitudes(flight.plant)[:, -1:]])[0]])
-    row: dict = {"windows": len(flight.starts)}
-    row |= {name: _number(v) for name, v in zip(FIELDS, means.tolist(), strict=True)}
-    return row | {"faults": flight.recording.faults, "notes": list(flight.recording.notes)}
+    means = _values(pooled([magnitudes(flight.plant)[:, -1:]])[0])
+    return {"windows": len(flight.starts), **means, "faults": flight.recording.faults, "notes": flight.recording.notes}
 
 
-def _values(metrics: list[Metric]) -> dict[str, float | None]:
-    return {name: _number(m.mean) for name, m in zip(FIELDS, metrics, strict=True)}
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _values(metrics: list[Metric]) -> dict[str, float]:
+    return {name: m.mean for name, m in zip(FIELDS, metrics, strict=True)}

@@ -78,7 +78,7 @@ class MissionClient:
         failsafe: last status text about a failsafe since arming.
         blockers: status texts since arming was rejected.
         error: reason why the flight is impossible, "" as long as it is possible.
-        version: of the firmware, "" until it has told it.
+        version: of the firmware, "" until it reports it.
         reached: number of the last item that the vehicle has reached, -1: none.
     """
 
@@ -241,8 +241,8 @@ class MissionClient:
         if self.stage is not Stage.UPLOADING or not -1 <= number < len(self._items):
             return
         item = self._items[max(number, 0)]
-        given = (item.param1, item.param2, item.param3, item.param4)
-        parameters = (self._conventions.open_value if math.isnan(value) else value for value in given)
+        requested = (item.param1, item.param2, item.param3, item.param4)
+        parameters = (self._conventions.open_value if math.isnan(value) else value for value in requested)
         fields = (item.frame, item.command, 0, 1, *parameters)
         place = (item.x, item.y, item.z)
         if number < 0:

@@ -32,24 +32,24 @@ def firmware_service(
         recorded: messages of a log to fly again; None: fly the firmware.
     """
     config = setup.services[name]
-    given: FirmwareSetup = config.parameters
+    own: FirmwareSetup = config.parameters
     if recorded is not None:
         service = Service(name, [], [])
         service.parts = [Playback(name, config.ports, recorded, service)]
-        service.python_topics = TOPICS if given.phases else TOPICS[:2]
+        service.python_topics = TOPICS if own.phases else TOPICS[:2]
         return service
-    link = FirmwareBlock(name, given, config.inputs, create)
-    none = (0.0,) * len(given.order)
-    held: Any = Hold(given.voltage_max, none)
+    link = FirmwareBlock(name, own, config.inputs, create)
+    none = (0.0,) * len(own.order)
+    parameters: Any = Hold(own.voltage_max, none)
     inputs = [InputPort(COMMAND), InputPort(ports.BATTERY)]
-    if given.phases:
-        held = HoldReference(held)
+    if own.phases:
+        parameters = HoldReference(parameters)
         inputs.append(InputPort(ports.TRAJECTORY))
-    hold = Block(f"{name}.hold", held, Cell(HeldState(given.voltage_max)), tuple(inputs), config.ports)
-    phases = given.phases or ("",)
+    hold = Block(f"{name}.hold", parameters, Cell(HeldState(own.voltage_max)), tuple(inputs), config.ports)
+    phases = own.phases or ("",)
     wires = [
         actuators_wire(setup.port(ports.ACTUATORS)),
-        status_wire(given.status_every, phases, link.words.table),
-        *([setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases)] if given.phases else []),
+        status_wire(own.status_every, phases, link.words.table),
+        *([setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases)] if own.phases else []),
     ]
     return Service(name, [link, hold], wires)

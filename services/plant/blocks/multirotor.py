@@ -1,16 +1,20 @@
 """The plant of a multirotor, as one rigid body or as five: motor voltages in, the true state out."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
+
+from numba import types
 
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics import effects
+from lapwing.dynamics.effects.payload_release import RELEASED, PayloadRelease
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
 from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.kernels.state_tree import finite
 from lapwing.services.common.ports import BatteryReading, PerRotor, TrueState
-from lapwing.services.plant.blocks.gripper import release_payload
 from lapwing.services.plant.blocks.termination import termination_status
 
 for _name in effects.names():
@@ -60,3 +64,16 @@ def step(
     gauge = BatteryReading(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
     sound = finite(vehicle.motion)
     return MultirotorPlantState(vehicle, last), (truth, gauge), termination_status(tick, last, sound)
+
+
+def release_payload(effects: tuple, memory: tuple) -> tuple:
+    """Return the effects' discrete state after the release of the payload; unchanged without a payload."""
+    raise NotImplementedError("compiled code only")
+
+
+@overload_for(release_payload, inline=True)
+def _let_go(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
+    carried = [getattr(kind, "instance_class", None) is PayloadRelease for kind in effects]
+    parts = "".join("gone, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
+    body = f"return ({parts})" if any(carried) else "return memory"
+    return compile_source("release_payload(effects, memory)", {"gone": RELEASED}, body)

@@ -3,7 +3,7 @@
 import pytest
 
 from lapwing.services.betaflight import boot
-from lapwing.services.betaflight.cli_lines import lines
+from lapwing.services.betaflight.boot import lines
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.scene_resolver import load, resolve
 
