@@ -226,6 +226,10 @@ class BlockDiagram:
         """Return the row of a port at `tick`, shape (width,)."""
         return self._rows[port][self._index(port, tick)]
 
+    def ring(self, port: str) -> np.ndarray:
+        """Return the ring buffer of a port, shape (2^k, width); the row of a tick is number tick // period mod 2^k."""
+        return self._rows[port]
+
     def rows(self, port: str, ticks: np.ndarray) -> np.ndarray:
         """Return the rows of a port at recent `ticks` (n,), shape (n, width)."""
         return self._rows[port][self._index(port, ticks)]
