@@ -56,22 +56,20 @@ def record_actions(
             rows = whole._rows[port.name]
             watched.append(_Watched(rows.ctypes.data, rows.nbytes, image.rows[port.name]))
     actions: list[Action] = []
-    act = whole._act
-    planned: dict[int, int] = {}  # tick of the next run of each block
+    planned: dict[str, int] = {}  # tick of the next run of each block
 
-    def observed(k: int, tick: int) -> int:
-        if whole._parts[k].name not in own:
-            return act(k, tick)
+    def observed(block: Any, tick: int) -> int:
+        if block.name not in own:
+            return block.on_tick(tick)
         before = [_words(each) for each in watched]
-        following = act(k, tick)
+        following = block.on_tick(tick)
         writes = [w for each, old in zip(watched, before, strict=True) for w in _changes(each, old)]
-        woken, planned[k] = planned.get(k, 0) != tick, following
+        woken, planned[block.name] = planned.get(block.name, 0) != tick, following
         if writes or woken:
-            actions.append(Action(tick, whole._parts[k].name, tuple(writes)))
+            actions.append(Action(tick, block.name, tuple(writes)))
         return following
 
-    whole._act = observed  # type: ignore[method-assign,assignment]
-    whole.advance(min(setup.last_tick, round(LONGEST * setup.rate)) + 1)
+    whole.advance(min(setup.last_tick, round(LONGEST * setup.rate)) + 1, observed)
     return actions
 
 

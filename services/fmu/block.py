@@ -1,14 +1,23 @@
-"""Python block that steps one FMU at every tick."""
+"""Block that steps one FMU at every tick, in compiled code (`exchange`) as long as the FMU answers at once."""
 
-import math
-from collections.abc import Mapping, Sequence
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
-from lapwing.cosim.diagram.block_diagram import BlockDiagram
+import numpy as np
+
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram
+from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.services.fmu.host_process import HostError, HostProcess
+from lapwing.kernels import math
+from lapwing.kernels.cell import Cell
+from lapwing.services.fmu.exchange import FmuExchange
+from lapwing.services.fmu.host_process import HostError, HostProcess, poll_entry
 from lapwing.services.fmu.service_config import Connection, FmuConfig
+
+_WAIT = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
 
 
 class FmuBlock:
@@ -30,64 +39,111 @@ class FmuBlock:
         )
         self._fmu, self._ports = fmu, {port: own.name for port, own in outputs.items()}
         self._where = f"services.{fmu.name}: {Path(fmu.path).name}"
+        self._request, self._reply = np.zeros(2 + len(fmu.inputs)), np.zeros(1 + len(fmu.outputs))
+        self._channels, self._poll_entry = np.full(2, -1), poll_entry(-1)
         self._host: HostProcess | None = None
+        self._error: BaseException | None = None
+        self._wait = _WAIT(self._finish)
+        self._report_wait: Callable[[str], None] = lambda text: None
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Store the diagram; the process of the FMU starts at the first tick."""
-        self._graph, fmu = graph, self._fmu
+        """Have the diagram run compiled code for this block; the process of the FMU starts at the first tick."""
         self._interval = graph.setup.interval
-        self._read = [
-            (port, max(1, graph.ports[port].period), _places(fmu.inputs, port))
-            for port in dict.fromkeys(each.port for each in fmu.inputs)
-        ]
-        self._write = [
-            (port, own, graph.ports[own].period, _places(fmu.outputs, port)) for port, own in self._ports.items()
-        ]
+        code = graph.prepare(Block(self.name, self._exchange(graph), Cell(0)))
+        graph.replace(graph.part(self.name), code)
+
+    def open(self, report_wait: Callable[[str], None]) -> None:
+        """Store the function that reports waits for the FMU, which may take longer than a service may be silent."""
+        self._report_wait = report_wait
+
+    def close(self) -> None:
+        """End the process of the FMU."""
+        self._host = None
+
+    @property
+    def reports(self) -> dict[str, str]:
+        """No entries of the log's metadata."""
+        return {}
 
     def on_tick(self, tick: int) -> int:
-        """Step the FMU to `tick`.
+        """Return NEVER: the compiled code has replaced this function."""
+        return NEVER
 
-        Raises:
-            LockStepError: the FMU crashed, hung, reported an error, or has a non-finite output.
-        """
-        time = tick * self._interval
+    def failure(self, tick: int) -> Exception:
+        """Return the error of `tick`. Raise an exception that interrupted the wait for the FMU."""
+        where = f"t = {tick * self._interval:.3f} s"
+        if isinstance(self._error, HostError):
+            return LockStepError(f"{self._where}: {self._error} at {where}")
+        if self._error is not None:
+            raise self._error
+        name, value = next(
+            (each.element.variable, value)
+            for each, value in zip(self._fmu.outputs, self._reply[1:], strict=True)
+            if not math.isfinite(value)
+        )
+        return LockStepError(f"{self._where}: output {name} is {value} at {where}")
+
+    def _finish(self, sent: int, received: int) -> int:
+        """Finish an exchange that compiled code has begun. Return 0 on success."""
         try:
             if self._host is None:
-                self._host = HostProcess(self._fmu)
-            begin, step = ((tick - 1) * self._interval, self._interval) if tick else (0.0, -1.0)
-            self._set_inputs(tick, self._host.inputs)
-            self._host.step(begin, step)
-        except HostError as error:
-            raise LockStepError(f"{self._where}: {error} at t = {time:.3f} s") from None
-        self._publish(tick, self._host.outputs.tolist(), time)
-        return tick + 1
+                self._host = HostProcess(self._fmu, self._request, self._reply, self._report_wait)
+                self._channels[:] = self._host.requests, self._host.replies
+                ctypes.pointer(self._poll_entry)[0] = poll_entry(self._host.replies)
+            self._host.finish(sent, received)
+        except BaseException as error:  # exceptions do not pass through compiled code; `failure` raises it
+            self._error = error
+            return 1
+        return 0
 
-    def _set_inputs(self, tick: int, inputs: "memoryview[float]") -> None:
-        """Write the newest samples of ports in the units of the FMU; the inputs are 0 before the first."""
-        stamp = tick - self._fmu.delay
-        if stamp < 0:
-            return
-        for port, period, places in self._read:
-            row = self._graph.row(port, stamp - stamp % period).tolist()
-            for index, column, factor in places:
-                inputs[index] = row[column] * factor
-
-    def _publish(self, tick: int, outputs: Sequence[float], time: float) -> None:
-        """Write the ports that are due, with the outputs of the FMU in their columns."""
-        if not all(map(math.isfinite, outputs)):
-            for each, value in zip(self._fmu.outputs, outputs, strict=True):
-                if not math.isfinite(value):
-                    name = each.element.variable
-                    raise LockStepError(f"{self._where}: output {name} is {value} at t = {time:.3f} s")
-        for port, own, period, places in self._write:
-            if tick % period == 0:
-                row = self._graph.row(own, tick)
-                if port != own:
-                    row[:] = self._graph.row(port, tick)
-                for index, column, factor in places:
-                    row[column] = outputs[index] * factor
+    def _exchange(self, graph: BlockDiagram) -> FmuExchange:
+        fmu, libc = self._fmu, ctypes.CDLL(None)
+        sources = {each.port: () for each in fmu.inputs}
+        targets = {
+            port: (0, 0) if own == port else (graph.ring(port).ctypes.data, len(graph.ring(port)) - 1)
+            for port, own in self._ports.items()
+        }
+        write, poll, read, wait = map(_address, (libc.write, libc.poll, libc.read, self._wait))
+        source_tables = _tables(graph, fmu.inputs, sources, {})
+        target_tables = _tables(graph, fmu.outputs, targets, self._ports)
+        return FmuExchange(
+            graph.setup.interval, fmu.delay, self._request, self._reply, self._request.ctypes.data,
+            self._reply.ctypes.data, self._channels, ctypes.addressof(self._poll_entry), write, poll, read, wait,
+            *source_tables, *target_tables,
+        )  # fmt: skip
 
 
-def _places(connections: tuple[Connection, ...], port: str) -> list[tuple[int, int, float]]:
-    """Return (index among the connections, column, factor) of the connections of a port."""
-    return [(k, each.column, each.factor) for k, each in enumerate(connections) if each.port == port]
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def _tables(
+    graph: BlockDiagram, connections: Sequence[Connection], more: Mapping[str, tuple[int, ...]], own: Mapping[str, str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the tables of ports, places and factors of an exchange.
+
+    Args:
+        graph: the diagram.
+        connections: inputs or outputs.
+        more: further columns of each port.
+        own: port of the FMU in place of a port.
+    """
+    ports: list[tuple[int, ...]] = []
+    places: list[tuple[int, int]] = []
+    factors: list[float] = []
+    for port, columns in more.items():
+        first = len(places)
+        for index, each in enumerate(connections):
+            if each.port == port:
+                places.append((index, 8 * each.column))
+                factors.append(each.factor)
+        name = own.get(port, port)
+        ring = graph.ring(name)
+        place = ring.ctypes.data, ring.strides[0], len(ring) - 1, graph.ports[name].period
+        ports.append((*place, first, len(places), *columns))
+    width = 6 + len(next(iter(more.values()), ()))
+    return (
+        np.array(ports, np.int64).reshape(-1, width),
+        np.array(places, np.int64).reshape(-1, 2),
+        np.array(factors, np.float64),
+    )

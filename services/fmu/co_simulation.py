@@ -1,9 +1,16 @@
 """Co-simulation: the FMU integrates itself. Steps that end early go on after the FMU's event."""
 
 import ctypes
+import os
 from typing import Any
 
-from lapwing.services.fmu.instance import DISCARD, UPDATES, FmuInstance
+import numpy as np
+
+from lapwing.kernels.cell import Cell
+from lapwing.services.fmu import stepping
+from lapwing.services.fmu.instance import DISCARD, FmuInstance
+from lapwing.services.fmu.stepping import UPDATES, Channel, FmuCalls
+from lapwing.services.fmu.variable_group import Group
 
 LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of status in FMI 2.0
 
@@ -15,15 +22,21 @@ class CoSimulation(FmuInstance):
         """See `FmuInstance`."""
         self._event_mode = spec["version"] == 3 and bool(model.coSimulation.hasEventMode)
         super().__init__(spec, model, fmu, inputs, outputs)
-        self._do_step = self.function("DoStep")
-        if self._event_mode:
-            self._enter_event_mode, self._enter_step_mode = map(self.function, ("EnterEventMode", "EnterStepMode"))
-        self._time, self._size, self._reached = (ctypes.c_double() for _ in range(3))
-        flags = [ctypes.c_bool() for _ in range(3)]
-        self._event_needed, self._terminate, self._early = flags
-        begin = self.component, self._time, self._size
-        results = [*map(ctypes.byref, flags), ctypes.byref(self._reached)]
-        self._arguments = (*begin, ctypes.c_bool(True), *results) if self.is_3 else (*begin, ctypes.c_int(1))
+        events = "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode"
+        enter, update, leave = (_address(self.function(name)) if self._event_mode else 0 for name in events)
+        self._flags, self._times = np.zeros(8, np.uint8), np.full(4, np.nan)
+        bits = np.frombuffer(inputs, np.int64) if len(inputs) else np.zeros(0, np.int64)
+        self._former = np.zeros_like(bits)
+        self._calls = Cell(
+            FmuCalls(
+                component=self.address, do_step=_address(self.function("DoStep")), enter_event_mode=enter,
+                update_discrete_states=update, enter_step_mode=leave, is_3=self.is_3, event_mode=self._event_mode,
+                sets=_table(self.set_groups), gets=_table(self.get_groups), inputs=bits, former=self._former,
+                flags=self._flags, flags_address=self._flags.ctypes.data, times=self._times,
+                times_address=self._times.ctypes.data,
+            )
+        )  # fmt: skip
+        self.has_numbers_in_place = all(group.in_place for group in (*self.set_groups, *self.get_groups))
 
     def instantiate_options(self) -> dict[str, Any]:
         """Return the permission to end steps early at events."""
@@ -31,53 +44,71 @@ class CoSimulation(FmuInstance):
 
     def after_initialisation(self) -> None:
         """Settle the discrete states, and enter step mode."""
+        self._former[:] = np.frombuffer(self.inputs, np.int64) if len(self.inputs) else 0
         if self._event_mode:
             self.update_discrete_states(0.0)
-            self.call(self._enter_step_mode)
+            self.call(self.function("EnterStepMode"))
+            if self.ended is not None:
+                self._times[3] = self.ended
 
     def advance(self, time: float, step: float) -> None:
-        """Set inputs at `time`, and step the FMU by `step` [s]."""
-        if not self._event_mode:
-            self.set_inputs()
-        elif self.inputs_changed:
-            self._event(time, True)
-        if not self.is_3:
-            self._step2(time, step)
-            return
-        stop, at = time + step, time
-        for _ in range(UPDATES):
-            reached = self._step3(at, stop - at)
-            if self._event_mode and self._event_needed.value:
-                self._event(reached)
-            if reached >= stop - 1e-9 * step or self.ended is not None:
-                return
-            if reached <= at and not self._event_needed.value:
-                raise ValueError(f"doStep does not get beyond t = {at:g} s")
-            at = reached
-        raise ValueError(f"doStep ended early {UPDATES} times between t = {time:g} s and {stop:g} s")
+        """Set inputs at `time`, step the FMU by `step` [s], and read the outputs."""
+        for group in self.set_groups:
+            group.convert()
+        self._finish(*stepping.step_once(self._calls, time, step))
+        for group in self.get_groups:
+            group.copy_out()
 
-    def _call(self, time: float, step: float) -> int:
-        self._time.value, self._size.value = time, step
-        return int(self._do_step(*self._arguments))
+    def serve(self, channel: Cell) -> None:
+        """Answer requests in compiled code. Return if the FMU has ended the simulation, and its outputs are not sent.
 
-    def _step2(self, time: float, step: float) -> None:
-        status = self._call(time, step)
-        if status == DISCARD and self.fmu.getBooleanStatus(TERMINATED):
-            self.ended = self.fmu.getRealStatus(LAST_SUCCESSFUL_TIME)
-            return
-        self.check("doStep", status)
+        Args:
+            channel: cell of a `stepping.Channel`.
 
-    def _step3(self, time: float, step: float) -> float:
-        """Return the time that a step reaches."""
-        self.check("doStep", self._call(time, step))
-        reached = self._reached.value if self._early.value else time + step
-        if self._terminate.value:
-            self.ended = reached
-        return reached
+        Raises:
+            ValueError: the FMU reports an error.
+        """
+        result, status = stepping.serve(self._calls, channel)
+        while result == stepping.INTERRUPTED:
+            result, status = stepping.serve(self._calls, channel)
+        if result == stepping.CLOSED:
+            os._exit(0)  # the run is over; foreign code is not asked
+        self._finish(result, status)
 
-    def _event(self, time: float, with_inputs: bool = False) -> None:
-        self.call(self._enter_event_mode)
-        if with_inputs:
-            self.set_inputs()
-        self.update_discrete_states(time)
-        self.call(self._enter_step_mode)
+    def _finish(self, result: int, status: int) -> None:
+        """Handle the result of a step. Raise ValueError if it failed."""
+        if result == stepping.DO_STEP and status == DISCARD and not self.is_3 and self.fmu.getBooleanStatus(TERMINATED):
+            self._times[3] = self.fmu.getRealStatus(LAST_SUCCESSFUL_TIME)
+            self.get_outputs()
+        elif result in stepping.FUNCTIONS:
+            self.check(stepping.FUNCTIONS[result], status)
+        elif result == stepping.ENDED:
+            raise ValueError(f"asked to end the simulation (t = {self._times[3]:g} s)")
+        elif result == stepping.UNSETTLED:
+            raise ValueError(f"the discrete states do not settle in {UPDATES} updates")
+        elif result == stepping.STUCK:
+            raise ValueError(f"doStep does not get beyond t = {self._times[2]:g} s")
+        elif result == stepping.MANY:
+            raise ValueError(f"doStep ended early {UPDATES} times in one step")
+
+
+def channel(requests: int, replies: int, request: bytearray, reply: bytearray) -> Cell:
+    """Return the channel of `CoSimulation.serve`: file descriptors, and the bytes of a request and a reply."""
+    libc, received = ctypes.CDLL(None), np.zeros(1, np.int64)
+    asked, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
+    places = asked.ctypes.data, answer.ctypes.data
+    return Cell(Channel(requests, replies, asked, answer, *places, received, _address(libc.read), _address(libc.write)))
+
+
+def _address(function: Any) -> int:
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def _table(groups: list[Group]) -> np.ndarray:
+    """Return the arguments of the calls that set or get groups."""
+    rows = [
+        (_address(g.function), ctypes.addressof(g.references), len(g.references), ctypes.addressof(g.values))
+        for g in groups
+    ]
+    sizes = [len(g.values) for g in groups]
+    return np.column_stack([np.array(rows, np.int64).reshape(-1, 4), np.array(sizes, np.int64)])

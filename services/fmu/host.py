@@ -8,12 +8,13 @@ import ctypes
 import hashlib
 import json
 import os
+import signal
 import struct
 import sys
 from pathlib import Path
 from typing import Any
 
-from lapwing.services.fmu.co_simulation import CoSimulation
+from lapwing.services.fmu.co_simulation import CoSimulation, channel
 from lapwing.services.fmu.instance import FmuInstance
 from lapwing.services.fmu.service_config import CO_SIMULATION
 
@@ -50,24 +51,9 @@ def instantiated(spec: dict[str, Any], inputs: Any, outputs: Any) -> FmuInstance
     fmu = kind(guid=model.guid, unzipDirectory=str(folder), instanceName=spec["name"], modelIdentifier=identifier)
     if spec["interface"] == CO_SIMULATION:
         return CoSimulation(spec, model, fmu, inputs, outputs)
-    from lapwing.services.fmu.model_exchange import ModelExchange  # imports numba
+    from lapwing.services.fmu.model_exchange import ModelExchange  # imports the integrators
 
     return ModelExchange(spec, model, fmu, inputs, outputs)
-
-
-def _step(instance: FmuInstance, time: float, step: float) -> None:
-    """Set inputs, step or (if `step` is negative) initialise, and read the outputs.
-
-    Raises:
-        ValueError: the FMU reports an error; the text has its last message.
-    """
-    if step < 0.0:
-        instance.initialise()
-    else:
-        if instance.ended is not None:
-            raise ValueError(f"asked to end the simulation (t = {instance.ended:g} s)")
-        instance.advance(time, step)
-    instance.get_outputs()
 
 
 def serve(requests: int, replies: int) -> None:
@@ -77,19 +63,26 @@ def serve(requests: int, replies: int) -> None:
     n, m = len(spec["inputs"]), len(spec["outputs"])
     request, reply = bytearray(8 * (2 + n)), bytearray(8 * (1 + m))
     moment, inputs = (ctypes.c_double * 2).from_buffer(request), (ctypes.c_double * n).from_buffer(request, 16)
-    status, outputs = ctypes.c_int64.from_buffer(reply), (ctypes.c_double * m).from_buffer(reply, 8)
+    status, outputs = ctypes.c_double.from_buffer(reply), (ctypes.c_double * m).from_buffer(reply, 8)
+    pipes = channel(requests, replies, request, reply)
     instance: FmuInstance | None = None
     while True:
-        _read(requests, request)
         try:
-            instance = instance or instantiated(spec, inputs, outputs)
-            _step(instance, *moment)
+            if isinstance(instance, CoSimulation) and instance.has_numbers_in_place:
+                instance.serve(pipes)
+            else:
+                _read(requests, request)
+                instance = instance or instantiated(spec, inputs, outputs)
+                if moment[1] < 0.0:
+                    instance.initialise()
+                else:
+                    instance.advance(*moment)
             os.write(replies, reply)
         except Exception as error:  # FMPy raises many
             text = (" ".join(str(error).split()) or type(error).__name__).encode()[:500]
             status.value = len(text)
             os.write(replies, reply + text)
-            status.value = 0
+            status.value = 0.0
 
 
 def _read(channel: int, data: bytearray) -> bytearray:
@@ -104,4 +97,5 @@ def _read(channel: int, data: bytearray) -> bytearray:
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run decides when the FMU ends
     serve(*map(int, sys.argv[1:]))

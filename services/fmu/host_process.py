@@ -1,8 +1,8 @@
 """The process of an FMU, as seen from the run, which continues if foreign machine code crashes or hangs."""
 
 import contextlib
+import ctypes
 import json
-import math
 import os
 import select
 import shutil
@@ -12,10 +12,15 @@ import subprocess
 import sys
 import tempfile
 import weakref
+from collections.abc import Callable
 
+import numpy as np
+
+from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.fmu.service_config import FmuConfig
 
-STARTUP = 300.0  # [s] to load the FMU, compile for model exchange, and initialise it
+STARTUP = 300.0  # [s] to load the FMU, compile, and initialise it
+LOOK = 0.1  # [s] after which a wait looks whether the process gets a processor
 LENGTH = struct.Struct("<q")
 
 
@@ -27,25 +32,32 @@ class HostProcess:
     """A process that runs one FMU. Two pipes connect it, which are faster than a socket.
 
     Attributes:
-        inputs: doubles that the next step sets the inputs to.
-        outputs: doubles that the last step has left.
+        requests, replies: file descriptors of the pipes.
     """
 
-    def __init__(self, fmu: FmuConfig):
+    def __init__(
+        self,
+        fmu: FmuConfig,
+        request: np.ndarray,
+        reply: np.ndarray,
+        report_wait: Callable[[str], None] = lambda text: None,
+    ):
         """Start the process and instantiate the FMU.
+
+        Args:
+            fmu: configuration.
+            request: doubles of a request: time [s], step [s] (negative: initialise), inputs.
+            reply: doubles of an answer: length of an error text [bytes], outputs.
+            report_wait: is called with a text during long waits.
 
         Raises:
             HostError: the file has changed, or cannot be instantiated.
         """
-        self._timeout = fmu.timeout
-        self._request, self._reply = bytearray(8 * (2 + len(fmu.inputs))), bytearray(8 * (1 + len(fmu.outputs)))
-        numbers = memoryview(self._request).cast("d")
-        self._moment, self.inputs = numbers[:2], numbers[2:]
-        self._status = memoryview(self._reply).cast("q")[:1]
-        self.outputs = memoryview(self._reply).cast("d")[1:]
+        self._timeout, self._request, self._reply = fmu.timeout, request, reply
+        self._report_wait, self._name = report_wait, f"services.{fmu.name}"
         folder = tempfile.mkdtemp(prefix="lapwing-fmu-")
-        child_requests, self._requests = os.pipe()
-        self._replies, child_replies = os.pipe()
+        child_requests, self.requests = os.pipe()
+        self.replies, child_replies = os.pipe()
         channels = child_requests, child_replies
         self._process = subprocess.Popen(
             [sys.executable, "-m", "lapwing.services.fmu.host", *map(str, channels)],
@@ -53,57 +65,53 @@ class HostProcess:
         )  # fmt: skip
         for each in channels:
             os.close(each)
-        self._end = weakref.finalize(self, _end, self._process, (self._requests, self._replies), folder)
+        self._end = weakref.finalize(self, _end, self._process, (self.requests, self.replies), folder)
         poll = select.poll()
-        poll.register(self._replies, select.POLLIN)
+        poll.register(self.replies, select.POLLIN)
         self._poll = poll.poll
         text = json.dumps({**fmu._asdict(), "folder": folder}).encode()
-        self._limit(STARTUP)
-        self._send(LENGTH.pack(len(text)) + text)
+        self._limit = STARTUP
+        self._send(memoryview(LENGTH.pack(len(text)) + text))
 
-    def step(self, time: float, step: float) -> None:
-        """Set inputs, step from `time` by `step` [s], and read the outputs; a negative step initialises.
+    def finish(self, sent: int, received: int) -> None:
+        """Send the rest of a request and receive the rest of its answer.
+
+        Args:
+            sent: bytes of the request that have been sent; not positive: none.
+            received: bytes of the answer that have been received; not positive: none.
 
         Raises:
             HostError: the FMU crashed, hung or reported an error.
         """
-        self._moment[0], self._moment[1] = time, step
-        self._send(self._request)
-        self._receive(self._reply)
-        if step < 0.0:
-            self._limit(self._timeout)
-        if self._status[0]:
-            text = bytearray(self._status[0])
-            self._receive(text)
+        self._send(self._request.data.cast("B")[max(sent, 0) :])
+        self._receive(self._reply.data.cast("B")[max(received, 0) :])
+        if self._reply[0]:
+            text = bytearray(int(self._reply[0]))
+            self._receive(memoryview(text))
             self._end()
             raise HostError(text.decode(errors="replace"))
+        self._limit = self._timeout  # of the next
 
-    def _limit(self, seconds: float) -> None:
-        """Limit the waits for the process."""
-        self._waits, self._wait_ms = seconds, math.ceil(1e3 * seconds)
-
-    def _send(self, data: bytes | bytearray) -> None:
+    def _send(self, data: memoryview) -> None:
         try:
-            sent = os.write(self._requests, data)
-            while sent < len(data):
-                sent += os.write(self._requests, memoryview(data)[sent:])
+            while data:
+                data = data[os.write(self.requests, data) :]
         except OSError:
             raise self._crashed() from None
 
-    def _receive(self, data: bytearray) -> None:
-        size = self._part(data)
-        while size < len(data):
-            size += self._part(memoryview(data)[size:])
-
-    def _part(self, data: bytearray | memoryview) -> int:
-        if not self._poll(self._wait_ms):
-            self._process.kill()
-            self._end()
-            raise HostError(f"no answer for {self._waits:g} s")
-        size = os.readv(self._replies, [data])
-        if not size:
-            raise self._crashed()
-        return size
+    def _receive(self, data: memoryview) -> None:
+        patience = Patience(self._limit, self._process.pid)
+        while data:
+            while not self._poll(1e3 * min(LOOK, 0.25 * self._limit)):
+                self._report_wait(f"waits for the FMU of {self._name}")
+                if patience.over:
+                    self._process.kill()
+                    self._end()
+                    raise HostError(f"no answer for {self._limit:g} s")
+            size = os.readv(self.replies, [data])
+            if not size:
+                raise self._crashed()
+            data = data[size:]
 
     def _crashed(self) -> HostError:
         try:
@@ -113,6 +121,14 @@ class HostProcess:
             code = self._process.wait()
         self._end()
         return HostError(f"crashed ({signal.Signals(-code).name if code < 0 else f'exit code {code}'})")
+
+
+def poll_entry(descriptor: int) -> ctypes.Array:
+    """Return a `struct pollfd` that waits for input."""
+    entry = (ctypes.c_int16 * 4)()
+    ctypes.c_int32.from_buffer(entry).value = descriptor
+    entry[2] = select.POLLIN
+    return entry
 
 
 def _end(process: subprocess.Popen, channels: tuple[int, int], folder: str) -> None:

@@ -2,128 +2,12 @@
 
 import ctypes
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
-WARNING, DISCARD = 1, 2  # statuses of FMI; WARNING is the highest that is no failure
-UPDATES = 1000  # of discrete states at one time, before an FMU counts as one that never settles
+from lapwing.services.fmu.stepping import UPDATES, WARNING
+from lapwing.services.fmu.variable_group import Group
 
-
-class _Type(NamedTuple):
-    suffix: str  # of the functions that set and get it
-    c_type: Any
-    lowest: float  # whole numbers it holds; 0 and 0 of other types
-    highest: float
-
-
-def _integer(suffix: str, c_type: Any, signed: bool = True) -> _Type:
-    bits = 8 * ctypes.sizeof(c_type)
-    limits = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
-    return _Type(suffix, c_type, *limits)
-
-
-_FMI2 = {
-    "Real": _Type("Real", ctypes.c_double, 0, 0),
-    "Integer": _integer("Integer", ctypes.c_int),
-    "Enumeration": _integer("Integer", ctypes.c_int),
-    "Boolean": _Type("Boolean", ctypes.c_int, 0, 0),
-}
-_FMI3 = {
-    "Float64": _Type("Float64", ctypes.c_double, 0, 0),
-    "Float32": _Type("Float32", ctypes.c_float, 0, 0),
-    **{f"Int{n}": _integer(f"Int{n}", getattr(ctypes, f"c_int{n}")) for n in (8, 16, 32, 64)},
-    **{f"UInt{n}": _integer(f"UInt{n}", getattr(ctypes, f"c_uint{n}"), signed=False) for n in (8, 16, 32, 64)},
-    "Enumeration": _integer("Int64", ctypes.c_int64),
-    "Boolean": _Type("Boolean", ctypes.c_bool, 0, 0),
-}
-
-
-class Group:
-    """Variables of one type, set or read by one call."""
-
-    def __init__(
-        self, instance: "FmuInstance", verb: str, kind: str, elements: list[tuple[int, list[Any]]], numbers: Any
-    ):
-        """Lay out the values of all elements of the variables.
-
-        Args:
-            instance: of the FMU.
-            verb: "Set" or "Get".
-            kind: type of the variables.
-            elements: (index in `numbers`, `Element`).
-            numbers: array of doubles, which the values of the variables come from or go to.
-        """
-        given = (_FMI3 if instance.is_3 else _FMI2)[kind]
-        begins: dict[int, int] = {}
-        names: dict[int, str] = {}
-        total = 0
-        for _, (name, reference, _, _, size) in elements:
-            if reference not in begins:
-                begins[reference], names[reference] = total, name
-                total += size
-        self.indices = [index for index, _ in elements]
-        self.places = [begins[reference] + index for _, (_, reference, _, index, _) in elements]
-        self.names = [element[0] for _, element in elements]
-        self.partial = len(set(self.places)) < total
-        self._numbers = numbers
-        # Doubles side by side are passed to the FMU in place, other numbers side by side by one slice
-        begin = self.indices[0]
-        is_dense = self.places == [*range(total)] and self.indices == [*range(begin, begin + total)]
-        self._slice = slice(begin, begin + total) if is_dense else None
-        self._in_place = is_dense and given.c_type is ctypes.c_double
-        values = given.c_type * total
-        self.values = (
-            values.from_buffer(numbers, begin * ctypes.sizeof(ctypes.c_double)) if self._in_place else values()
-        )
-        self._former: list[float] = []  # the numbers that `values` has
-        self._is_real = kind in ("Real", "Float64", "Float32")
-        self._is_boolean = kind == "Boolean"
-        self._limits = given.lowest, given.highest
-        references = (ctypes.c_uint32 * len(begins))(*begins)
-        sizes = (ctypes.c_size_t(total),) if instance.is_3 else ()
-        self.arguments = (instance.component, references, ctypes.c_size_t(len(begins)), self.values, *sizes)
-        self.function = instance.function(verb + given.suffix)
-        self._read = instance.function("Get" + given.suffix)
-
-    def fill(self) -> int:
-        """Read all elements, for arrays of which only some are set. Return the status."""
-        return int(self._read(*self.arguments))
-
-    def set(self) -> int:
-        """Set the variables to the numbers. Return the status.
-
-        Raises:
-            ValueError: a number does not fit the type.
-        """
-        if not self._in_place:
-            numbers = self._numbers[self._slice or slice(None)]
-            if numbers != self._former:
-                self._convert()
-                self._former = numbers
-        return int(self.function(*self.arguments))
-
-    def get(self) -> int:
-        """Read the numbers from the variables. Return the status."""
-        status = int(self.function(*self.arguments))
-        if self._in_place:
-            return status
-        if self._slice:
-            self._numbers[self._slice] = self.values[:]
-        else:
-            for index, place in zip(self.indices, self.places, strict=True):
-                self._numbers[index] = self.values[place]
-        return status
-
-    def _convert(self) -> None:
-        for index, place, name in zip(self.indices, self.places, self.names, strict=True):
-            value = self._numbers[index]
-            if self._is_real:
-                self.values[place] = value
-            elif self._is_boolean:
-                self.values[place] = value != 0.0
-            elif math.isfinite(value) and self._limits[0] <= int(value) <= self._limits[1]:
-                self.values[place] = int(value)
-            else:
-                raise ValueError(f"{name} cannot be set to {value:g}; its type has whole numbers in {self._limits}")
+DISCARD = 2  # status of FMI
 
 
 class FmuInstance:
@@ -184,7 +68,7 @@ class FmuInstance:
         return [Group(self, verb, kind, own, numbers) for kind, own in entries.items()]
 
     def initialise(self) -> None:
-        """Set start values and inputs, and initialise the FMU at time 0."""
+        """Set start values and inputs, initialise the FMU at time 0, and read the outputs."""
         start = self.spec["start"]
         values = (ctypes.c_double * len(start))(*(value for _, value in start))
         for group in self._groups("Set", [element for element, _ in start], values):
@@ -200,12 +84,13 @@ class FmuInstance:
         self.set_inputs()
         self.fmu.exitInitializationMode()
         self.after_initialisation()
+        self.get_outputs()
 
     def after_initialisation(self) -> None:
         """Leave the mode in which the FMU is after its initialisation."""
 
     def advance(self, time: float, step: float) -> None:
-        """Set inputs at `time`, and advance the FMU by `step` [s]."""
+        """Set inputs at `time`, advance the FMU by `step` [s], and read the outputs."""
         raise NotImplementedError
 
     @property

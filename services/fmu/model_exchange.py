@@ -6,7 +6,8 @@ from typing import Any
 
 from lapwing.dynamics import integrators
 from lapwing.services.fmu.derivatives import FmuFunctions, advance_states
-from lapwing.services.fmu.instance import UPDATES, FmuInstance
+from lapwing.services.fmu.instance import FmuInstance
+from lapwing.services.fmu.stepping import UPDATES
 
 WIDTH = 1e-12  # [s] of the interval in which a state event is known to be
 
@@ -41,7 +42,13 @@ class ModelExchange(FmuInstance):
         self._states, self._indicators = (ctypes.c_double * states)(), (ctypes.c_double * indicators)()
 
     def advance(self, time: float, step: float) -> None:
-        """Set inputs at `time`, which is an event if they differ, and integrate over `step` [s]."""
+        """Set inputs at `time`, which is an event if they differ, integrate over `step` [s], and read the outputs."""
+        if self.ended is not None:
+            raise ValueError(f"asked to end the simulation (t = {self.ended:g} s)")
+        self._integrate_over(time, step)
+        self.get_outputs()
+
+    def _integrate_over(self, time: float, step: float) -> None:
         end, slack = time + step, SLACK * step
         if self.inputs_changed:
             self._event(time, True)

@@ -159,25 +159,32 @@ class BlockDiagram:
         self._parts[k], self._codes[k] = part, code
         next(group for group in self._groups if k in group.parts).replace(k, code)
 
-    def advance(self, stop: int) -> None:
+    def advance(self, stop: int, on_tick: Callable[[Any, int], int] | None = None) -> None:
         """Run to the tick `stop` (exclusive), or to the end of the run.
+
+        Args:
+            stop: last tick (exclusive).
+            on_tick: is called in place of the method `on_tick` of a Python block, with the block and the tick; it calls
+                that method and returns its result.
 
         Raises:
             LockStepError: the state of a block is invalid.
         """
         if self.ended:
             return
-        stop, self.ended, failed = advance_groups(self._groups, stop, self._act, self._failure)
+
+        def act(part: int, tick: int) -> int:
+            self._set_tick(tick)
+            block = self._parts[part]
+            return block.on_tick(tick) if on_tick is None else on_tick(block, tick)
+
+        stop, self.ended, failed = advance_groups(self._groups, stop, act, self._failure)
         self.tick = max(self.tick, stop)
         if len(self._groups) > 1:
             for service in self.services:
                 service.messages.sort(key=_tick)
         if failed is not None:
             raise failed
-
-    def _act(self, part: int, tick: int) -> int:
-        self._set_tick(tick)
-        return self._parts[part].on_tick(tick)
 
     def _failure(self, part: int, tick: int) -> Exception:
         self._set_tick(tick)
@@ -218,6 +225,10 @@ class BlockDiagram:
     def row(self, port: str, tick: int) -> np.ndarray:
         """Return the row of a port at `tick`, shape (width,)."""
         return self._rows[port][self._index(port, tick)]
+
+    def ring(self, port: str) -> np.ndarray:
+        """Return the ring buffer of a port, shape (2^k, width); the row of a tick is number tick // period mod 2^k."""
+        return self._rows[port]
 
     def rows(self, port: str, ticks: np.ndarray) -> np.ndarray:
         """Return the rows of a port at recent `ticks` (n,), shape (n, width)."""

@@ -166,6 +166,10 @@ class VehicleBlock:
         """Run the block at `tick`."""
         return self._part.on_tick(tick)
 
+    def failure(self, tick: int) -> Exception:
+        """Return the error of `tick` of a block that has compiled code."""
+        return _failure(self.vehicle, self._part.failure, tick)
+
 
 class ConnectedVehicleBlock(VehicleBlock):
     """A Python block of a vehicle with a connection to a program outside the run."""
@@ -218,6 +222,10 @@ class VehicleDiagram:
     def row(self, port: str, tick: int) -> np.ndarray:
         """Return the numbers of a port at `tick`."""
         return self._graph.row(qualified_name(self.setup.vehicle, port), tick)
+
+    def ring(self, port: str) -> np.ndarray:
+        """Return the ring buffer of a port."""
+        return self._graph.ring(qualified_name(self.setup.vehicle, port))
 
     def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
         """Set the numbers of a port at `tick`."""

@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from lapwing.services.fmu.host_process import HostProcess
 from lapwing.services.fmu.model import ImportedFmu
 from lapwing.services.fmu.schema import FmuTable
@@ -21,7 +23,9 @@ class OpenedFmu:
         config = fmu.with_exports(fmu.config({}, {"a": fmu}))
         elements = [element for name in inputs for element in fmu.description.elements("inputs", name, "input")]
         config = config._replace(inputs=tuple(Connection("u", k, each, 1.0) for k, each in enumerate(elements)))
-        self.interface, self._host, self.time = config.interface, HostProcess(config), 0.0
+        self._request, self._reply = np.zeros(2 + len(config.inputs)), np.zeros(1 + len(config.outputs))
+        self.interface, self.time = config.interface, 0.0
+        self._host = HostProcess(config, self._request, self._reply)
         self._columns = [each.column for each in config.outputs]
 
     def initialise(self, *inputs: float) -> tuple[float, ...]:
@@ -35,7 +39,7 @@ class OpenedFmu:
         return result
 
     def _step(self, time: float, step: float, inputs: Sequence[float]) -> tuple[float, ...]:
-        for k, value in enumerate(inputs):
-            self._host.inputs[k] = value
-        self._host.step(time, step)
-        return tuple(value for _, value in sorted(zip(self._columns, self._host.outputs, strict=True)))
+        self._request[:2] = time, step
+        self._request[2 : 2 + len(inputs)] = inputs
+        self._host.finish(0, 0)
+        return tuple(value for _, value in sorted(zip(self._columns, self._reply[1:].tolist(), strict=True)))
