@@ -85,7 +85,7 @@ def test_run_command_names_failed_unit(tmp_path):
 
 
 def reading(rate, valid=True):
-    return ImuReading((rate, 0.0, 0.0), (0.0, 0.0, 9.81), 1e-6, 1e-4, valid)
+    return ImuReading((rate, 0.0, 0.0), (rate, 0.0, 9.81), 1e-6, 1e-4, valid)
 
 
 def vote(rows):
