@@ -30,7 +30,7 @@ from lapwing.messages.topics import (
     template_topic,
 )
 from lapwing.studies import tracking
-from lapwing.studies.flight_events import Event, events, slack
+from lapwing.studies.flight_events import IMU_SELECTION, Event, events, imu_failures, ordered, slack
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.flight_topics import FlightTopics
 from lapwing.studies.mission import Mission, mission_of
@@ -250,6 +250,8 @@ class FlightData(FlightTopics):
             return [Event(*event) for event in zip(said.times.tolist(), said.name, said.msg, strict=True)]
         status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
         result = events(self.truth, status, setpoint, self.armed, self.origin.scene)
+        if self.has(IMU_SELECTION):
+            result = ordered([*result, *imu_failures(self.topic(IMU_SELECTION))])
         load = self.origin.scene.get("cooperative_load")
         if (
             load and self.has("body_states") and self.has("rotor_wrench")

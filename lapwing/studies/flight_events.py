@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.services.common import status_texts
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.model_validity import validity_warnings
@@ -14,6 +15,7 @@ from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
 BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
+IMU_SELECTION = "custom_sensor/imu_selection"  # topic of the vote: unit in use, bits of failed ones
 ORDER = tuple(KINDS)  # at the same time
 
 
@@ -124,6 +126,19 @@ def _status_events(status: TopicView) -> Iterator[Event]:
         for time, level in changes(t, status.battery_warning):
             if level:
                 yield Event(time, "battery", BATTERY[min(int(level), len(BATTERY) - 1)])
+
+
+def imu_failures(selection: TopicView) -> list[Event]:
+    """Return the failures of redundant IMUs that the autopilot's vote noticed, and the unit in use instead."""
+    used, failed = np.asarray(selection["values"]).T.astype(int)
+    unit_at, before, result = dict(zip(selection.times.tolist(), used, strict=True)), 0, []
+    for time, bits in changes(selection.times, failed):
+        for unit in range(1, 4):
+            if (bits & ~before) >> (unit - 1) & 1:
+                text = status_texts.IMU_FAILED.format(unit, unit_at[time])
+                result.append(Event(round(time, 9), "fault", text))
+        before = bits
+    return result
 
 
 def _contacts(truth: TopicView) -> Iterator[Event]:

@@ -28,7 +28,7 @@ from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
 from lapwing.services.common.autopilot_parameters import PX4_CASCADE, with_gains
 from lapwing.services.common.operator_inbox import merge_commands
-from lapwing.services.common.ports import Setpoint
+from lapwing.services.common.ports import ImuSelection, Setpoint
 
 Operator = Callable[[int], Iterable[Any]]
 
@@ -102,6 +102,7 @@ class CommanderBlock:
                 config.operator,
                 injection.units,
                 len(a.rotor_x),
+                config.imus,
             )
         )
         self._injection = injection
@@ -149,6 +150,7 @@ class CommanderBlock:
                 reference,
                 self._thrust(tick),
                 flight.landed_state == LANDED,
+                self._imu_selection(tick),
                 self._commands(tick),
             )
         )
@@ -190,6 +192,10 @@ class CommanderBlock:
     def _flight(self, tick: int) -> Flight:
         flight: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
         return flight
+
+    def _imu_selection(self, tick: int) -> ImuSelection:
+        known = self._config.imus > 1 and tick > 0
+        return self._graph.latest(ports.IMU_SELECTION, tick - 1) if known else ImuSelection()
 
     def _reference(self, tick: int) -> Setpoint:
         setpoint: Setpoint = self._graph.latest(ports.TRAJECTORY, tick)

@@ -8,7 +8,7 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
-from lapwing.messages import Estimate, EstimateCovariance, header
+from lapwing.messages import Estimate, EstimateCovariance, Reading, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.autopilot.estimator import NAMES
@@ -43,6 +43,18 @@ def wires(
             else []
         ),
     ]
+
+
+def imu_selection_wire(vehicle: str, every: int) -> TopicEncoder:
+    """Return the encoder of the vote between redundant IMUs: the unit in use and the bits of failed ones."""
+
+    def fields(x: ports.ImuSelection, time_ns: np.ndarray) -> Fields:
+        return {**stamp_columns(time_ns), "values": np.column_stack([x.unit, x.failed])}
+
+    name = ports.IMU_SELECTION
+    return TopicEncoder(
+        topic.custom_sensor(name), name, every, fields, lambda: Reading(header(0, vehicle), name, (0.0, 0.0))
+    )
 
 
 def _covariance_wire(port: Port) -> TopicEncoder:

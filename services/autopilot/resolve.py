@@ -38,6 +38,8 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
     inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (fitted if user_code else sensors)]
+    imus = scene.lookup("sensors.imu.count") if ports.IMU in sensors else 1
+    inputs += [InputPort(name) for name in ports.IMUS[1:imus]]
     if ports.AIRSPEED in fitted and config.accept_commands and not user_code:
         inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only
     inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
@@ -61,6 +63,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         _controller(scene),
         _custom(scene, "estimator", estimator_rate) if user_code else None,
         vehicle_model(known_airframe(scene), exchange.interval) if config.controller or user_code else None,
+        imus,
         distance_sensor(scene),
     )
     no_voltage = (0.0,) * len(setup.airframe.rotor_x)

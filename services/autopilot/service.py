@@ -9,18 +9,20 @@ from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.kernels.cell import Cell
 from lapwing.messages import topics as topic
-from lapwing.services.autopilot import block, motor_failure
+from lapwing.services.autopilot import block, imu_vote, motor_failure
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
 from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller, flies_px4_cascade
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters
 from lapwing.services.autopilot.custom.custom_blocks import controller_parts, estimator_parts
-from lapwing.services.autopilot.encoders import wires
+from lapwing.services.autopilot.encoders import imu_selection_wire, wires
+from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.correction import Correction
 from lapwing.services.autopilot.estimator.blocks.covariance import CovarianceOutput
 from lapwing.services.autopilot.estimator.blocks.estimate import FilterEstimate
 from lapwing.services.autopilot.estimator.blocks.gps_block import GpsFusion
 from lapwing.services.autopilot.estimator.blocks.ground_truth import TrueEstimate
+from lapwing.services.autopilot.estimator.blocks.imu_switch import ImuSwitch
 from lapwing.services.autopilot.estimator.blocks.inertial import STANDSTILL_EVERY, InertialNavigation
 from lapwing.services.autopilot.estimator.blocks.navigation_state import blank
 from lapwing.services.autopilot.estimator.blocks.terrain_height import GroundReference
@@ -54,7 +56,8 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     def operator_commands(tick: int) -> list[Any]:
         return [*(config.plan if tick == 0 else ()), *operator(tick)]
 
-    faults = Cell(Faults(motors=(SOUND,) * len(config.airframe.rotor_x))) if config.operator else None
+    sound, motors = (SOUND,) * config.imus, (SOUND,) * len(config.airframe.rotor_x)
+    faults = Cell(Faults(gyro=sound, accelerometer=sound, motors=motors)) if config.operator else None
     sensor_ports = () if config.own_estimator else [i.port for i in setup.services[NAME].inputs]
     injection = Injection(faults, setup, sensor_ports, config.airframe.motor)
     commander = CommanderBlock(config, law, thresholds, service, operator_commands, injection, px4)
@@ -84,8 +87,20 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     if ports.AIRSPEED in sensor_ports:
         airspeed_port = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
         service.wires.append(airspeed_wire(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
+    if config.imus > 1:
+        service.wires.append(imu_selection_wire(setup.vehicle, config.imu_every))
     service.python_topics = (topic.OPERATOR, topic.COMMAND_ACKS) if config.operator else ()
     return service
+
+
+def _vote(config: AutopilotSetup, p: Estimator, state: Cell, selected: Port, injection: Injection) -> list[Block]:
+    """Return the blocks between redundant inertial measurement units and the estimator."""
+    readings = tuple(InputPort(injection.received(unit)) for unit in ports.IMUS[: config.imus])
+    result, every = Port(ports.IMU_SELECTION, ports.ImuSelection(), config.imu_every), config.imu_every
+    vote = Block(
+        f"{NAME}.imu_vote", imu_vote.Vote(p.frozen), Cell(imu_vote.VoteState()), readings, (selected, result), every
+    )
+    return [vote, Block(f"{NAME}.imu_switch", ImuSwitch(p), state, (InputPort(ports.IMU_SELECTION),), (), every)]
 
 
 def _navigation(
@@ -106,8 +121,12 @@ def _navigation(
     over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
     known_ports = setup.ports
     inertial = InertialNavigation(p, config.start_world, STANDSTILL_EVERY * config.imu_every)
-    inputs = (InputPort(injection.received(ports.IMU)), InputPort(injection.received(ports.MAGNETOMETER)), flight)
-    parts = [Block(f"{NAME}.inertial", inertial, state, inputs, (), config.imu_every)]
+    imu, parts = injection.received(ports.IMU), []
+    if config.imus > 1:
+        imu = "imu.selected"
+        parts = _vote(config, p, state, known_ports[ports.IMU]._replace(name=imu), injection)
+    inputs = (InputPort(imu), InputPort(injection.received(ports.MAGNETOMETER)), flight)
+    parts += [Block(f"{NAME}.inertial", inertial, state, inputs, (), config.imu_every)]
     for port, fusion in (
         (ports.MAGNETOMETER, Correction(p)),
         (ports.BAROMETER, Correction(p)),

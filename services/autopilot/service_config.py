@@ -37,4 +37,5 @@ class AutopilotSetup(NamedTuple):
     controller: CustomCode | None = None  # None: the cascaded PID; name "px4": PX4's cascade
     own_estimator: CustomCode | None = None
     vehicle: VehicleModel | None = None  # vehicle parameters for user code
+    imus: int = 1  # units that the autopilot votes on
     distance_sensor: str | None = None  # port of the sensor of the distance to the ground

@@ -17,8 +17,8 @@ OF_SYSTEMS = {"battery": (SOUND, OFF, STUCK, WRONG), "motor": (SOUND, OFF, STUCK
 class Faults(NamedTuple):
     """Failure type of each unit."""
 
-    gyro: int = SOUND
-    accelerometer: int = SOUND
+    gyro: tuple[int, ...] = (SOUND,)  # of each inertial measurement unit
+    accelerometer: tuple[int, ...] = (SOUND,)
     magnetometer: int = SOUND
     barometer: int = SOUND
     gps: int = SOUND

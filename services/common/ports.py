@@ -11,6 +11,8 @@ from lapwing.dynamics.vector import ZERO, Vec3
 
 TRUTH, BATTERY, BODIES, CONTACT = "truth", "battery", "bodies", "contact"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
+IMUS = (IMU, "imu2", "imu3")  # redundant units
+IMU_SELECTION = "imu_selection"
 OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
 ESTIMATE_COVARIANCE = "estimate_covariance"
@@ -76,6 +78,14 @@ class ImuReading(NamedTuple):
     omega_variance: float = 0.0  # [(rad/s)^2] per axis, of the white noise
     specific_force_variance: float = 0.0  # [(m/s^2)^2]
     valid: bool = False
+
+
+class ImuSelection(NamedTuple):
+    """Result of the vote between redundant inertial measurement units."""
+
+    unit: int = 1  # in use, from 1
+    failed: int = 0  # bit i: unit i + 1 has failed
+    switched: bool = False  # another unit than at the reading before
 
 
 class MagnetometerReading(NamedTuple):

@@ -26,5 +26,7 @@ AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "nobody took
 """Reasons for disarming."""
 TAKEN_OVER = "{}: {}"  # reason and mode of a failsafe
 
+IMU_FAILED = "IMU {} has failed, IMU {} is in use"  # of redundant units
+
 ROUTINE = frozenset((ARMED, LANDED, *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)]))
 """Texts of events that every flight has."""

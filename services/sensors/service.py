@@ -8,6 +8,7 @@ from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.kernels.cell import Cell
+from lapwing.services.common import ports
 from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.encoders import PORTS, GpsWiring, SonarWiring, own_wire, wires
 
@@ -40,7 +41,7 @@ def _other_wires(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
         module = sys.modules[type(p.sensor).__module__]
         if port.name in PORTS:
             continue
-        ships = module.__package__ == __package__
+        ships = module.__package__ == __package__ and port.name not in ports.IMUS
         result += module.wires(setup.vehicle, port, p) if ships else [own_wire(setup.vehicle, port)]
     return result
 

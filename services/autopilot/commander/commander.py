@@ -65,6 +65,7 @@ class Commander:
             prearm_checks.count_outages(view, state)
         for command in view.commands:
             handle(context, command)
+        _announce_imu_failures(context)
         state.guidance.inputs.age(view.dt)
         _retry_arming(context)
         setpoint, from_estimate = _setpoint(context)
@@ -81,6 +82,16 @@ class Commander:
             status=status(constants, view, state),
             valid_for=time_without_changes(context),
         )
+
+
+def _announce_imu_failures(context: Context) -> None:
+    """Send a text for each unit that the vote has newly excluded."""
+    after, state = context.view.imu_selection, context.state
+    if after.failed != state.imu_selection.failed:
+        for unit in range(1, context.constants.imus + 1):
+            if (after.failed & ~state.imu_selection.failed) >> (unit - 1) & 1:
+                context.outbox.send_text(status_texts.IMU_FAILED.format(unit, after.unit))
+        state.imu_selection = after
 
 
 def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:

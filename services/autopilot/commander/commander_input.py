@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from lapwing.services.autopilot.estimator.filter_state import GPS
 from lapwing.services.common.autopilot_parameters import Parameter
-from lapwing.services.common.ports import Setpoint, StateEstimate
+from lapwing.services.common.ports import ImuSelection, Setpoint, StateEstimate
 
 POSITION_LOST = 64 | 128 | 1 << GPS  # bits of the estimate's health
 
@@ -21,6 +21,7 @@ class Constants(NamedTuple):
     has_operator: bool  # commands are accepted
     failing: tuple[str, ...] = ()  # units whose failures may be injected
     rotors: int = 4
+    imus: int = 1
 
 
 class CommanderInput(NamedTuple):
@@ -34,6 +35,7 @@ class CommanderInput(NamedTuple):
     setpoint: Setpoint | None  # of the scene's trajectory; None without one
     thrust: float  # commanded at the last tick, over the hover thrust
     motors_cut: bool  # by the controller after a landing
+    imu_selection: ImuSelection = ImuSelection()  # result of the vote between the IMUs
     commands: tuple[Any, ...] = ()  # `OperatorCommand` messages in order
 
     @property

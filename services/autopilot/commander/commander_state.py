@@ -10,6 +10,7 @@ from lapwing.services.autopilot.commander.modes import hold_mode
 from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
 from lapwing.services.autopilot.estimator import SOURCES
 from lapwing.services.common.failure_types import SOUND, Faults
+from lapwing.services.common.ports import ImuSelection
 
 TRAJECTORY_MODE = "mission"  # mode name along the scene's trajectory
 
@@ -42,6 +43,7 @@ class State:
     pending_arm: PendingArm | None = None
     on_ground_time: float = 0.0  # [s] armed on the ground
     blocked_time: float = 0.0  # [s] without descent at a descending setpoint
+    imu_selection: ImuSelection = field(default_factory=ImuSelection)  # last one announced
     finish_requested: bool = False  # the next disarming ends the run
 
     @property
@@ -54,7 +56,8 @@ def initial(constants: Constants) -> State:
     """Return the initial state: on the ground, disarmed."""
     values = {p.name: p.default for p in constants.parameters.values()}
     guidance = Guidance(values, PositionSmoothing((0.0, 0.0, constants.resting_height), 0.0))
-    faults = Faults(motors=(SOUND,) * constants.rotors)
+    sound = (SOUND,) * constants.imus
+    faults = Faults(gyro=sound, accelerometer=sound, motors=(SOUND,) * constants.rotors)
     if constants.has_trajectory:
         return State(guidance, TRAJECTORY_MODE, None, faults=faults)
     return State(guidance, hold_mode.NAME, hold_mode.Mode(constants, guidance), faults=faults)

@@ -7,10 +7,11 @@ from typing import Any
 from lapwing.services.autopilot.commander.command_handlers import Denied, handles
 from lapwing.services.autopilot.commander.flight_mode import value
 from lapwing.services.autopilot.commander.transitions import Context
-from lapwing.services.common.failure_types import KINDS, UNITS, Faults, possible, refusal
+from lapwing.services.common.failure_types import KINDS, UNITS, possible, refusal
 
 ENABLE = "SYS_FAILURE_EN"
 LEVEL, THRESHOLDS = "SYS_FAIL_BAT_LVL", ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")  # for its values from 1 on
+INSTANCES = {"motor": "motors", "gyro": "gyro", "accelerometer": "accelerometer"}  # fields of `Faults` with several
 BELOW = 0.01  # difference of a wrong battery's charge to the threshold, as in PX4
 
 
@@ -28,10 +29,13 @@ def inject_failure(context: Context, command: Any) -> None:
         raise Denied(f"inject failure: there is no {unit}")
     if kind not in possible(unit):
         raise Denied(f"inject failure: {refusal(unit)}")
-    numbers = _instances(unit, constants.rotors if unit == "motor" else 1, *values[2:])
-    named = f" {', '.join(map(str, numbers))}" if len(numbers) < constants.rotors and unit == "motor" else ""
-    if unit == "motor":
-        state.faults = _with_motors(state.faults, kind, numbers)
+    count = {"motor": constants.rotors, "gyro": constants.imus, "accelerometer": constants.imus}.get(unit, 1)
+    numbers = _instances(unit, count, *values[2:])
+    named = f" {', '.join(map(str, numbers))}" if len(numbers) < count else ""
+    if unit in INSTANCES:
+        field = INSTANCES[unit]
+        before = getattr(state.faults, field)
+        state.faults = state.faults._replace(**{field: _with_instances(before, kind, numbers)})
     else:
         changes: dict[str, Any] = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
         state.faults = state.faults._replace(**changes)
@@ -52,10 +56,9 @@ def _instances(unit: str, count: int, number: float, bits: float) -> list[int]:
     return [int(k) for k in asked] or list(range(1, count + 1))
 
 
-def _with_motors(faults: Faults, kind: int, numbers: Sequence[int]) -> Faults:
-    """Return the failures with a failure type of some motors."""
-    motors = (kind if k in numbers else before for k, before in enumerate(faults.motors, start=1))
-    return faults._replace(motors=tuple(motors))
+def _with_instances(failures: tuple[int, ...], kind: int, numbers: Sequence[int]) -> tuple[int, ...]:
+    """Return the failures of all instances with a failure type of some."""
+    return tuple(kind if k in numbers else before for k, before in enumerate(failures, start=1))
 
 
 def _low_charge(parameters: Mapping[str, float]) -> float:

@@ -5,6 +5,7 @@ When readings are rejected for long, the estimate may be wrong. Its covariance g
 
 import numpy as np
 
+from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
@@ -21,6 +22,8 @@ from lapwing.services.autopilot.estimator.filter_state import (
     THETA,
     VELOCITY,
     Memory,
+    Nominal,
+    State,
 )
 
 _MOTION = 0.3  # [s] of rejected position and velocity, after which the IMU states are inflated
@@ -56,3 +59,24 @@ def inflate_covariance(p: Estimator, m: Memory, source: int) -> None:
         c[BAROMETER, BAROMETER] += 1.0
     elif source == MAG and for_long:
         _widen(c, IRON, 2e-6)
+
+
+@kernel
+def forget_imu(p: Estimator, s: State) -> State:
+    """Return the state with unknown inertial biases, as of another unit.
+
+    Args:
+        p: `Estimator`.
+        s: `State`; its arrays are changed in place.
+    """
+    c, n = s.memory.covariance, s.nominal
+    for i in range(3):
+        for k, deviation in ((GYRO + i, p.gyro_bias_std), (ACCELEROMETER + i, p.accelerometer_bias_std)):
+            c[k, :] = 0.0
+            c[:, k] = 0.0
+            c[k, k] = deviation * deviation
+    nominal = Nominal(
+        n.attitude, n.velocity_world, n.position_world, ZERO, ZERO, n.gps_correlated_error,
+        n.magnetometer_bias, n.heading_bias, n.barometer_bias, n.sonar_scale,
+    )  # fmt: skip
+    return State(nominal, s.inertial, s.memory)

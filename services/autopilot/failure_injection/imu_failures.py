@@ -20,6 +20,7 @@ class ImuInjection(NamedTuple):
 
     faults: Any  # cell of `Faults`
     key: Key  # of random numbers
+    unit: int  # index of the unit
 
 
 @always_inline
@@ -36,7 +37,8 @@ def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: 
 @always_inline
 def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """Output the received reading; the second input is the reading `DELAY` ago."""
-    r, before, gyro, accelerometer = inputs[0].value, inputs[1], p.faults.value.gyro, p.faults.value.accelerometer
+    r, before, faults = inputs[0].value, inputs[1], p.faults.value
+    gyro, accelerometer = faults.gyro[p.unit], faults.accelerometer[p.unit]
     late, turn, push = before.value, r.omega_body, r.specific_force_body
     omega = _chosen(
         gyro, turn, s.last.omega_body, late.omega_body, (turn[0] + TURN, turn[1], turn[2]),

@@ -1,6 +1,7 @@
 """Failure injection blocks, direct motor control, and their ports."""
 
 from collections.abc import Callable, Collection
+from functools import partial
 from typing import Any
 
 from lapwing.cosim.config.run_config import RunConfig
@@ -16,8 +17,13 @@ from lapwing.services.autopilot.failure_injection.sensor_failures import SensorI
 from lapwing.services.autopilot.motor import Motor
 from lapwing.services.common import ports
 
+
+def _imu(unit: int, faults: Any, key: Key) -> ImuInjection:
+    return ImuInjection(faults, key, unit)
+
+
 _SENSORS: dict[str, Callable[[Any, Key], Any]] = {
-    ports.IMU: ImuInjection,
+    **{name: partial(_imu, unit) for unit, name in enumerate(ports.IMUS)},
     ports.MAGNETOMETER: SensorInjection,
     ports.BAROMETER: SensorInjection,
     ports.GPS: SensorInjection,
@@ -55,7 +61,7 @@ class Injection:
         """Units that can fail."""
         if self.faults is None:
             return ()
-        return (*[unit for name in self._sensors for unit in _UNITS[name]], "battery", "motor")
+        return (*[unit for name in self._sensors for unit in _UNITS.get(name, ())], "battery", "motor")
 
     def received(self, port: str) -> str:
         """Return the port on which the autopilot receives samples of `port`."""

@@ -1,0 +1,26 @@
+"""Reset of the inertial biases when another inertial measurement unit is used: its biases are its own."""
+
+from typing import NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
+from lapwing.kernels import always_inline
+from lapwing.services.autopilot import estimator
+from lapwing.services.autopilot.estimator import Estimator
+from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
+
+
+class ImuSwitch(NamedTuple):
+    """Parameters of the block."""
+
+    filter: Estimator
+
+
+@always_inline
+def step(
+    p: ImuSwitch, s: NavigationState, tick: int, inputs: tuple[InputSample, ...]
+) -> tuple[NavigationState, tuple[()], int]:
+    """Reset the biases at the tick of a switch."""
+    x = s.filter
+    if s.begun and inputs[0].value.switched:
+        x = estimator.forget_imu(p.filter, x)
+    return NavigationState(s.begun, x), (), CONTINUE

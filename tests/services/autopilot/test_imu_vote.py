@@ -1,0 +1,94 @@
+"""Redundant inertial measurement units: the vote, and flights with a failed unit."""
+
+import numpy as np
+import pytest
+
+import lapwing
+from lapwing.cosim.diagram.compiled_block import InputSample
+from lapwing.services.autopilot import imu_vote
+from lapwing.services.common.ports import ImuReading
+
+FAULTS = {
+    "off": [{"kind": "dropout", "start": 20.0}],
+    "stuck": [{"kind": "freeze", "start": 20.0}],
+    "noise": [{"kind": "spikes", "start": 20.0, "size": 5.0, "probability": 1.0}],
+}
+
+
+def fly(count, faults=()):
+    return lapwing.fly("delivery_mission", overrides={"sensors.imu.count": count, "sensors.imu.faults": list(faults)})
+
+
+def texts(flight):
+    return [event.text for event in flight.events if event.text.startswith("IMU")]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.long
+def test_vehicle_with_three_units_lands_with_failed_first_unit(fault):
+    flight = fly(3, FAULTS[fault])
+    assert flight.landed
+    assert flight.outcome.kind == "landed"
+    assert texts(flight) == ["IMU 1 has failed, IMU 2 is in use"]
+    (event,) = [event for event in flight.events if event.text.startswith("IMU")]
+    assert 20.0 < event.time < 20.2
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+@pytest.mark.long
+def test_vehicle_with_one_unit_does_not_land_with_failed_unit(fault):
+    assert fly(1, FAULTS[fault]).outcome.kind == "crashed"
+
+
+@pytest.mark.parametrize("fault", ["off", "stuck"])
+@pytest.mark.long
+def test_vehicle_with_two_units_lands_with_missing_or_stuck_unit(fault):
+    assert fly(2, FAULTS[fault]).outcome.kind == "landed"
+
+
+@pytest.mark.long
+def test_units_have_errors_of_their_own_and_first_is_unchanged():
+    single, several = fly(1), fly(3)
+    assert texts(several) == []
+    second, third = (several.topic(f"custom_sensor/imu{unit}")["values"][:500, :3].mean(axis=0) for unit in (2, 3))
+    first = several.topic("imu").angular_velocity[:500].mean(axis=0)
+    assert np.abs(first - second).max() > 1e-4
+    assert np.abs(second - third).max() > 1e-4
+    np.testing.assert_array_equal(single.topic("imu").angular_velocity, several.topic("imu").angular_velocity)
+    np.testing.assert_array_equal(single.estimate.velocity, several.estimate.velocity)
+
+
+def reading(rate, valid=True):
+    return ImuReading((rate, 0.0, 0.0), (rate, 0.0, 9.81), 1e-6, 1e-4, valid)
+
+
+def vote(rows):
+    """Return the selection after each row of readings."""
+    step, state, result = imu_vote.step, imu_vote.VoteState(), []
+    for tick, row in enumerate(rows):
+        inputs = tuple(InputSample(True, r) for r in row)
+        state, (_, selection), _ = step(imu_vote.Vote(12), state, tick, inputs)
+        result.append(selection)
+    return result
+
+
+def changing(k):
+    return 1e-3 * np.sin(float(k))
+
+
+def test_deviating_unit_is_replaced_at_once_and_fails_after_ten_readings():
+    rows = [[reading(changing(k) + 0.2), reading(changing(k + 1)), reading(changing(k + 2))] for k in range(20)]
+    result = vote(rows)
+    assert {selection.unit for selection in result} == {2}
+    assert [selection.switched for selection in result[:2]] == [True, False]
+    assert [selection.failed for selection in result] == [0] * 9 + [1] * 11
+
+
+def test_unit_in_use_stays_after_repair_of_first_unit():
+    rows = [
+        [reading(changing(k), valid=not 5 <= k < 20), reading(changing(k + 1)), reading(changing(k + 2))]
+        for k in range(300)
+    ]
+    result = vote(rows)
+    assert [s.unit for s in result] == [1] * 5 + [2] * 295
+    assert (result[-1].failed, result[100].failed) == (0, 1)
