@@ -27,8 +27,10 @@ from lapwing.messages.topics import (
     STATUS,
     TRUTH,
     Topic,
+    custom_sensor,
     template_topic,
 )
+from lapwing.services.common import ports
 from lapwing.studies import tracking
 from lapwing.studies.flight_events import IMU_SELECTION, Event, events, imu_failures, ordered, slack
 from lapwing.studies.flight_provenance import Origin
@@ -43,7 +45,7 @@ IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # 
 
 
 # Topics from which outcome, events, metrics and report are made.
-SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS)
+SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS, custom_sensor(ports.IMU_SELECTION))
 
 
 class FlightData(FlightTopics):

@@ -1,11 +1,16 @@
-"""Redundant inertial measurement units: the vote, and flights with a failed unit."""
+"""Redundant inertial measurement units: the vote, flights with a failed unit, and the command that runs one."""
+
+import subprocess
+import sys
 
 import numpy as np
 import pytest
+from flights import ENABLED, fly_by_sensors, inject, said
 
 import lapwing
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.services.autopilot import imu_vote
+from lapwing.services.common.failure_types import GARBAGE, OFF, STUCK
 from lapwing.services.common.ports import ImuReading
 
 FAULTS = {
@@ -56,6 +61,39 @@ def test_units_have_errors_of_their_own_and_first_is_unchanged():
     assert np.abs(second - third).max() > 1e-4
     np.testing.assert_array_equal(single.topic("imu").angular_velocity, several.topic("imu").angular_velocity)
     np.testing.assert_array_equal(single.estimate.velocity, several.estimate.velocity)
+
+
+def fly_with_injections(script):
+    return fly_by_sensors(10.0, script, ENABLED, "sensors.imu.count=3")
+
+
+@pytest.fixture(scope="module")
+def sound_position():
+    return last_position(fly_with_injections({}))
+
+
+def last_position(flown):
+    return flown.column("ground_truth", lambda m: (m.pose.position.x, m.pose.position.y, m.pose.position.z))[-1]
+
+
+@pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE])
+@pytest.mark.long
+def test_injected_failure_of_one_instance_is_named_and_harmless(kind, sound_position):
+    script = {7.0: [inject("gyro", kind, 1), inject("accelerometer", kind, 4, id=8)]}
+    flown = fly_with_injections(script)
+    assert "inject failure: there is no accelerometer 4; expected 1 to 3, 0 for all" in said(flown)
+    assert "IMU 1 has failed, IMU 2 is in use" in said(flown)
+    assert last_position(flown) == pytest.approx(sound_position, abs=0.1)
+
+
+@pytest.mark.long
+def test_run_command_names_failed_unit(tmp_path):
+    sets = ["sensors.imu.count=3", 'sensors.imu.faults=[{kind="freeze",start=4.0}]', "run.duration=6.0"]
+    command = [sys.executable, "-m", "lapwing", "run", "delivery_mission", "--log", str(tmp_path / "log.mcap")]
+    done = subprocess.run(
+        [*command, *(word for key in sets for word in ("--set", key))], capture_output=True, text=True, cwd=tmp_path
+    )
+    assert "IMU 1 has failed, IMU 2 is in use" in " ".join(done.stdout.split()), done.stdout + done.stderr
 
 
 def reading(rate, valid=True):
