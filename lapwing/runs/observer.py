@@ -17,16 +17,32 @@ class Observer(Protocol):
 
     def begin(self) -> None:
         """Note that the first tick is flown."""
+        ...
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
         """Show the progress at `time_ns`, with the newest payloads of the pose and status topics."""
+        ...
 
     def compiling(self, compilation: Compilation) -> None:
         """Show that kernels are being compiled, until `begin`."""
+        ...
 
     def say(self, line: str) -> None:
         """Show a line to the user."""
+        ...
 
 
-class Silent(Observer):
+class Silent:
     """Observer that shows nothing."""
+
+    def begin(self) -> None:
+        """Do nothing."""
+
+    def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
+        """Do nothing."""
+
+    def compiling(self, compilation: Compilation) -> None:
+        """Do nothing."""
+
+    def say(self, line: str) -> None:
+        """Do nothing."""

@@ -38,7 +38,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
     inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (fitted if user_code else sensors)]
-    imus = scene.lookup("sensors.imu.count") if ports.IMU in sensors else 1
+    imus = scene.lookup("sensors.imu.instances") if ports.IMU in sensors else 1
     inputs += [InputPort(name) for name in ports.IMUS[1:imus]]
     if ports.AIRSPEED in fitted and config.accept_commands and not user_code:
         inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only

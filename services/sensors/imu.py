@@ -40,9 +40,7 @@ class Imu(NamedTuple):
     gyro: Gyro = Gyro()  # its gyroscopes
     accelerometer: Accelerometer = Accelerometer()  # its accelerometers
     rate: Annotated[float, Gt(0)] = 250.0  # [Hz]
-    count: Annotated[int, Ge(1), Le(3)] = (
-        1  # units with errors of their own; the autopilot votes; `faults` are of the first
-    )
+    instances: Annotated[int, Ge(1), Le(3)] = 1  # redundant units; the autopilot votes; `faults` are of the first
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
     warm_up_rise: float = 0.0  # [K] still to come at the start, over the calibrated temperature
     warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]

@@ -56,7 +56,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         given.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         if name == ports.SONAR:
             sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
-        for unit in ports.IMUS[1 : p.count] if name == ports.IMU else ():
+        for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
             if unit in tables:
                 raise ConfigError(f"sensors.{unit}", "is the name of a redundant unit of sensors.imu", "another name")
             key = stream_key(scene[Run].seed, scene[Vehicle].name, unit)

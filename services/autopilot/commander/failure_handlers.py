@@ -34,11 +34,10 @@ def inject_failure(context: Context, command: Any) -> None:
     named = f" {', '.join(map(str, numbers))}" if len(numbers) < count else ""
     if unit in INSTANCES:
         field = INSTANCES[unit]
-        before = getattr(state.faults, field)
-        state.faults = state.faults._replace(**{field: _with_instances(before, kind, numbers)})
+        changes: dict[str, Any] = {field: _with_instances(getattr(state.faults, field), kind, numbers)}
     else:
-        changes: dict[str, Any] = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
-        state.faults = state.faults._replace(**changes)
+        changes = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
+    state.faults = state.faults._replace(**changes)
     outbox.faults = state.faults
     outbox.send_text(f"injected: {unit}{named} {KINDS[kind]}")
 

@@ -21,7 +21,9 @@ FAULTS = {
 
 
 def fly(count, faults=()):
-    return lapwing.fly("delivery_mission", overrides={"sensors.imu.count": count, "sensors.imu.faults": list(faults)})
+    return lapwing.fly(
+        "delivery_mission", overrides={"sensors.imu.instances": count, "sensors.imu.faults": list(faults)}
+    )
 
 
 def texts(flight):
@@ -64,7 +66,7 @@ def test_units_have_errors_of_their_own_and_first_is_unchanged():
 
 
 def fly_with_injections(script):
-    return fly_by_sensors(10.0, script, ENABLED, "sensors.imu.count=3")
+    return fly_by_sensors(10.0, script, ENABLED, "sensors.imu.instances=3")
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +90,7 @@ def test_injected_failure_of_one_instance_is_named_and_harmless(kind, sound_posi
 
 @pytest.mark.long
 def test_run_command_names_failed_unit(tmp_path):
-    sets = ["sensors.imu.count=3", 'sensors.imu.faults=[{kind="freeze",start=4.0}]', "run.duration=6.0"]
+    sets = ["sensors.imu.instances=3", 'sensors.imu.faults=[{kind="freeze",start=4.0}]', "run.duration=6.0"]
     command = [sys.executable, "-m", "lapwing", "run", "delivery_mission", "--log", str(tmp_path / "log.mcap")]
     done = subprocess.run(
         [*command, *(word for key in sets for word in ("--set", key))], capture_output=True, text=True, cwd=tmp_path

@@ -4,7 +4,7 @@ import json
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -47,9 +47,9 @@ def measure(seeds: Iterable[int], processes: int | None = None) -> Iterator[Land
 
 def read(path: Path) -> dict[int, LandingErrors]:
     """Return the landings of a file of `write` by their seeds; none if the file does not exist."""
-    rows = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
-    landings = (LandingErrors(**{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()}) for row in rows)
-    return {landing.seed: landing for landing in landings}
+    rows: list[dict[str, Any]] = json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
+    values: list[dict[str, Any]] = [{k: tuple(v) if isinstance(v, list) else v for k, v in row.items()} for row in rows]
+    return {row["seed"]: LandingErrors(**row) for row in values}
 
 
 def write(path: Path, landings: Iterable[LandingErrors]) -> None:
