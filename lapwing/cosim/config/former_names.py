@@ -34,8 +34,8 @@ def present_name(name: str) -> str:
 
 def present_fields(class_path: str, members: Mapping[str, Any]) -> dict[str, Any]:
     """Return the members of a recorded object of the present "module:Class" by the present names of its fields."""
-    renamed = former_names()["fields"].get(class_path, {})
-    present = {renamed.get(key, key): value for key, value in members.items()}
+    renamed, added = (former_names()[kind].get(class_path, {}) for kind in ("fields", "added"))
+    present = added | {renamed.get(key, key): value for key, value in members.items()}
     if class_path.endswith(":GroundContact") and (square := present.pop("square_stiction_velocity", None)):
         # anchors that a flag held became friction elements
         present |= {"tangential_damping": present["damping"], "inverse_stiction": 1.0 / math.sqrt(square)}

@@ -107,6 +107,8 @@ def test_former_keys_lead_to_present_tables_and_fields():
     assert set(former_names()["keys"]) <= set(vocabulary().sections)
     for name, renamed in former_names()["fields"].items():
         assert set(renamed.values()) - {"square_stiction_velocity"} <= set(_fields(_class_of(name, [])))
+    for name, added in former_names()["added"].items():
+        assert set(added) <= set(_fields(_class_of(name, [])))
 
 
 @pytest.mark.parametrize("name", [*(f"{module}:x" for module in former_names()["modules"]), *former_names()["classes"]])
