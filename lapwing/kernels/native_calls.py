@@ -3,6 +3,7 @@
 # numba.core.types fills itself at import
 # mypy: disable-error-code="attr-defined"
 
+import ctypes
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -11,6 +12,11 @@ from numba.core import types
 from numba.extending import intrinsic
 
 _INT32, _INT64, _DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
+
+
+def address_of(function: Any) -> int:
+    """Return the address of a function of ctypes."""
+    return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def _caller(result: ir.Type) -> Callable:

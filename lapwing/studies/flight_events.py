@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.services.common import status_texts
+from lapwing.services.common import ports, status_texts
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.model_validity import validity_warnings
@@ -15,7 +15,7 @@ from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
 BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
-IMU_SELECTION = "custom_sensor/imu_selection"  # topic of the vote: unit in use, bits of failed ones
+IMU_SELECTION = f"custom_sensor/{ports.IMU_SELECTION}"  # topic of the vote: unit in use, bits of failed ones
 ORDER = tuple(KINDS)  # at the same time
 
 

@@ -3,7 +3,6 @@
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import math
 from lapwing.kernels.cell import Cell
+from lapwing.kernels.native_calls import address_of
 from lapwing.services.fmu.exchange import FmuExchange
 from lapwing.services.fmu.host_process import HostError, HostProcess, poll_entry
 from lapwing.services.fmu.service_config import Connection, FmuConfig
@@ -103,7 +103,7 @@ class FmuBlock:
             port: (0, 0) if own == port else (graph.ring(port).ctypes.data, len(graph.ring(port)) - 1)
             for port, own in self._ports.items()
         }
-        write, poll, read, wait = map(_address, (libc.write, libc.poll, libc.read, self._wait))
+        write, poll, read, wait = map(address_of, (libc.write, libc.poll, libc.read, self._wait))
         source_tables = _tables(graph, fmu.inputs, sources, {})
         target_tables = _tables(graph, fmu.outputs, targets, self._ports)
         return FmuExchange(
@@ -111,10 +111,6 @@ class FmuBlock:
             self._reply.ctypes.data, self._channels, ctypes.addressof(self._poll_entry), write, poll, read, wait,
             *source_tables, *target_tables,
         )  # fmt: skip
-
-
-def _address(function: Any) -> int:
-    return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 
 def _tables(

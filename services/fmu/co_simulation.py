@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.kernels.cell import Cell
+from lapwing.kernels.native_calls import address_of
 from lapwing.services.fmu import stepping
 from lapwing.services.fmu.instance import DISCARD, FmuInstance
 from lapwing.services.fmu.stepping import UPDATES, Channel, FmuCalls
@@ -23,13 +24,13 @@ class CoSimulation(FmuInstance):
         self._event_mode = spec["version"] == 3 and bool(model.coSimulation.hasEventMode)
         super().__init__(spec, model, fmu, inputs, outputs)
         events = "EnterEventMode", "UpdateDiscreteStates", "EnterStepMode"
-        enter, update, leave = (_address(self.function(name)) if self._event_mode else 0 for name in events)
+        enter, update, leave = (address_of(self.function(name)) if self._event_mode else 0 for name in events)
         self._flags, self._times = np.zeros(8, np.uint8), np.full(4, np.nan)
         bits = np.frombuffer(inputs, np.int64) if len(inputs) else np.zeros(0, np.int64)
         self._former = np.zeros_like(bits)
         self._calls = Cell(
             FmuCalls(
-                component=self.address, do_step=_address(self.function("DoStep")), enter_event_mode=enter,
+                component=self.address, do_step=address_of(self.function("DoStep")), enter_event_mode=enter,
                 update_discrete_states=update, enter_step_mode=leave, is_3=self.is_3, event_mode=self._event_mode,
                 sets=_table(self.set_groups), gets=_table(self.get_groups), inputs=bits, former=self._former,
                 flags=self._flags, flags_address=self._flags.ctypes.data, times=self._times,
@@ -97,17 +98,14 @@ def channel(requests: int, replies: int, request: bytearray, reply: bytearray) -
     libc, received = ctypes.CDLL(None), np.zeros(1, np.int64)
     asked, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
     places = asked.ctypes.data, answer.ctypes.data
-    return Cell(Channel(requests, replies, asked, answer, *places, received, _address(libc.read), _address(libc.write)))
-
-
-def _address(function: Any) -> int:
-    return ctypes.cast(function, ctypes.c_void_p).value or 0
+    functions = address_of(libc.read), address_of(libc.write)
+    return Cell(Channel(requests, replies, asked, answer, *places, received, *functions))
 
 
 def _table(groups: list[Group]) -> np.ndarray:
     """Return the arguments of the calls that set or get groups."""
     rows = [
-        (_address(g.function), ctypes.addressof(g.references), len(g.references), ctypes.addressof(g.values))
+        (address_of(g.function), ctypes.addressof(g.references), len(g.references), ctypes.addressof(g.values))
         for g in groups
     ]
     sizes = [len(g.values) for g in groups]

@@ -1,12 +1,12 @@
 """The study's points as a table and as JSON."""
 
-import json
 from pathlib import Path
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.studies import json_file
 from lapwing.studies.accuracy.error_budget import Part
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.round_off import RoundOff
@@ -100,10 +100,10 @@ def write_json(
         "duration": problem.duration,
         "time_unit": problem.unit,
         "reference": problem.source,
-        "points": [p._asdict() for p in points],
-        "cheapest": chosen._asdict() if chosen else None,
-        "round_off": rounding._asdict() if rounding else None,
-        "apart": [p._asdict() for p in parts],
+        "points": points,
+        "cheapest": chosen,
+        "round_off": rounding,
+        "apart": parts,
         "step_ns": dict(zip(("hovering", "in contact"), cost, strict=True)) if cost else None,
     }
-    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    json_file.write_json(path, data)

@@ -4,9 +4,8 @@ Both flights are closed loops with the same random numbers. Their difference is 
 each vehicle as it is recorded, with all that the autopilot makes of it.
 """
 
-import json
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from rich.box import SIMPLE
@@ -18,6 +17,7 @@ from lapwing.messages.topics import BATTERY, TRUTH
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.plant.schema import Solver
 from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies import json_file
 from lapwing.studies.accuracy.coordinates import matrices
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly_each
@@ -150,7 +150,4 @@ def show(console: Console, found: FlightAccuracy) -> None:
 
 def write_json(path: Path, found: FlightAccuracy) -> None:
     """Write the errors."""
-    data: dict[str, Any] = found._asdict()
-    data["quantities"] = [quantity._asdict() for quantity in found.quantities]
-    data["got"], data["worst"] = found.worst.error, found.worst._asdict()
-    path.write_text(json.dumps(data, indent=1) + "\n", encoding="utf-8")
+    json_file.write_json(path, {**found._asdict(), "got": found.worst.error, "worst": found.worst})

@@ -149,7 +149,7 @@ def flown(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") 
 def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
     """Return the largest difference of flights at the strictest accuracy whose starts differ by the last bit.
 
-    No accuracy below it can be met: a landing multiplies a difference of its start by up to 3e5.
+    A sample, not a bound: a landing multiplies a difference of its start by up to 3e5.
     """
     p, state = plant(case)
     p, n = p._replace(tolerance=CONTACT_SHARE * ACCURACIES[-1]), airborne_steps(ACCURACIES[-1], integrator)

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.studies.accuracy.landings import cases
+from lapwing.studies.json_file import write_json
 from lapwing.studies.workers import workers
 
 
@@ -53,10 +54,9 @@ def read(path: Path) -> dict[int, LandingErrors]:
 
 
 def write(path: Path, landings: Iterable[LandingErrors]) -> None:
-    """Write landings as JSON, one per line, in the order of their seeds."""
-    rows = [json.dumps(landing._asdict()) for landing in sorted(landings)]
+    """Write landings as JSON in the order of their seeds."""
     complete = path.with_name(f"{path.name}.{os.getpid()}")  # an interrupted write leaves the file as it was
-    complete.write_text("[\n" + ",\n".join(rows) + "\n]\n", encoding="utf-8")
+    write_json(complete, sorted(landings))
     complete.replace(path)
 
 
