@@ -14,7 +14,8 @@ from lapwing.kernels import math
 from lapwing.kernels.cell import Cell
 from lapwing.kernels.native_calls import address_of
 from lapwing.services.fmu.exchange import FmuExchange
-from lapwing.services.fmu.host_process import HostError, HostProcess, poll_entry
+from lapwing.services.fmu.host_process import HostError, HostProcess
+from lapwing.services.fmu.pipe_polling import LOOKS, poll_entry
 from lapwing.services.fmu.service_config import Connection, FmuConfig
 
 _WAIT = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)
@@ -89,7 +90,7 @@ class FmuBlock:
             if self._host is None:
                 self._host = HostProcess(self._fmu, self._request, self._reply, self._report_wait)
                 self._channels[:] = self._host.requests, self._host.replies
-                ctypes.pointer(self._poll_entry)[0] = poll_entry(self._host.replies)
+                self._poll_entry[:] = poll_entry(self._host.replies)
             self._host.finish(sent, received)
         except BaseException as error:  # exceptions do not pass through compiled code; `failure` raises it
             self._error = error
@@ -108,8 +109,8 @@ class FmuBlock:
         target_tables = _tables(graph, fmu.outputs, targets, self._ports)
         return FmuExchange(
             graph.setup.interval, fmu.delay, self._request, self._reply, self._request.ctypes.data,
-            self._reply.ctypes.data, self._channels, ctypes.addressof(self._poll_entry), write, poll, read, wait,
-            *source_tables, *target_tables,
+            self._reply.ctypes.data, self._channels, self._poll_entry.ctypes.data, LOOKS, write, poll,
+            read, wait, *source_tables, *target_tables,
         )  # fmt: skip
 
 

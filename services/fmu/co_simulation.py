@@ -10,6 +10,7 @@ from lapwing.kernels.cell import Cell
 from lapwing.kernels.native_calls import address_of
 from lapwing.services.fmu import stepping
 from lapwing.services.fmu.instance import DISCARD, FmuInstance
+from lapwing.services.fmu.pipe_polling import LOOKS, poll_entry
 from lapwing.services.fmu.stepping import UPDATES, Channel, FmuCalls
 from lapwing.services.fmu.variable_group import Group
 
@@ -98,8 +99,11 @@ def channel(requests: int, replies: int, request: bytearray, reply: bytearray) -
     libc, received = ctypes.CDLL(None), np.zeros(1, np.int64)
     asked, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
     places = asked.ctypes.data, answer.ctypes.data
-    functions = address_of(libc.read), address_of(libc.write)
-    return Cell(Channel(requests, replies, asked, answer, *places, received, *functions))
+    functions = map(address_of, (libc.poll, libc.read, libc.write))
+    entry = poll_entry(requests)
+    return Cell(
+        Channel(requests, replies, asked, answer, *places, received, entry, entry.ctypes.data, LOOKS, *functions)
+    )
 
 
 def _table(groups: list[Group]) -> np.ndarray:

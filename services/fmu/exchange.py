@@ -10,6 +10,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, NON_FINITE
 from lapwing.cosim.diagram.tick_schedule import LATCHED
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.native_calls import call_int, call_long, load_double, store_double
+from lapwing.services.fmu.pipe_polling import soon_readable
 
 PROMPT = 2  # [ms] that compiled code waits for an answer; then Python waits, which obeys signals and time limits
 
@@ -25,6 +26,7 @@ class FmuExchange(NamedTuple):
     reply_address: int
     channels: Any  # file descriptors of requests and answers
     poll_entry: int  # address of a `struct pollfd` for the answers
+    looks: int  # see `pipe_polling.LOOKS`
     write: int  # addresses of C functions
     poll: int
     read: int
@@ -74,7 +76,10 @@ def _answered(p: FmuExchange) -> bool:
     """Send the request, and return True once the answer is there without an error."""
     size, received = 8 * len(p.request), 0
     sent = call_long(p.write, (p.channels[0], p.request_address, size))
-    if sent == size and call_int(p.poll, (p.poll_entry, 1, PROMPT)) == 1:
+    prompt = sent == size and (
+        soon_readable(p.poll, p.poll_entry, p.looks) or call_int(p.poll, (p.poll_entry, 1, PROMPT)) == 1
+    )
+    if prompt:
         size = 8 * len(p.reply)
         received = call_long(p.read, (p.channels[1], p.reply_address, size))
         if received == size and p.reply[0] == 0.0:

@@ -1,7 +1,6 @@
 """The process of an FMU, as seen from the run, which continues if foreign machine code crashes or hangs."""
 
 import contextlib
-import ctypes
 import json
 import os
 import select
@@ -121,14 +120,6 @@ class HostProcess:
             code = self._process.wait()
         self._end()
         return HostError(f"crashed ({signal.Signals(-code).name if code < 0 else f'exit code {code}'})")
-
-
-def poll_entry(descriptor: int) -> ctypes.Array:
-    """Return a `struct pollfd` that waits for input."""
-    entry = (ctypes.c_int16 * 4)()
-    ctypes.c_int32.from_buffer(entry).value = descriptor
-    entry[2] = select.POLLIN
-    return entry
 
 
 def _end(process: subprocess.Popen, channels: tuple[int, int], folder: str) -> None:

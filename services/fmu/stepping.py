@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.native_calls import call_int, call_long
+from lapwing.services.fmu.pipe_polling import soon_readable
 
 WARNING = 1  # highest status of FMI that is no failure
 UPDATES = 1000  # of discrete states at one time, or events in a step, before an FMU counts as one that never settles
@@ -45,7 +46,11 @@ class Channel(NamedTuple):
     request_address: int
     reply_address: int
     received: Any  # (1,) bytes of the present request
-    read: int  # addresses of C functions
+    poll_entry: Any  # `struct pollfd` of the requests
+    poll_entry_address: int
+    looks: int  # see `pipe_polling.LOOKS`
+    poll: int  # addresses of C functions
+    read: int
     write: int
 
 
@@ -161,6 +166,7 @@ def serve(calls: Any, channel: Any) -> tuple[int, int]:
     c, io = calls.value, channel.value
     while True:
         size = 8 * len(io.request)
+        soon_readable(io.poll, io.poll_entry_address, io.looks)  # if not, read sleeps
         while io.received[0] < size:
             got = io.received[0]
             n = call_long(io.read, (io.requests, io.request_address + got, size - got))

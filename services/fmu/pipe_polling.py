@@ -1,0 +1,34 @@
+"""Wait for a pipe in compiled code without sleep: a process that sleeps takes 10 to 30 us to wake up."""
+
+import os
+import select
+import struct
+
+import numpy as np
+
+from lapwing.kernels import always_inline
+from lapwing.kernels.native_calls import call_int
+
+LOOKS = 200 if len(os.sched_getaffinity(0)) > 1 else 0
+"""Looks at a pipe (0.2 us each) before a process sleeps; on one processor, the other end cannot write meanwhile."""
+
+
+def poll_entry(descriptor: int) -> np.ndarray:
+    """Return the eight bytes of a `struct pollfd` that waits for input."""
+    return np.frombuffer(bytearray(struct.pack("=ihh", descriptor, select.POLLIN, 0)), np.int64)
+
+
+@always_inline
+def soon_readable(poll: int, entry: int, looks: int) -> bool:
+    """Look at a pipe until there is something to read or its other end is closed, at most `looks` times.
+
+    Args:
+        poll: address of the C function.
+        entry: address of a `struct pollfd`.
+        looks: see `LOOKS`.
+    """
+    found = False
+    while looks > 0 and not found:
+        found = call_int(poll, (entry, 1, 0)) != 0
+        looks -= 1
+    return found
