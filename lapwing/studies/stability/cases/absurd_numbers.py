@@ -98,10 +98,10 @@ def of_commands(value: float) -> tuple[str, float]:
             graph.advance(tick + 1)
             last = tick
     except LockStepError as error:
-        told = np.abs(graph.row(ports.TRUTH, last)).max()
-        return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(told)
-    told = np.abs(graph.row(ports.TRUTH, last)).max()
-    return ("flown" if math.isfinite(told) else "silent"), float(told)
+        largest = np.abs(graph.row(ports.TRUTH, last)).max()
+        return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(largest)
+    largest = np.abs(graph.row(ports.TRUTH, last)).max()
+    return ("flown" if math.isfinite(largest) else "silent"), float(largest)
 
 
 def baseline_step(mass: float, volts: float) -> float:
@@ -114,8 +114,8 @@ def baseline_step(mass: float, volts: float) -> float:
         return float(z)
 
 
-def _count(found: list[str], what: str) -> float:
-    return float(sum(f == what for f in found))
+def _count(results: list[str], what: str) -> float:
+    return float(sum(f == what for f in results))
 
 
 def _no_numbers(values: list[float]) -> float:
@@ -168,7 +168,7 @@ def run() -> CaseResult:
             "of those, after which the state before is no longer finite",
             0.0,
             why,
-            _no_numbers([told for _, told in commands]),
+            _no_numbers([largest for _, largest in commands]),
             "one state, overwritten",
             by_voltage,
         ),

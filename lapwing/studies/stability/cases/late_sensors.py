@@ -74,9 +74,9 @@ def by_own_clock(ticks: int, interval: float) -> int:
     return int((np.abs(np.diff(read) - interval) > 1e-3 * interval).sum())
 
 
-def worst(found: Outcome) -> float:
+def worst(outcome: Outcome) -> float:
     """Return the maximum error over its standard deviation while the estimate reports good health."""
-    return float(found.ratio[found.well].max(initial=0.0))
+    return float(outcome.ratio[outcome.well].max(initial=0.0))
 
 
 def run() -> CaseResult:

@@ -48,12 +48,12 @@ def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
     times = np.arange(0.0, 30.0, STEP)
     for t in times:
         integral = integrate(gains, integral, -z, cut if unwound else 0.0, STEP)
-        wanted = weight + output(gains, integral, -z, -v)
-        given = min(max(wanted, 0.0), most)
-        cut = float(np.sign(wanted - given))
+        demand = weight + output(gains, integral, -z, -v)
+        actual = min(max(demand, 0.0), most)
+        cut = float(np.sign(demand - actual))
         if AT <= t < AT + loss:
-            given = 0.0
-        thrust += STEP / frame.motor.time_constant * (given - thrust)
+            actual = 0.0
+        thrust += STEP / frame.motor.time_constant * (actual - thrust)
         v += STEP * (4.0 * thrust / frame.mass - frame.gravity)
         z += STEP * v
         result.append(z)
