@@ -26,7 +26,7 @@ class Drone(NamedTuple):
     propeller_mass: Four  # [kg]
     propeller_inertia: tuple[Vec3, ...]  # principal moments, x along the blade, z the spin axis [kg m^2]
     spins: Four  # 1: torque-driven, 0: imposed speed
-    attached: Four = (1.0, 1.0, 1.0, 1.0)  # 0: torn off
+    held: Four = (1.0, 1.0, 1.0, 1.0)  # 0: torn off
 
 
 class DroneState(NamedTuple):

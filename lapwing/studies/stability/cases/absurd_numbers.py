@@ -17,7 +17,7 @@ from lapwing.services.process_table import create
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.systems import cooperative_load, gyrostat
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
-from lapwing.studies.stability.flights import finite, flown
+from lapwing.studies.stability.flights import finite, fly
 
 HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: rejected with time, place and value, never used"
 
@@ -50,7 +50,7 @@ class Steady:
 def of_parameters(value: float, key: str) -> str:
     """Return the reaction to an absurd parameter: "refused", "reported", "flown" or "silent"."""
     try:
-        flight = flown("hover", [f"{key}={value!r}", *SHORT])
+        flight = fly("hover", [f"{key}={value!r}", *SHORT])
     except ValueError:
         return "refused"
     except ArithmeticError:

@@ -15,7 +15,7 @@ from lapwing.kernels.state_tree import unflatten
 from lapwing.messages.topics import BODIES, LIFT, TRUTH
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.cases.cooperative_load import INERTIA, LENGTH, QUAD, G
-from lapwing.studies.stability.flights import flown
+from lapwing.studies.stability.flights import fly
 from lapwing.studies.stability.sampled_runs import rows
 from lapwing.studies.tension import pushes, tension
 
@@ -103,7 +103,7 @@ def slack_at() -> float:
 
 def silent() -> tuple[float, float]:
     """Return 1 for each flight with a pushing link that the event, or watching the length, does not report."""
-    flight = flown("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
+    flight = fly("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
     reported = any(event.kind == "slack" for event in flight.events)
     place, length = (
         flight.topic("body_states").position,
