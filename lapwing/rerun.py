@@ -59,8 +59,8 @@ def blueprint(topics: set[str]) -> Any:
     views: list[Any] = [layout.TimeSeriesView(origin=t, name=name) for name in PLOTTED if (t := there(name))]
     if place := there("gps/fix"):
         views.append(layout.MapView(origin=place, name="map"))
-    if told := there("events"):
-        views.append(layout.TextLogView(origin=told, name="events"))
+    if source := there("events"):
+        views.append(layout.TextLogView(origin=source, name="events"))
     shown = [topic for topic in ("/tf", there("pose"), there("mag")) if topic in topics]
     space = layout.Spatial3DView(origin="/", contents=shown, name="in space")
     return layout.Blueprint(layout.Horizontal(space, layout.Vertical(*views)), collapse_panels=True)

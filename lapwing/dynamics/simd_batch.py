@@ -169,8 +169,8 @@ def _command(commands, member, i):
 @always_inline
 def _begin(like, memory, at, key, tick, commands, member, interval):
     m = take(like, memory, at)
-    asked = map_index(_command, m.voltage, commands, member)
-    drive = multirotor_stepper.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), asked, interval)
+    voltages = map_index(_command, m.voltage, commands, member)
+    drive = multirotor_stepper.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), voltages, interval)
     give((m.motion, drive.memory, drive.body, drive.voltage, tick * interval), memory, at)
 
 

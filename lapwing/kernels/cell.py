@@ -61,8 +61,8 @@ def _form(value: Any) -> tuple[_Form, Sequence[Any]]:
     top: Any = (type(value), *map(type, value)) if isinstance(value, tuple) else type(value)
     for form in _by_classes.get(top, ()):
         assert form.flattener is not None
-        if (found := form.flattener.leaves(value)) is not None:
-            return form, found
+        if (values := form.flattener.leaves(value)) is not None:
+            return form, values
     try:
         key: Hashable = structure(value)
     except UnknownError:

@@ -124,15 +124,15 @@ def _reduce_tuple(function, common, value, a, b):
     return compile_source("reduce_tuple(function, common, value, a, b)", {}, *calls, "return value")
 
 
-def any_in_tuple(found: tuple) -> bool:
+def any_in_tuple(flags: tuple) -> bool:
     """Return True if any entry of a tuple is true."""
-    return any(found)
+    return any(flags)
 
 
 @overload_for(any_in_tuple, inline=True)
-def _any_in_tuple(found):
+def _any_in_tuple(flags):
     return compile_source(
-        "any_in_tuple(found)", {}, f"return {' or '.join(f'found[{i}]' for i in range(len(found))) or 'False'}"
+        "any_in_tuple(flags)", {}, f"return {' or '.join(f'flags[{i}]' for i in range(len(flags))) or 'False'}"
     )
 
 
@@ -143,6 +143,6 @@ def map_index(function: Callable, count: tuple, *arguments: Any) -> tuple:
 
 @overload_for(map_index)
 def _map_index(function, count, *arguments):
-    given = "".join(f"arguments[{k}], " for k in range(len(arguments)))
-    calls = "".join(f"function({given}{i}), " for i in range(len(count)))
+    leading = "".join(f"arguments[{k}], " for k in range(len(arguments)))
+    calls = "".join(f"function({leading}{i}), " for i in range(len(count)))
     return compile_source("map_index(function, count, *arguments)", {}, f"return ({calls})")

@@ -22,14 +22,14 @@ def address_of(function: Any) -> int:
 def _caller(result: ir.Type) -> Callable:
     def call(typing_context: Any, address: types.Type, arguments: types.Type) -> tuple[Any, Callable]:
         kinds = [_DOUBLE if isinstance(each, types.Float) else _INT64 for each in arguments]
-        given = types.Tuple([types.float64 if isinstance(each, types.Float) else types.int64 for each in arguments])
+        converted = types.Tuple([types.float64 if isinstance(each, types.Float) else types.int64 for each in arguments])
 
         def generate(context: Any, builder: ir.IRBuilder, signature: Any, values: Sequence[ir.Value]) -> ir.Value:
             function = builder.inttoptr(values[0], ir.FunctionType(result, kinds).as_pointer())
             status = builder.call(function, [builder.extract_value(values[1], i) for i in range(len(kinds))])
             return status if result is _INT64 else builder.sext(status, _INT64)
 
-        return types.int64(types.int64, given), generate
+        return types.int64(types.int64, converted), generate
 
     return call
 

@@ -63,8 +63,8 @@ def _columns(part: Any, rows: np.ndarray, left: Iterator[int]) -> Any:
     if not isinstance(part, tuple):
         return rows[:, next(left)]
     if not any(isinstance(item, tuple) for item in part) and (not hasattr(part, "_fields") or _alike(part)):
-        taken = list(islice(left, len(part)))
-        return rows[:, taken[0] : taken[0] + len(taken)] if taken else rows[:, :0]
+        columns = list(islice(left, len(part)))
+        return rows[:, columns[0] : columns[0] + len(columns)] if columns else rows[:, :0]
     items = [_columns(item, rows, left) for item in part]
     return type(part)(*items) if hasattr(part, "_fields") else tuple(items)
 

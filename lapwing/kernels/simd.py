@@ -86,13 +86,13 @@ def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
 def pack4(context, a, b, c, d):
     """Return a vector of four floats."""
 
-    def made(context, builder, sig, args):
+    def generate(context, builder, sig, args):
         vector = ir.Constant(VECTOR, ir.Undefined)
         for k, value in enumerate(args):
             vector = builder.insert_element(vector, value, INDEX(k))
         return vector
 
-    return signature(LANES, *[types.float64] * 4), made
+    return signature(LANES, *[types.float64] * 4), generate
 
 
 @intrinsic
@@ -105,22 +105,22 @@ def splat(context, x):
 def unpack4(context, x):
     """Return the four floats of x as a tuple."""
 
-    def taken(context, builder, sig, args):
+    def generate(context, builder, sig, args):
         parts = [builder.extract_element(args[0], INDEX(k)) for k in range(4)]
         return context.make_tuple(builder, sig.return_type, parts)
 
-    return signature(types.UniTuple(types.float64, 4), LANES), taken
+    return signature(types.UniTuple(types.float64, 4), LANES), generate
 
 
 @intrinsic
 def sqrt(context, x):
     """Return the square root of every lane."""
 
-    def taken(context, builder, sig, args):
+    def generate(context, builder, sig, args):
         kind = ir.FunctionType(VECTOR, (VECTOR,))
         return builder.call(cgutils.get_or_insert_function(builder.module, kind, "llvm.sqrt.v4f64"), args)
 
-    return signature(LANES, LANES), taken
+    return signature(LANES, LANES), generate
 
 
 @intrinsic
@@ -144,12 +144,12 @@ def select_vector(flag, a, b):
 def any_above(context, x):
     """Return True if any lane is above zero."""
 
-    def asked(context, builder, sig, args):
+    def generate(context, builder, sig, args):
         above = builder.fcmp_ordered(">", args[0], ir.Constant(VECTOR, [0.0] * 4))
         four = builder.bitcast(above, ir.IntType(4))
         return builder.icmp_unsigned("!=", four, four.type(0))
 
-    return signature(types.boolean, LANES), asked
+    return signature(types.boolean, LANES), generate
 
 
 def _place(context: Any, builder: Any, array: Any, value: Any, start: Any) -> Any:
@@ -161,10 +161,10 @@ def _place(context: Any, builder: Any, array: Any, value: Any, start: Any) -> An
 def load(context, array, start):
     """Return four consecutive floats of a contiguous array from index `start`, without bounds check."""
 
-    def taken(context, builder, sig, args):
+    def generate(context, builder, sig, args):
         return builder.load(_place(context, builder, sig.args[0], *args), align=8)
 
-    return signature(LANES, array, types.intp), taken
+    return signature(LANES, array, types.intp), generate
 
 
 @intrinsic
@@ -187,7 +187,9 @@ def horizontal_sum(x):
 
 def _interleave(four: Any) -> Callable:
     paths, names = tuple(f"four[{k}]" for k in range(4)), {"pack4": pack4}
-    expression = unroll(four.types[0], paths, lambda found, p, _: None if found else f"pack4({', '.join(p)})", names)
+    expression = unroll(
+        four.types[0], paths, lambda matched, p, _: None if matched else f"pack4({', '.join(p)})", names
+    )
     return compile_source("interleave(four)", names, f"return {expression}")
 
 
@@ -202,7 +204,7 @@ interleave = generated_overload(
 def _deinterleave(tree: Any) -> Callable:
     names: dict[str, Any] = {"unpack4": unpack4}
     parts = [
-        unroll(tree, ("tree",), lambda found, p, _, k=k: None if found else f"unpack4({p[0]})[{k}]", names)
+        unroll(tree, ("tree",), lambda matched, p, _, k=k: None if matched else f"unpack4({p[0]})[{k}]", names)
         for k in range(4)
     ]
     return compile_source("deinterleave(tree)", names, f"return ({', '.join(parts)})")

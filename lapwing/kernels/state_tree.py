@@ -41,8 +41,8 @@ NUMBERS: list[type] = [types.Float]
 
 
 def _leaf_class(tree: types.Type) -> type | None:
-    found = getattr(tree, "instance_class", None)
-    return found if found in MANIFOLDS else None
+    result = getattr(tree, "instance_class", None)
+    return result if result in MANIFOLDS else None
 
 
 def unroll(tree: types.Type, paths: tuple[str, ...], rule: Callable, names: dict[str, Any]) -> str:
@@ -99,15 +99,15 @@ def _of_numbers(paths: tuple[str, ...], template: str) -> Callable:
 
 def _number_paths(tree: types.Type, path: str) -> list[str]:
     """Return the expressions of all stored numbers of a tree, in order."""
-    found: list[str] = []
+    result: list[str] = []
 
     def rule(leaf, paths, _):
         if leaf is None:
-            found.append(paths[0])
+            result.append(paths[0])
         return None if leaf else paths[0]
 
     unroll(tree, (path,), rule, {})
-    return found
+    return result
 
 
 def _flatten(tree: types.Type, names: dict[str, Any]) -> str:
@@ -126,24 +126,24 @@ def _finite(tree: types.Type, names: dict[str, Any]) -> str:
 def _error_ratio(tree: types.Type, names: dict[str, Any]) -> str:
     def rule(leaf, paths, _):
         x, e = paths
-        found.append(f"abs({e}) / (1.0 + abs({x}))" if leaf is None else f"largest({e})")
+        result.append(f"abs({e}) / (1.0 + abs({x}))" if leaf is None else f"largest({e})")
         return x
 
-    found: list[str] = []
+    result: list[str] = []
     unroll(tree, ("x", "e"), rule, names)
     names["largest"] = largest
-    return f"max(0.0, {', '.join(found)})"
+    return f"max(0.0, {', '.join(result)})"
 
 
 def _relative_difference(tree: types.Type, names: dict[str, Any]) -> str:
     names["of_part"] = relative_difference
-    found = []
+    result = []
     for i, part in enumerate(tree.types):  # types of tuples are requested often
         if isinstance(part, types.BaseTuple):
-            found.append(f"of_part(x[{i}], y[{i}])")
+            result.append(f"of_part(x[{i}], y[{i}])")
         else:
-            found += [f"abs({n} - y{n[1:]}) / (1.0 + abs({n}))" for n in _number_paths(part, f"x[{i}]")]
-    return f"max(0.0, 0.0, {', '.join(found)})"
+            result += [f"abs({n} - y{n[1:]}) / (1.0 + abs({n}))" for n in _number_paths(part, f"x[{i}]")]
+    return f"max(0.0, 0.0, {', '.join(result)})"
 
 
 def _unflatten(tree: types.Type, names: dict[str, Any]) -> str:

@@ -15,20 +15,20 @@ _BY_TYPE = frozenset({float, bool, type(None), np.float64, np.float32, np.int64,
 
 def leaves(value: Any) -> list[Any]:
     """Return all numbers, arrays and cells of a tree of tuples and NamedTuples, in order."""
-    found: list[Any] = []
-    _walk(value, found)
-    return found
+    result: list[Any] = []
+    _walk(value, result)
+    return result
 
 
-def _walk(value: Any, found: list[Any]) -> None:
+def _walk(value: Any, result: list[Any]) -> None:
     if not isinstance(value, tuple):
-        found.append(value)
+        result.append(value)
         return
     for item in value:
         if type(item) is float:
-            found.append(item)
+            result.append(item)
         else:
-            _walk(item, found)
+            _walk(item, result)
 
 
 class Flattener:
@@ -77,5 +77,5 @@ def _written(example: Any) -> Any:
             walk(item, of)
 
     walk(example, "value")
-    given = [f"({''.join(f'{name}, ' for name in names)})" for names in (tuples, parts)]
-    return compile_source("flatten(value)", {}, *lines, f"return {', '.join(given)}")
+    outputs = [f"({''.join(f'{name}, ' for name in names)})" for names in (tuples, parts)]
+    return compile_source("flatten(value)", {}, *lines, f"return {', '.join(outputs)}")

@@ -70,8 +70,8 @@ def battery_use(flight: FlightData) -> BatteryUse | None:
 def _cutoff(flight: FlightData, cells: int) -> float | None:
     """Return the cut-off voltage [V] of the pack; None if no effect of the scene has one."""
     effects = flight.origin.scene.get("effects", {})
-    given = next((effects[name] for name in EFFECTS if name in effects), None)
-    return None if given is None else cells * float(given.get("cutoff_voltage", 3.0))
+    battery = next((effects[name] for name in EFFECTS if name in effects), None)
+    return None if battery is None else cells * float(battery.get("cutoff_voltage", 3.0))
 
 
 def _low(flight: FlightData) -> float | None:

@@ -69,12 +69,12 @@ def consistency(flight: FlightData) -> dict[str, float]:
     return result
 
 
-def _places(times: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+def _places(times: np.ndarray, desired: np.ndarray) -> np.ndarray:
     """Return the index of each wanted time [s] among ascending times, -1 where it is missing."""
     if not len(times):
-        return np.full(len(wanted), -1)
-    nearest = np.minimum(np.searchsorted(times, wanted - 1e-6), len(times) - 1)
-    return np.where(np.abs(times[nearest] - wanted) < 1e-6, nearest, -1)
+        return np.full(len(desired), -1)
+    nearest = np.minimum(np.searchsorted(times, desired - 1e-6), len(times) - 1)
+    return np.where(np.abs(times[nearest] - desired) < 1e-6, nearest, -1)
 
 
 def _rotation_vector(after: np.ndarray, before: np.ndarray) -> np.ndarray:

@@ -91,7 +91,7 @@ class FlightData(FlightTopics):
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/ground_truth)")
             others = {topic.key(name) for name in fleet for topic in IN_SPACE}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
-            return cls._of_log(log, str(path), log.histories(_wanted(own, only, fleet)), named, fleet)
+            return cls._of_log(log, str(path), log.histories(_selected_names(own, only, fleet)), named, fleet)
 
     @classmethod
     def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
@@ -109,7 +109,7 @@ class FlightData(FlightTopics):
             fleet = _vehicles(known, log.metadata)
             if not fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /NAME/ground_truth)")
-            histories = log.histories(_wanted(known, only, fleet))
+            histories = log.histories(_selected_names(known, only, fleet))
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
     @classmethod
@@ -267,12 +267,12 @@ class FlightData(FlightTopics):
         return self.outcome.kind in LANDED
 
 
-def _wanted(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
+def _selected_names(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
     """Return the names in a log that belong to the requested topics."""
     if only is None:
         return names
-    wanted = {topic.key(name) for topic in only for name in fleet}
-    return [name for name in names if name in wanted]
+    selected = {topic.key(name) for topic in only for name in fleet}
+    return [name for name in names if name in selected]
 
 
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:

@@ -55,9 +55,9 @@ def events(
     return ordered(result)
 
 
-def ordered(found: Iterable[Event]) -> list[Event]:
+def ordered(events: Iterable[Event]) -> list[Event]:
     """Return events in order of time; simultaneous ones in the order of their kinds."""
-    return sorted(found, key=lambda event: (event.time, ORDER.index(event.kind)))
+    return sorted(events, key=lambda event: (event.time, ORDER.index(event.kind)))
 
 
 def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[Event]:

@@ -27,6 +27,6 @@ def refusal(
     """
     if host not in known or any(not o.startswith("http://") or o[len("http://") :] not in known for o in origins):
         return http.HTTPStatus.FORBIDDEN
-    given = path.partition("?")[0].strip("/").split("/")[0]
-    matches = bool(token) and secrets.compare_digest(given.encode(), token.encode())
+    first = path.partition("?")[0].strip("/").split("/")[0]
+    matches = bool(token) and secrets.compare_digest(first.encode(), token.encode())
     return None if matches else http.HTTPStatus.NOT_FOUND

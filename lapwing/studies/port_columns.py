@@ -29,10 +29,10 @@ def columns_of(
                 columns = PortColumns(graph, wire)
                 yield wire.topic, columns.ticks * interval, columns
         for topic in service.python_topics:
-            said = [(tick, payload) for of, tick, payload in service.messages if of is topic]
-            if said and (only is None or template_topic(topic) in only):
-                ticks = np.array([tick for tick, _ in said], np.int64)
-                yield topic, ticks * interval, history(topic.message, [payload for _, payload in said])
+            messages = [(tick, payload) for of, tick, payload in service.messages if of is topic]
+            if messages and (only is None or template_topic(topic) in only):
+                ticks = np.array([tick for tick, _ in messages], np.int64)
+                yield topic, ticks * interval, history(topic.message, [payload for _, payload in messages])
 
 
 class PortColumns(Mapping[str, Any]):

@@ -60,10 +60,10 @@ def _flown(
     setup = run if isinstance(run, RunConfig) else resolve(run)
     services = create_all(setup, operator)
     wires = [wire for service in services for wire in service.wires]
-    wanted = {
+    selected = {
         wire.port for wire in wires if (wire.topic.recorded if only is None else template_topic(wire.topic) in only)
     }
-    graph, failure, diverged = BlockDiagram(setup, services, PAGE, wanted, rows), "", False
+    graph, failure, diverged = BlockDiagram(setup, services, PAGE, selected, rows), "", False
     try:
         look = setup.last_tick + 1 if observe is None else LOOK
         while graph.tick <= setup.last_tick and not graph.ended:

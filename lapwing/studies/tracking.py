@@ -32,14 +32,14 @@ def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
 
 
 @kernel
-def _sines(found: Any, cosines: Any, xyzw: Any) -> None:
+def _sines(out: Any, cosines: Any, xyzw: Any) -> None:
     """Compute sines of roll, pitch, yaw (3, n), cosines of roll, yaw (2, n), up to a factor, of quaternions (4, n)."""
     for k in range(xyzw.shape[1]):
         x, y, z, w = xyzw[0, k], xyzw[1, k], xyzw[2, k], xyzw[3, k]
-        found[0, k], cosines[0, k] = 2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)
+        out[0, k], cosines[0, k] = 2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)
         sine = 2.0 * (w * y - z * x)
-        found[1, k] = np.sign(sine) if abs(sine) > 1.0 else sine
-        found[2, k], cosines[1, k] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
+        out[1, k] = np.sign(sine) if abs(sine) > 1.0 else sine
+        out[2, k], cosines[1, k] = 2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)
 
 
 def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> np.ndarray:
@@ -74,20 +74,20 @@ def strided(values: np.ndarray) -> np.ndarray:
 
 
 @always_inline
-def _turn(wanted: float, flown: float) -> float:
+def _turn(desired: float, actual: float) -> float:
     """Return the shortest rotation from one angle to another [rad]."""
-    turn = wanted - flown
+    turn = desired - actual
     return turn if abs(turn) <= 0.5 * TURN else turn - TURN * np.rint(turn / TURN)
 
 
 @kernel
-def _errors(found: Any, reference: Any, position: Any, attitude: Any, armed: Any) -> None:
+def _errors(out: Any, reference: Any, position: Any, attitude: Any, armed: Any) -> None:
     k = 0
     for row in range(len(armed)):
         if armed[row]:
             for i in range(3):
-                found[k, i] = reference[row, i] - position[row, i]
-                found[k, 3 + i] = _turn(reference[row, 3 + i], attitude[row, i])
+                out[k, i] = reference[row, i] - position[row, i]
+                out[k, 3 + i] = _turn(reference[row, 3 + i], attitude[row, i])
             k += 1
 
 
@@ -101,23 +101,23 @@ class Reference(NamedTuple):
 
 def rmse(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> dict[str, float]:
     """Return the root-mean-square error of each axis [m], [rad] while armed, or NaN. See `errors` for arguments."""
-    wanted = Reference(*(strided(values) for values in reference))
-    result = _mean_squares(*wanted, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
+    desired = Reference(*(strided(values) for values in reference))
+    result = _mean_squares(*desired, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
     return dict(zip(AXES, map(math.sqrt, result), strict=True))
 
 
 @kernel
 def _mean_squares(
-    wanted: Any, roll_pitch: Any, heading: Any, position: Any, attitude: Any, armed: Any
+    desired: Any, roll_pitch: Any, heading: Any, position: Any, attitude: Any, armed: Any
 ) -> tuple[float, float, float, float, float, float]:
     rows = 0
     x = y = z = roll = pitch = yaw = 0.0
     for row in range(len(armed)):
         if armed[row]:
             rows += 1
-            x += (wanted[row, 0] - position[row, 0]) ** 2
-            y += (wanted[row, 1] - position[row, 1]) ** 2
-            z += (wanted[row, 2] - position[row, 2]) ** 2
+            x += (desired[row, 0] - position[row, 0]) ** 2
+            y += (desired[row, 1] - position[row, 1]) ** 2
+            z += (desired[row, 2] - position[row, 2]) ** 2
             roll += _turn(roll_pitch[row, 0], attitude[0, row]) ** 2
             pitch += _turn(roll_pitch[row, 1], attitude[1, row]) ** 2
             yaw += _turn(heading[row], attitude[2, row]) ** 2
@@ -125,25 +125,25 @@ def _mean_squares(
     return x / n, y / n, z / n, roll / n, pitch / n, yaw / n
 
 
-def reach(wanted: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
+def reach(desired: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
     """Return the largest distance of armed positions from their reference [m], and the overshoot beyond the
     extremes of those along any axis [m], below 0 where they never come as far. Shapes (n, 3), (n, 3), (n,)."""
-    return _reach(strided(wanted), strided(position), plain(armed, bool))
+    return _reach(strided(desired), strided(position), plain(armed, bool))
 
 
 @kernel
-def _reach(wanted: Any, position: Any, armed: Any) -> tuple[float, float]:
+def _reach(desired: Any, position: Any, armed: Any) -> tuple[float, float]:
     squares, away = 0.0, 0.0
     along_x = along_y = along_z = (-np.inf, -np.inf, -np.inf, -np.inf)
     for row in range(len(armed)):
         if armed[row]:
-            x, y = wanted[row, 0] - position[row, 0], wanted[row, 1] - position[row, 1]
-            z = wanted[row, 2] - position[row, 2]
+            x, y = desired[row, 0] - position[row, 0], desired[row, 1] - position[row, 1]
+            z = desired[row, 2] - position[row, 2]
             square = x * x + y * y + z * z
             squares, away = squares + square, _greater(away, square)
-            along_x = _extended(along_x, position[row, 0], wanted[row, 0])
-            along_y = _extended(along_y, position[row, 1], wanted[row, 1])
-            along_z = _extended(along_z, position[row, 2], wanted[row, 2])
+            along_x = _extended(along_x, position[row, 0], desired[row, 0])
+            along_y = _extended(along_y, position[row, 1], desired[row, 1])
+            along_z = _extended(along_z, position[row, 2], desired[row, 2])
     if squares != squares:  # what a comparison would leave out
         return np.nan, np.nan
     return np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z)))
@@ -153,10 +153,11 @@ Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown
 
 
 @always_inline
-def _extended(known: Extremes, flown: float, wanted: float) -> Extremes:
+def _extended(known: Extremes, actual: float, desired: float) -> Extremes:
     """Return the extremes extended by another x."""
     return (
-        _greater(known[0], flown), _greater(known[1], -flown), _greater(known[2], wanted), _greater(known[3], -wanted),
+        _greater(known[0], actual), _greater(known[1], -actual),
+        _greater(known[2], desired), _greater(known[3], -desired),
     )  # fmt: skip
 
 

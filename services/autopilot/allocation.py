@@ -111,8 +111,8 @@ def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ..
     arms = np.round(B[1:YAW] / B[0], ARM_DIGITS)
     if len(np.unique(arms, axis=1).T) < count:
         return (whole,)
-    found = [shares for k in range(1, count + 1) if (shares := rotor_shares(B, k, weights)) is not None]
-    return (whole, *found) if len(found) == count else (whole,)
+    reduced = [shares for k in range(1, count + 1) if (shares := rotor_shares(B, k, weights)) is not None]
+    return (whole, *reduced) if len(reduced) == count else (whole,)
 
 
 def _share(row: np.ndarray) -> Share:

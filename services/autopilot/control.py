@@ -167,7 +167,7 @@ def step(
         integrate(p.pitch_inner, s.integral_angles[1], turn[1], s.cut.pitch, dt),
         integrate(p.yaw, s.integral_angles[2], turn[2], s.cut.yaw, dt),
     )
-    wanted = VirtualControls(
+    desired = VirtualControls(
         collective_control(p, integral[2], error[2], error_rate[2], setpoint.acceleration_world[2], roll, pitch),
         output(p.roll_inner, integral_angles[0], -turn[0], -turn_rate[0])
         - p.controls_per_acceleration[0] * tilt_y.command_acceleration,
@@ -176,14 +176,14 @@ def step(
         output(p.yaw, integral_angles[2], turn[2], turn_rate[2]),
     )
     shares = active_allocation(p.shares, failed)
-    given = saturate(shares, wanted, p.thrust_max)
+    saturated = saturate(shares, desired, p.thrust_max)
     cut = VirtualControls(
-        sign(wanted.collective - given.collective),
-        sign(wanted.roll - given.roll),
-        sign(wanted.pitch - given.pitch),
-        sign(wanted.yaw - given.yaw),
+        sign(desired.collective - saturated.collective),
+        sign(desired.roll - saturated.roll),
+        sign(desired.pitch - saturated.pitch),
+        sign(desired.yaw - saturated.yaw),
     )
-    thrust = clamp_to_range(mix(shares, given), p.thrust_max)
+    thrust = clamp_to_range(mix(shares, saturated), p.thrust_max)
     volts = voltages(p.motor, thrust)
     state = State(landed, integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
     return state, Command(volts, thrust, angles_reference[0], angles_reference[1], setpoint.yaw, False)

@@ -77,14 +77,14 @@ def _arm(p: Parameters, k: int, root: PerRotor) -> tuple[float, float]:
 def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> int:
     """Return the number, from 1, of the rotor whose loss of thrust explains the disturbance, 0 if none does."""
     x, y = disturbance
-    found, most = 0, LOST
+    suspected, most = 0, LOST
     for k in range(len(p.roll_arm)):
         ax, ay = _arm(p, k, root)
         lack = -(x * ax + y * ay) / (ax * ax + ay * ay)
         left = (x + lack * ax) * (x + lack * ax) + (y + lack * ay) * (y + lack * ay)
         if lack > most and left < ALIGNED * (x * x + y * y):
-            found, most = k + 1, lack
-    return found
+            suspected, most = k + 1, lack
+    return suspected
 
 
 @always_inline
@@ -118,7 +118,7 @@ def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, as
     )
     square = BANDWIDTH * BANDWIDTH * dt
     disturbance = (s.disturbance[0] + square * ex, s.disturbance[1] + square * ey)
-    found = suspect(p, root, disturbance)
-    lasting = s.lasting + dt if found > 0 and found == s.suspect else 0.0
-    failed = found if lasting > DETECTION_TIME and s.failed == 0 else s.failed
-    return State(asked, root, rate, disturbance, found, lasting, failed)
+    suspected = suspect(p, root, disturbance)
+    lasting = s.lasting + dt if suspected > 0 and suspected == s.suspect else 0.0
+    failed = suspected if lasting > DETECTION_TIME and s.failed == 0 else s.failed
+    return State(asked, root, rate, disturbance, suspected, lasting, failed)

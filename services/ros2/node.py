@@ -86,10 +86,10 @@ class Node:
         """Subscribe to topics of other nodes; `topics` has the message class by topic."""
         endpoints = [Endpoint(topic, message.type_name) for topic, message in messages.items()]
         topics = {endpoint.key(self._domain): endpoint.topic for endpoint in endpoints}
-        asked = CommandSubscription(self._bus.subscribe(*topics), topics)
+        commands = CommandSubscription(self._bus.subscribe(*topics), topics)
         for endpoint in endpoints:
             self._bus.declare_liveliness(self._token(endpoint, SUBSCRIPTION))
-        return asked
+        return commands
 
     def _token(self, endpoint: Endpoint, kind: str) -> str:
         self._entities += 1

@@ -41,7 +41,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     tables = scene[Sensors].tables
     if not tables:
         return None
-    instruments, given = [], []
+    instruments, outputs = [], []
     sonar, gps = None, GpsWiring()
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Communication].interval)
@@ -53,7 +53,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
         reading = READINGS[name] if name in READINGS else _reading(name, table, p)
-        given.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
+        outputs.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         if name == ports.SONAR:
             sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
         for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
@@ -61,8 +61,8 @@ def resolve(scene: Scene) -> ServiceConfig | None:
                 raise ConfigError(f"sensors.{unit}", "is the name of a redundant unit of sensors.imu", "another name")
             key = stream_key(scene[Run].seed, scene[Vehicle].name, unit)
             instruments.append(Instrument(p._replace(faults=None), key, gravity(scene), environment(scene)))
-            given.append(given[-1]._replace(name=unit))
-    return ServiceConfig(SensorsSetup(tuple(instruments), sonar, gps), (InputPort(ports.TRUTH),), tuple(given))
+            outputs.append(outputs[-1]._replace(name=unit))
+    return ServiceConfig(SensorsSetup(tuple(instruments), sonar, gps), (InputPort(ports.TRUTH),), tuple(outputs))
 
 
 def _with_damage(scene: Scene, p: Imu) -> Imu:
@@ -83,14 +83,14 @@ def _with_terrain(scene: Scene, p: Gps) -> Gps:
     return p._replace(constellation=p.constellation._replace(steepness=steep))
 
 
-def reseed(given: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
+def reseed(config: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
     """Return the instruments with another seed."""
-    setup: SensorsSetup = given.parameters
+    setup: SensorsSetup = config.parameters
     instruments = tuple(
         instrument._replace(key=stream_key(seed, vehicle, port.name))
-        for instrument, port in zip(setup.instruments, given.ports, strict=True)
+        for instrument, port in zip(setup.instruments, config.ports, strict=True)
     )
-    return given._replace(parameters=setup._replace(instruments=instruments))
+    return config._replace(parameters=setup._replace(instruments=instruments))
 
 
 def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
@@ -114,8 +114,8 @@ def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:
         state = module.initial(p, key, Truth())
         after, reading = module.sample(p, state, key, 0, Truth())
     except Exception as error:
-        said = str(error).strip().partition("\n")[0]
-        raise ConfigError(where, f"{type(error).__name__}: {said}") from error
+        text = str(error).strip().partition("\n")[0]
+        raise ConfigError(where, f"{type(error).__name__}: {text}") from error
     for what, result, declared in (
         ("initial", state, module.blank()),
         ("sample's state", after, module.blank()),

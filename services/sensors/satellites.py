@@ -90,8 +90,8 @@ def check_sky(sky: tuple[Satellite, ...] | None) -> None:
         return
     dilution = math.sqrt(math.total(x * x for x in python_function(geometry)(sky))) if len(sky) >= FEWEST else math.inf
     if not dilution < WORST:
-        said = f"got {len(sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
-        raise ConfigError("sky", said, f"{FEWEST} or more, spread so that it is below {WORST:g}")
+        problem = f"got {len(sky)} satellites with a dilution of precision (PDOP) of {dilution:.3g}"
+        raise ConfigError("sky", problem, f"{FEWEST} or more, spread so that it is below {WORST:g}")
 
 
 def check_constellation(c: Constellation | None) -> None:

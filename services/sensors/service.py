@@ -25,11 +25,11 @@ class SensorsSetup(NamedTuple):
 
 def create(setup: RunConfig) -> Service:
     """Return the sensors of a run."""
-    given = setup.services[NAME]
-    s: SensorsSetup = given.parameters
+    config = setup.services[NAME]
+    s: SensorsSetup = config.parameters
     parts = [
-        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), given.inputs, (port,), port.period)
-        for p, port in zip(s.instruments, given.ports, strict=True)
+        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), config.inputs, (port,), port.period)
+        for p, port in zip(s.instruments, config.ports, strict=True)
     ]
     return Service(NAME, parts, _other_wires(setup, s) + wires(setup, s.sonar, s.gps))
 

@@ -128,10 +128,10 @@ def coupled(c: CrossCoupling | None, key: Key, lane: int, drawn: Mat3) -> Mat3:
     if c is None:
         return drawn
     a, b, d = scale(math.radians(c.non_orthogonality_deg), normal3(key, TURN_ON, _SKEWED + lane))
-    given = c.gyro_matrix if lane == 0 else c.accelerometer_matrix
+    matrix = c.gyro_matrix if lane == 0 else c.accelerometer_matrix
     m = drawn
     skew = (m[0], m[1] + a, m[2] + b, m[3] + a, m[4], m[5] + d, m[6] + b, m[7] + d, m[8])
-    return matmul(given, skew)
+    return matmul(matrix, skew)
 
 
 @kernel

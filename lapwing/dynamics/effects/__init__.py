@@ -68,10 +68,12 @@ def class_name(name: str) -> str:
 
 def parameter_class(name: str, module: str | None = None) -> type:
     """Return the parameter class of an effect. See `get` for arguments."""
-    found, wanted = get(name, module), class_name(name)
-    if not hasattr(found, wanted):
-        raise ConfigError(f"effects.{name}.module", f"{module} has no class {wanted}", "the effect's parameters there")
-    return getattr(found, wanted)
+    defining, expected = get(name, module), class_name(name)
+    if not hasattr(defining, expected):
+        raise ConfigError(
+            f"effects.{name}.module", f"{module} has no class {expected}", "the effect's parameters there"
+        )
+    return getattr(defining, expected)
 
 
 def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment: Environment = STANDARD) -> tuple:

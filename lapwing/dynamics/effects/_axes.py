@@ -16,16 +16,16 @@ from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.codegen import map_tuple, overload_for
 
 
-def by_axis(along_z: Callable, tilted: Callable, axis: tuple, given: Any) -> Any:
+def by_axis(along_z: Callable, tilted: Callable, axis: tuple, arguments: Any) -> Any:
     """Call the compiled `along_z(given)` for an empty tuple `axis`, otherwise `tilted(given)`; chosen by type."""
-    return python_function(tilted if axis else along_z)(given)
+    return python_function(tilted if axis else along_z)(arguments)
 
 
 @overload_for(by_axis, inline=True)
-def _by_axis(along_z, tilted, axis, given):
+def _by_axis(along_z, tilted, axis, arguments):
     if len(axis):
-        return lambda along_z, tilted, axis, given: tilted(given)
-    return lambda along_z, tilted, axis, given: along_z(given)
+        return lambda along_z, tilted, axis, arguments: tilted(arguments)
+    return lambda along_z, tilted, axis, arguments: along_z(arguments)
 
 
 @always_inline
@@ -46,8 +46,8 @@ def _product(_, a, b):
 
 
 @always_inline
-def _thrust_along_z(given):
-    layout, loads = given
+def _thrust_along_z(arguments):
+    layout, loads = arguments
     return total(loads.thrust), (
         total(map_tuple(_product, 0.0, layout.y_body, loads.thrust)),
         -total(map_tuple(_product, 0.0, layout.x_body, loads.thrust)),
@@ -69,8 +69,8 @@ def _load(_, place, both):
 
 
 @always_inline
-def _thrust_tilted(given):
-    layout, loads = given
+def _thrust_tilted(arguments):
+    layout, loads = arguments
     reaction = map_tuple(_product, 0.0, layout.reaction_sign, loads.torque)
     pushes = map_tuple(_load, 0.0, places(layout), map_tuple(pair, 0.0, loads.thrust, reaction))
     return total_wrench(map_tuple(_push, 0.0, layout.axis, pushes))

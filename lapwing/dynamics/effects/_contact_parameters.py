@@ -59,25 +59,25 @@ class GroundContact(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundContact | GroundContactSmooth":
         """Return the parameters with the airframe's feet and mass."""
-        given = checked(Settings, table)
-        if given.friction_dynamic > given.friction_static:
-            expected = f"at most friction_static = {given.friction_static}"
-            raise ConfigError("friction_dynamic", f"got {given.friction_dynamic}", expected)
+        settings = checked(Settings, table)
+        if settings.friction_dynamic > settings.friction_static:
+            expected = f"at most friction_static = {settings.friction_static}"
+            raise ConfigError("friction_dynamic", f"got {settings.friction_dynamic}", expected)
         points = airframe.contact or reject("the vehicle has no feet, [contact] in its file")
         feet = points.feet + points.hull
         common = (
-            LEVEL, feet, _reach(feet), given.stiffness, given.damping, 1.0 / given.transition_width,
-            given.friction_static, given.friction_dynamic,
+            LEVEL, feet, _reach(feet), settings.stiffness, settings.damping, 1.0 / settings.transition_width,
+            settings.friction_static, settings.friction_dynamic,
         )  # fmt: skip
-        if given.friction == "regularised":
-            rate = _rate_bound(airframe, points.feet, (given.stiffness, 0.0), (given.damping, 0.0))
-            return GroundContactSmooth(*common, 1.0 / given.critical_velocity, rate, _mobility(airframe, feet))
-        stiffness = (given.stiffness, given.tangential_stiffness)
+        if settings.friction == "regularised":
+            rate = _rate_bound(airframe, points.feet, (settings.stiffness, 0.0), (settings.damping, 0.0))
+            return GroundContactSmooth(*common, 1.0 / settings.critical_velocity, rate, _mobility(airframe, feet))
+        stiffness = (settings.stiffness, settings.tangential_stiffness)
         undamped = _rate_bound(airframe, points.feet, stiffness, (0.0, 0.0))
-        damping = max(given.damping, given.tangential_stiffness / (FASTEST_DEFLECTION * undamped))
-        rate = _rate_bound(airframe, points.feet, stiffness, (given.damping, damping))
-        rate = max(rate, given.tangential_stiffness / damping * STABLE / STABLE_DAMPER)
-        return cls(*common, given.tangential_stiffness, damping, 1.0 / given.stiction_velocity, rate)
+        damping = max(settings.damping, settings.tangential_stiffness / (FASTEST_DEFLECTION * undamped))
+        rate = _rate_bound(airframe, points.feet, stiffness, (settings.damping, damping))
+        rate = max(rate, settings.tangential_stiffness / damping * STABLE / STABLE_DAMPER)
+        return cls(*common, settings.tangential_stiffness, damping, 1.0 / settings.stiction_velocity, rate)
 
     def in_environment(self, environment: Environment) -> "GroundContact":
         """On the ground that is there."""

@@ -255,10 +255,10 @@ all_stiff_sleeping = generated_overload(
 
 
 def _without_sleepers(effects: Any, _: Any) -> Callable:
-    kept = "".join(
+    items = "".join(
         f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["is_sleeping"]
     )
-    return compile_source("without_sleepers(effects, values)", {}, f"return ({kept})")
+    return compile_source("without_sleepers(effects, values)", {}, f"return ({items})")
 
 
 without_sleepers = generated_overload(
@@ -293,9 +293,9 @@ def _with_rates(effects: Any, *_rest: Any) -> Callable:
     names = {"known": KnownWrench, **{f"f{i}": hook for i, hook in active.items()}}
     lines = [f"force{i}, torque{i}, rate{i} = f{i}(effects[{i}], memory[{i}], motion)" for i in active]
     count = len(effects.types)
-    kept = "".join(f"known(force{i}, torque{i}), " if i in active else f"effects[{i}], " for i in range(count))
+    items = "".join(f"known(force{i}, torque{i}), " if i in active else f"effects[{i}], " for i in range(count))
     rates = "".join(f"rate{i}, " for i in active)
-    return compile_source("with_rates(effects, memory, motion)", names, *lines, f"return ({kept}), ({rates})")
+    return compile_source("with_rates(effects, memory, motion)", names, *lines, f"return ({items}), ({rates})")
 
 
 with_rates = generated_overload(

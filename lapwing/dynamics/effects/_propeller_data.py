@@ -32,10 +32,10 @@ def parsed(key: str, text: str) -> dict[str, Any]:
     names = [name.lower() for name in _cells(lines[0][1])]
     if "cq" in names:
         names = ["cp" if name == "cq" else name for name in names]
-    for name, said in NEEDED.items():
+    for name, description in NEEDED.items():
         if names.count(name) != 1:
             raise ConfigError(
-                key, f"line {lines[0][0]} names {names.count(name)} columns {said}", "one of each: J, CT, CP"
+                key, f"line {lines[0][0]} names {names.count(name)} columns {description}", "one of each: J, CT, CP"
             )
     turn = 2.0 * math.pi if "cq" in lines[0][1].lower() else 1.0
     curves: dict[float, list[tuple[float, float, float]]] = {}
@@ -68,9 +68,9 @@ def _numbers(key: str, number: int, line: str, count: int) -> Sequence[float]:
     if len(cells) != count:
         raise ConfigError(key, f"line {number} has {len(cells)} columns", f"{count} as its first line")
     try:
-        found = [float(cell) for cell in cells]
+        numbers = [float(cell) for cell in cells]
     except ValueError:
-        found = [math.nan]
-    if not all(map(math.isfinite, found)):
+        numbers = [math.nan]
+    if not all(map(math.isfinite, numbers)):
         raise ConfigError(key, f"line {number}: {line!r} has a hole", "a number in each column")
-    return found
+    return numbers

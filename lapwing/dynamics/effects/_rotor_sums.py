@@ -22,16 +22,16 @@ def _total(a):
 
 def total_vector(a: tuple[Vec3, ...]) -> Vec3:
     """Return the sum of a tuple of vectors."""
-    found = a[0]
+    total = a[0]
     for more in a[1:]:
-        found = add(found, more)
-    return found
+        total = add(total, more)
+    return total
 
 
 @overload_for(total_vector, inline=True)
 def _total_vector(a):
-    lines = [f"found = add(found, a[{i}])" for i in range(1, len(a))]
-    return compile_source("total_vector(a)", {"add": add}, "found = a[0]", *lines, "return found")
+    lines = [f"total = add(total, a[{i}])" for i in range(1, len(a))]
+    return compile_source("total_vector(a)", {"add": add}, "total = a[0]", *lines, "return total")
 
 
 def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:

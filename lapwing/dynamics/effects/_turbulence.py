@@ -50,9 +50,11 @@ class Part(NamedTuple):
 
 def conditions(table: dict) -> Conditions:
     """Return the conditions of a scene's table. Raise ConfigError if it is invalid."""
-    given = checked(Settings, table)
-    airspeed, altitude = given.airspeed or 0.0, given.altitude or 0.0
-    return Conditions(given.wind_speed, airspeed, altitude, math.cos(given.direction_to), math.sin(given.direction_to))
+    settings = checked(Settings, table)
+    airspeed, altitude = settings.airspeed or 0.0, settings.altitude or 0.0
+    return Conditions(
+        settings.wind_speed, airspeed, altitude, math.cos(settings.direction_to), math.sin(settings.direction_to)
+    )
 
 
 @always_inline
@@ -94,22 +96,22 @@ def in_world(c: Conditions, u: float, v: float, w: float) -> Vec3:
 @always_inline
 def first_order(x, theta, n):
     """Return the state of the longitudinal filter `theta` correlation times later (theory.md, eq. (2.22))."""
-    kept = math.exp(-theta)
-    return kept * x + math.sqrt(1.0 - kept * kept) * n
+    decay = math.exp(-theta)
+    return decay * x + math.sqrt(1.0 - decay * decay) * n
 
 
 @always_inline
 def second_order(x1, x2, theta, n1, n2):
     """Return the states of the transverse filter `theta` correlation times later (theory.md, eq. (2.23))."""
-    kept = math.exp(-theta)
-    square = kept * kept
+    decay = math.exp(-theta)
+    square = decay * decay
     q11 = 0.5 * (1.0 - square)
     q12 = 0.25 * (1.0 - square * (1.0 + 2.0 * theta))
     q22 = 0.25 * (1.0 - square * (1.0 + 2.0 * theta * (1.0 + theta)))
     root = math.sqrt(q11)
     cross = q12 / root
     rest = math.sqrt(max(q22 - cross * cross, 0.0))
-    return kept * x1 + root * n1, kept * (x2 + theta * x1) + cross * n1 + rest * n2
+    return decay * x1 + root * n1, decay * (x2 + theta * x1) + cross * n1 + rest * n2
 
 
 @always_inline

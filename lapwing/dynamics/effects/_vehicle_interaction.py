@@ -60,8 +60,8 @@ def interacts(effects: tuple) -> bool:
 
 def presence(effects: tuple) -> NeighbourState:
     """Return the neighbour state with the effects' part; the vehicle's state fills in the rest."""
-    given = [e.presence() for e in effects if type(e) in INTERACTION]
-    return NeighbourState(**{key: value for table in given for key, value in table.items()})
+    tables = [e.presence() for e in effects if type(e) in INTERACTION]
+    return NeighbourState(**{key: value for table in tables for key, value in table.items()})
 
 
 def _all_interactions(effects: Any, *_rest: Any) -> Any:

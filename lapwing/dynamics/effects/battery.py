@@ -40,11 +40,11 @@ class Battery(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
         """Return the parameters of the airframe's battery."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")
         resistance = pack.cells * pack.cell_resistance
         return cls(
-            float(pack.cells), pack.capacity, resistance, given.initial_charge, pack.cells * given.cutoff_voltage
+            float(pack.cells), pack.capacity, resistance, settings.initial_charge, pack.cells * settings.cutoff_voltage
         )
 
     def initial_discrete_state(self) -> tuple[float, float, float]:

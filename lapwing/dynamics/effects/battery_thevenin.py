@@ -73,20 +73,21 @@ class BatteryThevenin(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
         """Return the parameters of the airframe's battery."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")
-        if given.restart is not None and given.restart <= given.cutoff_voltage:
+        if settings.restart is not None and settings.restart <= settings.cutoff_voltage:
             raise ConfigError(
-                "restart", f"got {given.restart:g} V", f"more than cutoff_voltage = {given.cutoff_voltage:g} V"
+                "restart", f"got {settings.restart:g} V", f"more than cutoff_voltage = {settings.cutoff_voltage:g} V"
             )
         n, ohmic = pack.cells, pack.cell_resistance
-        fast, slow = given.transient_resistance or (0.627 * ohmic, 0.669 * ohmic)
-        heat = given.heat_capacity or n * NOMINAL_VOLTAGE * pack.capacity * HEAT_PER_ENERGY
-        restart = math.inf if given.restart is None else n * given.restart
+        fast, slow = settings.transient_resistance or (0.627 * ohmic, 0.669 * ohmic)
+        heat = settings.heat_capacity or n * NOMINAL_VOLTAGE * pack.capacity * HEAT_PER_ENERGY
+        restart = math.inf if settings.restart is None else n * settings.restart
         return cls(
-            float(n), pack.capacity, n * ohmic, n * fast, n * slow, *given.transient_time, given.initial_charge,
-            n * given.cutoff_voltage, restart, given.activation, heat, given.cooling_time,
-            given.temperature or REFERENCE, given.peukert_exponent, given_temperature=given.temperature is not None,
+            float(n), pack.capacity, n * ohmic, n * fast, n * slow, *settings.transient_time, settings.initial_charge,
+            n * settings.cutoff_voltage, restart, settings.activation, heat, settings.cooling_time,
+            settings.temperature or REFERENCE, settings.peukert_exponent,
+            given_temperature=settings.temperature is not None,
         )  # fmt: skip
 
     def in_environment(self, environment: Environment) -> "BatteryThevenin":
@@ -121,11 +122,11 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     # the transients' heat is taken for that of the current through them: in the mean of a load it is
     settled = e.air_temperature + (ohmic + fast + slow) * current * e.cooling_time / e.heat_capacity
     temperature = settled + cooled * (temperature - settled)
-    taken = current
+    drain = current
     rated = e.capacity / 3600.0  # [A] 1 C
     if e.peukert_exponent > 1.0 and current > rated:
-        taken = current * math.pow(current / rated, e.peukert_exponent - 1.0)
-    charge = max(charge - taken * interval / e.capacity, 0.0)
+        drain = current * math.pow(current / rated, e.peukert_exponent - 1.0)
+    charge = max(charge - drain * interval / e.capacity, 0.0)
     voltage = e.cells * open_circuit_voltage(charge) - ohmic - fast - slow
     on = 1.0 if voltage > (e.cutoff_voltage if on > 0.0 else e.restart) else 0.0
     return (charge, max(voltage, 0.0), current, temperature, fast, slow, on)

@@ -35,12 +35,12 @@ class BodyDrag(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyDrag":
         """Return the parameters with the airframe's areas, unless the table has others."""
-        given = checked(Settings, table)
-        area = given.area
+        settings = checked(Settings, table)
+        area = settings.area
         if area is None:
             area = airframe.drag.area if airframe.drag else reject("needs the key area: the vehicle has no [drag]")
         x, y, z = area
-        return cls((0.5 * x, 0.5 * y, 0.5 * z), given.linear)
+        return cls((0.5 * x, 0.5 * y, 0.5 * z), settings.linear)
 
 
 @wrench_body(BodyDrag)

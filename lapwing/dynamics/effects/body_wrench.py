@@ -36,8 +36,8 @@ class BodyWrench(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyWrench":
         """Take both from the scene's table."""
-        given = checked(Settings, table)
-        return cls(given.force, given.torque)
+        settings = checked(Settings, table)
+        return cls(settings.force, settings.torque)
 
 
 @wrench_body(BodyWrench)

@@ -52,7 +52,7 @@ class CeilingEffect(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CeilingEffect":
         """Return the parameters of the airframe's propeller."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -60,11 +60,11 @@ class CeilingEffect(NamedTuple):
         flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         if flow >= pitch:
             reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
-        length, width = given.size or (UNBOUNDED, UNBOUNDED)
+        length, width = settings.size or (UNBOUNDED, UNBOUNDED)
         reach = FADE_TO * radius + max(math.hypot(*place) for place in airframe.rotors.position)
         return cls(
-            1.0 / radius, given.height, given.centre, (0.5 * length, 0.5 * width), given.asymmetry, pitch / flow,
-            min(static * flow / torque, 1.0), reach,
+            1.0 / radius, settings.height, settings.centre, (0.5 * length, 0.5 * width), settings.asymmetry,
+            pitch / flow, min(static * flow / torque, 1.0), reach,
         )  # fmt: skip
 
 

@@ -117,7 +117,7 @@ def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
     """Return (index, distance [m]) of the nearest rotor whose wake reaches rotor k; (-1, 0) if none does."""
     places = np.array(airframe.rotors.position)
     axes = np.array(airframe.rotors.tilted_axis or [(0.0, 0.0, 1.0)] * len(places))
-    found = []
+    candidates = []
     for j, arm in enumerate(places - places[k]):
         height = small_matrices.dot(arm, axes[k])
         aside = small_matrices.length(arm - height * axes[k])
@@ -126,8 +126,8 @@ def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
             and aside <= ASIDE * radius
             and small_matrices.dot(axes[j], axes[k]) >= PARALLEL
         ):
-            found.append((height, j))
-    distance, number = min(found, default=(0.0, -1))
+            candidates.append((height, j))
+    distance, number = min(candidates, default=(0.0, -1))
     return number, distance
 
 

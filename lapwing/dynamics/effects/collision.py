@@ -52,12 +52,12 @@ class Collision(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Collision":
         """Return the parameters with a sphere around the rotors, unless the table has its own."""
-        given = checked(Settings, table)
-        radius = given.radius
+        settings = checked(Settings, table)
+        radius = settings.radius
         if radius is None:
             propeller = airframe.propeller or reject("needs the key radius: the vehicle has no [propeller]")
             radius = max(math.hypot(*place) for place in airframe.rotors.position) + 0.5 * propeller.diameter
-        return cls(radius, given.restitution, given.friction)
+        return cls(radius, settings.restitution, settings.friction)
 
     def initial_discrete_state(self) -> tuple[Vec3, Vec3]:
         """Return zero force [N] and torque [N m] of others, world."""
@@ -88,11 +88,11 @@ def touch(e, memory, own, others, interval):
         normal = scale(1.0 / distance, apart)
         relative = subtract(own.velocity_world, other.velocity_world)
         parting = dot(normal, relative)
-        wanted = max(-min(own.restitution, other.restitution) * parting, PUSH * depth / interval)
-        if wanted <= parting:
+        desired = max(-min(own.restitution, other.restitution) * parting, PUSH * depth / interval)
+        if desired <= parting:
             continue
         reduced = own.mass * other.mass / (own.mass + other.mass)
-        push = reduced * (wanted - parting) / interval  # [N]
+        push = reduced * (desired - parting) / interval  # [N]
         force = add(force, scale(push, normal))
         rough = min(own.friction, other.friction)
         if rough == 0.0:

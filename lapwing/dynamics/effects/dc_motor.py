@@ -56,18 +56,18 @@ class DcMotor(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "DcMotor":
         """Return the parameters of the airframe's motor."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         engine = airframe.motor
         inertia = airframe.rotors.inertia + engine.inertia / (engine.gear_ratio * engine.gear_ratio)
         resistance = engine.resistance + engine.esc_resistance
         winding = ()
-        if given.inductance:
-            winding = _winding(given.inductance, resistance, engine.rotor_constant, engine.belt_efficiency, inertia)
+        if settings.inductance:
+            winding = _winding(settings.inductance, resistance, engine.rotor_constant, engine.belt_efficiency, inertia)
         return cls(
             engine.rotor_constant,
             1.0 / resistance,
             engine.no_load_current,
-            0.0 - given.braking_current,
+            0.0 - settings.braking_current,
             airframe.motor_current_limit,
             engine.power_limit,
             1.0 / inertia,
@@ -104,11 +104,11 @@ def _free(e, speed, voltage):
 @always_inline
 def _limited(e, speed, current):
     """Return the current [A] that the controller allows."""
-    wanted = min(max(current, e.least_current), e.current_limit)
+    desired = min(max(current, e.least_current), e.current_limit)
     # the power K w I + R I^2 is at its limit where I = 2 P / (K w + sqrt((K w)^2 + 4 R P))
     back = e.motor_constant * speed
-    if wanted * (back + wanted / e.inverse_resistance) <= e.power_limit:
-        return wanted
+    if desired * (back + desired / e.inverse_resistance) <= e.power_limit:
+        return desired
     return 2.0 * e.power_limit / (back + math.sqrt(back * back + 4.0 * e.power_limit / e.inverse_resistance))
 
 
@@ -151,46 +151,46 @@ def _without_lag(c, both, voltage):
 
 @always_inline
 def _lagging(c, both, more):
-    e, kept = c
+    e, decay = c
     speed, torque = both
     voltage, (transient, _) = more
-    return _driven(e, speed, torque, _settled(e, speed, torque, voltage) + kept * transient, voltage)
+    return _driven(e, speed, torque, _settled(e, speed, torque, voltage) + decay * transient, voltage)
 
 
 @always_inline
-def _all_without_lag(given):
-    e, _, __, both, voltage = given
+def _all_without_lag(arguments):
+    e, _, __, both, voltage = arguments
     return map_tuple(_without_lag, (e, 0.0), both, voltage)
 
 
 @always_inline
-def _all_lagging(given):
-    e, memory, t, both, voltage = given
-    kept = exact.exp(-e.winding[2] * (t - memory[0]))
-    return map_tuple(_lagging, (e, kept), both, map_tuple(pair, 0.0, voltage, memory[1]))
+def _all_lagging(arguments):
+    e, memory, t, both, voltage = arguments
+    decay = exact.exp(-e.winding[2] * (t - memory[0]))
+    return map_tuple(_lagging, (e, decay), both, map_tuple(pair, 0.0, voltage, memory[1]))
 
 
 @always_inline
 def _continued(c, both, more):
     """Return (transient [A], voltage [V]) of a rotor whose current goes on from a step of the voltage."""
-    e, kept = c
+    e, decay = c
     speed, torque = both
     voltage, (transient, before) = more
-    current = _limited(e, speed, _settled(e, speed, torque, before) + kept * transient)
+    current = _limited(e, speed, _settled(e, speed, torque, before) + decay * transient)
     return current - _settled(e, speed, torque, voltage), voltage
 
 
 @always_inline
-def _update_without_lag(given):
+def _update_without_lag(arguments):
     return ()
 
 
 @always_inline
-def _update_lagging(given):
-    e, memory, s, rotors = given
-    kept = exact.exp(-e.winding[2] * (s.t - memory[0]))
+def _update_lagging(arguments):
+    e, memory, s, rotors = arguments
+    decay = exact.exp(-e.winding[2] * (s.t - memory[0]))
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, rotors.torque)
-    return s.t, map_tuple(_continued, (e, kept), both, map_tuple(pair, 0.0, rotors.voltage, memory[1]))
+    return s.t, map_tuple(_continued, (e, decay), both, map_tuple(pair, 0.0, rotors.voltage, memory[1]))
 
 
 @discrete_update(DcMotor)

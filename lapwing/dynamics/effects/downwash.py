@@ -42,11 +42,11 @@ class Downwash(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":
         """Return the parameters with the discs of the airframe's propellers."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         places = airframe.rotors.position
         opposite = 2.0 * max(math.hypot(x, y) for x, y, _ in places)
-        return cls(0.5 * propeller.diameter * math.sqrt(len(places)), given.spread, given.core * opposite)
+        return cls(0.5 * propeller.diameter * math.sqrt(len(places)), settings.spread, settings.core * opposite)
 
     def initial_discrete_state(self) -> tuple[float, float, float]:
         """Return the wind of others [m/s], world."""

@@ -50,8 +50,8 @@ def _element(e, deflection, foot):
     limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * foot.press
     square = dot(stretched, stretched)
     over = square - limit * limit
-    held = select_vector(over, scale(limit / sqrt(square), stretched), stretched) if any_above(over) else stretched
-    return scale(-1.0, held), scale(1.0 / e.tangential_damping, subtract(held, pull))
+    limited = select_vector(over, scale(limit / sqrt(square), stretched), stretched) if any_above(over) else stretched
+    return scale(-1.0, limited), scale(1.0 / e.tangential_damping, subtract(limited, pull))
 
 
 def _friction(e, memory, foot):

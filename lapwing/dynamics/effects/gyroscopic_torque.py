@@ -40,8 +40,8 @@ def _signed(_, sign, value):
 
 
 @always_inline
-def _along_z(given):
-    e, s, rotors = given
+def _along_z(arguments):
+    e, s, rotors = arguments
     sign, omega = s.layout.reaction_sign, s.motion.omega_body
     # a rotor that pushes the body to +z turns about -z itself
     momentum = -e.inertia * total(map_tuple(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
@@ -61,8 +61,8 @@ def _sum_along(axis, sign, values):
 
 
 @always_inline
-def _tilted(given):
-    e, s, rotors = given
+def _tilted(arguments):
+    e, s, rotors = arguments
     sign, axis = s.layout.reaction_sign, s.layout.axis
     momentum = scale(-e.inertia, _sum_along(axis, sign, s.motion.rotor_speed))
     spin_up = scale(e.inertia, _sum_along(axis, sign, rotors.acceleration))

@@ -39,11 +39,11 @@ class HForce(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "HForce":
         """Return the parameters of the airframe's propeller, unless the table has the coefficient."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         positions = airframe.rotors.position
         if len({z for _, _, z in positions}) > 1 and not airframe.rotors.tilted_axis:
             reject("the rotors must all be at one height")
-        coefficient = given.coefficient
+        coefficient = settings.coefficient
         if coefficient is None:
             propeller = airframe.propeller or reject("needs the key coefficient: the vehicle has no [propeller]")
             coefficient = h_force_coefficient(propeller)
@@ -56,8 +56,8 @@ def _product(_, a, b):
 
 
 @always_inline
-def _along_z(given):
-    e, s = given
+def _along_z(arguments):
+    e, s = arguments
     layout, speed = s.layout, s.motion.rotor_speed
     v, omega = air_body(s)
     # sums over the rotors of speed times 1, x, y and x^2 + y^2 give the force and torque of all of them
@@ -82,8 +82,8 @@ def _of_rotor(c, speed, at):
 
 
 @always_inline
-def _tilted(given):
-    e, s = given
+def _tilted(arguments):
+    e, s = arguments
     air, omega = air_body(s)
     at = map_tuple(pair, 0.0, places(s.layout), s.layout.axis)
     return total_wrench(map_tuple(_of_rotor, (e.coefficient * s.air.density, air, omega), s.motion.rotor_speed, at))

@@ -62,7 +62,7 @@ class MultirotorGroundEffect(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "MultirotorGroundEffect":
         """Return the parameters of the airframe's propellers over level ground."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, places = 0.5 * propeller.diameter, airframe.rotors.position
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -71,7 +71,7 @@ class MultirotorGroundEffect(NamedTuple):
         pairs = tuple(tuple((_square(a, b), 0.0 if a is b else share) for b in places) for a in places)
         diagonal = max(square for row in pairs for square, _ in row)
         reach = max(math.hypot(*place) for place in places)
-        fountain = 2.0 * radius * radius * given.fountain
+        fountain = 2.0 * radius * radius * settings.fountain
         return cls(radius, LOWEST * radius, flow, fountain, diagonal, pairs, FADE_TO * radius + reach)
 
     def in_environment(self, environment: Environment) -> "MultirotorGroundEffect":

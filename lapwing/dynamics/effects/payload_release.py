@@ -40,16 +40,16 @@ class PayloadRelease(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "PayloadRelease":
         """Return mass properties with and without the box."""
-        given = checked(Settings, table)
-        release = float("inf") if given.release_time is None else given.release_time
+        settings = checked(Settings, table)
+        release = float("inf") if settings.release_time is None else settings.release_time
         if airframe.payload:
             if twice := {"mass", "size"} & set(table):
                 raise ConfigError(min(twice), "stands beside the table airframe.payload", "one of them")
             return cls(release, *_with_and_without(airframe))
-        mass, total = airframe.mass.payload if given.mass is None else given.mass, airframe.mass.total
+        mass, total = airframe.mass.payload if settings.mass is None else settings.mass, airframe.mass.total
         if mass >= total:
             raise ConfigError("mass", f"got {mass}", f"less than the vehicle's {total} kg")
-        x, y, z = given.size
+        x, y, z = settings.size
         box = (mass * (y * y + z * z) / 12.0, mass * (z * z + x * x) / 12.0, mass * (x * x + y * y) / 12.0)
         inertia, products = airframe.mass.inertia, airframe.mass.products
         rest = (inertia[0] - box[0], inertia[1] - box[1], inertia[2] - box[2])

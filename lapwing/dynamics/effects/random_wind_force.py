@@ -53,8 +53,13 @@ class RandomWindForce(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RandomWindForce":
         """Return the parameters of a scene's table."""
-        given = checked(Settings, table)
-        return cls(given.mean, given.sigma, 0.5 * given.shape_coefficient * given.area * given.density, given.interval)
+        settings = checked(Settings, table)
+        return cls(
+            settings.mean,
+            settings.sigma,
+            0.5 * settings.shape_coefficient * settings.area * settings.density,
+            settings.interval,
+        )
 
     def initial_discrete_state(self) -> tuple[Vec3, Vec3]:
         """Return zero force and wind, before the first tick."""

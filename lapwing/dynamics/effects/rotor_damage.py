@@ -38,15 +38,15 @@ class RotorDamage(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
         """Return the parameters for one of the airframe's rotors."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         count = len(airframe.rotors.position)
-        if given.rotor > count:
-            raise ConfigError("rotor", f"got {given.rotor}", f"one of the vehicle's rotors, 1 to {count}")
+        if settings.rotor > count:
+            raise ConfigError("rotor", f"got {settings.rotor}", f"one of the vehicle's rotors, 1 to {count}")
 
         def only_this(left):
-            return tuple(left if k == given.rotor else 1.0 for k in range(1, count + 1))
+            return tuple(left if k == settings.rotor else 1.0 for k in range(1, count + 1))
 
-        return cls(given.time, only_this(given.remaining_thrust), only_this(given.remaining_torque))
+        return cls(settings.time, only_this(settings.remaining_thrust), only_this(settings.remaining_torque))
 
     def initial_discrete_state(self) -> tuple[PerRotor, PerRotor]:
         """Return the current fractions of thrust and torque."""

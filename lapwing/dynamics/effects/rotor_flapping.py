@@ -43,15 +43,15 @@ class RotorFlapping(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorFlapping":
         """Return the parameters of the airframe's propeller."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
-        coefficient, radius = given.coefficient, 0.5 * propeller.diameter
+        coefficient, radius = settings.coefficient, 0.5 * propeller.diameter
         if coefficient is None:
             # at the tip: geometric angle H / (2 pi R), inflow ratio v_h / (w R) = sqrt(T / (2 rho A)) / (w R)
             tip = propeller.pitch / (2.0 * math.pi * radius)
             inflow = math.sqrt(2.0 * thrust_coefficient(propeller) / math.pi) / math.pi
             coefficient = max(4.0 * tip - 2.0 * inflow, 0.0)
-        return cls(coefficient, given.stiffness, 1.0 / radius)
+        return cls(coefficient, settings.stiffness, 1.0 / radius)
 
 
 @always_inline
@@ -87,15 +87,15 @@ def _wrench_tilted(c, at, state):
 
 
 @always_inline
-def _along_z(given):
-    e, s, states = given
+def _along_z(arguments):
+    e, s, states = arguments
     air, omega = air_body(s)
     return total_wrench(map_tuple(_wrench, (e, air, omega), places(s.layout), states))
 
 
 @always_inline
-def _tilted(given):
-    e, s, states = given
+def _tilted(arguments):
+    e, s, states = arguments
     air, omega = air_body(s)
     at = map_tuple(pair, 0.0, places(s.layout), s.layout.axis)
     return total_wrench(map_tuple(_wrench_tilted, (e, air, omega), at, states))

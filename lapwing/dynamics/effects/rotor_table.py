@@ -59,17 +59,17 @@ class RotorTable(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorTable":
         """Return the parameters of the table, with the airframe's diameter."""
-        given = checked(Settings, table)
-        diameter = given.diameter
+        settings = checked(Settings, table)
+        diameter = settings.diameter
         if diameter is None:
             propeller = airframe.propeller or reject("needs the key diameter: the vehicle has no [propeller]")
             diameter = propeller.diameter
-        _check(given)
-        thrust = np.array(given.thrust) * math.pow(diameter, 4)
-        torque = np.array(given.power) * math.pow(diameter, 5) / (2.0 * math.pi)
-        at_rest, square = given.advance.index(0.0), math.square(2.0 * math.pi)
+        _check(settings)
+        thrust = np.array(settings.thrust) * math.pow(diameter, 4)
+        torque = np.array(settings.power) * math.pow(diameter, 5) / (2.0 * math.pi)
+        at_rest, square = settings.advance.index(0.0), math.square(2.0 * math.pi)
         return cls(
-            np.array(given.advance), np.radians(given.angle_deg), thrust, torque, diameter,
+            np.array(settings.advance), np.radians(settings.angle_deg), thrust, torque, diameter,
             float(thrust[0, at_rest]) / square, float(torque[0, at_rest]) / square,
         )  # fmt: skip
 
@@ -85,8 +85,8 @@ def embed(table: dict[str, Any], folder: Path) -> None:
     """Read the file of a scene's table into the table. Raise ConfigError if it is invalid."""
     if not isinstance(file := table.get("file"), str):
         return
-    if given := {"advance", "angle_deg", "thrust", "power"} & set(table):
-        raise ConfigError(min(given), "stands beside file", "one of them")
+    if settings := {"advance", "angle_deg", "thrust", "power"} & set(table):
+        raise ConfigError(min(settings), "stands beside file", "one of them")
     path = folder / file
     try:
         table.update(parsed("file", path.read_text(encoding="utf-8")))
@@ -96,9 +96,9 @@ def embed(table: dict[str, Any], folder: Path) -> None:
         raise ConfigError("file", f"{path}: not a UTF-8 text file") from None
 
 
-def _check(given: Settings) -> None:
+def _check(settings: Settings) -> None:
     """Raise ConfigError if the table cannot be interpolated."""
-    j, angles = given.advance, given.angle_deg
+    j, angles = settings.advance, settings.angle_deg
     if not j:
         raise ConfigError("advance", "missing", "the advance ratios, or file = the path of a table of test data")
     for name, values in (("advance", j), ("angle_deg", angles)):
@@ -114,7 +114,7 @@ def _check(given: Settings) -> None:
         raise ConfigError(
             "advance", f"got J from {j[0]:g} to {j[-1]:g}", "two rows or more, J = 0 (at rest) among them"
         )
-    for name, curves in (("thrust", given.thrust), ("power", given.power)):
+    for name, curves in (("thrust", settings.thrust), ("power", settings.power)):
         if [len(curve) for curve in curves] != [len(j)] * len(angles):
             raise ConfigError(name, f"got rows of {[len(c) for c in curves]}", f"{len(angles)} of {len(j)} numbers")
         at_rest = curves[0][j.index(0.0)]
@@ -171,21 +171,21 @@ def _loads(c, speed, hub):
 
 @always_inline
 def _thrust(_, before, both):
-    factor, found = both
-    return before + factor * found[0]
+    factor, values = both
+    return before + factor * values[0]
 
 
 @always_inline
 def _torque(_, before, both):
-    factor, found = both
-    return before + factor * found[1]
+    factor, values = both
+    return before + factor * values[1]
 
 
 @loads(RotorTable)
 def rotor_table(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
-    found = map_tuple(_loads, (e, s.air.density), s.motion.rotor_speed, hub_speeds(s))
+    values = map_tuple(_loads, (e, s.air.density), s.motion.rotor_speed, hub_speeds(s))
     return Loads(
-        map_tuple(_thrust, 0.0, before.thrust, map_tuple(pair, 0.0, factors.thrust, found)),
-        map_tuple(_torque, 0.0, before.torque, map_tuple(pair, 0.0, factors.torque, found)),
+        map_tuple(_thrust, 0.0, before.thrust, map_tuple(pair, 0.0, factors.thrust, values)),
+        map_tuple(_torque, 0.0, before.torque, map_tuple(pair, 0.0, factors.torque, values)),
     )

@@ -43,11 +43,11 @@ class SharedSlungLoad(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "SharedSlungLoad":
         """Return the parameters with the damping for the airframe's mass."""
-        given = checked(Settings, table)
-        reduced = 1.0 / (1.0 / given.mass + 1.0 / airframe.mass.total)
-        damping = 2.0 * given.damping_ratio * math.sqrt(given.stiffness * reduced)
-        hook = subtract(given.hook, airframe.mass.centre)
-        return cls(Sling(given.mass, given.length, given.stiffness, damping, hook, given.drag_area, LEVEL))
+        settings = checked(Settings, table)
+        reduced = 1.0 / (1.0 / settings.mass + 1.0 / airframe.mass.total)
+        damping = 2.0 * settings.damping_ratio * math.sqrt(settings.stiffness * reduced)
+        hook = subtract(settings.hook, airframe.mass.centre)
+        return cls(Sling(settings.mass, settings.length, settings.stiffness, damping, hook, settings.drag_area, LEVEL))
 
     def in_environment(self, environment: Environment) -> "SharedSlungLoad":
         """Return the effect over the scene's terrain."""

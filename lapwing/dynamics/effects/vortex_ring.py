@@ -55,13 +55,13 @@ class VortexRing(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "VortexRing":
         """Return the parameters of the airframe's propeller."""
-        given = checked(Settings, table)
+        settings = checked(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, count = 0.5 * propeller.diameter, len(airframe.rotors.position)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
         flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         lanes = tuple(LANE + k for k in range(count))
-        return cls(flow, given.loss, given.unsteadiness, lanes, ((0.0, 0.0),) * count)
+        return cls(flow, settings.loss, settings.unsteadiness, lanes, ((0.0, 0.0),) * count)
 
     def initial_discrete_state(self) -> tuple[tuple[float, float], ...]:
         """Return the oscillation of each rotor, in phase and a quarter of a period behind, of unit deviation later."""
@@ -87,11 +87,11 @@ def _oscillated(c, state, both):
     key, tick, interval = c
     speed, lane = both
     angle = speed * interval
-    kept, drawn = math.exp(-FADING * angle), normal3(key, tick, lane)
-    fresh = math.sqrt(1.0 - kept * kept)
+    decay, drawn = math.exp(-FADING * angle), normal3(key, tick, lane)
+    fresh = math.sqrt(1.0 - decay * decay)
     sine, cosine = math.sincos(TURNING * angle)
     a, b = state
-    return kept * (cosine * a - sine * b) + fresh * drawn[0], kept * (sine * a + cosine * b) + fresh * drawn[1]
+    return decay * (cosine * a - sine * b) + fresh * drawn[0], decay * (sine * a + cosine * b) + fresh * drawn[1]
 
 
 @discrete_update(VortexRing)

@@ -38,9 +38,11 @@ class WindBoundaryLayer(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "WindBoundaryLayer":
         """Return the parameters over level ground."""
-        given = checked(Settings, table)
-        scale = given.speed / math.log1p(given.height / given.roughness)
-        return cls((scale * math.cos(given.direction_to), scale * math.sin(given.direction_to)), 1.0 / given.roughness)
+        settings = checked(Settings, table)
+        scale = settings.speed / math.log1p(settings.height / settings.roughness)
+        return cls(
+            (scale * math.cos(settings.direction_to), scale * math.sin(settings.direction_to)), 1.0 / settings.roughness
+        )
 
     def in_environment(self, environment: Environment) -> "WindBoundaryLayer":
         """Return the effect over the scene's terrain."""

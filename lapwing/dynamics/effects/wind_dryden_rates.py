@@ -92,21 +92,21 @@ def passed(x1, x2, z, beta, theta, n1, n2, n3):
     """
     k = beta - 1.0
     k = k if abs(k) > APART else APART
-    kept, low = math.exp(-theta), math.exp(-beta * theta)
-    i0 = (kept - low) / k
-    i1 = (theta * kept - i0) / k
+    decay, low = math.exp(-theta), math.exp(-beta * theta)
+    i0 = (decay - low) / k
+    i1 = (theta * decay - i0) / k
     a, b = beta * (ROOT3 * i0 + (1.0 - ROOT3) * i1), beta * (1.0 - ROOT3) * i0  # of x1, of x2
     # covariances when all is stationary, and what of them is new after that time
     p13 = beta * (0.5 * ROOT3 + 0.25 * (1.0 - ROOT3)) / (1.0 + beta)
     p23 = (p13 + 0.25 * beta) / (1.0 + beta)
     p33 = ROOT3 * p13 + (1.0 - ROOT3) * p23
     mean1, mean2, mean3 = 0.5 * a + 0.25 * b + p13 * low, 0.25 * (a + b) + p23 * low, a * p13 + b * p23 + p33 * low
-    q13 = p13 - kept * mean1
-    q23 = p23 - kept * (mean2 + theta * mean1)
+    q13 = p13 - decay * mean1
+    q23 = p23 - decay * (mean2 + theta * mean1)
     q33 = p33 - (a * mean1 + b * mean2 + low * mean3)
-    q11 = 0.5 * (1.0 - kept * kept)
-    q12 = 0.25 * (1.0 - kept * kept * (1.0 + 2.0 * theta))
-    q22 = 0.25 * (1.0 - kept * kept * (1.0 + 2.0 * theta * (1.0 + theta)))
+    q11 = 0.5 * (1.0 - decay * decay)
+    q12 = 0.25 * (1.0 - decay * decay * (1.0 + 2.0 * theta))
+    q22 = 0.25 * (1.0 - decay * decay * (1.0 + 2.0 * theta * (1.0 + theta)))
     root = math.sqrt(q11)
     cross = q12 / root
     rest = math.sqrt(max(q22 - cross * cross, 0.0))

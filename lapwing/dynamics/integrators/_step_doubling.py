@@ -39,18 +39,18 @@ def integrate_step_doubling(how, p, t, x, h, end):
         left = end - t
         part = min(part, 2.0 * h)
         last = part > (1.0 - 1e-9) * left
-        taken = left if last else part
-        half = 0.5 * taken
-        whole = _once(how.method, p, t, x, taken)
+        size = left if last else part
+        half = 0.5 * size
+        whole = _once(how.method, p, t, x, size)
         y = _once(how.method, p, t + half, _once(how.method, p, t, x, half), half)
         sound = finite(y)
         error = relative_difference(y, whole) if sound else math.inf
-        if error > allowed and taken > smallest:
-            part = shorter(taken, error, allowed)
+        if error > allowed and size > smallest:
+            part = shorter(size, error, allowed)
             continue
         x = y
         if last or not sound:
             return x
-        t += taken
+        t += size
         if error < allowed / 32.0:
-            part = 2.0 * taken
+            part = 2.0 * size

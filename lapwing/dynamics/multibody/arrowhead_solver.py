@@ -131,9 +131,9 @@ def _sum(m):
 @always_inline
 def eliminate(core, leaf):
     """Return accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
-    given = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
+    drive = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
     force = subtract(leaf.force, scale(leaf.mass, leaf.drift))
-    torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(given, leaf.axis)))
+    torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(drive, leaf.axis)))
     mass, moment = core.mass + horizontal_sum(leaf.mass), _all(scale(leaf.mass, leaf.offset))
     inverse = 1.0 / mass
     points = point_inertia(leaf.mass, leaf.offset)
@@ -147,7 +147,7 @@ def eliminate(core, leaf):
     # back to the leaves, eqs. (8.40), (8.41)
     turned = add(alpha, leaf.turn)
     relative = add(cross(alpha, leaf.offset), leaf.drift)
-    spin = given * (1.0 / leaf.axial) - leaf.spins * dot(leaf.axis, turned)
+    spin = drive * (1.0 / leaf.axial) - leaf.spins * dot(leaf.axis, turned)
     return Result(
         a,
         alpha,
@@ -155,5 +155,5 @@ def eliminate(core, leaf):
         add(turned, scale(spin, leaf.axis)),
         spin,
         subtract(scale(leaf.mass, add(a, relative)), leaf.force),
-        subtract(add(times(leaf.inertia, turned), scale(given, leaf.axis)), leaf.torque),
+        subtract(add(times(leaf.inertia, turned), scale(drive, leaf.axis)), leaf.torque),
     )

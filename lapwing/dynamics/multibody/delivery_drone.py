@@ -131,10 +131,10 @@ def _double(angles):
 @always_inline
 def _propellers(d, x, loads, g):
     """Return the propellers as leaves in chassis axes; their inertia varies at twice the speed (eq. (8.50))."""
-    w, speed, spins, held = x.omega_body, interleave(x.speeds), interleave(d.spins), interleave(d.held)
+    w, speed, spins, attached = x.omega_body, interleave(x.speeds), interleave(d.spins), interleave(d.held)
     offset, drive = interleave(d.hubs), interleave(loads.drive)
-    mass, inertia = held * interleave(d.propeller_mass), interleave(d.propeller_inertia)
-    moments = scale(held, inertia)
+    mass, inertia = attached * interleave(d.propeller_mass), interleave(d.propeller_inertia)
+    moments = scale(attached, inertia)
     cosine, sine = _double(x.angles)
     mean, half = 0.5 * (moments[0] + moments[1]), 0.5 * (moments[0] - moments[1])
     c, s = half * cosine, half * sine
@@ -149,11 +149,11 @@ def _propellers(d, x, loads, g):
         (zero, zero, 1.0 + zero),
         inertia[2],
         spins,
-        held * drive,
+        attached * drive,
         cross(w, cross(w, offset)),
         (w[1] * speed, -w[0] * speed, drive * (1.0 - spins)),
-        (weight[0], weight[1], weight[2] + held * interleave(loads.thrust)),
-        (-gyroscopic[0], -gyroscopic[1], held * interleave(loads.aerodynamic_torque) - gyroscopic[2]),
+        (weight[0], weight[1], weight[2] + attached * interleave(loads.thrust)),
+        (-gyroscopic[0], -gyroscopic[1], attached * interleave(loads.aerodynamic_torque) - gyroscopic[2]),
     )
 
 
@@ -170,8 +170,8 @@ def motion(d, loads, x):
         subtract(loads.torque_body, cross(w, multiply(d.inertia, w))),
     )
     s = eliminate(core, _propellers(d, x, loads, g))
-    held, spins = interleave(d.held), interleave(d.spins)
-    spin = held * (s.spin + (1.0 - spins) * interleave(loads.drive))
+    attached, spins = interleave(d.held), interleave(d.spins)
+    spin = attached * (s.spin + (1.0 - spins) * interleave(loads.drive))
     return Accelerations(
         apply(R, s.acceleration),
         s.angular_acceleration,

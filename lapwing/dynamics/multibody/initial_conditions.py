@@ -15,12 +15,12 @@ def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> 
     configuration, velocity, _, drive = prepared(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
     refuse_singular(system, p.singular)
-    names, held = system.row_names(), len(e.residual)
+    names, holonomic = system.row_names(), len(e.residual)
     bad = [f"{names[r]} (position, {e.residual[r]:.3g})" for r in np.flatnonzero(np.abs(e.residual) > tolerance)]
     slip = velocity_defect(e, velocity)
     bad += [f"{names[r]} (velocity, {slip[r]:.3g})" for r in np.flatnonzero(np.abs(slip) > tolerance)]
     if bad:
-        raise ValueError(f"initial state violates {len(bad)} of {held + len(slip)} conditions: {'; '.join(bad)}")
+        raise ValueError(f"initial state violates {len(bad)} of {holonomic + len(slip)} conditions: {'; '.join(bad)}")
 
 
 def consistent(system, configuration, velocity, drive=None):

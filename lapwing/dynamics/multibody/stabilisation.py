@@ -48,9 +48,9 @@ def defects(a, configuration, velocity, drive):
 def ranks(a, configuration, velocity, drive):
     """Return (rank of the holonomic rows, rank of all rows) at a consistent state."""
     p, e = rows(a, configuration, velocity, drive)
-    _, _, held = factor_rows(a, p, e, len(e.residual), RANK_TOLERANCE, ANY)
+    _, _, holonomic = factor_rows(a, p, e, len(e.residual), RANK_TOLERANCE, ANY)
     _, _, every = factor_rows(a, p, e, len(e.target), RANK_TOLERANCE, ANY)
-    return held.rank, every.rank
+    return holonomic.rank, every.rank
 
 
 @kernel
@@ -65,12 +65,12 @@ def project(a, configuration, velocity, drive, ranks):
 
     `ranks`: upper bounds of the rank of the holonomic rows and of all rows.
     """
-    held = 5 * len(a.joint_bodies)
+    holonomic = 5 * len(a.joint_bodies)
     p, e = rows(a, configuration, velocity, drive)
     for _ in range(ITERATIONS):
         if largest(e.residual) < ENOUGH:
             break
-        root, rotational, f = factor_rows(a, p, e, held, _tolerance(e), ranks[0])
+        root, rotational, f = factor_rows(a, p, e, holonomic, _tolerance(e), ranks[0])
         y, _, _ = pivoted_qr.shortest(f, -e.residual)
         divide_root_transposed(root, rotational, y)
         configuration = displaced(configuration, y.reshape(-1, 6))
@@ -109,10 +109,10 @@ def partition(a, configuration, velocity, drive, ranks):
     Column pivoting of the Jacobian selects the dependent coordinates, which Newton's iteration corrects; then the
     velocities. See `project` for `ranks`.
     """
-    held, width = 5 * len(a.joint_bodies), 6 * len(a.mass)
+    holonomic, width = 5 * len(a.joint_bodies), 6 * len(a.mass)
     _, e = rows(a, configuration, velocity, drive)
-    if held > 0:
-        jacobian = np.ascontiguousarray(e.jacobian_t[:, :held].T)
+    if holonomic > 0:
+        jacobian = np.ascontiguousarray(e.jacobian_t[:, :holonomic].T)
         mask = _dependent(pivoted_qr.factor(jacobian, _tolerance(e), ranks[0]), width)
         for _ in range(ITERATIONS):
             if largest(e.residual) < ENOUGH:
@@ -120,7 +120,7 @@ def partition(a, configuration, velocity, drive, ranks):
             change = _correction(jacobian, mask, e.residual, _tolerance(e), ranks[0])
             configuration = displaced(configuration, change.reshape(-1, 6))
             _, e = rows(a, configuration, velocity, drive)
-            jacobian = np.ascontiguousarray(e.jacobian_t[:, :held].T)
+            jacobian = np.ascontiguousarray(e.jacobian_t[:, :holonomic].T)
     if len(e.target) > 0:
         jacobian = np.ascontiguousarray(e.jacobian_t.T)
         mask = _dependent(pivoted_qr.factor(jacobian, _tolerance(e), ranks[1]), width)

@@ -100,15 +100,15 @@ def top(t, x, y):
 
 
 @kernel
-def _deeper(found, place, top_z, wall):
+def _deeper(deepest, place, top_z, wall):
     """Return the deeper of a previous result and the depth in an obstacle, measured to its nearest face."""
     under = top_z - place[2]
     inside, x, y = wall
     if under <= 0.0 or inside <= 0.0:
-        return found
+        return deepest
     depth = min(under, inside)
-    if depth <= found[0]:
-        return found
+    if depth <= deepest[0]:
+        return deepest
     return (depth, UP) if under <= inside else (depth, (x, y, 0.0))
 
 

@@ -59,34 +59,34 @@ def _shared(matrix, x, b, b_rate):
 
 
 @kernel
-def shares(p, x, wanted, slope):
+def shares(p, x, desired, slope):
     """Return the vector s whose parts along the links carry F_d together, and its derivative (eq. (7.23))."""
     matrix = (SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING)
     for i in range(len(x.link)):
         matrix = add_outer(matrix, 1.0, x.link[i].direction)
-    s, s_rate = _shared(matrix, x, scale(p.load_mass, wanted), scale(p.load_mass, slope))
+    s, s_rate = _shared(matrix, x, scale(p.load_mass, desired), scale(p.load_mass, slope))
     # once more on what the damping left out: its effect falls to second order
     rest, rest_rate = _shared(matrix, x, scale(SHARE_DAMPING, s), scale(SHARE_DAMPING, s_rate))
     return add(s, rest), add(s_rate, rest_rate)
 
 
 @kernel
-def desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i):
+def desired_force(p, x, desired, slope, s, s_rate, omega_rate, i):
     """Return the desired world force [N] of quadrotor i, and its derivative (theory.md, eqs. (7.24) and (7.25))."""
     c = p.drive
     q, omega = x.link[i].direction, x.link[i].omega
     m, inertia = p.quad_mass[i], p.quad_mass[i] * p.link_length[i]
-    parallel = dot(q, s) + inertia * dot(omega, omega) + m * dot(q, wanted)
+    parallel = dot(q, s) + inertia * dot(omega, omega) + m * dot(q, desired)
     swing = add(scale(-c.link_direction_gain, cross(c.direction[i], q)), scale(-c.link_rate_gain, omega))
     # the part normal to the link turns it as wanted: omega' = q x (v' - a_g) / L - q x u / (m L)
-    lever = subtract(scale(m, cross(q, wanted)), scale(inertia, swing))
+    lever = subtract(scale(m, cross(q, desired)), scale(inertia, swing))
     force = add(scale(parallel, q), cross(lever, q))
     # the same, differentiated
     q_rate = cross(omega, q)
     parallel_rate = dot(q_rate, s) + dot(q, s_rate) + 2.0 * inertia * dot(omega, omega_rate)
-    parallel_rate += m * (dot(q_rate, wanted) + dot(q, slope))
+    parallel_rate += m * (dot(q_rate, desired) + dot(q, slope))
     swing_rate = add(scale(-c.link_direction_gain, cross(c.direction[i], q_rate)), scale(-c.link_rate_gain, omega_rate))
-    lever_rate = subtract(scale(m, add(cross(q_rate, wanted), cross(q, slope))), scale(inertia, swing_rate))
+    lever_rate = subtract(scale(m, add(cross(q_rate, desired), cross(q, slope))), scale(inertia, swing_rate))
     along = add(scale(parallel_rate, q), scale(parallel, q_rate))
     return force, add(along, add(cross(lever_rate, q), cross(lever, q_rate)))
 
@@ -108,8 +108,8 @@ def upright(force, force_rate, floor):
     over = force[2] - floor
     root = math.sqrt(over * over + 0.04 * floor * floor)
     slope = 0.5 * (1.0 + over / root)
-    kept = (force[0], force[1], floor + 0.5 * (over + root))
-    return kept, (force_rate[0], force_rate[1], slope * force_rate[2])
+    limited = (force[0], force[1], floor + 0.5 * (over + root))
+    return limited, (force_rate[0], force_rate[1], slope * force_rate[2])
 
 
 @always_inline
@@ -126,9 +126,9 @@ def desired_attitude(force, force_rate):
 def moment(p, x, force, force_rate, i):
     """Return the moment [N m] that aligns body z with the desired force (theory.md, eq. (7.27))."""
     c = p.drive
-    kept, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
-    wanted, omega_wanted = desired_attitude(kept, kept_rate)
-    difference = matmul(transpose(wanted), rotation_matrix(x.attitude[i]))
+    limited, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
+    desired, omega_wanted = desired_attitude(limited, kept_rate)
+    difference = matmul(transpose(desired), rotation_matrix(x.attitude[i]))
     o = x.omega_body[i]
     rate_error = subtract(o, apply_transposed(difference, omega_wanted))
     damped = scale(-c.attitude_rate_gain / c.epsilon, rate_error)
@@ -137,17 +137,17 @@ def moment(p, x, force, force_rate, i):
 
 
 @always_inline
-def quad_thrust(p, x, wanted, slope, s, s_rate, i):
+def quad_thrust(p, x, desired, slope, s, s_rate, i):
     """Return the thrust [N] of quadrotor i: the part of its desired force along its axis."""
     # a force does not depend on the accelerations, only its derivative does
-    force, _ = desired_force(p, x, wanted, slope, s, s_rate, NOTHING, i)
+    force, _ = desired_force(p, x, desired, slope, s, s_rate, NOTHING, i)
     m = rotation_matrix(x.attitude[i])
     return dot(force, (m[2], m[5], m[8]))
 
 
 @always_inline
-def quad_moment(p, x, wanted, slope, s, s_rate, force, specific, i):
+def quad_moment(p, x, desired, slope, s, s_rate, force, specific, i):
     """Return the moment [N m] of quadrotor i for all forces [N] and the specific acceleration [m/s^2]."""
     omega_rate = link_acceleration(p, x, force, specific, i)
-    wanted_thrust, thrust_rate = desired_force(p, x, wanted, slope, s, s_rate, omega_rate, i)
+    wanted_thrust, thrust_rate = desired_force(p, x, desired, slope, s, s_rate, omega_rate, i)
     return moment(p, x, wanted_thrust, thrust_rate, i)

@@ -132,22 +132,22 @@ def _link_rate(p, x, force, specific, i):
 
 
 @always_inline
-def _body_rate(p, x, given, i):
+def _body_rate(p, x, lift, i):
     inertia, o = p.quad_inertia[i], x.omega_body[i]
-    return divide(add(given.moment_body[i], cross(multiply(inertia, o), o)), inertia)
+    return divide(add(lift.moment_body[i], cross(multiply(inertia, o), o)), inertia)
 
 
 @kernel
 def rate(p, t, x):
     """Return the tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
-    given = command(p, t, x)
-    force = map_index(thrust_world, x.link, x, given.thrust)
+    lift = command(p, t, x)
+    force = map_index(thrust_world, x.link, x, lift.thrust)
     specific = load_acceleration(p, x, force)
     return CooperativeLoadState(
         x.load_velocity,
         add(specific, (0.0, 0.0, -p.gravity)),
         x.omega_body,
-        map_index(_body_rate, x.link, p, x, given),
+        map_index(_body_rate, x.link, p, x, lift),
         map_index(_link_rate, x.link, p, x, force, specific),
     )
 

@@ -75,8 +75,8 @@ def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gr
         return form.initial_state(p, position, attitude)
     position, attitude = _balanced(p.effects[k], p.body.mass * gravity, position, attitude)
     state = form.initial_state(p, position, attitude)
-    held = _deflections(p.effects[k], position, attitude)
-    return state._replace(memory=(*state.memory[:k], held or state.memory[k], *state.memory[k + 1 :]))
+    deflections = _deflections(p.effects[k], position, attitude)
+    return state._replace(memory=(*state.memory[:k], deflections or state.memory[k], *state.memory[k + 1 :]))
 
 
 def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pose:

@@ -168,10 +168,10 @@ def rate(drive, t, x):
         b = x.body
         return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
     p = on_se3.machine(drive, t, seen(drive.parameters.layout, x))
-    given = drive.parameters.layout.bodies
-    a = _system(given.arrays, p)
+    bodies = drive.parameters.layout.bodies
+    a = _system(bodies.arrays, p)
     q, v = _arrays(x)
-    f = given.feedback
+    f = bodies.feedback
     s, _ = solve(a, q, v, _wrenches(p), _imposed(a, p), 2.0 * f, f * f, RANK_TOLERANCE, _ranks(a)[1])
     return _tree(v, s.acceleration)
 
@@ -189,13 +189,13 @@ def apply_constraint_impulse(drive, x):
 @noinline
 def held(drive, x):
     """Return the bodies with stabilised constraints."""
-    given = drive.parameters.layout.bodies
-    if given.hold == five_body_stabilisation.NONE or not _all_upright(x):
+    bodies = drive.parameters.layout.bodies
+    if bodies.hold == five_body_stabilisation.NONE or not _all_upright(x):
         return x
-    if given.hold == five_body_stabilisation.PROJECTION:
+    if bodies.hold == five_body_stabilisation.PROJECTION:
         return apply_constraint_impulse(drive, x)
     p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
-    a = _system(given.arrays, p)
+    a = _system(bodies.arrays, p)
     q, v = _arrays(x)
     q, v = stabilisation.partition(a, q, v, _imposed(a, p), _ranks(a))
     return _tree(q, v)
@@ -219,9 +219,9 @@ def singular(x: FiveEulerBodies) -> int:
     return next((i for i, b in enumerate(x.body) if math.isinf(b.angles[1])), -1)
 
 
-def parameters(*given, **named) -> MultirotorParameters:
+def parameters(*arguments, **named) -> MultirotorParameters:
     """See `multirotor_multibody.parameters`."""
-    return _assembled(multirotor_multibody.parameters(*given, **named))
+    return _assembled(multirotor_multibody.parameters(*arguments, **named))
 
 
 def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
@@ -238,7 +238,7 @@ def _assembled(p: MultirotorParameters) -> MultirotorParameters:
     return p._replace(layout=p.layout._replace(bodies=bodies._replace(arrays=system.arrays)))
 
 
-def initial_state(*given, **named) -> MultirotorState:
+def initial_state(*arguments, **named) -> MultirotorState:
     """See `multirotor_multibody.initial_state`."""
-    state = multirotor_multibody.initial_state(*given, **named)
+    state = multirotor_multibody.initial_state(*arguments, **named)
     return state._replace(motion=of_five(state.motion))

@@ -47,8 +47,8 @@ def within(limit, voltage, _):
 def _airborne(p, body, memory, voltage):
     """Return the drive without the effects that can sleep."""
     effects = hooks.without_sleepers(p.effects, p.effects)
-    kept = hooks.without_sleepers(p.effects, memory)
-    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, kept, voltage)
+    awake = hooks.without_sleepers(p.effects, memory)
+    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, awake, voltage)
 
 
 class AwakeState(NamedTuple):
@@ -140,9 +140,9 @@ def _stiff_steps(method, drive, t, x, h, end):
         left = end - t
         part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, seen(p.layout, x), h))
         last = part > (1.0 - 1e-9) * left
-        taken = left if last else part
-        half = 0.5 * taken
-        y, whole, start, length = x, x, t, taken
+        size = left if last else part
+        half = 0.5 * size
+        y, whole, start, length = x, x, t, size
         for k in range(3):  # one call in the code: passing arguments to three took a sixth of the time
             y = _step(method, drive, start, y, length)
             if k == 0:
@@ -151,13 +151,13 @@ def _stiff_steps(method, drive, t, x, h, end):
                 start = t + half
         sound = finite(y)
         error = relative_difference(y, whole) if sound else math.inf
-        part = taken * _growth(error, allowed)
-        if taken > smallest and error > allowed:
+        part = size * _growth(error, allowed)
+        if size > smallest and error > allowed:
             continue
         x = _extrapolated(method, y, whole)
         if last or not sound:
             return x.motion, hooks.with_integrated(p.effects, memory, x.memory)
-        t += taken
+        t += size
 
 
 @always_inline

@@ -72,14 +72,14 @@ class KernelCache(_Cache):
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
         """Return the version for a signature, or None if it must be compiled."""
         target_context.refresh()
-        found = self._key(sig, target_context.codegen()) if self._enabled else None
-        result = self._loaded(found, sig, target_context)
+        current = self._key(sig, target_context.codegen()) if self._enabled else None
+        result = self._loaded(current, sig, target_context)
         if result is None:
             for listener in _listeners:
                 listener(self._label)
-            if found:
-                file_locks.acquire(f"{self._folder}/{self._file(found, self._is_inner())}-{found.sources}")
-                result = self._loaded(found, sig, target_context)
+            if current:
+                file_locks.acquire(f"{self._folder}/{self._file(current, self._is_inner())}-{current.sources}")
+                result = self._loaded(current, sig, target_context)
         if result is not None:
             _counted["loaded"] += 1
         return result
@@ -90,20 +90,20 @@ class KernelCache(_Cache):
         if data.lifted or data.library.has_dynamic_globals:
             warnings.warn(f"{self._label} is not stored on disk: it uses addresses of this process", NumbaWarning, 2)
             return
-        found = self._key(sig, data.codegen) if self._enabled else None
-        if found is not None:
-            name = self._file(found, self._is_inner(data))
-            cache_files.write(self._folder, name, found.sources, dumps((found, self._reduce(data))))
+        current = self._key(sig, data.codegen) if self._enabled else None
+        if current is not None:
+            name = self._file(current, self._is_inner(data))
+            cache_files.write(self._folder, name, current.sources, dumps((current, self._reduce(data))))
 
-    def _loaded(self, found: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
+    def _loaded(self, current: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
         inner = self._is_inner()
-        content = cache_files.read(self._folder, self._file(found, inner), found.sources) if found else None
+        content = cache_files.read(self._folder, self._file(current, inner), current.sources) if current else None
         if content is None:
             return None
         with contextlib.suppress(Exception):  # any error here is repaired by compiling again
-            kept, payload = pickle.loads(content)
+            stored, payload = pickle.loads(content)
             result = self._rebuild(target_context, payload)
-            if kept == found and result.signature.args == sigutils.normalize_signature(sig)[0]:
+            if stored == current and result.signature.args == sigutils.normalize_signature(sig)[0]:
                 return result
         return None
 
@@ -119,13 +119,13 @@ class KernelCache(_Cache):
         """Return the result that is rebuilt from its stored parts."""
         return CompileResult._rebuild(target_context, *payload)
 
-    def _file(self, found: Key, inner: bool) -> str:
-        return f"{self._name}-{'inner-' if inner else ''}{found.made_of}"
+    def _file(self, current: Key, inner: bool) -> str:
+        return f"{self._name}-{'inner-' if inner else ''}{current.made_of}"
 
     def _key(self, sig: Any, codegen: Any) -> Key | None:
         arguments, returns = sigutils.normalize_signature(sig)
         try:
-            found = key(self._dispatcher, arguments, returns, codegen.magic_tuple())
+            current = key(self._dispatcher, arguments, returns, codegen.magic_tuple())
         except NotKeptError:
             return None
-        return found if source_digest.unchanged(found.modules) else None
+        return current if source_digest.unchanged(current.modules) else None

@@ -20,9 +20,9 @@ KEPT = 4  # versions of one file, so that two checkouts do not delete each other
 @cache
 def root() -> Path | None:
     """Return the folder of the cache, or None if there is none (no home folder)."""
-    given = os.environ.get("LAPWING_CACHE")
+    setting = os.environ.get("LAPWING_CACHE")
     try:
-        return Path(given) if given else Path.home() / ".cache" / "lapwing"
+        return Path(setting) if setting else Path.home() / ".cache" / "lapwing"
     except RuntimeError:
         return None
 

@@ -97,18 +97,18 @@ class _Writer:
         module, name = value.__module__, value.__qualname__
         if module.partition(".")[0] in VERSIONED:
             return f"{module}.{name}"
-        found: Any = sys.modules.get(module)
+        item: Any = sys.modules.get(module)
         for part in name.split("."):
-            found = getattr(found, part, None)
-        if found is not value or module == "__main__":
+            item = getattr(item, part, None)
+        if item is not value or module == "__main__":
             raise NotKeptError(f"class {name} cannot be imported")
         self.modules.add(module)
         tables = sorted(DispatchTable.tables.items())  # modules are not imported in the same order everywhere
         entries = [f", {name}: {self.value(table[value])}" for name, table in tables if value in table]
         return f"{module}.{name}{''.join(entries)}"
 
-    def of_global(self, path: str, namespace: dict, name: str, names: set[str], told: bool) -> str:
-        """Return the text of a global name; `told`: the source of the module defines it."""
+    def of_global(self, path: str, namespace: dict, name: str, names: set[str], defined: bool) -> str:
+        """Return the text of a global name; `defined`: the source of the module defines it."""
         value = namespace[name]
         self.seen.append((namespace, name, value))
         if isinstance(value, ModuleType):
@@ -116,11 +116,11 @@ class _Writer:
                 return value.__name__
             self.modules.add(value.__name__)
             inside = sorted(n for n in names if n in vars(value))
-            return "\n".join(self.of_global(f"{path}.{n}", vars(value), n, set(), told) for n in inside)
+            return "\n".join(self.of_global(f"{path}.{n}", vars(value), n, set(), defined) for n in inside)
         try:
             return f"{path} = {self.value(value)}"
         except NotKeptError:
-            if told:
+            if defined:
                 return path
             raise
 
@@ -156,14 +156,14 @@ def _part(function: FunctionType) -> Part:
     names = {name for code in codes for name in code.co_names}
     inside = (*(cell.cell_contents for cell in function.__closure__ or ()), function.__defaults__)
     namespace = function.__globals__
-    told = namespace is getattr(sys.modules.get(function.__module__), "__dict__", None)
+    defined = namespace is getattr(sys.modules.get(function.__module__), "__dict__", None)
     lines = [
         _name(function),
         hashlib.blake2b(b"".join(code.co_code for code in codes), digest_size=16).hexdigest(),
         *(repr(value) for code in codes for value in code.co_consts if not isinstance(value, CodeType)),
         *(str(code.co_names) for code in codes),
         *map(writer.value, inside),
-        *(writer.of_global(name, namespace, name, names, told) for name in sorted(names) if name in namespace),
+        *(writer.of_global(name, namespace, name, names, defined) for name in sorted(names) if name in namespace),
     ]
     part = Part("\n".join(lines), tuple(writer.functions), frozenset(writer.modules), tuple(writer.seen))
     if not writer.mutable:

@@ -24,8 +24,8 @@ WHOLE = ".whole"  # suffix of the names of functions with this convention
 class _Whole:
     """Arguments as values of their own types; types without data are omitted."""
 
-    def __init__(self, context: Any, given: Sequence[types.Type]):
-        self._kinds = [None if isinstance(t, types.Omitted) else context.get_value_type(t) for t in given]
+    def __init__(self, context: Any, arguments: Sequence[types.Type]):
+        self._kinds = [None if isinstance(t, types.Omitted) else context.get_value_type(t) for t in arguments]
         self.argument_types = tuple(kind for kind in self._kinds if kind is not None)
 
     def as_arguments(self, builder: Any, values: Sequence[Any]) -> tuple:

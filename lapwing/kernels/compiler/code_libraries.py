@@ -166,8 +166,8 @@ class InnerLibrary(KernelLibrary):
     def environments(self) -> tuple:
         """Return the numba environments of its functions and of the `noinline` functions that they reach."""
         names = self._environments.union(*(library._environments for library in self._noinline.values()))
-        found = (lookup_environment(name) for name in sorted(names))
-        return tuple(environment for environment in found if environment is not None and environment.can_cache())
+        environments = (lookup_environment(name) for name in sorted(names))
+        return tuple(environment for environment in environments if environment is not None and environment.can_cache())
 
     def serialize_using_object_code(self) -> tuple:
         """Return (name, `noinline` symbol, bitcode, environments) of this library and of the ones that it reaches."""
@@ -177,11 +177,11 @@ class InnerLibrary(KernelLibrary):
     @classmethod
     def restored(cls, codegen: Any, serialised: tuple) -> "InnerLibrary":
         """Return the library from the result of `serialize_using_object_code`."""
-        made = []
+        libraries = []
         for name, noinline, bitcode, environments in serialised:
             library = cls(codegen, name)
             library.noinline, library._bitcode, library._environments = noinline, bitcode, environments
             library._finalized = True
-            made.append(library)
-        made[0]._noinline = {library.noinline: library for library in made[1:]}
-        return made[0]
+            libraries.append(library)
+        libraries[0]._noinline = {library.noinline: library for library in libraries[1:]}
+        return libraries[0]

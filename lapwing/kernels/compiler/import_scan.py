@@ -19,22 +19,22 @@ def imports(module: str, is_package: bool, source: bytes, version: str) -> list[
     Raises:
         SyntaxError: the source is not Python.
     """
-    kept = cache_files.read("imports", module, version)
-    if kept is None:
-        kept = "\n".join(sorted(_parsed(source, module if is_package else module.rpartition(".")[0]))).encode()
-        cache_files.write("imports", module, version, kept)
-    return kept.decode().split()
+    text = cache_files.read("imports", module, version)
+    if text is None:
+        text = "\n".join(sorted(_parsed(source, module if is_package else module.rpartition(".")[0]))).encode()
+        cache_files.write("imports", module, version, text)
+    return text.decode().split()
 
 
 def _parsed(source: bytes, package: str) -> set[str]:
-    found: set[str] = set()
+    imports: set[str] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 parts = alias.name.split(".")
-                found.update(".".join(parts[: n + 1]) for n in range(len(parts)))
+                imports.update(".".join(parts[: n + 1]) for n in range(len(parts)))
         elif isinstance(node, ast.ImportFrom):
             above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
             base = ".".join([*above, *([node.module] if node.module else [])])
-            found.update([base, *(f"{base}.{alias.name}" for alias in node.names if alias.name != "*")])
-    return found
+            imports.update([base, *(f"{base}.{alias.name}" for alias in node.names if alias.name != "*")])
+    return imports

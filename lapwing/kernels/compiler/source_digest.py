@@ -95,36 +95,38 @@ def _source(module: str) -> Source:
     with open(path, "rb") as file:
         content = file.read()
     version = hashlib.blake2b(content, digest_size=16).hexdigest()
-    found = set()
+    names = set()
     own = module.partition(".")[0]
     for name in imports(module, os.path.basename(path) == "__init__.py", content, version):
         top = name.partition(".")[0]
         kind = "followed" if top in OURS or top == own else _kind(top)
         if kind == "followed" and _file(name):
-            found.add(name)
+            names.add(name)
         elif kind == "stamped" and _file(top):
-            found.add(f"{top}*")
-    return Source(path, version, tuple(found))
+            names.add(f"{top}*")
+    return Source(path, version, tuple(names))
 
 
 @cache
 def _reach(module: str) -> frozenset[str]:
     """Return a module, all modules that it imports, and the packages that contain them."""
-    found, ahead = {module}, [module]
+    reached, ahead = {module}, [module]
     while ahead:
-        new = set(_source(ahead.pop()).imports) - found
-        found |= new
+        new = set(_source(ahead.pop()).imports) - reached
+        reached |= new
         ahead += new
     # a package's `__init__.py` runs before its modules; its re-exports are not followed
-    parts = [name.split(".") for name in found]
+    parts = [name.split(".") for name in reached]
     above = {".".join(p[:n]) for p in parts for n in range(1, len(p))}
-    return frozenset(found | {name for name in above if _file(name)})
+    return frozenset(reached | {name for name in above if _file(name)})
 
 
 @cache
 def _all(modules: frozenset[str]) -> frozenset[str]:
-    found: frozenset[str] = frozenset().union(*(_reach(m) for m in modules if _kind(m.partition(".")[0]) != "standard"))
-    return found
+    reached: frozenset[str] = frozenset().union(
+        *(_reach(m) for m in modules if _kind(m.partition(".")[0]) != "standard")
+    )
+    return reached
 
 
 @cache

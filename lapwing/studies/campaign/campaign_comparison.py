@@ -51,10 +51,10 @@ def compare(one: Path, other: Path) -> Comparison:
     """
     a, b = Results(read(one)), Results(read(other))
     known = {pair: k for k, pair in enumerate(_pairs(a))}
-    found = [(known[pair], k) for k, pair in enumerate(_pairs(b)) if pair in known]
-    if not found:
+    pairs = [(known[pair], k) for k, pair in enumerate(_pairs(b)) if pair in known]
+    if not pairs:
         raise ValueError(f"{one} and {other}: have no run of the same seed; expected two campaigns of one --seed")
-    at, of = np.array(found).T
+    at, of = np.array(pairs).T
     good, better = a["success"][at].astype(float), b["success"][of].astype(float)
     differences = [Difference("success", float(good.mean()), float(better.mean()), paired(good, better))]
     for name in METRICS:
@@ -64,7 +64,7 @@ def compare(one: Path, other: Path) -> Comparison:
             if there.any():
                 means = float(x[there].mean()), float(y[there].mean())
                 differences.append(Difference(name, *means, paired(x[there], y[there])))
-    count = len(found)
+    count = len(pairs)
     failures = interval(int(count - good.sum()), count), interval(int(count - better.sum()), count)
     worse, mended = int(((good == 1) & (better == 0)).sum()), int(((good == 0) & (better == 1)).sum())
     total = len(set(_pairs(a)) | set(_pairs(b)))
@@ -74,24 +74,24 @@ def compare(one: Path, other: Path) -> Comparison:
     return Comparison((str(one), str(other)), differing, count, total - count, failures, mended, worse, differences)
 
 
-def _pairs(found: Results) -> list[tuple[int, int]]:
-    return list(zip(found["run"].tolist(), found["seed"].tolist(), strict=True))
+def _pairs(results: Results) -> list[tuple[int, int]]:
+    return list(zip(results["run"].tolist(), results["seed"].tolist(), strict=True))
 
 
-def show(console: Console, found: Comparison) -> None:
+def show(console: Console, comparison: Comparison) -> None:
     """Print the comparison."""
-    left_out = f", {found.left_out} left out that only one has flown" if found.left_out else ""
-    console.print(f"{found.pairs} pairs of runs{left_out}")
-    console.print(f"the campaigns differ in: {', '.join(found.differing) or 'nothing'}")
-    for name, p in zip(found.names, found.failures, strict=True):
+    left_out = f", {comparison.left_out} left out that only one has flown" if comparison.left_out else ""
+    console.print(f"{comparison.pairs} pairs of runs{left_out}")
+    console.print(f"the campaigns differ in: {', '.join(comparison.differing) or 'nothing'}")
+    for name, p in zip(comparison.names, comparison.failures, strict=True):
         console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}")
-    console.print(f"  failed in the first only: {found.only_one}, in the second only: {found.only_other}")
+    console.print(f"  failed in the first only: {comparison.only_one}, in the second only: {comparison.only_other}")
     title = "Means, and the change from the first to the second with its 95 % interval"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     table.add_column("figure", no_wrap=True)
     for head in ("first", "second", "change", "from", "to"):
         table.add_column(head, justify="right", no_wrap=True)
-    for d in found.differences:
+    for d in comparison.differences:
         label, scale = ("success [%]", 100.0) if d.figure == "success" else shown(d.figure)
         means = (f"{scale * mean:.4g}" for mean in (d.one, d.other))
         changes = (f"{scale * change:+.3g}" for change in d.difference)

@@ -34,36 +34,36 @@ def shown(name: str) -> tuple[str, float]:
     return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
 
 
-def required(found: Results) -> dict[str, float]:
+def required(results: Results) -> dict[str, float]:
     """Return the limits of metrics in the scene's `[success]`."""
-    texts = found.folder.about["success"]
+    texts = results.folder.about["success"]
     return {match[1]: float(match[2]) for text in texts if (match := _LIMIT.fullmatch(text.strip()))}
 
 
-def errors(found: Results) -> Plot:
+def errors(results: Results) -> Plot:
     """Plot root-mean-square errors with the published values."""
     caption = "Share of the runs with a smaller root-mean-square error of the reference against the truth."
-    return _distributions(found, [name for name in found.figures if name.startswith("rmse.")], caption)
+    return _distributions(results, [name for name in results.figures if name.startswith("rmse.")], caption)
 
 
-def others(found: Results) -> Plot:
+def others(results: Results) -> Plot:
     """Plot all other metrics that differ between runs."""
-    names = [name for name in found.figures if not name.startswith("rmse")]
-    return _distributions(found, names, "Share of the runs with a smaller value.")
+    names = [name for name in results.figures if not name.startswith("rmse")]
+    return _distributions(results, names, "Share of the runs with a smaller value.")
 
 
-def _distributions(found: Results, names: list[str], caption: str) -> Plot:
+def _distributions(results: Results, names: list[str], caption: str) -> Plot:
     if not names:
         raise NotRecordedError("every run has the same")
-    limits, panels = required(found), []
+    limits, panels = required(results), []
     for k, name in enumerate(names):
         label, scale = shown(name)
         marks: list[Mark] = []
-        for legend, column, colour in _each(found, name):
+        for legend, column, colour in _each(results, name):
             values = scale * np.sort(column[np.isfinite(column)])
             marks.append(Line(values, np.arange(1, len(values) + 1) / len(values), legend, colour))
-        if name in found.published:
-            marks.append(_upright(scale * found.published[name], found.source, REFERENCE))
+        if name in results.published:
+            marks.append(_upright(scale * results.published[name], results.source, REFERENCE))
         if name in limits:
             marks.append(_upright(scale * limits[name], "required", BOUND))
         place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS}
@@ -71,20 +71,20 @@ def _distributions(found: Results, names: list[str], caption: str) -> Plot:
     return _grid(panels, caption)
 
 
-def _each(found: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
+def _each(results: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
     """Return (legend, metric of the runs, colour) of each vehicle of a fleet; of the run for one or many vehicles."""
-    own = found.of_vehicles(name)
+    own = results.of_vehicles(name)
     if not 0 < len(own) <= len(COLOURS):
-        return [("the worst vehicles" if own else "runs", found[name], FLOWN)]
+        return [("the worst vehicles" if own else "runs", results[name], FLOWN)]
     return [(vehicle, own[vehicle], colour) for vehicle, colour in zip(own, COLOURS, strict=False)]
 
 
-def touchdown(found: Results) -> Plot:
+def touchdown(results: Results) -> Plot:
     """Plot the touch-down points; of one vehicle with the ellipses of a normal distribution."""
-    if found.vehicles:
-        return _touchdowns(found)
-    points = np.column_stack([found["touchdown.x"], found["touchdown.y"]])
-    good = found["success"].astype(bool)[np.isfinite(points).all(axis=1)]
+    if results.vehicles:
+        return _touchdowns(results)
+    points = np.column_stack([results["touchdown.x"], results["touchdown.y"]])
+    good = results["success"].astype(bool)[np.isfinite(points).all(axis=1)]
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 3:
         raise NotRecordedError("fewer than three runs touch down")
@@ -104,10 +104,12 @@ def touchdown(found: Results) -> Plot:
     return Plot((Panel(drawn, "y [m]", "x [m]", timed=False, equal=True),), caption, 5.0)
 
 
-def _touchdowns(found: Results) -> Plot:
+def _touchdowns(results: Results) -> Plot:
     """Plot the touch-down points of each vehicle of a fleet."""
     marks = []
-    for (vehicle, x, colour), (_, y, _) in zip(_each(found, "touchdown.x"), _each(found, "touchdown.y"), strict=True):
+    for (vehicle, x, colour), (_, y, _) in zip(
+        _each(results, "touchdown.x"), _each(results, "touchdown.y"), strict=True
+    ):
         there = np.isfinite(x) & np.isfinite(y)
         if there.any():
             marks.append(_dots(np.column_stack([x, y])[there], vehicle, colour))
@@ -117,12 +119,12 @@ def _touchdowns(found: Results) -> Plot:
     return Plot((panel,), "Last touch-down of each vehicle in each run.", 5.0)
 
 
-def success(found: Results) -> Plot:
+def success(results: Results) -> Plot:
     """Return the probability of success over each parameter."""
-    panels, good = [], found["success"].astype(bool)
-    keys, rest = _most(found)
+    panels, good = [], results["success"].astype(bool)
+    keys, rest = _most(results)
     for k, key in enumerate(keys):
-        x, middles, groups = found.number(key), [], []
+        x, middles, groups = results.number(key), [], []
         for inside in _bins(x):
             middles.append(float(x[inside].mean()))
             groups.append(interval(int(good[inside].sum()), int(inside.sum())))
@@ -133,29 +135,29 @@ def success(found: Results) -> Plot:
         )
         label = "probability of success" if k % ACROSS == 0 else ""
         place: dict[str, Any] = {"row": k // ACROSS, "column": k % ACROSS, "y_range": (-0.02, 1.02)}
-        panels.append(Panel(marks, label, _with_unit(found, key), x_ticks=_texts(found, key), timed=False, **place))
+        panels.append(Panel(marks, label, _with_unit(results, key), x_ticks=_texts(results, key), timed=False, **place))
     caption = "Share of successes among the runs of each part of a parameter's range, of equal counts."
     return _grid(panels, caption + rest)
 
 
-def matters(found: Results) -> Plot:
+def matters(results: Results) -> Plot:
     """Plot sensitivities: rank correlations, and Sobol indices if SALib is installed."""
-    keys = _parameters(found)
-    aims = ["success"] if np.ptp(found["success"].astype(float)) > 0.0 else []
-    aims += [name for name in MATTERS if name in found.figures]
+    keys = _parameters(results)
+    aims = ["success"] if np.ptp(results["success"].astype(float)) > 0.0 else []
+    aims += [name for name in MATTERS if name in results.figures]
     if not aims:
         raise NotRecordedError("every run came to the same")
-    x = np.column_stack([found.number(key) for key in keys])
-    independent = not found.folder.plan.sweep  # which Sobol indices suppose
+    x = np.column_stack([results.number(key) for key in keys])
+    independent = not results.folder.plan.sweep  # which Sobol indices suppose
     with_sobol = has_sobol() and len(x) >= ENOUGH and independent
     kinds = ["rank correlation", *(["first-order Sobol index"] if with_sobol else [])]
     panels = []
     for row, aim in enumerate(aims):
-        y = found[aim].astype(float)
+        y = results[aim].astype(float)
         there = np.isfinite(y)
         correlated = [rank_correlation(x[there, k], y[there]) for k in range(len(keys))]
-        told = np.flatnonzero(there)[_some(there.sum(), MOST)]
-        indices = sobol(x[told], y[told], keys) if with_sobol and len(told) >= ENOUGH else []
+        chosen = np.flatnonzero(there)[_some(there.sum(), MOST)]
+        indices = sobol(x[chosen], y[chosen], keys) if with_sobol and len(chosen) >= ENOUGH else []
         for column, values in enumerate([correlated, indices][: len(kinds)]):
             bars = tuple(
                 Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
@@ -180,19 +182,22 @@ def matters(found: Results) -> Plot:
     return Plot(tuple(panels), caption, height, (1.0,) * len(aims), (1.0,) * len(kinds))
 
 
-def parallel(found: Results) -> Plot:
+def parallel(results: Results) -> Plot:
     """Return every run as a line over all parameters and what matters, each scaled to its range."""
-    keys, rest = _most(found)
-    names = [*keys, *(name for name in MATTERS if name in found.figures)]
+    keys, rest = _most(results)
+    names = [*keys, *(name for name in MATTERS if name in results.figures)]
     columns, ticks = [], []
     for name in names:
-        values, (label, scale) = found.number(name), shown(name) if name in METRICS else (_with_unit(found, name), 1.0)
+        values, (label, scale) = (
+            results.number(name),
+            shown(name) if name in METRICS else (_with_unit(results, name), 1.0),
+        )
         low, high = np.nanmin(values), np.nanmax(values)
         columns.append((values - low) / (high - low if high > low else 1.0))
-        texts = _texts(found, name)
+        texts = _texts(results, name)
         ends = (texts[0], texts[-1]) if texts else (f"{scale * low:.3g}", f"{scale * high:.3g}")
         ticks.append(f"{_broken(label)}\n{ends[0]}\nto {ends[1]}")
-    rows, good = np.column_stack(columns), found["success"].astype(bool)
+    rows, good = np.column_stack(columns), results["success"].astype(bool)
     marks = []
     for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
         if chosen.any():
@@ -211,23 +216,25 @@ def _some(n: int, most: int) -> np.ndarray:
     return np.arange(n) if n <= most else np.sort(np.random.default_rng(1).choice(n, most, replace=False))
 
 
-def _parameters(found: Results) -> list[str]:
+def _parameters(results: Results) -> list[str]:
     """Return the parameters that differ between the runs."""
-    keys = [key for key in found.folder.plan.keys if len(np.unique(found[key])) > 1]
+    keys = [key for key in results.folder.plan.keys if len(np.unique(results[key])) > 1]
     if not keys:
         raise NotRecordedError("no parameter varies; --vary KEY=DISTRIBUTION lets one")
     return keys
 
 
-def _most(found: Results) -> tuple[list[str], str]:
+def _most(results: Results) -> tuple[list[str], str]:
     """Return the parameters with the strongest correlations, as many as panels, and a text on the others."""
-    keys = _parameters(found)
+    keys = _parameters(results)
     if len(keys) <= KEYS:
         return keys, ""
-    aims = [found[name].astype(float) for name in ("success", *MATTERS) if name == "success" or name in found.figures]
+    aims = [
+        results[name].astype(float) for name in ("success", *MATTERS) if name == "success" or name in results.figures
+    ]
 
     def strength(key: str) -> float:
-        x = found.number(key)
+        x = results.number(key)
         every = (abs(rank_correlation(x[there], y[there]).value) for y in aims if (there := np.isfinite(y)).any())
         return max((value for value in every if np.isfinite(value)), default=0.0)
 
@@ -247,15 +254,15 @@ def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
     yield from (place == k for k in np.unique(place))
 
 
-def _with_unit(found: Results, key: str) -> str:
+def _with_unit(results: Results, key: str) -> str:
     """Return a parameter's key with its unit, if that is known."""
-    unit = found.units.get(key, "")
+    unit = results.units.get(key, "")
     return f"{key} [{unit}]" if unit else key
 
 
-def _texts(found: Results, name: str) -> tuple[str, ...]:
+def _texts(results: Results, name: str) -> tuple[str, ...]:
     """Return the values of a parameter of texts, in the order of their numbers."""
-    return tuple(np.unique(found[name])) if found[name].dtype == object else ()
+    return tuple(np.unique(results[name])) if results[name].dtype == object else ()
 
 
 def _broken(key: str) -> str:

@@ -25,36 +25,36 @@ PLOTS: dict[str, Callable[[Results], Plot]] = {
 LISTED = ("max_distance", "touchdown.speed", "max_tilt")  # of the worst runs
 
 
-def write(path: Path, found: Results) -> None:
+def write(path: Path, results: Results) -> None:
     """Write the report in the format of the name's ending: .html, .pdf or .png.
 
     Raises:
         ValueError: it cannot be written.
     """
-    sections = [_section(title, draw, found) for title, draw in PLOTS.items()]
+    sections = [_section(title, draw, results) for title, draw in PLOTS.items()]
     try:
         if path.suffix == ".html":
-            path.write_text(_page(found, sections), encoding="utf-8")
+            path.write_text(_page(results, sections), encoding="utf-8")
         else:
             drawn = [Titled(section.title, section.plot) for section in sections if section.plot]
             if path.suffix == ".pdf":
-                write_pdf(path, _cover(found), drawn)
+                write_pdf(path, _cover(results), drawn)
             else:
                 write_png(path, [titled.plot for titled in drawn])
     except OSError as fault:
         raise ValueError(f"{path}: cannot write the report: {fault.strerror or fault}") from None
 
 
-def _section(title: str, draw: Callable[[Results], Plot], found: Results) -> Section:
+def _section(title: str, draw: Callable[[Results], Plot], results: Results) -> Section:
     name = title.lower().replace(" ", "-")
     try:
-        return Section(name, title, draw(found))
+        return Section(name, title, draw(results))
     except NotRecordedError as reason:
         return Section(name, title, missing=str(reason))
 
 
-def _facts(found: Results) -> dict[str, object]:
-    about, plan = found.folder.about, found.folder.plan
+def _facts(results: Results) -> dict[str, object]:
+    about, plan = results.folder.about, results.folder.plan
     facts = {
         "seed": plan.seed,
         "varied": "; ".join([f"{key} = {text}" for key, text in about["vary"].items()])
@@ -68,10 +68,10 @@ def _facts(found: Results) -> dict[str, object]:
     return {name: text for name, text in facts.items() if text}
 
 
-def _cover(found: Results) -> Cover:
-    p = found.failure
+def _cover(results: Results) -> Cover:
+    p = results.failure
     share = f"Failures: {p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
-    spreads = {axis: found.spread(f"rmse.{axis}") for axis in AXES}
+    spreads = {axis: results.spread(f"rmse.{axis}") for axis in AXES}
     rows = [
         (
             f"{axis} [{shown(axis)[0]}]",
@@ -80,16 +80,18 @@ def _cover(found: Results) -> Cover:
         for axis, s in spreads.items()
         if s is not None
     ]
-    facts = tuple((name, str(text)) for name, text in _facts(found).items())
-    return Cover(_title(found), found.outcome_text, (share,), ("RMSE", "median", "95 %", "worst"), tuple(rows), facts)
+    facts = tuple((name, str(text)) for name, text in _facts(results).items())
+    return Cover(
+        _title(results), results.outcome_text, (share,), ("RMSE", "median", "95 %", "worst"), tuple(rows), facts
+    )
 
 
-def _title(found: Results) -> str:
-    return f"{found.scene}: {len(found) + len(found.refused['run'])} runs"
+def _title(results: Results) -> str:
+    return f"{results.scene}: {len(results) + len(results.refused['run'])} runs"
 
 
-def _page(found: Results, sections: list[Section]) -> str:
-    plan = found.folder.plan
+def _page(results: Results, sections: list[Section]) -> str:
+    plan = results.folder.plan
     heads = [campaign_plots.shown(name) for name in LISTED]
     worst = [
         {
@@ -98,26 +100,26 @@ def _page(found: Results, sections: list[Section]) -> str:
             "parameters": ", ".join(f"{key} {_short(row[key])}" for key in plan.keys),
             "figures": [f"{scale * row[name]:.3g}" for name, (_, scale) in zip(LISTED, heads, strict=True)],
             "command": shlex.join(
-                ["lapwing", "run", plan.path, "--run", str(row["run"]), "--campaign", str(found.folder.path)]
+                ["lapwing", "run", plan.path, "--run", str(row["run"]), "--campaign", str(results.folder.path)]
             ),
         }
-        for row in found.worst(WORST)
+        for row in results.worst(WORST)
     ]
-    refused = zip(found.refused["run"].tolist(), found.refused["outcome_text"].tolist(), strict=True)
+    refused = zip(results.refused["run"].tolist(), results.refused["outcome_text"].tolist(), strict=True)
     return render(
         "campaign.html",
-        title=_title(found),
-        outcome_text=found.outcome_text,
-        failure=found.failure,
-        facts=_facts(found),
+        title=_title(results),
+        outcome_text=results.outcome_text,
+        failure=results.failure,
+        facts=_facts(results),
         heads=[label for label, _ in heads],
         worst=worst,
-        vehicles=console_output.vehicle_cells(found),
+        vehicles=console_output.vehicle_cells(results),
         vehicle_heads=console_output.VEHICLE_COLUMNS,
         vehicle_title=console_output.VEHICLES,
-        nearest=console_output.nearest_of(found) if found.vehicles else "",
+        nearest=console_output.nearest_of(results) if results.vehicles else "",
         refused=list(refused)[:WORST],
-        refusals=len(found.refused["run"]),
+        refusals=len(results.refused["run"]),
         sections=sections,
     )
 

@@ -104,15 +104,15 @@ def parse(text: str) -> Distribution:
     Raises:
         ValueError: the distribution is unknown, or its arguments are invalid.
     """
-    found = _FORM.fullmatch(text.strip())
-    if not found or found[1] not in KINDS:
+    match = _FORM.fullmatch(text.strip())
+    if not match or match[1] not in KINDS:
         raise ValueError(f"expected a distribution, {', '.join(KINDS)}: normal(10.4, 0.2), got {text!r}")
-    arguments = _arguments(found[2])
+    arguments = _arguments(match[2])
     try:
-        return KINDS[found[1]](*arguments)
+        return KINDS[match[1]](*arguments)
     except TypeError:
-        wanted = ", ".join(signature(KINDS[found[1]]).parameters)
-        raise ValueError(f"{found[1]}: got {found[2]!r}, expected {found[1]}({wanted}) with numbers") from None
+        names = ", ".join(signature(KINDS[match[1]]).parameters)
+        raise ValueError(f"{match[1]}: got {match[2]!r}, expected {match[1]}({names}) with numbers") from None
 
 
 def _arguments(text: str) -> list[Any]:

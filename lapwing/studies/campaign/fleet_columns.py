@@ -35,19 +35,19 @@ def joined(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], requir
         of_each: metrics by vehicle name.
         required: `[success]` by vehicle name.
     """
-    found: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in METRICS}
+    result: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in METRICS}
     unmet = {name: required[name].unmet(row) for name, row in of_each.items()}
     texts = [
         f"{name}: {of_each[name]['outcome_text']}; not {', not '.join(missed)}"
         for name, missed in unmet.items()
         if missed
     ]
-    found |= {"success": not texts, "outcome_text": "; ".join(texts)}
-    found[NEAREST] = nearest({name: flight.truth for name, flight in flights.items()}).distance
+    result |= {"success": not texts, "outcome_text": "; ".join(texts)}
+    result[NEAREST] = nearest({name: flight.truth for name, flight in flights.items()}).distance
     for name, row in of_each.items():
-        found |= {f"{name}.{key}": value for key, value in row.items() if key != "outcome_text"}
-        found[f"{name}.success"] = not unmet[name]
-    return found
+        result |= {f"{name}.{key}": value for key, value in row.items() if key != "outcome_text"}
+        result[f"{name}.success"] = not unmet[name]
+    return result
 
 
 def _worst(name: str, values: list[Any]) -> Any:

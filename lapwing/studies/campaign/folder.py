@@ -121,7 +121,7 @@ class Folder:
 def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
     """Return the manifest of a campaign as plain data."""
     scene = scene_of(plan)
-    said: dict[str, Any] = {
+    data: dict[str, Any] = {
         "scene": scene.name,
         **plan._asdict(),
         "vary": {key: str(distribution) for key, distribution in plan.vary},
@@ -131,7 +131,7 @@ def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
         "success": list(dict.fromkeys(text for each in scene.vehicles or (scene,) for text in each[Success].require)),
         **reference._asdict(),
     }
-    return json.loads(json.dumps(said))
+    return json.loads(json.dumps(data))
 
 
 def default_path(about: dict[str, Any]) -> Path:
@@ -181,8 +181,8 @@ def read(path: Path) -> Folder:
     try:
         about = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
         vary = tuple((key, parse(text)) for key, text in about["vary"].items())
-        given = {name: about[name] for name in Plan._fields}
-        plan = Plan(**given | {"vary": vary, "overrides": tuple(about["overrides"]), "sweep": tuple(about["sweep"])})
+        values = {name: about[name] for name in Plan._fields}
+        plan = Plan(**values | {"vary": vary, "overrides": tuple(about["overrides"]), "sweep": tuple(about["sweep"])})
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         raise ValueError(f"{path}: no campaign there; expected the folder of one, with {MANIFEST}") from None
     return Folder(path, plan, about)

@@ -33,9 +33,9 @@ class Results:
 
     def __init__(self, folder: Folder, units: Mapping[str, str] | None = None):
         self.folder, self.units, everything = folder, units or {}, folder.arrays()
-        taken = everything["outcome"] != REFUSED
-        self.columns = {name: values[taken] for name, values in everything.items()}
-        self.refused = {name: values[~taken] for name, values in everything.items()}
+        is_flown = everything["outcome"] != REFUSED
+        self.columns = {name: values[is_flown] for name, values in everything.items()}
+        self.refused = {name: values[~is_flown] for name, values in everything.items()}
 
     def __len__(self) -> int:
         """Return the number of completed runs."""

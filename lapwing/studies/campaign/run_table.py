@@ -69,13 +69,13 @@ def write_parquet(
 
 def arrays(kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> dict[str, np.ndarray]:
     """Return the columns of a table, shape (n,) each; texts as objects."""
-    found: dict[str, list[np.ndarray]] = {name: [] for name in kinds}
+    lists: dict[str, list[np.ndarray]] = {name: [] for name in kinds}
     for page in pages:
         rows = list(page)
         for name, kind in kinds.items():
             values = [_plain(row.get(name), kind) for row in rows]
-            found[name].append(np.array(values, object if kind is str else kind))
-    return {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in found.items()}
+            lists[name].append(np.array(values, object if kind is str else kind))
+    return {name: np.concatenate(parts) if parts else np.empty(0) for name, parts in lists.items()}
 
 
 def _plain(value: Any, kind: type) -> Any:

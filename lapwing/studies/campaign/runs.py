@@ -50,8 +50,8 @@ def versions() -> dict[str, str]:
     folder, digest = Path(lapwing.services.__file__).parents[1], hashlib.blake2b(digest_size=8)
     for path in sorted(path for name in _OURS for path in (folder / name).rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
-    found = {"lapwing": package_version(), "sources": digest.hexdigest(), "python": platform.python_version()}
-    return found | {name: version(name) for name in _NUMBERS_OF}
+    result = {"lapwing": package_version(), "sources": digest.hexdigest(), "python": platform.python_version()}
+    return result | {name: version(name) for name in _NUMBERS_OF}
 
 
 def vehicles(plan: Plan) -> tuple[str, ...]:
@@ -61,13 +61,13 @@ def vehicles(plan: Plan) -> tuple[str, ...]:
 
 def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
     """Return the name and type of every column of the table; `vehicles` of a fleet."""
-    found: dict[str, type] = {"run": int, "seed": int}
+    result: dict[str, type] = {"run": int, "seed": int}
     for key in plan.keys:
         drawn = next((d for k, d in plan.vary if k == key), None)
         values = [entry[key] for entry in plan.sweep if key in entry] if drawn is None else drawn.values
-        found[key] = float if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values) else str
-    found |= {"success": bool, **{name: str if name in ("outcome", "outcome_text") else float for name in METRICS}}
-    return {**found, **fleet_columns.columns(tuple(vehicles)), "end_state": str}
+        result[key] = float if all(isinstance(v, int | float) and not isinstance(v, bool) for v in values) else str
+    result |= {"success": bool, **{name: str if name in ("outcome", "outcome_text") else float for name in METRICS}}
+    return {**result, **fleet_columns.columns(tuple(vehicles)), "end_state": str}
 
 
 def first_setup(plan: Plan) -> tuple[int, RunConfig]:
@@ -127,10 +127,10 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
         return row | fleet_columns.joined(
             by_name, {name: metrics(flight) for name, flight in by_name.items()}, required
         )
-    found = metrics(flights[0])
-    unmet = scene[Success].unmet(found)
-    told = f"{found['outcome_text']}; not {', not '.join(unmet)}" if unmet else ""
-    return {**row, **found, "success": not unmet, "outcome_text": told}
+    result = metrics(flights[0])
+    unmet = scene[Success].unmet(result)
+    text = f"{result['outcome_text']}; not {', not '.join(unmet)}" if unmet else ""
+    return {**row, **result, "success": not unmet, "outcome_text": text}
 
 
 def _refusal(error: SceneError) -> str:
@@ -142,10 +142,10 @@ def _refusal(error: SceneError) -> str:
 
 
 def _of_refused(names: tuple[str, ...]) -> Row:
-    found: Row = dict.fromkeys(METRICS, math.nan)
+    result: Row = dict.fromkeys(METRICS, math.nan)
     for name, kind in fleet_columns.columns(names).items():
-        found[name] = {bool: False, str: REFUSED, float: math.nan}[kind]
-    return {**found, "outcome": REFUSED, "end_state": ""}
+        result[name] = {bool: False, str: REFUSED, float: math.nan}[kind]
+    return {**result, "outcome": REFUSED, "end_state": ""}
 
 
 def setup_of(plan: Plan, run: int) -> RunConfig:
@@ -180,22 +180,24 @@ def scene_of(plan: Plan) -> Scene:
 
 def sources(plan: Plan) -> dict[str, str]:
     """Return the source texts of a campaign: the scene, its files, and files that runs may name instead."""
-    found = {name: text.decode() for name, text in scene_of(plan).sources.items()}
+    result = {name: text.decode() for name, text in scene_of(plan).sources.items()}
     for key, distribution in plan.vary:
         for value in distribution.values:
             if isinstance(value, str):
                 with contextlib.suppress(SceneError):  # such a run is refused
                     named = load(scene_of(plan), {key: value}).sources
-                    found |= {f"{key}={value}: {n}": t.decode() for n, t in named.items() if found.get(n) != t.decode()}
-    return dict(sorted(found.items()))
+                    result |= {
+                        f"{key}={value}: {n}": t.decode() for n, t in named.items() if result.get(n) != t.decode()
+                    }
+    return dict(sorted(result.items()))
 
 
 @cache
 def _scene(scene: str, overrides: tuple[str, ...]) -> Scene:
-    found = load(scene, overrides)
-    for vehicle in found.vehicles or (found,):
+    result = load(scene, overrides)
+    for vehicle in result.vehicles or (result,):
         check_success(vehicle)
-    return found
+    return result
 
 
 @cache
@@ -213,12 +215,12 @@ def _check(plan: Plan, reference: Reference) -> None:
         scene_of(plan)
     except SceneError as error:
         raise ValueError(f"{where}: {error}") from None
-    for name, wanted in reference.versions.items():
-        if (found := versions().get(name)) != wanted:
-            raise ValueError(f"{where}: has {name} {found}; the campaign was begun with {wanted}")
+    for name, expected in reference.versions.items():
+        if (result := versions().get(name)) != expected:
+            raise ValueError(f"{where}: has {name} {result}; the campaign was begun with {expected}")
     if foreign_firmware(setup_of(plan, reference.run)):
         return  # no two of its flights need be equal
     if reference.end_state not in _agreed:
-        if (found := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
+        if (result := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
             raise ValueError(f"{where}: run {reference.run} goes another way there than where the campaign was begun")
         _agreed.add(reference.end_state)

@@ -37,8 +37,8 @@ class Count(NamedTuple):
 
     def __add__(self, other: "Count") -> "Count":  # type: ignore[override]
         kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REFUSED)}
-        seen = tuple((kind, n) for kind, n in kinds.items() if n)
-        return Count(self.runs + other.runs, self.successes + other.successes, seen)
+        counts = tuple((kind, n) for kind, n in kinds.items() if n)
+        return Count(self.runs + other.runs, self.successes + other.successes, counts)
 
     def __str__(self) -> str:
         return ", ".join(f"{n} {kind}" for kind, n in self.kinds)
@@ -46,9 +46,9 @@ class Count(NamedTuple):
 
 def count(rows: Iterable[Row]) -> Count:
     """Return the counts of some rows."""
-    kept = list(rows)
-    kinds = Counter(row["outcome"] for row in kept)
-    return Count() + Count(len(kept), sum(row["success"] for row in kept), tuple(kinds.items()))
+    table = list(rows)
+    kinds = Counter(row["outcome"] for row in table)
+    return Count() + Count(len(table), sum(row["success"] for row in table), tuple(kinds.items()))
 
 
 def campaign(

@@ -19,11 +19,11 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
     Raises:
         ValueError: there is no such run, or the scene differs from the campaign's.
     """
-    found = read(folder)
-    if not 0 <= run < found.plan.runs:
-        raise ValueError(f"--run {run}: expected a run of {folder}, 0 to {found.plan.runs - 1}")
-    plan = found.plan._replace(path=str(scene))
-    there, here = found.about["sources"], sources(plan)
+    campaign = read(folder)
+    if not 0 <= run < campaign.plan.runs:
+        raise ValueError(f"--run {run}: expected a run of {folder}, 0 to {campaign.plan.runs - 1}")
+    plan = campaign.plan._replace(path=str(scene))
+    there, here = campaign.about["sources"], sources(plan)
     for name in sorted({*there, *here}):
         if there.get(name) != here.get(name):
             raise ValueError(f"{scene}: {name} is not what {folder} has flown; expected the scene as it was then")
@@ -33,9 +33,9 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
 
 def end_state_of(run: int, folder: Path) -> str:
     """Return the final state of a run in its campaign; "" if it has not been flown."""
-    found = read(folder)
-    shard = next(k for k, runs in enumerate(found.shards) if run in runs)
-    if shard in found.missing():
+    campaign = read(folder)
+    shard = next(k for k, runs in enumerate(campaign.shards) if run in runs)
+    if shard in campaign.missing():
         return ""
-    row = next(row for row in found.rows(shard) if row["run"] == run)
+    row = next(row for row in campaign.rows(shard) if row["run"] == run)
     return "" if row["outcome"] == REFUSED else row["end_state"]

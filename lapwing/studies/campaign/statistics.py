@@ -36,8 +36,8 @@ def interval(k: int, n: int) -> Interval:
     """Return the Clopper-Pearson interval of a probability from k events in n trials; it is conservative."""
     if n == 0:
         return Interval(float("nan"), 0.0, 1.0)
-    found = stats.binomtest(k, n).proportion_ci(SURE, method="exact")
-    return Interval(k / n, float(found.low), float(found.high))
+    result = stats.binomtest(k, n).proportion_ci(SURE, method="exact")
+    return Interval(k / n, float(result.low), float(result.high))
 
 
 def spread(values: np.ndarray, runs: np.ndarray, least: bool = False) -> Spread | None:
@@ -89,9 +89,9 @@ def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
     bounds = np.column_stack([low, high])[varying].tolist()
     problem = {"num_vars": len(varying), "names": [names[k] for k in varying], "bounds": bounds}
     with np.errstate(invalid="ignore", divide="ignore"):  # a resample in which every run came to the same
-        found = rbd_fast.analyze(problem, x[:, varying], y, seed=1, conf_level=SURE)
+        result = rbd_fast.analyze(problem, x[:, varying], y, seed=1, conf_level=SURE)
     indices = [Interval(np.nan, np.nan, np.nan)] * len(names)
-    for k, s, c in zip(varying, found["S1"], found["S1_conf"], strict=True):
+    for k, s, c in zip(varying, result["S1"], result["S1_conf"], strict=True):
         indices[k] = Interval(float(s), float(s - c), float(s + c))
     return indices
 

@@ -17,36 +17,36 @@ from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
 LEAST = 1e-6  # [m] shorter bars are drawn as long as this
 
 
-def show(console: Console, found: Study) -> None:
+def show(console: Console, study: Study) -> None:
     """Print the study for people."""
-    head = f"{found.scene}: a plant step takes {found.airborne:.0f} ns hovering, {found.standing:.0f} ns standing"
+    head = f"{study.scene}: a plant step takes {study.airborne:.0f} ns hovering, {study.standing:.0f} ns standing"
     console.print(head)
-    _table(console, "Effects of the scene, and what leaving one out changes", found, active=True)
-    _table(console, "Effects that the scene leaves out, and what adding one changes", found, active=False)
-    saved = 1.0 - found.smallest_airborne / found.airborne, 1.0 - found.smallest_standing / found.standing
+    _table(console, "Effects of the scene, and what leaving one out changes", study, active=True)
+    _table(console, "Effects that the scene leaves out, and what adding one changes", study, active=False)
+    saved = 1.0 - study.smallest_airborne / study.airborne, 1.0 - study.smallest_standing / study.standing
     console.print(
-        f"Smallest set within {found.within:g} m: {', '.join(found.smallest) or 'none'} ({found.apart:.2g} m off; "
+        f"Smallest set within {study.within:g} m: {', '.join(study.smallest) or 'none'} ({study.apart:.2g} m off; "
         f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} standing)",
     )
     console.print('Costs after "<" are below what this measurement resolves.')
-    names = ", ".join(row.name for row in found.missing)
-    console.print(f"Left out, and worth more than {found.within:g} m: {names or 'none'}")
+    names = ", ".join(row.name for row in study.missing)
+    console.print(f"Left out, and worth more than {study.within:g} m: {names or 'none'}")
 
 
-def _table(console: Console, title: str, found: Study, active: bool) -> None:
+def _table(console: Console, title: str, study: Study, active: bool) -> None:
     console.print(title)
     table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
     table.add_column("effect", no_wrap=True)
     for column in ("hovering\n[ns]", "share", "standing\n[ns]", "path [m]", "end [m]", "energy"):
         table.add_column(column, justify="right", no_wrap=True)
-    for row in _of(found, active):
+    for row in _of(study, active):
         if row.influence is None:
             continue
-        share = f"{row.airborne / found.airborne:.0%}" if row.airborne > found.noise[0] else ""
-        airborne, standing = _cost(row.airborne, found.noise[0]), _cost(row.standing, found.noise[1])
+        share = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
+        airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
         table.add_row(row.name, airborne, share, standing, *_changes(row.influence))
     console.print(table)
-    for row in _of(found, active):
+    for row in _of(study, active):
         if row.remark:
             console.print(f"  not flown: {row.remark}", soft_wrap=True)
 
@@ -69,29 +69,29 @@ def percent(share: float) -> str:
     return f"{value:+.0f} %" if 9.95 <= abs(value) < 1e4 else f"{value:+.2g} %"
 
 
-def _of(found: Study, active: bool) -> list[Row]:
-    rows = [row for row in found.rows if row.active == active]
+def _of(study: Study, active: bool) -> list[Row]:
+    rows = [row for row in study.rows if row.active == active]
     return sorted(rows, key=lambda r: -r.influence.trajectory if r.influence else math.inf)
 
 
-def write_json(path: Path, found: Study) -> None:
+def write_json(path: Path, study: Study) -> None:
     """Write the study; values that are infinite or unknown are null."""
-    json_file.write_json(path, {**found._asdict(), "missing": [row.name for row in found.missing]})
+    json_file.write_json(path, {**study._asdict(), "missing": [row.name for row in study.missing]})
 
 
-def plot(path: Path, found: Study) -> None:
+def plot(path: Path, study: Study) -> None:
     """Plot the influence of every effect over the tolerance, and its cost."""
-    rows = [r for r in (*_of(found, False)[::-1], *_of(found, True)[::-1]) if r.influence]
+    rows = [r for r in (*_of(study, False)[::-1], *_of(study, True)[::-1]) if r.influence]
     names = [row.name if row.active else f"({row.name})" for row in rows]
     with styled():
         figure = Figure(figsize=(WIDTH, 1.1 + 0.27 * len(rows)), dpi=DPI, layout="constrained")
         influence, cost = figure.subplots(1, 2, sharey=True)
         ends = [row.influence.trajectory for row in rows if row.influence]
-        most = max([e for e in ends if math.isfinite(e)] + [10.0 * found.within])
+        most = max([e for e in ends if math.isfinite(e)] + [10.0 * study.within])
         lengths = [min(max(e, LEAST), 3.0 * most) if e > 0.0 else 0.0 for e in ends]  # no bar: no change
         colours = [FLOWN if row.active else "#9CC3DD" for row in rows]
         influence.barh(names, lengths, color=colours)
-        influence.axvline(found.within, color=BOUND, linewidth=1.2, label=f"tolerance {found.within:g} m")
+        influence.axvline(study.within, color=BOUND, linewidth=1.2, label=f"tolerance {study.within:g} m")
         influence.set_xscale("log")
         influence.set_xlabel("largest change of the trajectory [m]")
         influence.legend(loc="lower right")
@@ -100,5 +100,5 @@ def plot(path: Path, found: Study) -> None:
         for axis in (influence, cost):
             axis.grid(visible=False, axis="y")
             axis.margins(y=0.01)
-        figure.suptitle(f"{found.scene}: effects of the scene, and (in brackets) those it leaves out", fontsize=10)
+        figure.suptitle(f"{study.scene}: effects of the scene, and (in brackets) those it leaves out", fontsize=10)
         figure.savefig(path)

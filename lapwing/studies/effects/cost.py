@@ -41,13 +41,13 @@ def exchanges(method: Any, p: Any, s: Any, key: Key, command: tuple[float, ...],
 def costs(scene: Scene, variants: list[Tables]) -> list[Cost]:
     """Return the cost of a plant step of each variant."""
     calls = [_calls(variant(scene, tables)) for tables in variants]
-    taken = np.empty((ROUNDS, len(variants), 2))
-    for row in taken:
+    times = np.empty((ROUNDS, len(variants), 2))
+    for row in times:
         for i, pair in enumerate(calls):
             for j, call in enumerate(pair):
                 row[i, j] = call()
     # interruptions only add: the least is nearest to what the work itself takes
-    odd, even = (taken[begin::2].min(axis=0) / STEPS * 1e9 for begin in (1, 2))
+    odd, even = (times[begin::2].min(axis=0) / STEPS * 1e9 for begin in (1, 2))
     return [Cost(*np.minimum(a, b), *np.abs(a - b)) for a, b in zip(odd, even, strict=True)]
 
 

@@ -16,16 +16,16 @@ class Influence(NamedTuple):
     failure: str = ""
 
 
-def influence(flown: FlightData, other: FlightData) -> Influence:
-    """Return the difference of `other` from `flown`; a shorter flight is extended by its last state."""
+def influence(reference: FlightData, other: FlightData) -> Influence:
+    """Return the difference of `other` from `reference`; a shorter flight is extended by its last state."""
     if other.failure:
         return Influence(np.inf, np.inf, np.inf, other.failure)
-    count = max(len(flown.truth), len(other.truth))
-    a, b = (_held(flight.truth.position, count) for flight in (flown, other))
+    count = max(len(reference.truth), len(other.truth))
+    a, b = (_extended(flight.truth.position, count) for flight in (reference, other))
     apart = np.linalg.norm(a - b, axis=1)
-    change = (other.energy - flown.energy) / flown.energy if flown.energy else 0.0
+    change = (other.energy - reference.energy) / reference.energy if reference.energy else 0.0
     return Influence(float(apart.max()), float(apart[-1]), float(change))
 
 
-def _held(position: np.ndarray, count: int) -> np.ndarray:
+def _extended(position: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([position, np.repeat(position[-1:], count - len(position), axis=0)])

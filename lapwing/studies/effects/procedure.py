@@ -71,28 +71,28 @@ def study(scene: Scene, within: float, say: Callable[[str, int, int], None]) -> 
         flights = crew.fly([tables, *flying.values()])
         count = len(flying) + 1
         say("flying the scene as it is", 0, count)
-        flown = next(flights)
-        if flown.failure:
-            raise ValueError(f"{scene.path}: {flown.failure}")
+        reference = next(flights)
+        if reference.failure:
+            raise ValueError(f"{scene.path}: {reference.failure}")
         for i, (name, flight) in enumerate(zip(flying, flights, strict=True), 1):
             say(f"{'without' if name in tables else 'with'} {name}", i + 1, count)
-            result[name] = influence(flown, flight)
+            result[name] = influence(reference, flight)
         out = sorted((n for n in fewer if n in result), key=lambda n: result[n].trajectory)
         out = [n for n in out if result[n].trajectory <= within]
-        kept, apart = _smallest(crew, tables, flown, out, within, lambda text: say(text, count, count + 1))
+        smallest, apart = _smallest(crew, tables, reference, out, within, lambda text: say(text, count, count + 1))
     say("timing the plant's steps", count + 1, count + 1)
     names = list(flying)
-    full, least, *each = measured = costs(scene, [tables, kept, *flying.values()])
+    full, least, *each = measured = costs(scene, [tables, smallest, *flying.values()])
     rows = []
     for name in sorted(fewer) + sorted(more):
         sign = 1.0 if name in fewer else -1.0
-        taken = each[names.index(name)] if name in flying else (math.nan, math.nan)
-        airborne, standing = (sign * (a - b) for a, b in zip(full[:2], taken[:2], strict=True))
+        without = each[names.index(name)] if name in flying else (math.nan, math.nan)
+        airborne, standing = (sign * (a - b) for a, b in zip(full[:2], without[:2], strict=True))
         rows.append(Row(name, name in fewer, result.get(name), airborne, standing, refused.get(name, "")))
     unknown = math.nan, math.nan
     rows += [Row(name, False, None, *unknown, f"effects.{name}: needs other vehicles") for name in among]
     noise = max(cost.airborne_noise for cost in measured), max(cost.standing_noise for cost in measured)
-    return Study(scene.name, within, *full[:2], tuple(rows), tuple(kept), apart, *least[:2], noise)
+    return Study(scene.name, within, *full[:2], tuple(rows), tuple(smallest), apart, *least[:2], noise)
 
 
 def _without(tables: Tables, *names: str) -> dict[str, Any]:
@@ -100,17 +100,17 @@ def _without(tables: Tables, *names: str) -> dict[str, Any]:
 
 
 def _smallest(
-    crew: VariantPool, tables: Tables, flown: FlightData, out: list[str], within: float, say: Callable[[str], None]
+    crew: VariantPool, tables: Tables, reference: FlightData, out: list[str], within: float, say: Callable[[str], None]
 ) -> tuple[dict[str, Any], float]:
     """Return the effects that remain after the removal of as many of `out` as possible, and the resulting difference.
 
     Each of `out` alone is within the tolerance; while all together are not, the one of most influence is restored.
     """
     while out:
-        kept = _without(tables, *out)
+        smallest = _without(tables, *out)
         say(f"without {', '.join(out)} together")
-        apart = influence(flown, next(iter(crew.fly([kept])))).trajectory
+        apart = influence(reference, next(iter(crew.fly([smallest])))).trajectory
         if apart <= within:
-            return kept, apart
+            return smallest, apart
         out = out[:-1]
     return dict(tables), 0.0

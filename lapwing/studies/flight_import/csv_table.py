@@ -10,7 +10,7 @@ from typing import TextIO, cast
 import numpy as np
 
 
-def read_columns(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
+def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]:
     """Return the wanted columns of a CSV file that has them, by name; empty fields are NaN.
 
     Raises:
@@ -19,7 +19,7 @@ def read_columns(path: Path, wanted: Collection[str]) -> dict[str, np.ndarray]:
     try:
         with warnings.catch_warnings(), _opened(path) as file:
             names = [name.strip().strip('"') for name in file.readline().split(",")]
-            result = [name for name in dict.fromkeys(wanted) if name in names]
+            result = [name for name in dict.fromkeys(selected) if name in names]
             if not result:
                 raise ValueError(f"{path}: no known column in its header; check the --mapping")
             places = [names.index(name) for name in result]

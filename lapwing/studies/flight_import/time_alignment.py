@@ -51,16 +51,16 @@ def clock_drift(turning: np.ndarray, omega: np.ndarray, valid: np.ndarray, inter
     time, late = np.array(middles), np.array(offsets)
     slope, intercept, *_ = theilslopes(late, time)
     distance = np.abs(late - intercept - slope * time)
-    kept = distance <= 2.0 * np.median(distance) + 1e-3 * interval
-    if kept.sum() < FEWEST:
+    inliers = distance <= 2.0 * np.median(distance) + 1e-3 * interval
+    if inliers.sum() < FEWEST:
         return None
-    design = np.column_stack([np.ones(kept.sum()), time[kept]])
-    line = np.linalg.lstsq(design, late[kept], rcond=None)[0]
-    rest = late[kept] - design @ line
-    spread = float(np.sqrt((rest**2).sum() / (kept.sum() - 2)))
+    design = np.column_stack([np.ones(inliers.sum()), time[inliers]])
+    line = np.linalg.lstsq(design, late[inliers], rcond=None)[0]
+    rest = late[inliers] - design @ line
+    spread = float(np.sqrt((rest**2).sum() / (inliers.sum() - 2)))
     # spans overlap by half, so about half as many are independent
-    error = spread * np.sqrt(2.0 / ((time[kept] - time[kept].mean()) ** 2).sum())
-    return ClockDrift(float(line[1]), float(error), spread, int(kept.sum()))
+    error = spread * np.sqrt(2.0 / ((time[inliers] - time[inliers].mean()) ** 2).sum())
+    return ClockDrift(float(line[1]), float(error), spread, int(inliers.sum()))
 
 
 def time_offset(turning: np.ndarray, omega: np.ndarray, valid: np.ndarray, interval: float) -> tuple[float, float]:

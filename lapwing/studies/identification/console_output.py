@@ -14,10 +14,10 @@ from lapwing.studies.validation.prediction_metrics import FIELDS
 RELATED = 0.8  # correlation of two estimates from which it is printed
 
 
-def show(console: Console, found: Identification) -> None:
+def show(console: Console, identification: Identification) -> None:
     """Print estimates, correlations, undetermined parameters, and the errors on held-out flights."""
-    fit = found.fit
-    table = Table(title=f"{found.scene}: output error on {len(found.used)} flights")
+    fit = identification.fit
+    table = Table(title=f"{identification.scene}: output error on {len(identification.used)} flights")
     for head in ("parameter", "before", "estimate", "standard error"):
         table.add_column(head, justify="left" if head == "parameter" else "right")
     for key, before, value, error in zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True):
@@ -29,28 +29,28 @@ def show(console: Console, found: Identification) -> None:
             console.print(text, soft_wrap=True)
     for key in fit.undetermined:
         console.print(f"not determined by these flights: {key}", soft_wrap=True)
-    judged = f"{len(found.held_out)} held-out flights" if found.held_out else "the same flights"
+    judged = f"{len(identification.held_out)} held-out flights" if identification.held_out else "the same flights"
     console.print(f"error after 0.5 s on {judged}, before and after:")
-    for name, before, after in zip(FIELDS, found.before, found.after, strict=True):
+    for name, before, after in zip(FIELDS, identification.before, identification.after, strict=True):
         if np.isfinite(before):  # measured by a held-out flight
             console.print(f"  {name.replace('_', ' ')} [{UNITS[name]}]: {before:.3g}, {after:.3g}")
 
 
-def write_json(path: Path, found: Identification) -> None:
+def write_json(path: Path, identification: Identification) -> None:
     """Write estimates, standard errors, correlations and errors."""
-    fit = found.fit
+    fit = identification.fit
     rows = zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True)
-    errors = zip(FIELDS, found.before, found.after, strict=True)
+    errors = zip(FIELDS, identification.before, identification.after, strict=True)
     content = {
-        "scene": found.scene,
+        "scene": identification.scene,
         "parameters": {
             key: {"start": a, "estimate": b, "standard_error": c, "determined": key not in fit.undetermined}
             for key, a, b, c in rows
         },
         "correlations": fit.correlations,
         "loss": fit.cost,
-        "flights": found.used,
-        "held_out": found.held_out,
+        "flights": identification.used,
+        "held_out": identification.held_out,
         "held_out_errors": {name: {"before": a, "after": b} for name, a, b in errors},
     }
     json_file.write_json(path, content)

@@ -79,33 +79,35 @@ def identify(
         raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
     chosen = _held_out(len(recordings), seed)
     used = [r for k, r in enumerate(recordings) if k not in chosen]
-    held = [r for k, r in enumerate(recordings) if k in chosen]
+    held_out = [r for k, r in enumerate(recordings) if k in chosen]
     plant = PlantRows(base, recordings[0].interval)
     problem = OutputError(plant, used, keys, start, windows, memory, horizons)
     stamp = _stamp(base, keys, [r.name for r in used], windows, seed, (memory, horizons))
     begin = _resumed(progress, stamp)
 
-    def kept(step: int, values: np.ndarray, cost: float) -> None:
+    def store(step: int, values: np.ndarray, cost: float) -> None:
         say(f"loss {cost:.4g}", step, most)
         if progress:
             progress.write_text(json.dumps({"stamp": stamp, "values": values.tolist()}), encoding="utf-8")
 
-    fit = problem.solve(begin, most, kept)
-    judged = held or used
+    fit = problem.solve(begin, most, store)
+    judged = held_out or used
     before = _errors(plant, judged, keys, np.array(start), memory)
     after = _errors(plant, judged, keys, fit.values, memory)
     if progress:
         progress.unlink(missing_ok=True)
     name = str(getattr(base, "name", scene))
-    return Identification(name, fit, tuple(r.name for r in used), tuple(r.name for r in held), before, after)
+    return Identification(name, fit, tuple(r.name for r in used), tuple(r.name for r in held_out), before, after)
 
 
-def write_airframe(path: Path, scene: Scene | str | Path, found: Identification, overrides: Overrides = ()) -> None:
+def write_airframe(
+    path: Path, scene: Scene | str | Path, identification: Identification, overrides: Overrides = ()
+) -> None:
     """Write the scene's airframe with the estimated values, and those of effects as comments for the scene."""
     base = load_one(scene, overrides)
     table = base[VehicleAirframe].model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     table |= {"mass": base[VehicleAirframe].mass.model_dump(mode="json")}
-    values = {k: float(v) for k, v in zip(found.fit.keys, found.fit.values, strict=True)}
+    values = {k: float(v) for k, v in zip(identification.fit.keys, identification.fit.values, strict=True)}
     others = {}
     for key, value in values.items():
         first, _, rest = key.partition(".")
@@ -114,11 +116,13 @@ def write_airframe(path: Path, scene: Scene | str | Path, found: Identification,
         elif not is_flight_parameter(key):
             others[key] = value
     lines = [
-        f"# Identified by output error from {len(found.used)} flights: {', '.join(found.used)}.",
-        f"# Held out: {', '.join(found.held_out) or 'none'}.",
+        f"# Identified by output error from {len(identification.used)} flights: {', '.join(identification.used)}.",
+        f"# Held out: {', '.join(identification.held_out) or 'none'}.",
     ]
-    for key, value, error in zip(found.fit.keys, found.fit.values, found.fit.standard_errors, strict=True):
-        state = ", not determined by the flights" if key in found.fit.undetermined else ""
+    for key, value, error in zip(
+        identification.fit.keys, identification.fit.values, identification.fit.standard_errors, strict=True
+    ):
+        state = ", not determined by the flights" if key in identification.fit.undetermined else ""
         lines.append(f"# {key} = {value:.6g}, standard error {error:.2g}{state}")
     if others:
         lines.append("# For the scene, beside vehicle.airframe:")

@@ -92,8 +92,8 @@ def _difference(
     a: LogReader, b: LogReader, topic: str, kind: str, time_ns: int, one: list[bytes], other: list[bytes]
 ) -> Difference:
     if len(one) != len(other) or kind not in TYPES:
-        told = (f"{len(one)} messages", f"{len(other)} messages") if len(one) != len(other) else ("", "")
-        return Difference(topic, time_ns, "", told, ())
+        texts = (f"{len(one)} messages", f"{len(other)} messages") if len(one) != len(other) else ("", "")
+        return Difference(topic, time_ns, "", texts, ())
     pair = next((x, y) for x, y in zip(one, other, strict=True) if x != y)
     result = first_difference(TYPES[kind], *pair)
     assert result
@@ -110,8 +110,8 @@ def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -
     instants, moved = _apart(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
     position = dict(zip(instants.tolist(), moved.tolist(), strict=True))
     after = (times - first_ns) * 1e-9
-    wanted = [seconds for seconds in AFTER if seconds < after[-1]] + [float(after[-1])]
-    rows = dict.fromkeys(int(np.searchsorted(after, seconds - 1e-9)) for seconds in wanted)
+    moments = [seconds for seconds in AFTER if seconds < after[-1]] + [float(after[-1])]
+    rows = dict.fromkeys(int(np.searchsorted(after, seconds - 1e-9)) for seconds in moments)
     return tuple(Growth(float(after[k]), float(apart[k]), position.get(int(times[k]))) for k in rows)
 
 

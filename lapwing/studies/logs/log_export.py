@@ -31,10 +31,10 @@ def tables(log: LogReader, topics: Collection[str] | None = None) -> dict[str, T
     return result
 
 
-def write_csv(found: dict[str, Table], folder: Path) -> list[Path]:
+def write_csv(tables: dict[str, Table], folder: Path) -> list[Path]:
     """Write a file per topic; the first line has names and units: "velocity.x [m/s]"."""
     paths = []
-    for topic, table in found.items():
+    for topic, table in tables.items():
         path = folder / f"{_file_name(topic)}.csv"
         with path.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
@@ -44,7 +44,7 @@ def write_csv(found: dict[str, Table], folder: Path) -> list[Path]:
     return paths
 
 
-def write_parquet(found: dict[str, Table], folder: Path) -> list[Path]:
+def write_parquet(tables: dict[str, Table], folder: Path) -> list[Path]:
     """Write a file per topic; each column's unit is in its field's metadata, key "unit".
 
     Raises:
@@ -56,7 +56,7 @@ def write_parquet(found: dict[str, Table], folder: Path) -> list[Path]:
     except ImportError:
         raise ValueError("--parquet: pyarrow is not installed; pip install lapwing[parquet]") from None
     paths = []
-    for topic, table in found.items():
+    for topic, table in tables.items():
         arrays = {name: pyarrow.array(_plain(values)) for name, (_, values) in table.items()}
         units = {name: {"unit": of} if of else None for name, (of, _) in table.items()}
         fields = [pyarrow.field(name, array.type, metadata=units[name]) for name, array in arrays.items()]
@@ -66,12 +66,12 @@ def write_parquet(found: dict[str, Table], folder: Path) -> list[Path]:
     return paths
 
 
-def write_mat(found: dict[str, Table], path: Path) -> list[Path]:
+def write_mat(tables: dict[str, Table], path: Path) -> list[Path]:
     """Write one MATLAB file: a struct of columns per topic, whose field `units` is a struct of the same names."""
     from scipy.io import savemat
 
     structs: dict[str, Any] = {}
-    for topic, table in found.items():
+    for topic, table in tables.items():
         columns = {_identifier(name): _matlab(values) for name, (_, values) in table.items()}
         structs[_identifier(topic)] = columns | {"units": {_identifier(name): of for name, (of, _) in table.items()}}
     savemat(path, structs, long_field_names=True, oned_as="column")

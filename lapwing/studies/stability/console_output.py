@@ -56,8 +56,8 @@ def table(console: Console, results: Sequence[Result]) -> None:
         console.print(shown)
 
 
-def _coloured(passes: bool, wanted: bool | None = None) -> str:
-    colour = "green" if (passes if wanted is None else wanted) else "red"
+def _coloured(passes: bool, expected: bool | None = None) -> str:
+    colour = "green" if (passes if expected is None else expected) else "red"
     return f"[{colour}]{verdict(passes)}[/{colour}]"
 
 

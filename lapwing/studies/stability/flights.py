@@ -7,17 +7,17 @@ import numpy as np
 
 from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load
+from lapwing.studies import simulate
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.simulate import fly
 
 
-def flown(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> FlightData:
+def fly(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> FlightData:
     """Fly a scene with overrides "KEY=VALUE" to its end or to a non-finite state.
 
     Raises:
         SceneError: an override is invalid.
     """
-    result: FlightData = fly(load(scene, list(overrides)), topics)
+    result: FlightData = simulate.fly(load(scene, list(overrides)), topics)
     return result
 
 

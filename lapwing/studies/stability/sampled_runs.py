@@ -16,8 +16,8 @@ def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int)
     `steps` is a multiple of `samples`. Rows are NaN from the first non-finite one.
     """
     out = np.empty((samples + 1, len(flatten(x))))
-    kept = sampled(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
-    out[kept:] = np.nan
+    rows = sampled(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
+    out[rows:] = np.nan
     return out
 
 

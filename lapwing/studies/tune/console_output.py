@@ -38,25 +38,25 @@ class Rows:
         self.rows.append(cells)
 
 
-def tables(found: Tuned) -> Iterator[Rows]:
+def tables(tuning: Tuned) -> Iterator[Rows]:
     """Yield every table of the study, the result first."""
-    yield _margins(found)
-    if found.polished:
-        yield _errors(found)
-        yield _corners(found)
-    yield _model(found)
+    yield _margins(tuning)
+    if tuning.polished:
+        yield _errors(tuning)
+        yield _corners(tuning)
+    yield _model(tuning)
 
 
-def show(console: Console, found: Tuned) -> None:
+def show(console: Console, tuning: Tuned) -> None:
     """Print the tables, failures in red."""
-    for rows in tables(found):
+    for rows in tables(tuning):
         table = Table(title=rows.title, title_justify="left")
         for k, head in enumerate(rows.heads):
             table.add_column(head, justify="right" if k else "left", no_wrap=True)
         for k, row in enumerate(rows.rows):
             table.add_row(*row, style="bold red" if k in rows.failed else None)
         console.print(table)
-    for text in found.failures:
+    for text in tuning.failures:
         console.print(f"new gains fail: {text}", style="bold red", soft_wrap=True)
 
 
@@ -68,22 +68,22 @@ def cell(m: Margins) -> str:
     return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"
 
 
-def _margins(found: Tuned) -> Rows:
+def _margins(tuning: Tuned) -> Rows:
     rows = Rows(
-        "Crossover in rad/s, phase margin in degrees, upper/lower gain margin in dB", "loop", found.before.name, "new"
+        "Crossover in rad/s, phase margin in degrees, upper/lower gain margin in dB", "loop", tuning.before.name, "new"
     )
-    for name in found.after.margins:
+    for name in tuning.after.margins:
         rows.add(
             name,
-            cell(found.before.margins[name]),
-            cell(found.after.margins[name]),
-            failed=name in found.after.shortfalls,
+            cell(tuning.before.margins[name]),
+            cell(tuning.after.margins[name]),
+            failed=name in tuning.after.shortfalls,
         )
     return rows
 
 
-def _errors(found: Tuned) -> Rows:
-    p = found.polished
+def _errors(tuning: Tuned) -> Rows:
+    p = tuning.polished
     assert p is not None
     title = f"RMSE of {len(p.after)} flights of the scene: as designed and refined ({p.candidates} gain sets flown)"
     rows = Rows(title, "axis", "designed", "refined")
@@ -93,29 +93,29 @@ def _errors(found: Tuned) -> Rows:
     return rows
 
 
-def _corners(found: Tuned) -> Rows:
+def _corners(tuning: Tuned) -> Rows:
     rows = Rows(
         "Flights with a vehicle that differs from the controller's model",
         "vehicle",
         "max. position error, m",
         "outcome",
     )
-    for corner, f in found.corners.items():
+    for corner, f in tuning.corners.items():
         rows.add(str(corner), f"{f['max_distance']:.3f}", f["outcome"], failed=bool(failure(f)))
     return rows
 
 
-def _model(found: Tuned) -> Rows:
-    if found.identified is None:
+def _model(tuning: Tuned) -> Rows:
+    if tuning.identified is None:
         rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit")
         for name, unit in UNITS.items():
-            rows.add(name, f"{getattr(found.compiled, name):.4g}", unit)
+            rows.add(name, f"{getattr(tuning.compiled, name):.4g}", unit)
         return rows
     rows = Rows(
         "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %"
     )
     for name, unit in UNITS.items():
-        a, b = getattr(found.identified.model, name), getattr(found.compiled, name)
-        fit = f"{found.identified.fit[name]:.1f}" if name in LOOPS else ""
+        a, b = getattr(tuning.identified.model, name), getattr(tuning.compiled, name)
+        fit = f"{tuning.identified.fit[name]:.1f}" if name in LOOPS else ""
         rows.add(name, f"{a:.4g}", f"{b:.4g}", unit, fit)
     return rows

@@ -30,25 +30,25 @@ def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
     )
 
 
-def gain_set(model: Hover, wanted: Bandwidths) -> GainSet:
+def gain_set(model: Hover, initial: Bandwidths) -> GainSet:
     """Return the gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
 
     def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
         d = w / effect
         return _rounded(p * w * d), _rounded(i * w * p * w * d), _rounded(d)
 
-    roll = loop(model.roll, wanted.attitude, 0.12, 0.024)
-    outer = loop(model.tilt, wanted.position, 0.39, 0.032)
+    roll = loop(model.roll, initial.attitude, 0.12, 0.024)
+    outer = loop(model.tilt, initial.position, 0.39, 0.032)
     return GainSet(
-        description=f"lapwing tune: bandwidths {', '.join(f'{k} {v:.3g}' for k, v in wanted._asdict().items())} rad/s",
-        altitude=loop(model.altitude, wanted.altitude, 0.39, 0.06),
-        yaw=loop(model.yaw, wanted.yaw, 0.21, 0.017),
+        description=f"lapwing tune: bandwidths {', '.join(f'{k} {v:.3g}' for k, v in initial._asdict().items())} rad/s",
+        altitude=loop(model.altitude, initial.altitude, 0.39, 0.06),
+        yaw=loop(model.yaw, initial.yaw, 0.21, 0.017),
         roll_inner=(-roll[0], -roll[1], -roll[2]),
-        pitch_inner=loop(model.pitch, wanted.attitude, 0.12, 0.024),
+        pitch_inner=loop(model.pitch, initial.attitude, 0.12, 0.024),
         roll_outer=outer,
         pitch_outer=outer,
         tilt_limit=0.6,
-        reference_bandwidth=_rounded(4.1 * wanted.position),
+        reference_bandwidth=_rounded(4.1 * initial.position),
         reference_damping=0.55,
         feed_forward=True,
     )
@@ -74,25 +74,27 @@ def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
     return result
 
 
-def design(model: Hover, airframe: Airframe, tick: float, wanted: Bandwidths, say: Callable[[str], None]) -> Bandwidths:
-    """Return the fastest bandwidths at or below `wanted` whose gain set has the required margins.
+def design(
+    model: Hover, airframe: Airframe, tick: float, initial: Bandwidths, say: Callable[[str], None]
+) -> Bandwidths:
+    """Return the fastest bandwidths at or below `initial` whose gain set has the required margins.
 
     Args:
         model: plant about hover.
         airframe: nominal vehicle parameters of the controller.
         tick: period of the controller [s].
-        wanted: initial bandwidths.
+        initial: initial bandwidths.
         say: called with each loop that had to be slowed down, and the reason.
 
     Raises:
-        ValueError: no bandwidth down to a twentieth of `wanted` has the margins.
+        ValueError: no bandwidth down to a twentieth of `initial` has the margins.
     """
-    plant, now = assumed_airframe(airframe, model), wanted
+    plant, now = assumed_airframe(airframe, model), initial
     first: dict[str, str] = {}
     for _ in range(ATTEMPTS):
         wrong = shortfalls(open_loops(build(gain_set(model, now).plain(), airframe), plant, tick, DELAY))
         if not wrong:
-            for loop, was in wanted._asdict().items():
+            for loop, was in initial._asdict().items():
                 if (value := getattr(now, loop)) < was:
                     say(f"{loop}: backed off from {was:.3g} to {value:.3g} rad/s ({first[loop]})")
             return now

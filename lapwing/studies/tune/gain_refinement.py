@@ -57,7 +57,7 @@ def polish(
     margin is worse than any that flies. Deterministic: equal scenes return equal gains.
     """
     plant, setup = assumed_airframe(airframe, model), campaign_setup(scene)
-    seen: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
+    tried: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
 
     def fly(gains: GainSet) -> list[Figures]:
         progress()
@@ -79,7 +79,7 @@ def polish(
         if any(f["outcome"] != "landed" for f in result):
             return 10.0
         ratio = float(np.mean([rmse(result, axis) / rmse(before, axis) for axis in judged]))
-        seen[ratio] = bandwidths, gains, result
+        tried[ratio] = bandwidths, gains, result
         return ratio
 
     if not free:
@@ -88,14 +88,14 @@ def polish(
     simplex = np.vstack([at, at + FIRST_STEP * np.eye(len(at))])
     options = {"maxfev": CANDIDATES, "xatol": FINE, "fatol": FINE, "initial_simplex": simplex}
     minimize(cost, at, method="Nelder-Mead", options=options)
-    if not seen:
+    if not tried:
         what = next(
             (f["outcome_text"] for f in before if f["outcome"] != "landed"),
             "none of those near it holds its margins and lands",
         )
         raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
-    bandwidths, gains, after = seen[min(seen)]
-    return Polished(gains, bandwidths, before, after, len(seen))
+    bandwidths, gains, after = tried[min(tried)]
+    return Polished(gains, bandwidths, before, after, len(tried))
 
 
 def rmse(flights: list[Figures], axis: str) -> float:

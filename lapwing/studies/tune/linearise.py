@@ -49,14 +49,14 @@ def hover(scene: Scene) -> Hover:
     free = next((k for k, row in enumerate(known.wakes.thrust) if row[k] == 1.0), 0)  # a rotor outside all wakes
     count, evenly = len(lift), np.sqrt(lift)  # speeds in hover, over the speed of a rotor that carries the mean
 
-    def seen(speeds: np.ndarray, voltage: np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
+    def at_hover(speeds: np.ndarray, voltage: np.ndarray, attitude: Quaternion = NO_ROTATION) -> Any:
         state = initial_state(p, (0.0, 0.0, HEIGHT), attitude)
         motion = state.motion._replace(rotor_speed=tuple(float(v) for v in speeds))
         volts = tuple(float(v) for v in voltage)
         return observe(p, 0, INTERVAL, state._replace(motion=motion), volts)
 
     def unbalance(x: np.ndarray) -> tuple[float, float]:
-        o = seen(x[0] * evenly, x[1] * evenly)
+        o = at_hover(x[0] * evenly, x[1] * evenly)
         return o.acceleration_world[2], o.rotor_acceleration[0]
 
     top = frame.motor.max_voltage
@@ -69,12 +69,15 @@ def hover(scene: Scene) -> Hover:
     d = STEP * speed
 
     def slope(direction: np.ndarray, value: Callable[[Any], float]) -> float:
-        return (value(seen(rotors + d * direction, volts)) - value(seen(rotors - d * direction, volts))) / (2.0 * d)
+        return (value(at_hover(rotors + d * direction, volts)) - value(at_hover(rotors - d * direction, volts))) / (
+            2.0 * d
+        )
 
     one = np.ones(count)
     thrust = slope(one, lambda o: o.thrust[free])
     ahead = [
-        seen(rotors, volts, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0] for sign in (-1.0, 1.0)
+        at_hover(rotors, volts, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0]
+        for sign in (-1.0, 1.0)
     ]
 
     def turning(k: int) -> float:
@@ -84,7 +87,7 @@ def hover(scene: Scene) -> Hover:
     lag = -1.0 / slope(one, lambda o: o.rotor_acceleration[0])
     # Voltages that differ at equal speeds: what the body feels is the reaction to speeding the rotors up, alone.
     yawing, most = turns[2], int(np.argmax(np.abs(turns[2])))
-    more, less = (seen(rotors, volts + sign * STEP * voltage * yawing) for sign in (1.0, -1.0))
+    more, less = (at_hover(rotors, volts + sign * STEP * voltage * yawing) for sign in (1.0, -1.0))
     per_acceleration = (more.angular_acceleration_body[2] - less.angular_acceleration_body[2]) / float(
         (more.rotor_acceleration[most] - less.rotor_acceleration[most]) / yawing[most]
     )

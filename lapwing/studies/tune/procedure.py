@@ -61,7 +61,7 @@ class Tuned(NamedTuple):
 
 def tune(
     scene: Scene,
-    wanted: Bandwidths,
+    initial: Bandwidths,
     say: Callable[[str], None],
     log: Path | None = None,
     progress: Callable[[], None] = lambda: None,
@@ -70,7 +70,7 @@ def tune(
 
     Args:
         scene: scene with the vehicle, trajectory and wind.
-        wanted: initial bandwidths.
+        initial: initial bandwidths.
         say: called with each warning.
         log: log to identify the plant from; None to linearise the compiled model.
         progress: called after every gain set that was flown.
@@ -81,7 +81,7 @@ def tune(
     """
     if not scene.has(Autopilot):
         raise ValueError(f"{scene.path}: has no [autopilot] to tune; use a scene with an autopilot")
-    for name, value in wanted._asdict().items():
+    for name, value in initial._asdict().items():
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
     airframe, tick, config = known_airframe(scene), scene[Communication].interval, scene[Autopilot]
@@ -93,7 +93,7 @@ def tune(
     before = _judged(config.gains, own, plant, tick)
     for name, why in before.shortfalls.items():
         say(f"warning: present gains {config.gains} of the scene: {name}: {why}")
-    reached = design(model, airframe, tick, wanted, say)
+    reached = design(model, airframe, tick, initial, say)
     gains, polished, at_corners = gain_set(model, reached), None, {}
     if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not config.accept_commands:
         polished = gain_refinement.polish(scene, model, airframe, tick, reached, progress)

@@ -27,16 +27,20 @@ SHOWN = {
 LOOKS = ((REFERENCE, "dash"), (FLOWN, "solid"))  # of before and after
 
 
-def write(path: Path, found: Tuned) -> None:
+def write(path: Path, tuning: Tuned) -> None:
     """Write the page to a file."""
-    both = (found.before, found.after)
-    loops = [systems(j.parameters, found.assumed, found.tick, DELAY) for j in both]
+    both = (tuning.before, tuning.after)
+    loops = [systems(j.parameters, tuning.assumed, tuning.tick, DELAY) for j in both]
     sections = [
         Section("bode", "Open loops", _bode(both, loops)),
         Section("steps", "Steps of the setpoint", _steps(both, loops)),
     ]
     page = render(
-        "tuning.html", title=f"{found.scene}: gains", tables=list(tables(found)), sections=sections, gains=found.gains
+        "tuning.html",
+        title=f"{tuning.scene}: gains",
+        tables=list(tables(tuning)),
+        sections=sections,
+        gains=tuning.gains,
     )
     path.write_text(page, encoding="utf-8")
 
@@ -76,18 +80,18 @@ def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
     panels = []
     for column, (axis, loop) in enumerate(AXES.items()):
         marks: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]
-        said = []
+        notes = []
         for judged, systems_of, (colour, dash) in zip(both, loops, LOOKS, strict=True):
             seconds = 1.5 if axis == "yaw" else 4.0
             inner = f"{loop}_plant_input"  # an outer loop falls with its inner one
             if "unstable" in (judged.shortfalls.get(loop), judged.shortfalls.get(inner)):
-                said.append(f"{judged.name}: unstable")
+                notes.append(f"{judged.name}: unstable")
                 continue
             result = step(systems_of[loop], seconds)
-            said.append(f"{judged.name}: {result.rise:.2g} s, {100.0 * result.overshoot:.0f} % over")
+            notes.append(f"{judged.name}: {result.rise:.2g} s, {100.0 * result.overshoot:.0f} % over")
             marks.append(Line(np.asarray(result.time), np.asarray(result.value), judged.name, colour, dash=dash))
         label = "response to a unit step" if column == 0 else ""
         top = 1.35 * max([1.0, *(float(mark.y.max()) for mark in marks if isinstance(mark, Line))])  # room for the note
         place: dict[str, Any] = {"column": column, "timed": False, "y_range": (-0.05, top)}
-        panels.append(Panel(tuple(marks), label, "time [s]", title=axis, note="\n".join(said), **place))
+        panels.append(Panel(tuple(marks), label, "time [s]", title=axis, note="\n".join(notes), **place))
     return Plot(tuple(panels), _STEPS, 3.4, widths=(1.0,) * len(AXES))

@@ -38,9 +38,9 @@ class ClosedLoop(NamedTuple):
         """Mean absolute difference between simulated and recorded position [m], mean over axes."""
         return float(np.abs(self.simulated - self.recorded).mean())
 
-    def tracking_error(self, flown: np.ndarray) -> float:
+    def tracking_error(self, position: np.ndarray) -> float:
         """Mean absolute error [m] of a position against the setpoints, mean over axes."""
-        return float(np.abs(flown - self.setpoint).mean())
+        return float(np.abs(position - self.setpoint).mean())
 
 
 def fly_setpoints(scene: Scene | str | Path, flight: Recording, overrides: Overrides = ()) -> ClosedLoop | None:
@@ -61,12 +61,12 @@ def fly_setpoints(scene: Scene | str | Path, flight: Recording, overrides: Overr
     length = (len(points) - 1) * flight.interval
     lead = CLIMB + APPROACH + HOVER
     own: dict[str, Any] = {"trajectory.phase": _phases(points, flight.interval), "run.duration": lead + length}
-    flown: FlightData = simulate.fly(load_one(load_one(scene, overrides), own), only=(TRUTH,))
+    simulation: FlightData = simulate.fly(load_one(load_one(scene, overrides), own), only=(TRUTH,))
     time = np.arange(len(points)) * flight.interval
-    at, truth = flown.times("ground_truth"), np.asarray(flown.truth.position)
-    kept = lead + time <= at[-1]  # a flight that diverges ends early
-    simulated = np.column_stack([np.interp(lead + time[kept], at, c) for c in truth.T]) + floor
-    return ClosedLoop(flight.name, time[kept], desired[kept], flight.position[span][kept], simulated)
+    at, truth = simulation.times("ground_truth"), np.asarray(simulation.truth.position)
+    inside = lead + time <= at[-1]  # a flight that diverges ends early
+    simulated = np.column_stack([np.interp(lead + time[inside], at, c) for c in truth.T]) + floor
+    return ClosedLoop(flight.name, time[inside], desired[inside], flight.position[span][inside], simulated)
 
 
 def _airborne(flight: Recording) -> slice:

@@ -12,33 +12,32 @@ from lapwing.studies.validation.procedure import Validation
 UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True))
 
 
-def show(console: Console, found: Validation) -> None:
+def show(console: Console, validation: Validation) -> None:
     """Print the errors beside the baselines, and what was left out."""
-    table = Table(
-        title=f"{found.scene}: mean absolute prediction error, {found.windows} windows, {len(found.flights)} flights"
-    )
+    extent = f"{validation.windows} windows, {len(validation.flights)} flights"
+    table = Table(title=f"{validation.scene}: mean absolute prediction error, {extent}")
     table.add_column("after", justify="right")
     table.add_column("predicted by")
-    shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(found.plant[0][k].mean)]
+    shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(validation.plant[0][k].mean)]
     for name in (FIELDS[k] for k in shown):
         table.add_column(f"{name.replace('_', ' ')} [{UNITS[name]}]", justify="right")
-    for k, steps in enumerate(found.horizons):
-        after = f"{steps * found.interval:g} s"
-        table.add_row(after, "plant", *(with_interval(found.plant[k][f]) for f in shown))
-        for name, rows in found.baselines.items():
-            last = name == list(found.baselines)[-1]
+    for k, steps in enumerate(validation.horizons):
+        after = f"{steps * validation.interval:g} s"
+        table.add_row(after, "plant", *(with_interval(validation.plant[k][f]) for f in shown))
+        for name, rows in validation.baselines.items():
+            last = name == list(validation.baselines)[-1]
             table.add_row("", name.replace("_", " "), *(plain(rows[k][f].mean) for f in shown), end_section=last)
     console.print(table)
-    for flight in found.closed_loop:
+    for flight in validation.closed_loop:
         console.print(closed_loop_line(flight), soft_wrap=True)
-    memory = found.memory
+    memory = validation.memory
     console.print(
         f"start: measured state; rotor speeds from past commands; trim from the past {memory.force:g} s (force) and "
         f"{memory.torque:g} s (torque); 95 % intervals over flights",
     )
-    for line in found.skipped:
+    for line in validation.skipped:
         console.print(f"left out: {line}")
-    faulty = [(f.recording.name, f.recording.faults) for f in found.flights if f.recording.faults]
+    faulty = [(f.recording.name, f.recording.faults) for f in validation.flights if f.recording.faults]
     for name, faults in faulty:
         text = ", ".join(f"{cause}: {count}" for cause, count in faults.items())
         console.print(f"marked samples: {name}: {text}")

@@ -31,7 +31,7 @@ class Explanation(NamedTuple):
     torque: float  # [%]
 
 
-def trends(found: Validation) -> list[Trend]:
+def trends(validation: Validation) -> list[Trend]:
     """Return the errors at the last horizon over speed, climb, height and battery voltage."""
     quantities = {
         "speed [m/s]": lambda f: np.linalg.norm(f.recording.velocity[f.starts], axis=1),
@@ -39,38 +39,38 @@ def trends(found: Validation) -> list[Trend]:
         "height [m]": lambda f: f.recording.position[f.starts, 2],
         "battery voltage [V]": lambda f: f.recording.battery_voltage[f.starts],
     }
-    errors = np.concatenate([magnitudes(f.plant)[:, -1] for f in found.flights])
+    errors = np.concatenate([magnitudes(f.plant)[:, -1] for f in validation.flights])
     out = []
     for label, of in quantities.items():
-        values = np.concatenate([of(f) for f in found.flights])
+        values = np.concatenate([of(f) for f in validation.flights])
         if not np.isfinite(values).all() or np.ptp(values) == 0.0:
             continue
         low, high = np.quantile(values, [0.005, 0.995])
         edges = np.linspace(float(low), float(high), BINS + 1)
         index = np.digitize(values, edges) - 1
-        kept = [k for k in range(BINS) if (index == k).sum() >= FEWEST]
-        if kept:
+        bins = [k for k in range(BINS) if (index == k).sum() >= FEWEST]
+        if bins:
             with np.errstate(invalid="ignore"):  # quantities that were not measured are NaN
-                sums = [np.nansum(errors[index == k], axis=0) for k in kept]
-                means = np.array(sums) / [np.isfinite(errors[index == k]).sum(axis=0) for k in kept]
-            out.append(Trend(label, 0.5 * (edges[:-1] + edges[1:])[kept], means))
+                sums = [np.nansum(errors[index == k], axis=0) for k in bins]
+                means = np.array(sums) / [np.isfinite(errors[index == k]).sum(axis=0) for k in bins]
+            out.append(Trend(label, 0.5 * (edges[:-1] + edges[1:])[bins], means))
     return out
 
 
-def residual_spectra(found: Validation) -> tuple[np.ndarray, np.ndarray]:
+def residual_spectra(validation: Validation) -> tuple[np.ndarray, np.ndarray]:
     """Return frequencies [Hz] and the mean power spectra of residual accelerations, shape (n,) and (n, 6)."""
     total, count, frequency = 0.0, 0, np.empty(0)
-    for flight in found.flights:
+    for flight in validation.flights:
         span = slice(int(flight.starts[0]), int(flight.starts[-1]) + 1)
         residual = flight.states.residual[0, span]
         if len(residual) < SEGMENT:
             continue
-        frequency, power = welch(residual, 1.0 / found.interval, nperseg=SEGMENT, axis=0)
+        frequency, power = welch(residual, 1.0 / validation.interval, nperseg=SEGMENT, axis=0)
         total, count = total + power * len(residual), count + len(residual)
     return (frequency, np.asarray(total) / count) if count else (frequency, np.empty((0, 6)))
 
 
-def explanations(found: Validation) -> list[Explanation]:
+def explanations(validation: Validation) -> list[Explanation]:
     """Return the fraction of the residual accelerations that each candidate alone explains, the best first."""
     candidates = {
         "body velocity (drag, rotor drag)": lambda f, v: v,
@@ -82,18 +82,18 @@ def explanations(found: Validation) -> list[Explanation]:
         "height (ground effect)": lambda f, v: 1.0 / np.maximum(f.recording.position[f.starts, 2:3], 0.1) ** 2,
         "flight (payload, trim, motors)": lambda f, v: np.empty((len(v), 0)),
     }
-    residual = np.concatenate([f.states.residual[0, f.starts] for f in found.flights])
+    residual = np.concatenate([f.states.residual[0, f.starts] for f in validation.flights])
     residual = np.clip(residual, *np.quantile(residual, [0.01, 0.99], axis=0))
-    owner = np.repeat(np.arange(len(found.flights)), [len(f.starts) for f in found.flights])
+    owner = np.repeat(np.arange(len(validation.flights)), [len(f.starts) for f in validation.flights])
     out = []
     for cause, of in candidates.items():
         parts = []
-        for flight in found.flights:
+        for flight in validation.flights:
             back = conjugate(flight.recording.attitude[flight.starts])
             parts.append(of(flight, rotate(back, flight.recording.velocity[flight.starts])))
         matrix = np.concatenate(parts)
         if not matrix.shape[1]:
-            matrix = np.eye(len(found.flights))[owner]
+            matrix = np.eye(len(validation.flights))[owner]
         if np.isfinite(matrix).all():
             out.append(Explanation(cause, _share(matrix, residual[:, :3]), _share(matrix, residual[:, 3:])))
     return sorted(out, key=lambda e: -(e.force + e.torque))

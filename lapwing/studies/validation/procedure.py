@@ -103,16 +103,16 @@ def validate(
         errors = compare(recording, s, horizons, predict(plant, recording, s, state, horizons))
         flights.append(FlightErrors(recording, s, errors, state))
     say("baselines", len(used), len(used))
-    held = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
-    baselines = {"constant_velocity": held, "linear_fit": linear_fit(used, starts, horizons)}
+    constant = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
+    baselines = {"constant_velocity": constant, "linear_fit": linear_fit(used, starts, horizons)}
     loops = []
     for k, recording in enumerate(used if closed_loop else []):
         say(f"closed loop: {recording.name}", k, len(used))
-        flown = fly_setpoints(scene, recording, overrides)
-        if flown is None:
+        loop = fly_setpoints(scene, recording, overrides)
+        if loop is None:
             skipped.append(f"{recording.name}: no setpoints in the air to fly in closed loop")
         else:
-            loops.append(flown)
+            loops.append(loop)
     return Validation(
         str(Path(str(getattr(scene, "name", scene))).stem), interval, horizons, memory, tuple(flights), tuple(skipped),
         pooled([magnitudes(f.plant) for f in flights]),
@@ -136,24 +136,24 @@ def read_flights(paths: Sequence[Path], mapping: str | None, say: Callable[[str,
     return recordings
 
 
-def write_json(path: Path, found: Validation) -> None:
+def write_json(path: Path, validation: Validation) -> None:
     """Write errors, confidence intervals and baselines by horizon."""
     rows = []
-    for k, steps in enumerate(found.horizons):
-        row: dict = {"steps": steps, "time": steps * found.interval, "windows": found.windows}
-        row |= _values(found.plant[k])
-        row["confidence_95"] = {name: [m.low, m.high] for name, m in zip(FIELDS, found.plant[k], strict=True)}
-        row["baselines"] = {name: _values(rows_of[k]) for name, rows_of in found.baselines.items()}
+    for k, steps in enumerate(validation.horizons):
+        row: dict = {"steps": steps, "time": steps * validation.interval, "windows": validation.windows}
+        row |= _values(validation.plant[k])
+        row["confidence_95"] = {name: [m.low, m.high] for name, m in zip(FIELDS, validation.plant[k], strict=True)}
+        row["baselines"] = {name: _values(rows_of[k]) for name, rows_of in validation.baselines.items()}
         rows.append(row)
-    flights = {f.recording.name: _flight(found, f) for f in found.flights}
+    flights = {f.recording.name: _flight(validation, f) for f in validation.flights}
     content = {
-        "scene": found.scene,
-        "trim": found.memory,
+        "scene": validation.scene,
+        "trim": validation.memory,
         "horizons": rows,
         "flights": flights,
-        "skipped": found.skipped,
+        "skipped": validation.skipped,
     }
-    if found.closed_loop:
+    if validation.closed_loop:
         content["closed_loop"] = [
             {
                 "flight": c.name,
@@ -161,12 +161,12 @@ def write_json(path: Path, found: Validation) -> None:
                 "difference": c.difference,
                 "tracking_error": {name: c.tracking_error(getattr(c, name)) for name in ("simulated", "recorded")},
             }
-            for c in found.closed_loop
+            for c in validation.closed_loop
         ]
     json_file.write_json(path, content)
 
 
-def _flight(found: Validation, flight: FlightErrors) -> dict:
+def _flight(validation: Validation, flight: FlightErrors) -> dict:
     means = _values(pooled([magnitudes(flight.plant)[:, -1:]])[0])
     return {"windows": len(flight.starts), **means, "faults": flight.recording.faults, "notes": flight.recording.notes}
 

@@ -18,72 +18,73 @@ OVERLAID = 3  # flights in the closed-loop plot
 COLOURS = ("#1b6ca8", "#c44536", "#4a8f3c")
 
 
-def write(path: Path, found: Validation) -> None:
+def write(path: Path, validation: Validation) -> None:
     """Write tables of errors and explanations, errors over the envelope, and residual spectra."""
-    after = found.horizons[-1] * found.interval
+    after = validation.horizons[-1] * validation.interval
     sections = [
-        Section("envelope", "Errors over the envelope", _envelope(found, after)),
-        Section("spectra", "Spectra of the residuals", _spectra(found)),
+        Section("envelope", "Errors over the envelope", _envelope(validation, after)),
+        Section("spectra", "Spectra of the residuals", _spectra(validation)),
     ]
-    if found.closed_loop:
-        sections.append(Section("closed-loop", "Closed loop: the recorded setpoints, flown", _closed_loop(found)))
+    if validation.closed_loop:
+        sections.append(Section("closed-loop", "Closed loop: the recorded setpoints, flown", _closed_loop(validation)))
     lead = (
-        f"{found.windows} windows of {len(found.flights)} flights. Each starts from the measured state and is fed the "
-        f"measured motor commands. Trim from the past {found.memory.force:g} s (force) and "
-        f"{found.memory.torque:g} s (torque)."
+        f"{validation.windows} windows of {len(validation.flights)} flights. Each starts from the measured state and "
+        f"is fed the measured motor commands. Trim from the past {validation.memory.force:g} s (force) and "
+        f"{validation.memory.torque:g} s (torque)."
     )
     page = render(
-        "validation.html", title=f"{found.scene}: prediction of recorded flights", lead=lead,
-        tables=[_errors(found), _explained(found), *_loops(found), _flights(found)], sections=sections,
+        "validation.html", title=f"{validation.scene}: prediction of recorded flights", lead=lead,
+        tables=[_errors(validation), _explained(validation), *_loops(validation), _flights(validation)],
+        sections=sections,
     )  # fmt: skip
     path.write_text(page, encoding="utf-8")
 
 
-def _errors(found: Validation) -> Rows:
+def _errors(validation: Validation) -> Rows:
     heads = [f"{name.replace('_', ' ')} [{UNITS[name]}]" for name in FIELDS]
     table = Rows("Mean absolute error", "after, by", *heads)
-    for k, steps in enumerate(found.horizons):
-        after = f"{steps * found.interval:g} s"
-        table.add(f"{after}, plant", *map(with_interval, found.plant[k]))
-        for name, rows in found.baselines.items():
+    for k, steps in enumerate(validation.horizons):
+        after = f"{steps * validation.interval:g} s"
+        table.add(f"{after}, plant", *map(with_interval, validation.plant[k]))
+        for name, rows in validation.baselines.items():
             table.add(f"{after}, {name.replace('_', ' ')}", *(plain(m.mean) for m in rows[k]))
     return table
 
 
-def _explained(found: Validation) -> Rows:
+def _explained(validation: Validation) -> Rows:
     table = Rows("Share of the residuals that a missing effect would explain", "regressor", "force [%]", "torque [%]")
-    for cause, force, torque in explanations(found):
+    for cause, force, torque in explanations(validation):
         table.add(cause, f"{force:.1f}", f"{torque:.1f}")
     return table
 
 
-def _loops(found: Validation) -> list[Rows]:
-    if not found.closed_loop:
+def _loops(validation: Validation) -> list[Rows]:
+    if not validation.closed_loop:
         return []
     table = Rows(
         "Closed loop", "flight", "duration [s]", "simulated less recorded [m]", "tracking error, simulated [m]",
         "tracking error, recorded [m]",
     )  # fmt: skip
-    for c in found.closed_loop:
+    for c in validation.closed_loop:
         errors = (c.difference, c.tracking_error(c.simulated), c.tracking_error(c.recorded))
         table.add(c.name, f"{c.time[-1]:.1f}", *(f"{e:.3g}" for e in errors))
     return [table]
 
 
-def _flights(found: Validation) -> Rows:
+def _flights(validation: Validation) -> Rows:
     table = Rows("Flights", "flight", "windows", "marked samples", "notes")
-    for flight in found.flights:
+    for flight in validation.flights:
         faults = ", ".join(f"{cause}: {n}" for cause, n in flight.recording.faults.items())
         table.add(flight.recording.name, str(len(flight.starts)), faults or "none", "; ".join(flight.recording.notes))
-    for line in found.skipped:
+    for line in validation.skipped:
         name, _, why = line.partition(": ")
         table.add(name, "0", "", why)
     return table
 
 
-def _envelope(found: Validation, after: float) -> Plot:
+def _envelope(validation: Validation, after: float) -> Plot:
     panels = []
-    every = trends(found)
+    every = trends(validation)
     for column, trend in enumerate(every):
         for row, name in enumerate(SHOWN):
             line = Line(trend.centres, trend.errors[:, FIELDS.index(name)], marker="circle")
@@ -94,9 +95,9 @@ def _envelope(found: Validation, after: float) -> Plot:
     return Plot(tuple(panels), caption, 8.0, (1.0,) * len(SHOWN), (1.0,) * max(len(every), 1))
 
 
-def _closed_loop(found: Validation) -> Plot:
+def _closed_loop(validation: Validation) -> Plot:
     panels = []
-    flights = found.closed_loop[:OVERLAID]
+    flights = validation.closed_loop[:OVERLAID]
     for column, c in enumerate(flights):
         for row, axis in enumerate(CHANNELS):
             lines = (
@@ -111,8 +112,8 @@ def _closed_loop(found: Validation) -> Plot:
     return Plot(tuple(panels), caption, 7.0, (1.0,) * len(CHANNELS), (1.0,) * len(flights))
 
 
-def _spectra(found: Validation) -> Plot:
-    frequency, power = residual_spectra(found)
+def _spectra(validation: Validation) -> Plot:
+    frequency, power = residual_spectra(validation)
     panels = []
     for row, (label, first) in enumerate((("force [(m/s^2)^2/Hz]", 0), ("torque [(rad/s^2)^2/Hz]", 3))):
         lines = tuple(

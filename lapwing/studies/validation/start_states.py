@@ -50,7 +50,7 @@ def start_states(plant: PlantRows, flights: list[Recording], memory: TrimMemory)
     pieces = [(f, s) for f, flight in enumerate(flights) for s in range(0, len(flight), PIECE)]
     sets, lanes = len(plant.rows), len(pieces)
     motion = [np.column_stack([r.position, r.attitude, r.velocity, r.omega]) for r in flights]
-    motion = [_held(m, r.valid) for m, r in zip(motion, flights, strict=True)]
+    motion = [_without_gaps(m, r.valid) for m, r in zip(motion, flights, strict=True)]
     for m in motion:
         m[m[:, 2] < GROUNDED, 2] += LIFT
     first = np.array([s for _, s in pieces])
@@ -84,7 +84,7 @@ def start_states(plant: PlantRows, flights: list[Recording], memory: TrimMemory)
     return out
 
 
-def _held(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
+def _without_gaps(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """Return the values with invalid rows replaced by the last valid one, or the first."""
     index = np.maximum.accumulate(np.where(valid, np.arange(len(valid)), -1))
     if (index < 0).all():

@@ -141,10 +141,10 @@ def link(context: Context, command: Any) -> None:
 @handles("speed")
 def speed(context: Context, command: Any) -> None:
     """Change the speed [m/s] until disarmed; NaN: the parameter's."""
-    asked = value(command.values, 0)
-    if not (0.0 < asked < math.inf or math.isnan(asked)):
-        raise Denied(f"speed: expected one above 0 m/s, got {asked:g}")
-    context.state.guidance.speed = asked
+    requested = value(command.values, 0)
+    if not (0.0 < requested < math.inf or math.isnan(requested)):
+        raise Denied(f"speed: expected one above 0 m/s, got {requested:g}")
+    context.state.guidance.speed = requested
 
 
 @handles("parameter")
@@ -153,10 +153,10 @@ def parameter(context: Context, command: Any) -> None:
     known = context.constants.parameters.get(command.text)
     if known is None:
         raise Denied(f"unknown parameter {command.text}")
-    asked = value(command.values, 0)
-    denied_if_wrong(known.check, asked)
+    requested = value(command.values, 0)
+    denied_if_wrong(known.check, requested)
     parameters = context.state.guidance.parameters
-    parameters[known.name] = asked
+    parameters[known.name] = requested
     context.outbox.parameters = dict(parameters)
 
 

@@ -46,13 +46,13 @@ def _instances(unit: str, count: int, number: float, bits: float) -> list[int]:
     """Return the instance numbers, from 1 to `count`: one by its number, all for 0, or those of the bits."""
     if math.isnan(number) and bits > 0.0:  # as in MAVLink; False for NaN
         last = math.frexp(bits)[1] if math.isfinite(bits) else math.inf
-        asked = [last] if last > count else [k + 1 for k in range(count) if int(bits) >> k & 1]
+        motors = [last] if last > count else [k + 1 for k in range(count) if int(bits) >> k & 1]
     else:
-        asked = [] if math.isnan(number) or number == 0.0 else [number]
-    for k in asked:
+        motors = [] if math.isnan(number) or number == 0.0 else [number]
+    for k in motors:
         if k not in range(1, count + 1):
             raise Denied(f"inject failure: there is no {unit} {k:g}; expected 1 to {count}, 0 for all")
-    return [int(k) for k in asked] or list(range(1, count + 1))
+    return [int(k) for k in motors] or list(range(1, count + 1))
 
 
 def _with_instances(failures: tuple[int, ...], kind: int, numbers: Sequence[int]) -> tuple[int, ...]:

@@ -67,9 +67,9 @@ class Guidance:
     def limits(self) -> Limits:
         """Present limits of the setpoint."""
         p = self.parameters
-        wanted = p["MPC_XY_CRUISE"] if math.isnan(self.speed) else self.speed
+        desired = p["MPC_XY_CRUISE"] if math.isnan(self.speed) else self.speed
         return Limits(
-            min(wanted, p["MPC_XY_VEL_MAX"]),
+            min(desired, p["MPC_XY_VEL_MAX"]),
             p["MPC_Z_VEL_MAX_UP"],
             p["MPC_Z_VEL_MAX_DN"],
             p["MPC_ACC_HOR"],

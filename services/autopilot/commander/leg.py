@@ -45,14 +45,14 @@ class Leg:
     def step(self, guidance: Guidance, yaw: float, dt: float) -> None:
         """Move the setpoint for a tick of dt [s] and turn it to a yaw [rad]; NaN: by MPC_YAW_MODE."""
         smoothing, limits = guidance.smoothing, guidance.limits
-        wanted = self._wanted_yaw(guidance) if math.isnan(yaw) else yaw
-        error = abs(wrap_angle(wanted - smoothing.yaw))  # NaN compares as aligned
+        desired = self._wanted_yaw(guidance) if math.isnan(yaw) else yaw
+        error = abs(wrap_angle(desired - smoothing.yaw))  # NaN compares as aligned
         if guidance.parameters["MPC_YAW_MODE"] == TURN_FIRST and error > guidance.yaw_tolerance:
             smoothing.move_at(ZERO, limits, dt)
         else:
             along = smoothing.velocity_along(self.start, self.target, self.passing_speed, limits)
             smoothing.move_at(along, limits, dt)
-        smoothing.turn_to(wanted, limits, dt)
+        smoothing.turn_to(desired, limits, dt)
 
     def _wanted_yaw(self, guidance: Guidance) -> float:
         course = heading(guidance, self.target)

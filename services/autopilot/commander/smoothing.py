@@ -97,8 +97,8 @@ class PositionSmoothing:
     def move_at(self, velocity_world: Vec3, limits: Limits, dt: float) -> None:
         """Move at a velocity [m/s] for a tick of dt [s]."""
         error = subtract(limit_velocity(velocity_world, limits), self.velocity)
-        wanted = clamp_norm(scale(_VELOCITY_GAIN * self._gain_fraction(error, limits), error), limits.acceleration)
-        change = clamp_norm(subtract(wanted, self.acceleration), limits.jerk * dt)
+        desired = clamp_norm(scale(_VELOCITY_GAIN * self._gain_fraction(error, limits), error), limits.acceleration)
+        change = clamp_norm(subtract(desired, self.acceleration), limits.jerk * dt)
         acceleration = add(self.acceleration, change)
         step = scale(0.5 * dt, add(self.acceleration, acceleration))
         self.position = add(self.position, scale(dt, add(self.velocity, scale(0.5, step))))

@@ -58,30 +58,30 @@ def parse_controller_output(output: Any, none: PerRotor) -> ControllerOutput:
     return ControllerOutput(to_motors, volts, wrench, _numbers("roll_pitch", output.roll_pitch, 2))
 
 
-def _numbers(what: str, given: Iterable[float], n: int) -> Any:
+def _numbers(what: str, values: Iterable[float], n: int) -> Any:
     try:
-        found = tuple(map(float, given))
+        numbers = tuple(map(float, values))
     except (TypeError, ValueError):
-        found = ()
-    if len(found) != n:
-        raise TypeError(f"step returned {what} = {' '.join(repr(given).split())}, expected {n} number{'s' * (n > 1)}")
-    if not all(map(math.isfinite, found)):
-        raise ValueError(f"step returned {what} = {found}, which is not finite")
-    return found
+        numbers = ()
+    if len(numbers) != n:
+        raise TypeError(f"step returned {what} = {' '.join(repr(values).split())}, expected {n} number{'s' * (n > 1)}")
+    if not all(map(math.isfinite, numbers)):
+        raise ValueError(f"step returned {what} = {numbers}, which is not finite")
+    return numbers
 
 
 @overload_for(parse_controller_output, inline=True)
 def _parse_controller_output(output: types.Type, none: types.Type) -> Callable:
-    told = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
-    roll_pitch = "output[-1]" if told else "(0.0, 0.0)"
+    is_complete = len(output) == len(output.instance_class._fields)  # a compiled NamedTuple has no defaults filled in
+    roll_pitch = "output[-1]" if is_complete else "(0.0, 0.0)"
     if output.instance_class is MotorVoltages:
-        given = "True, output[0], (0.0, 0.0, 0.0, 0.0)"
+        values = "True, output[0], (0.0, 0.0, 0.0, 0.0)"
     else:
-        given = "False, none, (output[0], output[1][0], output[1][1], output[1][2])"
+        values = "False, none, (output[0], output[1][0], output[1][1], output[1][2])"
     return compile_source(
         "demand(output, none)",
         {"ControllerOutput": ControllerOutput},
-        f"return ControllerOutput({given}, {roll_pitch})",
+        f"return ControllerOutput({values}, {roll_pitch})",
     )
 
 

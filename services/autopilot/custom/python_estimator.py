@@ -40,8 +40,8 @@ class PythonEstimatorBlock(PeriodicPart):
             self._estimator = self._estimator or self._construct()
             estimate = checked_estimate(self._estimator.step(time, readings))
         except FAULTS as error:
-            said = blame(error, self._module)
-            raise LockStepError(f"estimator {self._code.name}: {said} at t = {time:.3f} s") from error
+            cause = blame(error, self._module)
+            raise LockStepError(f"estimator {self._code.name}: {cause} at t = {time:.3f} s") from error
         self._graph.put(HELD, tick, estimate)
 
 

@@ -53,8 +53,8 @@ def _thrust_at(motor: Motor, volts: float, _: float) -> float:
 def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """Output the command that reaches the motors; the controller does not see it."""
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
-    asked = d.motor_voltage if d.on else c.motor_voltage
-    thrust = map_tuple(_thrust_at, p.motor, asked, asked) if d.on else c.thrust
-    heard = map_index(_heard, asked, kinds, s.last, asked, s.readings)
+    commanded = d.motor_voltage if d.on else c.motor_voltage
+    thrust = map_tuple(_thrust_at, p.motor, commanded, commanded) if d.on else c.thrust
+    heard = map_index(_heard, commanded, kinds, s.last, commanded, s.readings)
     volts = map_tuple(_supplied, 0.0, kinds, heard)
     return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE

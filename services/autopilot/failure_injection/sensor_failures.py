@@ -28,8 +28,8 @@ def kind_of(faults: Faults, r: Any) -> int:
 
 @overload_for(kind_of, inline=True)
 def _kind_by(faults: types.Type, r: types.Type) -> Callable:
-    found = FAILURES[r.instance_class].kind
-    return lambda faults, r: found(faults)
+    kind = FAILURES[r.instance_class].kind
+    return lambda faults, r: kind(faults)
 
 
 def wrong(r: Any) -> Any:

@@ -176,11 +176,11 @@ def step(
     position_error = subtract(setpoint.position_world, estimate.position_world)
     velocity = position.velocity_setpoint(p.position, position_error, setpoint.velocity_world)
     velocity_error = subtract(velocity, estimate.velocity_world)
-    wanted = position.acceleration_setpoint(
+    desired = position.acceleration_setpoint(
         p.position, velocity_error, s.velocity_integral, acceleration, setpoint.acceleration_world
     )
-    thrust = position.thrust_setpoint(p.position, wanted)
-    velocity_integral = position.velocity_integral(p.position, s.velocity_integral, velocity_error, wanted, thrust, dt)
+    thrust = position.thrust_setpoint(p.position, desired)
+    velocity_integral = position.velocity_integral(p.position, s.velocity_integral, velocity_error, desired, thrust, dt)
 
     reference = attitude.attitude_setpoint(thrust, setpoint.yaw)
     omega = attitude.rate_setpoint(p.attitude, estimate.attitude, reference, setpoint.yaw_rate)
@@ -193,9 +193,9 @@ def step(
 
     table = active_allocation(p.shares, failed)
     demand = VirtualControls(norm(thrust), p.scale[0] * torque[0], p.scale[1] * torque[1], p.scale[2] * torque[2])
-    given = saturate(table, demand, 1.0)
-    cut = (sign(demand.roll - given.roll), sign(demand.pitch - given.pitch), sign(demand.yaw - given.yaw))
-    parts = clamp_to_range(mix(table, given), 1.0)
+    saturated = saturate(table, demand, 1.0)
+    cut = (sign(demand.roll - saturated.roll), sign(demand.pitch - saturated.pitch), sign(demand.yaw - saturated.yaw))
+    parts = clamp_to_range(mix(table, saturated), 1.0)
     volts = map_tuple(_volts, p, parts, parts)
     roll, pitch, yaw = to_roll_pitch_yaw(reference)
     state = State(velocity_integral, acceleration, rate_integral, estimate.omega_body, angular_acceleration, cut)

@@ -83,11 +83,11 @@ def thrust_setpoint(p: Parameters, acceleration: Vec3) -> Vec3:
     upright = 1.0 / math.sqrt(1.0 + slope * slope)
     collective = max(p.hover * (1.0 + acceleration[2] / g) / upright, p.thrust_min)
     z, tx, ty = collective * upright, collective * upright * share * ax, collective * upright * share * ay
-    wanted = math.sqrt(tx * tx + ty * ty)
-    kept = min(wanted, p.margin_xy)
-    z = min(z, math.sqrt(p.thrust_max * p.thrust_max - kept * kept))
+    demand = math.sqrt(tx * tx + ty * ty)
+    limited = min(demand, p.margin_xy)
+    z = min(z, math.sqrt(p.thrust_max * p.thrust_max - limited * limited))
     room = math.sqrt(max(p.thrust_max * p.thrust_max - z * z, 0.0))
-    part = min(1.0, room / max(wanted, 1e-9))
+    part = min(1.0, room / max(demand, 1e-9))
     return part * tx, part * ty, z
 
 

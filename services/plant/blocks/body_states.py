@@ -46,7 +46,7 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) 
     x = on_se3(s.vehicle.motion)
     j = joints(drive, tick * p.interval, x)
     a, (b, c, d, e) = x.chassis, x.propellers
-    told = BodyMotions(
+    sample = BodyMotions(
         (a.position_world, b.position_world, c.position_world, d.position_world, e.position_world),
         (a.attitude, b.attitude, c.attitude, d.attitude, e.attitude),
         (a.velocity_world, b.velocity_world, c.velocity_world, d.velocity_world, e.velocity_world),
@@ -54,4 +54,4 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) 
         (j[0][0], j[1][0], j[2][0], j[3][0], j[4][0]),
         (j[0][1], j[1][1], j[2][1], j[3][1], j[4][1]),
     )
-    return s, (told,), CONTINUE
+    return s, (sample,), CONTINUE

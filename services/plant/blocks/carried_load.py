@@ -87,8 +87,8 @@ def step(
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))
     place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)
-    told = NeighbourState(
+    sample = NeighbourState(
         place, velocity, ZERO, p.slings[0].load_mass, 0.0, 0.0, 0.0, 0.0, ZERO, place, velocity, acceleration, ZERO,
         tick * p.interval, True,
     )  # fmt: skip
-    return x, (told, BodyMotions((place,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), CONTINUE
+    return x, (sample, BodyMotions((place,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), CONTINUE

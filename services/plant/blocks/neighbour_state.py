@@ -40,11 +40,11 @@ def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) ->
     R, hook, omega = rotation_matrix(truth.attitude), p.like.hook_body, truth.omega_body
     turning = cross(omega, hook)
     swinging = add(cross(truth.angular_acceleration_body, hook), cross(omega, turning))
-    told = NeighbourState(
+    sample = NeighbourState(
         truth.position_world, truth.velocity_world, in_world(thrust, R), body.mass, truth.air_density,
         p.like.radius, p.like.restitution, p.like.disc_radius,
         hook, add(truth.position_world, apply(R, hook)), add(truth.velocity_world, apply(R, turning)),
         add(truth.acceleration_world, apply(R, swinging)), truth.wind_world, tick * p.interval, False,
         p.like.friction, apply(R, omega), _inverse_inertia_world(body, R),
     )  # fmt: skip
-    return s, (told,), CONTINUE
+    return s, (sample,), CONTINUE

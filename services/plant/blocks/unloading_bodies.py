@@ -48,7 +48,7 @@ def step(
     on_pack = add(add(add(on_pack, door), ground), walls)
     hinge, along = (0.0, 0.0, c.floor_height), exp((0.0, c.tilt, 0.0))
     turning = (0.0, unloading_contact_points.roller_speed(c, t), 0.0)
-    told = BodyMotions(
+    sample = BodyMotions(
         (s.position_world, hinge, _roller(c, 0), _roller(c, 1), _roller(c, 2), _roller(c, 3), ZERO),
         (s.attitude, exp((0.0, c.tilt + s.door[0], 0.0)), along, along, along, along, NO_ROTATION),
         (s.velocity_world, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO),
@@ -60,4 +60,4 @@ def step(
         ),
         (ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO),
     )  # fmt: skip
-    return s, (told,), CONTINUE
+    return s, (sample,), CONTINUE

@@ -17,7 +17,7 @@ from lapwing.services.process_table import create
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.systems import cooperative_load, gyrostat
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
-from lapwing.studies.stability.flights import finite, flown
+from lapwing.studies.stability.flights import finite, fly
 
 HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: rejected with time, place and value, never used"
 
@@ -50,7 +50,7 @@ class Steady:
 def of_parameters(value: float, key: str) -> str:
     """Return the reaction to an absurd parameter: "refused", "reported", "flown" or "silent"."""
     try:
-        flight = flown("hover", [f"{key}={value!r}", *SHORT])
+        flight = fly("hover", [f"{key}={value!r}", *SHORT])
     except ValueError:
         return "refused"
     except ArithmeticError:
@@ -98,10 +98,10 @@ def of_commands(value: float) -> tuple[str, float]:
             graph.advance(tick + 1)
             last = tick
     except LockStepError as error:
-        told = np.abs(graph.row(ports.TRUTH, last)).max()
-        return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(told)
-    told = np.abs(graph.row(ports.TRUTH, last)).max()
-    return ("flown" if math.isfinite(told) else "silent"), float(told)
+        largest = np.abs(graph.row(ports.TRUTH, last)).max()
+        return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(largest)
+    largest = np.abs(graph.row(ports.TRUTH, last)).max()
+    return ("flown" if math.isfinite(largest) else "silent"), float(largest)
 
 
 def baseline_step(mass: float, volts: float) -> float:
@@ -114,8 +114,8 @@ def baseline_step(mass: float, volts: float) -> float:
         return float(z)
 
 
-def _count(found: list[str], what: str) -> float:
-    return float(sum(f == what for f in found))
+def _count(results: list[str], what: str) -> float:
+    return float(sum(f == what for f in results))
 
 
 def _no_numbers(values: list[float]) -> float:
@@ -168,7 +168,7 @@ def run() -> CaseResult:
             "of those, after which the state before is no longer finite",
             0.0,
             why,
-            _no_numbers([told for _, told in commands]),
+            _no_numbers([largest for _, largest in commands]),
             "one state, overwritten",
             by_voltage,
         ),

@@ -48,7 +48,7 @@ class Outcome(NamedTuple):
         return np.maximum(self.position / self.position_std, self.angle / self.angle_std)
 
 
-def flown(faults: dict[str, str], more: Sequence[str] = (), *, as_if_on_time: bool = False) -> Outcome:
+def fly(faults: dict[str, str], more: Sequence[str] = (), *, as_if_on_time: bool = False) -> Outcome:
     """Fly the mission with faults and overrides; `as_if_on_time`: fixes count as measured on arrival."""
     overrides = [f"run.duration={END}", *more, *(f"sensors.{s}.faults=[{faults.get(s, NEVER)}]" for s in SENSORS)]
     setup = resolve(load("delivery_mission", overrides))
@@ -57,8 +57,8 @@ def flown(faults: dict[str, str], more: Sequence[str] = (), *, as_if_on_time: bo
         gps = next(part for service in services for part in service.parts if isinstance(part.parameters, GpsFusion))
         gps.parameters = gps.parameters._replace(age=0)
     topics = (TRUTH, ESTIMATE)
-    wanted = {wire.port for service in services for wire in service.wires if wire.topic in topics}
-    graph = BlockDiagram(setup, services, 64, wanted)
+    selected = {wire.port for service in services for wire in service.wires if wire.topic in topics}
+    graph = BlockDiagram(setup, services, 64, selected)
     filtering: Any = next(part for service in services for part in service.parts if part.name.endswith("inertial"))
     least = 1.0
     while not graph.ended and graph.tick <= setup.last_tick:
@@ -73,17 +73,17 @@ def _covariance(state: Any) -> np.ndarray:
 
 
 def _outcome(flight: FlightData, least: float) -> Outcome:
-    told, truth = flight.estimate, flight.truth
-    late = told.times > 5.0  # it has had time to begin
-    at = np.searchsorted(truth.times, told.times[late]).clip(max=len(truth.times) - 1)
-    turned = np.einsum("ki,ki->k", *(_matrices(q) for q in (told.orientation[late], truth.orientation[at])))
+    estimate, truth = flight.estimate, flight.truth
+    late = estimate.times > 5.0  # it has had time to begin
+    at = np.searchsorted(truth.times, estimate.times[late]).clip(max=len(truth.times) - 1)
+    turned = np.einsum("ki,ki->k", *(_matrices(q) for q in (estimate.orientation[late], truth.orientation[at])))
     return Outcome(
-        told.times[late],
-        np.linalg.norm(told.position[late] - truth.position[at], axis=1),
+        estimate.times[late],
+        np.linalg.norm(estimate.position[late] - truth.position[at], axis=1),
         np.arccos(np.clip(0.5 * (turned - 1.0), -1.0, 1.0)),
-        np.linalg.norm(told.position_std[late], axis=1),
-        np.linalg.norm(told.attitude_std[late], axis=1),
-        told.health_flags[late] == 0,
+        np.linalg.norm(estimate.position_std[late], axis=1),
+        np.linalg.norm(estimate.attitude_std[late], axis=1),
+        estimate.health_flags[late] == 0,
         least,
     )
 
@@ -112,16 +112,16 @@ def textbook() -> float:
 
 def run() -> CaseResult:
     """Compare errors with the estimated covariance."""
-    outcomes = {name: flown(faults) for name, faults in FAULTS.items()}
+    outcomes = {name: fly(faults) for name, faults in FAULTS.items()}
     rows, curves = [], []
     for name, o in outcomes.items():
         before = np.flatnonzero(o.t < START)[-1]
         trusting = np.maximum(o.position / o.position_std[before], o.angle / o.angle_std[before])
-        baseline, said = "its last word before the fault", float(trusting[o.t >= START].max())
+        baseline, label = "its last word before the fault", float(trusting[o.t >= START].max())
         if name == "gyro_bias":
-            baseline, said = "the gyro integrated", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
+            baseline, label = "the gyro integrated", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
         if name == "magnetometer":
-            baseline, said = "the compass taken at its word", np.pi / o.angle_std[before]
+            baseline, label = "the compass taken at its word", np.pi / o.angle_std[before]
         what = "largest error over the claimed deviation, while it says that it is well"
         rows.append(
             Row(
@@ -132,7 +132,7 @@ def run() -> CaseResult:
                 WHY,
                 float(o.ratio[o.well].max()),
                 baseline,
-                said,
+                label,
             )
         )
         curves.append(Curve(name, o.t, np.maximum(o.ratio, 1e-3)))

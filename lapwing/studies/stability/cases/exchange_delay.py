@@ -36,11 +36,11 @@ def scene(rate: int) -> Scene:
     return load("hover", [f"communication.rate={rate}", f"solver.step={1.0 / rate / -(-1000 // rate)!r}", *slow, *PUSH])
 
 
-def late(found: RunConfig, delay: int) -> RunConfig:
+def late(config: RunConfig, delay: int) -> RunConfig:
     """Return the run configuration with a command delay of so many ticks."""
-    plant = found.services["plant"]
+    plant = config.services["plant"]
     inputs = tuple(InputPort(i.port, 1 + delay) for i in plant.inputs)  # 1: from the next tick on is at once
-    return found._replace(services={**found.services, "plant": plant._replace(inputs=inputs)})
+    return config._replace(services={**config.services, "plant": plant._replace(inputs=inputs)})
 
 
 def flies(rate: int, delay: int) -> bool:
@@ -67,11 +67,11 @@ def longest(works: list[bool]) -> float:
 
 def run() -> CaseResult:
     """Compare the longest interval of each delay, in flight and by analysis."""
-    flown = np.array([longest([flies(rate, d) for rate in RATES]) for d in DELAYS])
+    measured = np.array([longest([flies(rate, d) for rate in RATES]) for d in DELAYS])
     linear = np.array([longest([predicted(rate, d) for rate in RATES]) for d in DELAYS])
     baseline = np.full(len(DELAYS), 1.0 / RATES[-1])
-    ratio = np.maximum(flown / linear, linear / flown)
-    blind = np.maximum(flown / baseline, baseline / flown)
+    ratio = np.maximum(measured / linear, linear / measured)
+    blind = np.maximum(measured / baseline, baseline / measured)
     row = Row(
         "interval",
         "Nyquist with the delay and half a tick of hold",
@@ -84,7 +84,7 @@ def run() -> CaseResult:
     )
     x = np.array(DELAYS, dtype=float)
     curves = [
-        Curve("in flight", x, 1e3 * flown),
+        Curve("in flight", x, 1e3 * measured),
         Curve("by analysis", x, 1e3 * linear),
         Curve("no delay", x, 1e3 * baseline),
     ]

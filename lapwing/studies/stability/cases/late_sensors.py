@@ -13,7 +13,7 @@ from lapwing.services.scene_resolver import load
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.stability import flights, jumping_clock
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.cases.estimator import SIGMAS, Outcome, flown
+from lapwing.studies.stability.cases.estimator import SIGMAS, Outcome, fly
 
 HARD = (
     "GPS half a second late, an IMU at 50 Hz, both; rates that do not divide the clock's; a process whose clock jumps"
@@ -46,7 +46,7 @@ def by_remainder(period: int, ticks: int) -> int:
 
 def with_jumping_clock() -> int:
     """Return the number of commands that differ from a single-process flight if the autopilot's clocks jump."""
-    steady = flights.flown("hover", [SHORT], None)  # first: it compiles what the processes then find
+    steady = flights.fly("hover", [SHORT], None)  # first: it compiles what the processes then find
     with tempfile.TemporaryDirectory() as folder:
         shutil.copy(jumping_clock.__file__, Path(folder) / "sitecustomize.py")
         log, paths = Path(folder) / "flight.mcap", [folder, *filter(None, sys.path)]
@@ -74,16 +74,16 @@ def by_own_clock(ticks: int, interval: float) -> int:
     return int((np.abs(np.diff(read) - interval) > 1e-3 * interval).sum())
 
 
-def worst(found: Outcome) -> float:
+def worst(outcome: Outcome) -> float:
     """Return the maximum error over its standard deviation while the estimate reports good health."""
-    return float(found.ratio[found.well].max(initial=0.0))
+    return float(outcome.ratio[outcome.well].max(initial=0.0))
 
 
 def run() -> CaseResult:
     """Compare errors with the estimated covariance, and count rejected readings."""
     what = "largest error over the claimed deviation, while it says that it is well"
     ours, baseline = "corrected at the time of the fix", "a fix counts as measured when it arrives; the whole flight"
-    outcomes = {name: flown({}, more) for name, more in CASES}
+    outcomes = {name: fly({}, more) for name, more in CASES}
     rows = [
         Row(
             name,
@@ -93,7 +93,7 @@ def run() -> CaseResult:
             WHY,
             worst(outcomes[name]),
             baseline,
-            float(flown({}, more, as_if_on_time=True).ratio.max()),
+            float(fly({}, more, as_if_on_time=True).ratio.max()),
         )
         for name, more in CASES
     ]
@@ -129,8 +129,8 @@ def sweep() -> Sweep:
     """Increase the latency of fixes, with the IMU at 50 Hz."""
     late = np.arange(1, 8)
     more = [[RARE, f"sensors.gps.latency_samples={n}"] for n in late.tolist()]
-    ours = np.array([worst(flown({}, m)) for m in more])
-    baseline = np.array([flown({}, m, as_if_on_time=True).ratio.max() for m in more])
+    ours = np.array([worst(fly({}, m)) for m in more])
+    baseline = np.array([fly({}, m, as_if_on_time=True).ratio.max() for m in more])
     curves = [
         Curve("corrected at the time of the fix", 0.1 * late, ours),
         Curve("as measured when it arrives; the whole flight", 0.1 * late, baseline),

@@ -15,7 +15,7 @@ from lapwing.kernels.state_tree import unflatten
 from lapwing.messages.topics import BODIES, LIFT, TRUTH
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.cases.cooperative_load import INERTIA, LENGTH, QUAD, G
-from lapwing.studies.stability.flights import flown
+from lapwing.studies.stability.flights import fly
 from lapwing.studies.stability.sampled_runs import rows
 from lapwing.studies.tension import pushes, tension
 
@@ -65,7 +65,7 @@ def let_go() -> tuple[float, float, float, float]:
     free, state = release(p, unflatten(x, tuple(map(float, y[-1]))))
     r = np.array([state.load_position, *state.quad_position])
     v = np.array([state.load_velocity, *state.quad_velocity])
-    kept = float((np.abs(accounts(r, v) - before) / size).max())
+    drift = float((np.abs(accounts(r, v) - before) / size).max())
     lost = float((np.abs(accounts(r, (position[-1] - position[-2]) / STEP) - before) / size).max())
     count = round(FALL / 1e-3)
     end = rows("rk4_renormalised", free, state, FALL, count, 1)[-1]
@@ -74,7 +74,7 @@ def let_go() -> tuple[float, float, float, float]:
     ours = np.array([end[:3], end[20:23], end[23:26]])
     light = rows("rkmk4", p._replace(load_mass=1e-3), unflatten(x, tuple(map(float, y[-1]))), FALL, 10 * count, 1)
     held, _ = bodies(LENGTH, light)
-    return kept, lost, float(np.abs(ours - exact).max()), float(np.abs(held[-1] - exact).max())
+    return drift, lost, float(np.abs(ours - exact).max()), float(np.abs(held[-1] - exact).max())
 
 
 def over_the_top() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -103,19 +103,19 @@ def slack_at() -> float:
 
 def silent() -> tuple[float, float]:
     """Return 1 for each flight with a pushing link that the event, or watching the length, does not report."""
-    flight = flown("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
-    told = any(event.kind == "slack" for event in flight.events)
+    flight = fly("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
+    reported = any(event.kind == "slack" for event in flight.events)
     place, length = (
         flight.topic("body_states").position,
         np.array(flight.origin.scene["cooperative_load"]["link_length"]),
     )
     off = np.abs(np.linalg.norm(place[:, :1] - place[:, 1:], axis=2) / length - 1.0).max()
-    return float(not told), float(off < 1e-9)
+    return float(not reported), float(off < 1e-9)
 
 
 def run() -> CaseResult:
     """Measure the release and afterwards, the top and beyond."""
-    kept, lost, fallen, held = let_go()
+    drift, lost, fallen, held = let_go()
     t, result, exact, angle = over_the_top()
     when = slack_at()
     sharing = np.abs(exact - LOAD * G * np.cos(angle)) / exact[0]
@@ -125,7 +125,7 @@ def run() -> CaseResult:
     figures = [
         Row("release", "every body keeps its position and velocity",
             "change of momentum, angular momentum and energy, relative", KEPT, "round-off of positions of 50 m",
-            kept, "velocities from the last two positions, 2.5 ms apart", lost),
+            drift, "velocities from the last two positions, 2.5 ms apart", lost),
         Row("fall", "free bodies, RK4 at 1 ms", "distance [m] from free fall and constant thrust in 2 s", FALLEN,
             "round-off: 4e-15 m for each of 2000 steps, were every one of one sign",
             fallen, "the load weighs a gram, the links stay", held),

@@ -4,7 +4,7 @@ import numpy as np
 
 from lapwing.services.scene_resolver import load
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.flights import flown
+from lapwing.studies.stability.flights import fly
 
 HARD = "rotors that follow their voltage within 10 us at a plant step of 1 ms: 36 times beyond RK4's stability"
 
@@ -16,7 +16,7 @@ LAGS = np.geomspace(1e-2, 1e-6, 9)
 
 def lagging(lag: float) -> tuple[np.ndarray, np.ndarray]:
     """Return (times [s], maximum relative deviation of a rotor's speed from that of its voltage) of a flight."""
-    truth = flown("hover", [f"airframe.motor.time_constant={lag!r}"]).truth
+    truth = fly("hover", [f"airframe.motor.time_constant={lag!r}"]).truth
     speed, voltage = truth.rotor_speed, truth.motor_voltage
     return truth.times, np.abs(speed * CONSTANT - voltage).max(axis=1) / voltage.max()
 

@@ -10,7 +10,7 @@ from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.flights import flown
+from lapwing.studies.stability.flights import fly
 
 HARD = (
     "a gust of 25 m/s, half a second without thrust, a payload dropped in wind, a motor out: outputs that are cut off"
@@ -48,12 +48,12 @@ def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
     times = np.arange(0.0, 30.0, STEP)
     for t in times:
         integral = integrate(gains, integral, -z, cut if unwound else 0.0, STEP)
-        wanted = weight + output(gains, integral, -z, -v)
-        given = min(max(wanted, 0.0), most)
-        cut = float(np.sign(wanted - given))
+        demand = weight + output(gains, integral, -z, -v)
+        actual = min(max(demand, 0.0), most)
+        cut = float(np.sign(demand - actual))
         if AT <= t < AT + loss:
-            given = 0.0
-        thrust += STEP / frame.motor.time_constant * (given - thrust)
+            actual = 0.0
+        thrust += STEP / frame.motor.time_constant * (actual - thrust)
         v += STEP * (4.0 * thrust / frame.mass - frame.gravity)
         z += STEP * v
         result.append(z)
@@ -62,14 +62,14 @@ def height(unwound: bool, loss: float) -> tuple[np.ndarray, np.ndarray]:
 
 def away(gains: str) -> float:
     """Return the maximum distance [m] from the path when the pack is dropped in a wind of 25 m/s."""
-    flight = flown("delivery_full", [*DROP, "run.duration=60.0", f"autopilot.gains={gains}"], TOPICS)
+    flight = fly("delivery_full", [*DROP, "run.duration=60.0", f"autopilot.gains={gains}"], TOPICS)
     n = min(len(flight.reference), len(flight.truth))
     return float(np.linalg.norm(flight.truth.position[:n] - flight.reference[:n, :3], axis=1).max())
 
 
 def rebound(gains: str) -> float:
     """Return the maximum height [m] above the path after a downward gust."""
-    flight = flown("hover", [*GUST, f"autopilot.gains={gains}"], TOPICS)
+    flight = fly("hover", [*GUST, f"autopilot.gains={gains}"], TOPICS)
     n = min(len(flight.reference), len(flight.truth))
     over = flight.truth.position[:n, 2] - flight.reference[:n, 2]
     return float(over[flight.truth.times[:n] > 10.0].max())
@@ -77,7 +77,7 @@ def rebound(gains: str) -> float:
 
 def tumbling() -> tuple[float, float]:
     """Return the norm error of the attitude quaternion with a motor out: in flight, and stepped from its rates."""
-    truth = flown("hover", OUT).truth
+    truth = fly("hover", OUT).truth
     q = np.array([1.0, 0.0, 0.0, 0.0])
     for wx, wy, wz in truth.angular_velocity:
         turn = np.array([[0, -wx, -wy, -wz], [wx, 0, wz, -wy], [wy, -wz, 0, wx], [wz, wy, -wx, 0]])

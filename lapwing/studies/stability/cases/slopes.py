@@ -21,8 +21,8 @@ STILL, SLIDES = 1e-6, 1e-3  # [m], relative
 def way(degrees: float, seconds: float = 60.0) -> float:
     """Return the distance [m] that a vehicle at rest moves on a slope."""
     # set down gently: held until the springs across the slope carry the weight, and then let go
-    held, state = standing(0.0, 0.0, math.radians(degrees), friction_static=5.0)
-    state = run_on(held, state, 3.0)
+    model, state = standing(0.0, 0.0, math.radians(degrees), friction_static=5.0)
+    state = run_on(model, state, 3.0)
     p, _ = standing(0.0, 0.0, math.radians(degrees))
     state = run_on(p, state, 3.0)  # the uphill feet slip by hundredths of a millimetre, and stick again
     later = run_on(p, state, seconds).motion

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.flights import flown
+from lapwing.studies.stability.flights import fly
 from lapwing.studies.stability.sampled_runs import rows
 
 HARD = "a carried load whose control is another process: each is constant for the other during a step"
@@ -34,7 +34,7 @@ def apart(rate: int, coupling: str) -> np.ndarray:
     slow = [f"rates.{name}=10" for name in ("pose", "estimate", "status", "battery", "commands")]
     interval = 1.0 / rate
     solver = f"solver.step={interval / round(interval / STEP)!r}"
-    truth = flown(
+    truth = fly(
         "cooperative_load",
         [
             f"communication.rate={rate}",

@@ -8,7 +8,7 @@ from lapwing.dynamics import integrators
 from lapwing.services.plant.models import unloading
 from lapwing.services.scene_resolver import load
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
-from lapwing.studies.stability.flights import flown
+from lapwing.studies.stability.flights import fly
 
 HARD = "a pack that rollers push over a door that falls open: contacts that begin, slide, stick and end"
 
@@ -21,7 +21,7 @@ TAKEN = 4.9  # [s] just before it is taken away
 @cache
 def end(step: float, *more: str) -> np.ndarray:
     """Return the pack's position before removal [m], NaN if the run ended before; shape (3,)."""
-    flight = flown("unload", [f"solver.step={step!r}", f"run.duration={TAKEN!r}", *more])
+    flight = fly("unload", [f"solver.step={step!r}", f"run.duration={TAKEN!r}", *more])
     return np.full(3, np.nan) if flight.failure else flight.truth.position[-1]
 
 

@@ -30,5 +30,5 @@ class Mode(FlightMode):
                 self._position = smoothing.position
         else:
             smoothing.move_to(self._position, limits, view.dt)
-        wanted = towards_roi(guidance) if math.isnan(self._yaw) else self._yaw
-        smoothing.turn_to(wanted, limits, view.dt)
+        desired = towards_roi(guidance) if math.isnan(self._yaw) else self._yaw
+        smoothing.turn_to(desired, limits, view.dt)

@@ -179,8 +179,8 @@ def _instant(item: Any) -> bool:
 
 def _place(item: Any, here: Vec3) -> Vec3:
     """Return the position of an item [m]; missing coordinates are those of `here`."""
-    asked = tuple(item.position) if item.action in (*TO_PLACES, "land") else _NOT_GIVEN
-    x, y, z = fill_in(here, asked)
+    requested = tuple(item.position) if item.action in (*TO_PLACES, "land") else _NOT_GIVEN
+    x, y, z = fill_in(here, requested)
     return x, y, here[2] if item.action in ("land", "loiter_to_alt") else z  # horizontally first
 
 

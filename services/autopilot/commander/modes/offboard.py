@@ -101,8 +101,8 @@ def _follow_position(
     approach = smoothing.velocity_to(fill_in(smoothing.position, position), limits)
     gained = scale(ACCELERATION_TIME, clamp_norm(_or_zero(acceleration), limits.acceleration))
     x, y, z = (
-        v if math.isnan(p) and math.isnan(asked) and not math.isnan(a) else 0.0
-        for v, p, asked, a in zip(smoothing.velocity, position, velocity, acceleration, strict=True)
+        v if math.isnan(p) and math.isnan(requested) and not math.isnan(a) else 0.0
+        for v, p, requested, a in zip(smoothing.velocity, position, velocity, acceleration, strict=True)
     )  # an acceleration alone adds to the present velocity
     smoothing.move_at(add(add(approach, _or_zero(velocity)), add(gained, (x, y, z))), limits, view.dt)
 

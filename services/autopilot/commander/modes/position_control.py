@@ -34,6 +34,6 @@ class Mode(FlightMode):
             self._position = None
         elif self._position is None and norm(smoothing.velocity) < STOPPED:
             self._position = smoothing.position
-        wanted = velocity if self._position is None else smoothing.velocity_to(self._position, limits)
-        smoothing.move_at(wanted, limits, view.dt)
+        desired = velocity if self._position is None else smoothing.velocity_to(self._position, limits)
+        smoothing.move_at(desired, limits, view.dt)
         smoothing.turn_at(yaw * limits.yaw_rate, limits, view.dt)

@@ -15,8 +15,8 @@ class Mode(FlightMode):
     """Climb vertically, then hold. Values: world z [m], default MIS_TAKEOFF_ALT above home; yaw [rad]."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        asked, ground = value(values, 0), constants.resting_height
-        self._height = guidance.above_home(constants, "MIS_TAKEOFF_ALT") if math.isnan(asked) else asked
+        requested, ground = value(values, 0), constants.resting_height
+        self._height = guidance.above_home(constants, "MIS_TAKEOFF_ALT") if math.isnan(requested) else requested
         if not ground < self._height <= MAXIMUM_TAKEOFF_HEIGHT:
             raise ValueError(f"take-off: expected a height from {ground:g} to 1000 m, got {self._height:g} m")
         if guidance.flying and guidance.smoothing.position[2] > self._height:
