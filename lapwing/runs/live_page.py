@@ -66,7 +66,8 @@ class LivePage:
         """Show the new steps and events of every vehicle."""
         if not self._vehicles:
             for k, (step, colour) in enumerate(zip(steps, self._colours, strict=True)):
-                self._vehicles.append(Vehicle(self._server.scene, k, step, step.vehicle, colour))
+                several = len(steps) > 1
+                self._vehicles.append(Vehicle(self._server.scene, k, step, step.vehicle, colour, named=several))
                 self._trails.append(LiveTrail(self._vehicles[-1], ERROR))
         now = time.monotonic()
         spread, self._before = float(np.clip(now - self._before, *LAG)), now

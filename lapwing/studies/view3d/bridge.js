@@ -1,7 +1,8 @@
 // Camera modes and a link to the time of an enclosing page, in a page of viser's client.
 (() => {
   const facts = window.lapwing;
-  window.__VISER_EMBED_CONFIG__ = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
+  const looks = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
+  Object.defineProperty(window, "__VISER_EMBED_CONFIG__", { get: () => looks, set() {} }); // a recording sets its own
 
   // A renderer without a graphics processor gets cheaper pictures: see `simplify`.
   const probe = document.createElement("canvas").getContext("webgl2");
@@ -33,9 +34,9 @@
     return names[key];
   }
   const node = (part, number) => client().nodeRefFromName[nameOf(part, number)];
+  const isPlaced = (number) => client()?.nodePoseData[nameOf("body", number)]?.poseUpdateState === "updated";
   function pose() {
     const one = node("body", view.vehicle);
-    if (!one?.parent) return null;
     one.updateWorldMatrix(true, false);
     const m = one.matrixWorld.elements;
     return { place: [m[12], m[13], m[14]], ahead: [m[0], m[1], m[2]], up: [m[8], m[9], m[10]] };
@@ -96,7 +97,8 @@
   let seen = "", placed = "", changed = 0; // what was drawn last, and when it became so [ms]
   function follow() {
     const now = state();
-    const at = now?.controls && pose();
+    const bodies = now?.controls ? facts.names.map((_, k) => node("body", k)) : [null];
+    const at = facts.names.every((_, k) => bodies[k]?.parent && (isPlaced(k) || !view.fresh)) && pose();
     if (at) {
       const next = `${view.time},${now.camera.matrixWorld.elements}`, elsewhere = `${view.mode},${at.place},${at.ahead},${at.up}`;
       if (next !== seen) {
@@ -110,12 +112,14 @@
         const ratio = devicePixelRatio * (performance.now() - changed < 1500 ? 0.5 : 1);
         if (now.viewport.dpr !== ratio) now.setDpr(ratio);
       }
-      const { controls } = now, [x, y, z] = at.place, far = Math.max(0.5, facts.size);
+      const { controls } = now, [x, y, z] = at.place, size = Math.max(0.5, facts.size);
       if (view.fresh || elsewhere !== placed) {
         if (view.mode === "onboard") {
-          const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * far, back = 0.9 * far;
+          const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * size, back = 0.9 * size;
           controls.setLookAt(x + up * u - back * a, y + up * v - back * b, z + up * w - back * c, x + 20 * a, y + 20 * b, z + 20 * c, false);
-        } else if (view.fresh) {
+        } else if (view.fresh) { // so far away that a fleet is in the picture
+          const spread = Math.max(...bodies.map((other) => other.position.distanceTo(bodies[view.vehicle].position)));
+          const far = view.place ? size : Math.max(size, Math.min(0.6 * spread, 5 * size));
           const usual = view.mode === "top" ? [0, 14, 0.01] : [1.5, 0.75, 1.9];
           const [dx, dy, dz] = (view.place ?? usual).map((value) => value * far);
           controls.setLookAt(x + dx, y + dy, z + dz, x, y, z, false);
@@ -209,8 +213,8 @@
   addEventListener("DOMContentLoaded", () => {
     const style = document.createElement("style");
     style.textContent = `.mantine-Notifications-root { display: none }
-      .mantine-Input-input:disabled { opacity: 1; color: inherit; background: none; border: 0; cursor: auto }
-      textarea.mantine-Textarea-input:disabled { height: 55vh !important; max-height: none; font-variant-numeric: tabular-nums }
+      .mantine-Input-input:disabled { opacity: 1 !important; color: inherit !important; background: none !important; border: 0; cursor: auto }
+      textarea.mantine-Textarea-input:disabled { min-height: 55vh; max-height: none; font-variant-numeric: tabular-nums }
       #lapwing { position: fixed; top: 10px; left: 10px; max-width: calc(100% - 20px); box-sizing: border-box; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
         font: 13px system-ui, sans-serif; color: #1f2328; background: #ffffffd9; border-radius: 6px; padding: 6px 10px }
       #lapwing span { display: flex; gap: 6px; align-items: center }

@@ -46,7 +46,7 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
     with serving() as server, server.atomic():  # no client is connected, so nothing has to be sent
         add_surroundings(server.scene, shown[0])
         vehicles = [
-            Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0)
+            Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0, named=len(shown) > 1)
             for k, (flight, title, colour) in enumerate(zip(shown, titles, colours, strict=True))
         ]
         recording, most, span = _record(server, shown, vehicles, times)

@@ -31,8 +31,8 @@ SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (
 class Vehicle:
     """One vehicle: its bodies, arrows and ghosts."""
 
-    def __init__(self, scene: Any, number: int, flight: FlightData, name: str, colour: str, ghost: bool = False):
-        """Add the nodes; `number` makes their names unique, and marks the vehicle for the camera of the page."""
+    def __init__(self, scene: Any, number: int, flight: FlightData, name: str, colour: str, ghost: bool = False, named: bool = False):
+        """Add the nodes; `number` makes their paths unique, `named` writes the name above the vehicle."""
         self.name, self.colour, self.motion = name, colour, motion(flight)
         self._scene, self._root = scene, f"/{number} {name.replace('/', '_')}"
         self._sent: dict[tuple[str, str], Any] = {}
@@ -44,7 +44,7 @@ class Vehicle:
         self._beams: dict[str, Beam] = {}
         for k, body in enumerate(self.motion.bodies):
             self._add_body(f"{self._root}/{k} {body.name.replace('/', '_')}", body, ghost)
-        if number or ghost:
+        if named:
             scene.add_label(f"{self._frames[0].name}/label", name, position=(0.0, 0.0, 0.9 * self._size))
 
     def _add_body(self, node: str, body: Body, ghost: bool) -> None:
