@@ -508,6 +508,6 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
         assert browser.errors == []
     assert calls < 80
     assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # what has been flown
-    assert 1 <= names < 7  # those behind others are hidden
+    assert 1 <= names < 8  # those behind others are hidden
     assert frames <= seconds + 1.0  # viser's own one a second
     assert after > 0

@@ -184,6 +184,8 @@ def parallel(found: Results) -> Plot:
     """Return every run as a line over all parameters and what matters, each scaled to its range."""
     keys, rest = _most(found)
     names = [*keys, *(name for name in MATTERS if name in found.figures)]
+    if len(names) < 2:
+        raise NotRecordedError("only one parameter varies")
     columns, ticks = [], []
     for name in names:
         values, (label, scale) = found.number(name), shown(name) if name in METRICS else (_with_unit(found, name), 1.0)

@@ -36,9 +36,20 @@ def write(path: Path, found: Tuned) -> None:
         Section("steps", "Steps of the setpoint", _steps(both, loops)),
     ]
     page = render(
-        "tuning.html", title=f"{found.scene}: gains", tables=list(tables(found)), sections=sections, gains=found.gains
-    )
+        "tuning.html", title=f"{found.scene}: gains", tables=list(tables(found)), sections=sections, gains=found.gains,
+        outcome=_outcome(found), failed=bool(found.failures),
+    )  # fmt: skip
     path.write_text(page, encoding="utf-8")
+
+
+def _outcome(found: Tuned) -> str:
+    """Return if the new gains have their margins, and how perturbed vehicles flew."""
+    if found.failures:
+        first, *others = found.failures
+        return f"The new gains fail: {first}" + (f"; and {len(others)} more" if others else "")
+    flown = len(found.corners)
+    flights = f", and all {flown} flights of perturbed vehicles succeed" if flown else "; no flight was made"
+    return f"The new gains pass: all {len(found.after.margins)} loops have their margins{flights}"
 
 
 _BODE = (

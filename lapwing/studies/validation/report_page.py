@@ -33,10 +33,23 @@ def write(path: Path, found: Validation) -> None:
         f"{found.memory.torque:g} s (torque)."
     )
     page = render(
-        "validation.html", title=f"{found.scene}: prediction of recorded flights", lead=lead,
+        "validation.html", title=f"{found.scene}: prediction of recorded flights", lead=lead, outcome=_outcome(found),
         tables=[_errors(found), _explained(found), *_loops(found), _flights(found)], sections=sections,
     )  # fmt: skip
     path.write_text(page, encoding="utf-8")
+
+
+def _outcome(found: Validation) -> str:
+    """Return the errors of the plant after the longest horizon, beside those of the best baseline."""
+    position, attitude = (FIELDS.index(name) for name in ("position", "attitude"))
+    plant = found.plant[-1]
+    best = {name: rows[-1][position].mean for name, rows in found.baselines.items()}
+    name = min(best, key=lambda key: best[key]) if best else ""
+    beside = f"; {name.replace('_', ' ')}: {best[name]:.3g} m" if name else ""
+    return (
+        f"Mean error of the plant after {found.horizons[-1] * found.interval:g} s: {plant[position].mean:.3g} m, "
+        f"{np.degrees(plant[attitude].mean):.3g}°{beside}"
+    )
 
 
 def _errors(found: Validation) -> Rows:

@@ -31,7 +31,16 @@ SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (
 class Vehicle:
     """One vehicle: its bodies, arrows and ghosts."""
 
-    def __init__(self, scene: Any, number: int, flight: FlightData, name: str, colour: str, ghost: bool = False, named: bool = False):
+    def __init__(
+        self,
+        scene: Any,
+        number: int,
+        flight: FlightData,
+        name: str,
+        colour: str,
+        ghost: bool = False,
+        named: bool = False,
+    ):
         """Add the nodes; `number` makes their paths unique, `named` writes the name above the vehicle."""
         self.name, self.colour, self.motion = name, colour, motion(flight)
         self._scene, self._root = scene, f"/{number} {name.replace('/', '_')}"

@@ -56,7 +56,8 @@ def _others(flight: FlightData) -> Iterator[Line]:
     """Yield the paths of the other vehicles of a fleet."""
     for i, (name, truth) in enumerate(flight.fleet.items()):
         if name != flight.vehicle:
-            yield Line(*truth.position.T[:2], name, COLOURS[i % len(COLOURS)], 1.2)
+            x, y, _ = truth.position.T
+            yield Line(x, y, name, COLOURS[i % len(COLOURS)], 1.2)
 
 
 def _extent(lines: list[Line]) -> tuple[np.ndarray, np.ndarray]:
