@@ -14,10 +14,10 @@ LANE = 0.32  # [inch] of a timeline
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
     """Return two plots in one; a panel of the first alone is kept, one of the second alone is named but not drawn."""
     others = {_key(panel): panel for panel in second.panels}
-    panels = []
+    panels, apart, named = [], _apart(first, second), (_named(first), _named(second))
     for panel in first.panels:
         other = others.pop(_key(panel), None)
-        panels.append(panel if other is None else _both(panel, other, labels, (_named(first), _named(second))))
+        panels.append(panel if other is None else _both(panel, other, labels, named, apart))
     spans = [plot.span for plot in (first, second) if plot.span]
     span = (min(s for s, _ in spans), max(e for _, e in spans)) if spans else None
     if first.caption == second.caption:
@@ -43,9 +43,21 @@ def _named(plot: Plot) -> set[str]:
     return {line.colour for line in lines if line.name and line.dash == "solid"}
 
 
-def _both(panel: Panel, other: Panel, labels: tuple[str, str], named: tuple[set[str], set[str]]) -> Panel:
+def _apart(first: Plot, second: Plot) -> set[str]:
+    """Return the names of marks that differ between the flights in any panel, so that the legend has each by flight."""
+    others = {_key(panel): panel.marks for panel in second.panels}
+    pairs = [(panel.marks, others[_key(panel)]) for panel in first.panels if _key(panel) in others]
+    both = [*pairs, *((b, a) for a, b in pairs)]
+    differing = [m for own, theirs in both for m in own if not any(_same(m, other) for other in theirs)]
+    return {m.name for m in differing if not isinstance(m, Stretch) and m.name}
+
+
+def _both(
+    panel: Panel, other: Panel, labels: tuple[str, str], named: tuple[set[str], set[str]], apart: set[str]
+) -> Panel:
     ours, others = _lanes(panel), _lanes(other)
     shared = [mark for mark in other.marks if any(_same(mark, own) for own in panel.marks)]
+    shared = [m for m in shared if isinstance(m, Stretch) or m.name not in apart]
     shared = [m for m in shared if not isinstance(m, Stretch) or ours[m.lane] == others[m.lane]]
     mine = [m if any(_same(m, s) for s in shared) else _of(m, labels[0], FIRST, "solid", named[0]) for m in panel.marks]
     theirs = [_of(m, labels[1], SECOND, "dot", named[1]) for m in other.marks if not any(m is s for s in shared)]
