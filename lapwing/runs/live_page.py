@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from contextlib import ExitStack
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.report.style import COLOURS, FLOWN
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.view3d.bodies import LEVEL
+from lapwing.studies.view3d.live_trail import LiveTrail
 from lapwing.studies.view3d.local_server import serving
 from lapwing.studies.view3d.recording import with_bridge
 from lapwing.studies.view3d.samples import Samples, sample
@@ -26,7 +27,6 @@ from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
 
 FRAMES = 8  # [frames] of a step, shown evenly until the next step
-PIECES = 1200  # [pieces] of all trails; the oldest are removed
 LINES = 200  # [lines] of events
 LAG = (0.02, 0.5)  # [s] shortest and longest time over which a step is spread
 ERROR = 0.25  # [m] at the end of the trail's colours
@@ -50,7 +50,7 @@ class LivePage:
         add_surroundings(self._server.scene, _before_start(members(setup)[0]))
         add_shaders(self._server.scene)
         self._vehicles: list[Vehicle] = []
-        self._pieces: deque[Any] = deque()
+        self._trails: list[LiveTrail] = []
         self._frames: deque[tuple[float, list[Samples], int]] = deque()  # wall time [s], samples, index
         self._ready, self._over, self._before = threading.Condition(), False, time.monotonic()
         gui = self._server.gui
@@ -66,7 +66,9 @@ class LivePage:
         """Show the new steps and events of every vehicle."""
         if not self._vehicles:
             for k, (step, colour) in enumerate(zip(steps, self._colours, strict=True)):
-                self._vehicles.append(Vehicle(self._server.scene, k, step, step.vehicle, colour))
+                several = len(steps) > 1
+                self._vehicles.append(Vehicle(self._server.scene, k, step, step.vehicle, colour, named=several))
+                self._trails.append(LiveTrail(self._vehicles[-1], ERROR))
         now = time.monotonic()
         spread, self._before = float(np.clip(now - self._before, *LAG)), now
         first, last = (float(steps[0].truth.times[k]) for k in (0, -1))
@@ -76,19 +78,9 @@ class LivePage:
             self._frames.extend((now + spread * k / FRAMES, result, k) for k in range(FRAMES))
             self._ready.notify()
         with self._server.atomic():
-            for vehicle, step in zip(self._vehicles, steps, strict=True):
-                self._extend_trail(vehicle, step)
+            for trail, step in zip(self._trails, steps, strict=True):
+                trail.extend(step)
             self._tell(steps, events)
-
-    def _extend_trail(self, vehicle: Vehicle, step: FlightData) -> None:
-        rows = np.unique(np.linspace(0, len(step.truth) - 1, FRAMES + 1).round().astype(int))
-        path, error = step.truth.position[rows], None
-        if len(step.reference):
-            error = np.linalg.norm(path - step.reference[np.minimum(rows, len(step.reference) - 1), :3], axis=1)
-        if len(rows) > 1:
-            self._pieces.append(vehicle.trail(f"{step.truth.times[-1]:.3f}", path, error, ERROR))
-        if len(self._pieces) > PIECES:
-            self._pieces.popleft().remove()
 
     def _tell(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
         several = len(steps) > 1

@@ -42,7 +42,7 @@ from lapwing.studies.topic_view import TopicView
 
 AXES = tuple(tracking.AXES)
 IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # of which a vehicle is drawn as it moves
-
+OF_OTHERS = (*IN_SPACE, STATUS)  # from which the other vehicles of a fleet are drawn, and their outcomes made
 
 # Topics from which outcome, events, metrics and report are made.
 SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS, custom_sensor(ports.IMU_SELECTION))
@@ -89,7 +89,7 @@ class FlightData(FlightTopics):
             named = vehicle or next(iter(fleet), None)
             if named is None or named not in fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/ground_truth)")
-            others = {topic.key(name) for name in fleet for topic in IN_SPACE}
+            others = {topic.key(name) for name in fleet for topic in OF_OTHERS}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
             return cls._of_log(log, str(path), log.histories(_selected_names(own, only, fleet)), named, fleet)
 
@@ -121,7 +121,7 @@ class FlightData(FlightTopics):
             return cls(views, Origin.of_log(source, name, log.metadata, log.attachments), failure, diverged)
 
         result: Self = of(vehicle, [key for key in histories if key.startswith(f"/{vehicle}/") or "/" not in key[1:]])
-        shown = {name: [key for topic in IN_SPACE if (key := topic.key(name)) in histories] for name in fleet}
+        shown = {name: [key for topic in OF_OTHERS if (key := topic.key(name)) in histories] for name in fleet}
         result.others = tuple(of(name, shown[name]) for name in fleet if name != vehicle)
         truths = {other.vehicle: other.truth for other in result.others}
         result.fleet = {name: truths.get(name, result.truth) for name in fleet}

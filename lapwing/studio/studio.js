@@ -109,7 +109,7 @@
         if (state.time) {
           time.textContent = `${state.time.toFixed(1)} s simulated, ${state.rate.toFixed(1)} times real time`;
           bar.style.width = `${Math.min(100, (100 * state.time) / Number(run.dataset.duration))}%`;
-        }
+        } else if (state.live) time.textContent = "flying";
         output.textContent = state.lines.join("\n");
       }
       setTimeout(poll, 500);

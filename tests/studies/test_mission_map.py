@@ -9,6 +9,7 @@ import synthetic_flights
 from lapwing.studies.flight_events import Event
 from lapwing.studies.plan_shapes import fence_shapes, waypoints
 from lapwing.studies.report.plots import mission_map
+from lapwing.studies.topic_view import TopicView
 
 TICKS, RATE = 101, 10
 
@@ -29,6 +30,20 @@ def flight(terrain=None):
 
 def named(name, given=None):
     return [mark for mark in mission_map.draw(given or flight()).panels[0].marks if mark.name.startswith(name)]
+
+
+def test_all_vehicles_of_fleet_are_on_map_by_name():
+    first, second = flight(), flight()
+    moved = {name: second.truth[name] for name in second.truth.fields}
+    moved["pose.position"] = second.truth.position + np.array([0.0, 30.0, 0.0])
+    first.fleet = {"wing": TopicView(second.truth._times_ns, moved), first.vehicle: first.truth}
+    panel = mission_map.draw(first).panels[0]
+    lines = {mark.name: mark for mark in panel.marks}
+    assert lines["wing"].y == pytest.approx(np.full(TICKS, 30.0))
+    assert lines[first.vehicle].y == pytest.approx(np.zeros(TICKS))
+    assert lines["wing"].colour != lines[first.vehicle].colour
+    assert panel.y_range[0] < 0.0
+    assert panel.y_range[1] > 30.0
 
 
 def test_events_that_went_wrong_are_where_vehicle_was():

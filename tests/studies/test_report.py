@@ -375,7 +375,10 @@ def test_differences_of_two_flights_have_names(log, tmp_path):
     both = overlay(one, two, ("a", "b"))
     assert [mark.name for mark in both.panels[0].marks] == ["flown, a", "reference", "flown, b"]
     assert both.panels[1].title == "a: RMSE 0.1000 m; b: RMSE 0.9000 m"
-    assert [mark.name for mark in both.panels[2].marks] == ["flown", "reference"]
+    same = next(panel for panel in both.panels if panel.y_label == "y [m]").marks  # the legend has each name by flight
+    assert [mark.name for mark in same] == ["flown, a", "reference", "flown, b"]
+    names = {mark.name for panel in both.panels for mark in panel.marks}
+    assert names == {"flown, a", "flown, b", "reference", "± RMSE, a", "± RMSE, b", ""}
 
 
 def test_keys_in_which_two_scenes_differ():

@@ -17,7 +17,10 @@ from lapwing.studies.report import write
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.view3d import headless as chromium
 from lapwing.studies.view3d import sampling, solids, vehicle_bodies
-from lapwing.studies.view3d.recording import _trail
+from lapwing.studies.view3d.coloured_mesh import coloured_mesh
+from lapwing.studies.view3d.live_trail import LINES, POINTS, LiveTrail
+from lapwing.studies.view3d.recording import page as view_page
+from lapwing.studies.view3d.rotors import Rotors
 from lapwing.studies.view3d.samples import sample
 from lapwing.studies.view3d.sampling import along
 from lapwing.studies.view3d.stage import Vehicle, error_colours, reach
@@ -105,10 +108,39 @@ def test_rotors_turn_in_their_own_direction():
     assert moved.bodies[0].rotors[1].angle == pytest.approx(T)  # ccw seen from above is about +z
     assert moved.bodies[0].rotors[0].angle == pytest.approx(-T)
     (body,) = sample(values, moved, np.array([1.0])).bodies
+    scene = Recorder()
+    Rotors(scene, "/body", moved.bodies[0].rotors, "#0072B2", 0.1).turn(body.angles[0])
+    tips = scene.nodes["/body/blades"].vertices.reshape(4, -1, 3)[:, :2].mean(axis=1) - np.array(HUBS)
     step = 2.0 * np.pi / sampling.TURNS
-    for k, sign in ((0, -1.0), (1, 1.0)):
-        w, _, _, z = body.spin[k][0]
-        assert np.exp(2j * np.arctan2(z, w)) == pytest.approx(np.exp(1j * sign), abs=step)
+    for (x, y, _), sign in zip(tips, (-1.0, 1.0, -1.0, 1.0), strict=True):
+        assert np.hypot(x, y) == pytest.approx(0.95 * 0.25, abs=1e-3)
+        assert np.arctan2(y, x) == pytest.approx(sign, abs=step)
+
+
+def test_thrust_arrows_stand_on_hubs_and_have_their_lengths():
+    rotors, scene = motion(flight()).bodies[0].rotors, Recorder()
+    Rotors(scene, "/body", rotors, "#0072B2", 0.1).push(np.array([1.0, 2.0, 0.0, -3.0]))
+    arrows = scene.nodes["/body/thrusts"].vertices.reshape(4, -1, 3)
+    assert np.ptp(arrows[:, :, 2], axis=1) == pytest.approx([0.1, 0.2, 0.0, 0.3])
+    assert arrows[3, :, 2].min() == pytest.approx(-0.3)
+    assert arrows[:, -1, :2] == pytest.approx(np.array(HUBS)[:, :2])
+    assert np.ptp(arrows[2], axis=0) == pytest.approx(0.0)  # nothing is seen of an arrow without length
+
+
+def test_coloured_mesh_is_read_with_its_shape_and_colours(tmp_path):
+    trimesh = pytest.importorskip("trimesh")
+    parts = [solids.box((0.0, 0.0, 1.0), (1.0, 2.0, 3.0), "#E69F00"), solids.ball((0.0,) * 3, 0.5, "#14181C")]
+    path = tmp_path / "body.glb"
+    path.write_bytes(coloured_mesh(parts))
+    mesh = trimesh.load(path, force="mesh", process=False)
+    assert mesh.vertices == pytest.approx(np.concatenate([part.vertices for part in parts]), abs=1e-6)
+    assert mesh.volume == pytest.approx(sum(map(volume, parts)), rel=1e-5)
+    data = path.read_bytes()
+    head = int.from_bytes(data[12:16], "little")
+    place = 20 + head + 8 + json.loads(data[20 : 20 + head])["bufferViews"][1]["byteOffset"]
+    colours = np.frombuffer(data, "<u2", 4 * len(mesh.vertices), place).reshape(-1, 4) / 65535.0
+    for row, colour in ((0, (0.791, 0.347, 0.0, 1.0)), (-1, (0.00700, 0.00913, 0.01161, 1.0))):  # linear
+        assert colours[row] == pytest.approx(colour, abs=1e-3)
 
 
 def test_samples_follow_pose_wind_and_thrust():
@@ -117,7 +149,7 @@ def test_samples_follow_pose_wind_and_thrust():
     assert result.bodies[0].position[:, 2] == pytest.approx([0.0, 2.0], abs=1e-3)
     assert result.bodies[0].orientation[1] == pytest.approx([1.0, 0.0, 0.0, 0.0])  # w, x, y, z
     assert result.wind[1] == pytest.approx([3.0, 0.0, 0.0])
-    assert [thrust[0] for thrust in result.bodies[0].thrust] == [1.0] * 4
+    assert result.bodies[0].thrusts[0].tolist() == [1.0] * 4
 
 
 def test_airframe_model_has_feet_and_payload_volume():
@@ -272,32 +304,22 @@ def test_node_is_sent_only_when_it_changes():
     assert frame.position is None
 
 
-def test_visible_trail_is_flown_path_in_few_lines():
-    times, shown, lines = np.linspace(0.0, 3.99, 350), {}, []
-
-    class Line:
-        visible = False
-
-    class Flown:
-        def trail(self, name, path, *_, visible):
-            line = Line()
-            shown[line] = path
-            return line
-
-        def desired_path(self, path):
-            pass
-
-    values = flight()
-    parts = _trail(Flown(), sample(values, motion(values), times), (0, len(times) - 1), 0.0)
-    for time, appearing, replaced in parts:
-        appearing.visible = True
-        for line in replaced:
-            line.visible = False
-        paths = [path[:, 2] for line, path in shown.items() if line.visible]
-        lines.append(len(paths))
-        length = sum(path[-1] - path[0] for path in paths)
-        assert length == pytest.approx(time, abs=0.01)
-    assert max(lines) <= 20
+def test_live_trail_is_flown_path_in_few_lines():
+    values, scene = flight(ticks=20), Recorder()
+    trail = LiveTrail(Vehicle(scene, 0, values, "drone1", "#0072B2"), 0.25)
+    steps = 3 * POINTS // 4
+    for k in range(steps):
+        truth = {name: values.truth[name] for name in values.truth.fields}
+        truth["pose.position"] = values.truth.position + np.array([0.0, 0.0, 0.2 * k])
+        views = {"ground_truth": TopicView(np.arange(20) * 10**7 + k * 200_000_000, truth)}
+        trail.extend(FlightData(views, copy.copy(values.origin)))
+    lines = [node for name, node in scene.nodes.items() if "/trail/" in name]
+    drawn = [getattr(line, "points", line.arguments[0]) for line in lines]
+    assert len(lines) == 4
+    assert len(lines) < LINES
+    ends = [(points[0, 0, 2], points[-1, 1, 2]) for points in drawn]
+    assert [stop for _, stop in ends[:-1]] == pytest.approx([start for start, _ in ends[1:]])
+    assert (ends[0][0], ends[-1][1]) == pytest.approx((0.0, 0.2 * (steps - 1) + 0.19), abs=1e-3)
 
 
 def test_error_colours_run_from_dark_blue_to_orange():
@@ -435,3 +457,57 @@ def test_browser_ties_view_to_plots(tmp_path, page):
     assert 0.1 < played < 4.0
     assert sought == pytest.approx(2.5, abs=0.01)
     assert re.match(r"(0\.99|1|2\.5)\S* s", cursor)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
+    first = flight()
+    for k in range(1, 8):
+        truth = {name: first.truth[name] for name in first.truth.fields}
+        truth["pose.position"] = first.truth.position + np.array([-2.0 * k, 0.02 * k, 0.0])
+        first.others += (FlightData({"ground_truth": TopicView(np.arange(TICKS) * 10**7, truth)}, first.origin),)
+    first.others = tuple(copy.copy(other) for other in first.others)
+    for k, other in enumerate(first.others):
+        other.vehicle = f"vehicle {k + 2}"
+    first.fleet = {one.vehicle: one.truth for one in (first, *first.others)}
+    path = tmp_path / "view.html"
+    path.write_text(view_page([first], [first.vehicle]), encoding="utf-8")
+    with chromium.Browser(path, tmp_path / "profile", size=(960, 540)) as browser:
+        calls, share, names, frames, seconds, after = browser.run(
+            READY
+            + """
+            lapwingView.seek(1.0);
+            await until(() => Math.abs(lapwingView.time - 1.0) < 0.01);
+            const wait = (time) => new Promise((done) => setTimeout(done, time));
+            const still = async () => { // until no frame has been drawn for half a second
+              for (let k = 0, before = -1; k < 200; k++) {
+                const now = lapwingView.frames();
+                if (now === before) return;
+                before = now;
+                await wait(500);
+              }
+            };
+            await still();
+            const shares = [];
+            __viserMutable.nodeRefFromName["/0 drone1/trail"].traverse(({ geometry }) => {
+              const pieces = geometry?.attributes.instanceStart?.count;
+              if (pieces) shares.push(geometry.instanceCount / pieces);
+            });
+            const tree = __viserSceneTree.getState();
+            const names = Object.keys(tree).filter((name) => name.endsWith("/label") && tree[name].effectiveVisibility);
+            const calls = __viserTestpoints.rendererInfo.render.calls;
+            const begin = lapwingView.frames(), start = performance.now();
+            await wait(4000);
+            const frames = lapwingView.frames() - begin, seconds = (performance.now() - start) / 1000;
+            lapwingView.seek(3.0);
+            await until(() => Math.abs(lapwingView.camera().target[1] - 3.0) < 0.05);
+            return [calls, shares, names.length, frames, seconds, lapwingView.frames() - begin - frames];
+            """
+        )
+        assert browser.errors == []
+    assert calls < 80
+    assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # what has been flown
+    assert 1 <= names < 8  # those behind others are hidden
+    assert frames <= seconds + 1.0  # viser's own one a second
+    assert after > 0

@@ -186,6 +186,8 @@ def parallel(results: Results) -> Plot:
     """Return every run as a line over all parameters and what matters, each scaled to its range."""
     keys, rest = _most(results)
     names = [*keys, *(name for name in MATTERS if name in results.figures)]
+    if len(names) < 2:
+        raise NotRecordedError("only one parameter varies")
     columns, ticks = [], []
     for name in names:
         values, (label, scale) = (

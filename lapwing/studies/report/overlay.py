@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.studies.report.plot import Band, Mark, Panel, Plot, Stretch
+from lapwing.studies.report.plot import Band, Line, Mark, Panel, Plot, Stretch
 from lapwing.studies.report.style import BOUND, COLOURS, FLOWN
 
 # Colours of the first and of the second flight, by those of one alone; what is not here keeps its colour.
@@ -14,10 +14,10 @@ LANE = 0.32  # [inch] of a timeline
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
     """Return two plots in one; a panel of the first alone is kept, one of the second alone is named but not drawn."""
     others = {_key(panel): panel for panel in second.panels}
-    panels = []
+    panels, apart, named = [], _apart(first, second), (_named(first), _named(second))
     for panel in first.panels:
         other = others.pop(_key(panel), None)
-        panels.append(panel if other is None else _both(panel, other, labels))
+        panels.append(panel if other is None else _both(panel, other, labels, named, apart))
     spans = [plot.span for plot in (first, second) if plot.span]
     span = (min(s for s, _ in spans), max(e for _, e in spans)) if spans else None
     if first.caption == second.caption:
@@ -37,12 +37,30 @@ def _key(panel: Panel) -> tuple:
     return panel.row, panel.column, panel.y_label
 
 
-def _both(panel: Panel, other: Panel, labels: tuple[str, str]) -> Panel:
+def _named(plot: Plot) -> set[str]:
+    """Return the colours of solid lines that the legend of a plot names."""
+    lines = [mark for panel in plot.panels for mark in panel.marks if isinstance(mark, Line)]
+    return {line.colour for line in lines if line.name and line.dash == "solid"}
+
+
+def _apart(first: Plot, second: Plot) -> set[str]:
+    """Return the names of marks that differ between the flights in any panel, so that the legend has each by flight."""
+    others = {_key(panel): panel.marks for panel in second.panels}
+    pairs = [(panel.marks, others[_key(panel)]) for panel in first.panels if _key(panel) in others]
+    both = [*pairs, *((b, a) for a, b in pairs)]
+    differing = [m for own, theirs in both for m in own if not any(_same(m, other) for other in theirs)]
+    return {m.name for m in differing if not isinstance(m, Stretch) and m.name}
+
+
+def _both(
+    panel: Panel, other: Panel, labels: tuple[str, str], named: tuple[set[str], set[str]], apart: set[str]
+) -> Panel:
     ours, others = _lanes(panel), _lanes(other)
     shared = [mark for mark in other.marks if any(_same(mark, own) for own in panel.marks)]
+    shared = [m for m in shared if isinstance(m, Stretch) or m.name not in apart]
     shared = [m for m in shared if not isinstance(m, Stretch) or ours[m.lane] == others[m.lane]]
-    mine = [m if any(_same(m, s) for s in shared) else _of(m, labels[0], FIRST, "solid") for m in panel.marks]
-    theirs = [_of(m, labels[1], SECOND, "dot") for m in other.marks if not any(m is s for s in shared)]
+    mine = [m if any(_same(m, s) for s in shared) else _of(m, labels[0], FIRST, "solid", named[0]) for m in panel.marks]
+    theirs = [_of(m, labels[1], SECOND, "dot", named[1]) for m in other.marks if not any(m is s for s in shared)]
     ranges = [p.y_range for p in (panel, other) if p.y_range]
     y_range = (min(low for low, _ in ranges), max(high for _, high in ranges)) if len(ranges) == 2 else None
     title, note = (
@@ -69,10 +87,14 @@ def _lanes(panel: Panel) -> dict[str, list[Stretch]]:
     return found
 
 
-def _of(mark: Mark, label: str, colours: dict[str, str], dash: str) -> Mark:
-    """Return the mark with its flight's name and style; dashed lines stay dashed."""
+def _of(mark: Mark, label: str, colours: dict[str, str], dash: str, named: set[str]) -> Mark:
+    """Return the mark with its flight's name and style; dashed lines stay dashed.
+
+    A mark without a name gets that of its flight, unless the legend already names a line of its colour.
+    """
     if isinstance(mark, Stretch):
         return mark._replace(lane=f"{mark.lane}, {label}")
-    mark = mark._replace(name=f"{mark.name}, {label}" if mark.name else label)
+    own = "" if mark.colour in named else label
+    mark = mark._replace(name=f"{mark.name}, {label}" if mark.name else own)
     mark = mark._replace(colour=colours.get(mark.colour, mark.colour))
     return mark if isinstance(mark, Band) or mark.dash != "solid" else mark._replace(dash=dash)

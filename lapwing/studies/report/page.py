@@ -35,14 +35,19 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
     published = scenes[0].get("published", {})
     names = labels(flights)
     told = [facts(flight) for flight in flights]
+    others = flights[0].others if len(flights) == 1 else ()
     drawn = sections(flights)  # one by one, each when the page comes to it
     heads = list(names) if len(flights) > 1 else ["this flight"]
     return render(
         "flight.html",
         name=" and ".join(names) if len(flights) > 1 else flights[0].metadata.get("scene") or names[0],
+        others=[(LOOKS.get(other.outcome.kind, "bad"), f"{other.vehicle}: {other.outcome}") for other in others],
         title=" · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
         labels=names if len(flights) > 1 else (),
-        outcomes=[(LOOKS.get(flight.outcome.kind, "bad"), flight.outcome) for flight in flights],
+        outcomes=[
+            (LOOKS.get(flight.outcome.kind, "bad"), f"{flight.vehicle}: {flight.outcome}" if others else flight.outcome)
+            for flight in flights
+        ],
         events=[flight.events for flight in flights],
         numbers=[key_numbers(flight) for flight in flights],
         trouble=[trouble(flight) for flight in flights],

@@ -36,13 +36,20 @@ def write(path: Path, tuning: Tuned) -> None:
         Section("steps", "Steps of the setpoint", _steps(both, loops)),
     ]
     page = render(
-        "tuning.html",
-        title=f"{tuning.scene}: gains",
-        tables=list(tables(tuning)),
-        sections=sections,
-        gains=tuning.gains,
-    )
+        "tuning.html", title=f"{tuning.scene}: gains", tables=list(tables(tuning)), sections=sections,
+        gains=tuning.gains, outcome=_outcome(tuning), failed=bool(tuning.failures),
+    )  # fmt: skip
     path.write_text(page, encoding="utf-8")
+
+
+def _outcome(tuning: Tuned) -> str:
+    """Return if the new gains have their margins, and how perturbed vehicles flew."""
+    if tuning.failures:
+        first, *others = tuning.failures
+        return f"The new gains fail: {first}" + (f"; and {len(others)} more" if others else "")
+    flown = len(tuning.corners)
+    flights = f", and all {flown} flights of perturbed vehicles succeed" if flown else "; no flight was made"
+    return f"The new gains pass: all {len(tuning.after.margins)} loops have their margins{flights}"
 
 
 _BODE = (

@@ -34,10 +34,24 @@ def write(path: Path, validation: Validation) -> None:
     )
     page = render(
         "validation.html", title=f"{validation.scene}: prediction of recorded flights", lead=lead,
+        outcome=_outcome(validation), sections=sections,
         tables=[_errors(validation), _explained(validation), *_loops(validation), _flights(validation)],
-        sections=sections,
     )  # fmt: skip
     path.write_text(page, encoding="utf-8")
+
+
+def _outcome(validation: Validation) -> str:
+    """Return the errors of the plant after the longest horizon, beside those of the best baseline."""
+    position, attitude = (FIELDS.index(name) for name in ("position", "attitude"))
+    plant = validation.plant[-1]
+    best = {name: rows[-1][position].mean for name, rows in validation.baselines.items()}
+    name = min(best, key=lambda key: best[key]) if best else ""
+    beside = f"; {name.replace('_', ' ')}: {best[name]:.3g} m" if name else ""
+    return (
+        f"Mean error of the plant after {validation.horizons[-1] * validation.interval:g} s: "
+        f"{plant[position].mean:.3g} m, "
+        f"{np.degrees(plant[attitude].mean):.3g}°{beside}"
+    )
 
 
 def _errors(validation: Validation) -> Rows:

@@ -53,7 +53,7 @@ class Beam:
         self._wide, self._shown = float(np.tan(samples.half_angle)), 0.0
         frame = f"{body}/{samples.name}"
         scene.add_frame(frame, show_axes=False, position=samples.origin, wxyz=samples.orientation)
-        cone = turned([(0.0, 0.0), (1.0, 1.0)], COLOUR, 0.22)
+        cone = turned([(0.0, 0.0), (1.0, 1.0)], COLOUR, 0.22)._replace(open=True)
         self._cone = add_solid(scene, f"{frame}/cone", cone, visible=False)
         self._point = add_solid(scene, f"{frame}/point", ball((0.0,) * 3, 0.035 * size, POINT), visible=False)
 

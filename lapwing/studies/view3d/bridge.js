@@ -1,11 +1,8 @@
 // Camera modes and a link to the time of an enclosing page, in a page of viser's client.
 (() => {
   const facts = window.lapwing;
-  const observed = []; // scenes and renderers that three.js announces to its developer tools
-  const tools = new EventTarget();
-  tools.addEventListener("observe", ({ detail }) => observed.push(detail));
-  window.__THREE_DEVTOOLS__ = tools;
-  window.__VISER_EMBED_CONFIG__ = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
+  const looks = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
+  Object.defineProperty(window, "__VISER_EMBED_CONFIG__", { get: () => looks, set() {} }); // a recording sets its own
 
   // A renderer without a graphics processor gets cheaper pictures: see `simplify`.
   const probe = document.createElement("canvas").getContext("webgl2");
@@ -18,30 +15,61 @@
     return context.call(this, kind, slow && kind === "webgl2" ? { ...options, antialias: smooth } : options);
   };
 
+  // The player draws its bar at 120 Hz, more often than a recording or a screen changes.
+  const every = window.setInterval;
+  window.setInterval = (run, period, ...rest) => every(run, period < 10 ? 1000 / (slow ? 30 : 60) : period, ...rest);
+
   const view = { mode: "follow", vehicle: 0, fresh: true, time: null };
   window.lapwingView = view;
-  const scene = () => observed.find((one) => one.isScene && one.__r3f);
-  const state = () => scene()?.__r3f.root.getState();
+  const client = () => window.__viserMutable; // the scene of viser's client, which it shows to its own tests
+  const state = () => client()?.scene?.__r3f?.root.getState();
 
-  function marker(number) { // the vehicle's own triangle, told by its colour
-    let found = null;
-    scene()?.traverse((one) => {
-      if (one.isMesh && one.material?.color?.getHex() === 0x010200 + number) found = one;
-    });
-    return found;
+  const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail" }, names = {};
+  function nameOf(part, number) { // of a node of a vehicle, which begins with its number
+    const nodes = client().nodeRefFromName, key = part + number;
+    if (!nodes[names[key]]) {
+      const shape = new RegExp(`^/${number} [^/]*/${PARTS[part]}$`);
+      names[key] = Object.keys(nodes).find((name) => shape.test(name));
+    }
+    return names[key];
   }
-  const markers = [];
+  const node = (part, number) => client().nodeRefFromName[nameOf(part, number)];
+  const isPlaced = (number) => client()?.nodePoseData[nameOf("body", number)]?.poseUpdateState === "updated";
   function pose() {
-    let one = markers[view.vehicle];
-    if (!one || !one.parent || one.__r3f?.isHidden) one = markers[view.vehicle] = marker(view.vehicle);
-    if (!one) return null;
+    const one = node("body", view.vehicle);
     one.updateWorldMatrix(true, false);
     const m = one.matrixWorld.elements;
     return { place: [m[12], m[13], m[14]], ahead: [m[0], m[1], m[2]], up: [m[8], m[9], m[10]] };
   }
 
+  function showTrails() { // what has been flown of each trail, whose points are evenly spaced in time
+    if (!facts.span) return;
+    const share = (view.time - facts.span[0]) / (facts.span[1] - facts.span[0]);
+    facts.names.forEach((_, k) => node("trail", k)?.traverse(({ geometry }) => {
+      const pieces = geometry?.attributes.instanceStart?.count;
+      if (pieces) geometry.instanceCount = Math.floor(Math.min(Math.max(share, 0), 1) * pieces + 1e-6);
+    }));
+  }
+
+  function showNames({ camera, size }) { // those that no nearer one covers
+    const tree = window.__viserSceneTree?.getState(), boxes = [];
+    const labels = facts.names.map((text, k) => {
+      const name = nameOf("label", k), body = node("body", k), place = client().nodePoseData[name]?.position;
+      if (!body || !place || !tree?.[name]) return null;
+      const at = camera.position.clone().set(...place).applyMatrix4(body.matrixWorld), far = at.distanceTo(camera.position);
+      at.project(camera);
+      const x = (0.5 + 0.5 * at.x) * size.width, y = (0.5 - 0.5 * at.y) * size.height;
+      return { entry: tree[name], far, left: x, top: y, right: x + 6 * text.length + 8, bottom: y + 18 };
+    });
+    for (const { entry, far, ...box } of labels.filter(Boolean).sort((one, other) => one.far - other.far)) {
+      const free = boxes.every((b) => box.right < b.left || b.right < box.left || box.bottom < b.top || b.bottom < box.top);
+      if (free) boxes.push(box);
+      entry.effectiveVisibility = free;
+    }
+  }
+
   function simplify(now, at) { // one small shadow around the vehicle that is followed, in the place of three
-    const lights = scene().children.filter((one) => one.isDirectionalLight && one.castShadow);
+    const lights = now.scene.children.filter((one) => one.isDirectionalLight && one.castShadow);
     if (!lights.length) return;
     const [light, ...others] = lights, half = 3 * facts.size, height = 200;
     for (const other of others) {
@@ -66,34 +94,39 @@
     }
   }
 
-  let seen = "", changed = 0; // what was drawn last, and when it became so [ms]
-  function moves(now) {
-    const next = `${view.time},${now.camera.matrixWorld.elements}`;
-    if (next !== seen) changed = performance.now();
-    seen = next;
-    return performance.now() - changed < 1500;
-  }
-
+  let seen = "", placed = "", changed = 0; // what was drawn last, and when it became so [ms]
   function follow() {
     const now = state();
-    const at = now?.controls && pose();
+    const bodies = now?.controls ? facts.names.map((_, k) => node("body", k)) : [null];
+    const at = facts.names.every((_, k) => bodies[k]?.parent && (isPlaced(k) || !view.fresh)) && pose();
     if (at) {
-      const moving = moves(now);
+      const next = `${view.time},${now.camera.matrixWorld.elements}`, elsewhere = `${view.mode},${at.place},${at.ahead},${at.up}`;
+      if (next !== seen) {
+        changed = performance.now();
+        showTrails();
+        showNames(now);
+      }
+      seen = next;
       if (slow) simplify(now, at);
       if (slow && !smooth && !view.filming) { // a quarter of the pixels while the picture moves, sharp once it stands still
-        const ratio = devicePixelRatio * (moving ? 0.5 : 1);
+        const ratio = devicePixelRatio * (performance.now() - changed < 1500 ? 0.5 : 1);
         if (now.viewport.dpr !== ratio) now.setDpr(ratio);
       }
-      const { controls } = now, [x, y, z] = at.place, far = Math.max(0.5, facts.size);
-      if (view.mode === "onboard") {
-        const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * far, back = 0.9 * far;
-        controls.setLookAt(x + up * u - back * a, y + up * v - back * b, z + up * w - back * c, x + 20 * a, y + 20 * b, z + 20 * c, false);
-      } else if (view.fresh) {
-        const usual = view.mode === "top" ? [0, 14, 0.01] : [1.5, 0.75, 1.9];
-        const [dx, dy, dz] = (view.place ?? usual).map((value) => value * far);
-        controls.setLookAt(x + dx, y + dy, z + dz, x, y, z, false);
-      } else if (view.mode !== "orbit") controls.moveTo(x, y, z, false);
-      if (view.fresh || (view.mode !== "orbit" && moving)) now.invalidate();
+      const { controls } = now, [x, y, z] = at.place, size = Math.max(0.5, facts.size);
+      if (view.fresh || elsewhere !== placed) {
+        if (view.mode === "onboard") {
+          const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * size, back = 0.9 * size;
+          controls.setLookAt(x + up * u - back * a, y + up * v - back * b, z + up * w - back * c, x + 20 * a, y + 20 * b, z + 20 * c, false);
+        } else if (view.fresh) { // so far away that a fleet is in the picture
+          const spread = Math.max(...bodies.map((other) => other.position.distanceTo(bodies[view.vehicle].position)));
+          const far = view.place ? size : Math.max(size, Math.min(0.6 * spread, 5 * size));
+          const usual = view.mode === "top" ? [0, 14, 0.01] : [1.5, 0.75, 1.9];
+          const [dx, dy, dz] = (view.place ?? usual).map((value) => value * far);
+          controls.setLookAt(x + dx, y + dy, z + dz, x, y, z, false);
+        } else if (view.mode !== "orbit") controls.moveTo(x, y, z, false);
+        now.invalidate();
+      }
+      placed = elsewhere;
       view.fresh = false;
       if (view.shown) view.ready = true;
     }
@@ -180,8 +213,8 @@
   addEventListener("DOMContentLoaded", () => {
     const style = document.createElement("style");
     style.textContent = `.mantine-Notifications-root { display: none }
-      .mantine-Input-input:disabled { opacity: 1; color: inherit; background: none; border: 0; cursor: auto }
-      textarea.mantine-Textarea-input:disabled { height: 55vh !important; max-height: none; font-variant-numeric: tabular-nums }
+      .mantine-Input-input:disabled { opacity: 1 !important; color: inherit !important; background: none !important; border: 0; cursor: auto }
+      textarea.mantine-Textarea-input:disabled { min-height: 55vh; max-height: none; font-variant-numeric: tabular-nums }
       #lapwing { position: fixed; top: 10px; left: 10px; max-width: calc(100% - 20px); box-sizing: border-box; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
         font: 13px system-ui, sans-serif; color: #1f2328; background: #ffffffd9; border-radius: 6px; padding: 6px 10px }
       #lapwing span { display: flex; gap: 6px; align-items: center }

@@ -2,7 +2,6 @@
 
 import json
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,13 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import COLOURS
 from lapwing.studies.view3d import require
 from lapwing.studies.view3d.local_server import serving
-from lapwing.studies.view3d.samples import Samples, sample
+from lapwing.studies.view3d.samples import sample
 from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
 from lapwing.studies.view3d.surroundings import add_surroundings
 
 RATE = 30.0  # [1/s] frames of a recording
 FRAMES = 2000  # of a recording at most; a longer one has fewer a second
-FLEET_FRAMES = 6000  # of all vehicles together
-PIECES = 100  # of a trail, which appear one after the other
-JOINED = 10  # pieces that one line replaces: each line is a draw call
+FLEET_FRAMES = 24000  # of all vehicles together
 POINTS = 1500  # of a trail
 
 
@@ -49,10 +46,10 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
     with serving() as server, server.atomic():  # no client is connected, so nothing has to be sent
         add_surroundings(server.scene, shown[0])
         vehicles = [
-            Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0)
+            Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0, named=len(shown) > 1)
             for k, (flight, title, colour) in enumerate(zip(shown, titles, colours, strict=True))
         ]
-        recording, most = _record(server, shown, vehicles, times)
+        recording, most, span = _record(server, shown, vehicles, times)
         html: str = recording.as_html()
     facts = {
         "names": titles,
@@ -60,6 +57,7 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
         "size": max(reach(vehicle.motion) for vehicle in vehicles),
         "start": float(times[0]),
         "error": most,
+        "span": span,
         "live": False,
     }
     return with_bridge(html, facts)
@@ -74,57 +72,29 @@ def _frame_times(shown: Sequence[FlightData]) -> np.ndarray:
 
 
 def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle], times: np.ndarray) -> Any:
-    """Record all frames; return the recording and the error [m] at the end of the colour scale."""
+    """Record all frames; return the recording, the error [m] at the end of the colour scale, and the trails' span [s].
+
+    A trail is one line, of which the page shows the part that has been flown: each line is a draw call.
+    """
     whole = _frame_times(shown)
-    along = np.unique(np.concatenate([whole[whole < times[0]], times, whole[whole > times[-1]]]))
+    along = np.linspace(whole[0], whole[-1], min(POINTS, len(whole)))
     paths = [sample(flight, vehicle.motion, along) for flight, vehicle in zip(shown, vehicles, strict=True)]
     errors = [path.error for path in paths if path.error is not None]
     most = float(max(np.quantile(error, 0.995) for error in errors)) if errors else 0.0
-    span = tuple(int(k) for k in np.searchsorted(along, times[[0, -1]]))
-    pieces = [_trail(vehicle, path, span, most) for vehicle, path in zip(vehicles, paths, strict=True)]
+    for vehicle, path in zip(vehicles, paths, strict=True):
+        if path.desired is not None:
+            vehicle.desired_path(path.desired)
+        vehicle.trail(path.bodies[0].position, path.error, most)
     samples = [sample(flight, vehicle.motion, times) for flight, vehicle in zip(shown, vehicles, strict=True)]
     for vehicle, result in zip(vehicles, samples, strict=True):
         vehicle.show(result, 0)
     recording = server.get_scene_serializer()
     for k in range(len(times)):
-        for vehicle, result, parts in zip(vehicles, samples, pieces, strict=True):
+        for vehicle, result in zip(vehicles, samples, strict=True):
             vehicle.show(result, k)
-            while parts and parts[0][0] <= times[k]:
-                _, appearing, replaced = parts.pop(0)
-                appearing.visible = True
-                for piece in replaced:
-                    piece.visible = False
         if k + 1 < len(times):
             recording.insert_sleep(float(times[k + 1] - times[k]))
-    return recording, most
-
-
-def _trail(vehicle: Vehicle, path: Samples, span: tuple[int, ...], most: float) -> list[tuple[float, Any, list[Any]]]:
-    """Add the desired path, and hidden pieces of the flown one; return when they appear [s], and what they replace.
-
-    One piece leads to the first frame; `span` has the indices of the first and the last frame.
-    """
-    first, last = span
-    cuts = np.unique([0, *np.linspace(first, last, min(PIECES, last - first) + 1).round().astype(int)])
-    step = max(1, -(-len(path.times) // POINTS))
-    if path.desired is not None:
-        vehicle.desired_path(path.desired[::step])
-
-    def piece(name: str, a: int, b: int) -> Any:
-        rows = np.unique(np.append(np.arange(a, b, step), b))
-        error = None if path.error is None else path.error[rows]
-        return vehicle.trail(name, path.bodies[0].position[rows], error, most, visible=False)
-
-    parts: list[tuple[float, Any, list[Any]]] = []
-    replaced: list[Any] = []
-    for i, (a, b) in enumerate(pairwise(cuts)):
-        time = float(path.times[b])
-        parts.append((time, piece(str(i), a, b), []))
-        replaced.append(parts[-1][1])
-        if len(replaced) == JOINED:
-            parts.append((time, piece(f"to {i}", int(cuts[i + 1 - JOINED]), b), replaced))
-            replaced = []
-    return parts
+    return recording, most, (float(whole[0]), float(whole[-1]))
 
 
 def with_bridge(html: str, facts: dict[str, Any]) -> str:
@@ -132,7 +102,8 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
 
     Args:
         html: the page.
-        facts: names and colours of the vehicles, the size of the largest [m], start [s], largest error [m], "live".
+        facts: names and colours of the vehicles, the size of the largest [m], start [s], largest error [m], "live",
+            and of a recording "span", the times of the first and the last point of the trails [s].
     """
     code = (Path(__file__).parent / "bridge.js").read_text(encoding="utf-8")
     given = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")

@@ -15,8 +15,8 @@ class BodySamples(NamedTuple):
 
     position: np.ndarray  # (k, 3) [m] world
     orientation: np.ndarray  # (k, 4) w, x, y, z
-    spin: list[np.ndarray | None]  # (k, 4) w, x, y, z of each rotor in its body
-    thrust: list[np.ndarray | None]  # (k,) [N] of each rotor
+    angles: np.ndarray | None  # (k, rotors) [rad] in the frame of the body
+    thrusts: np.ndarray | None  # (k, rotors) [N]
     force: np.ndarray | None  # (k, 3) [N] world
 
 
@@ -64,7 +64,14 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray) -> Samples:
 def _body(body: Body, times: np.ndarray, rows: np.ndarray) -> BodySamples:
     own = nearest(body.times, times)
     place = np.column_stack([np.interp(times, body.times, along) for along in body.position.T])
-    spin = [None if r.angle is None else about_z(rounded_angle(r.angle[rows])) for r in body.rotors]
-    thrust = [None if r.thrust is None else r.thrust[rows] for r in body.rotors]
+    angles = _columns([rotor.angle for rotor in body.rotors], rows)
+    thrusts = _columns([rotor.thrust for rotor in body.rotors], rows)
+    angles = None if angles is None else rounded_angle(angles)
     force = body.force[own] if body.force is not None and np.any(body.force) else None
-    return BodySamples(rounded(place), rounded(body.orientation[own][:, [3, 0, 1, 2]]), spin, thrust, force)
+    return BodySamples(rounded(place), rounded(body.orientation[own][:, [3, 0, 1, 2]]), angles, thrusts, force)
+
+
+def _columns(values: list[np.ndarray | None], rows: np.ndarray) -> np.ndarray | None:
+    """Return rows of values side by side, shape (k, columns); None where one is missing, or there are none."""
+    known = [value[rows] for value in values if value is not None]
+    return np.column_stack(known) if known and len(known) == len(values) else None

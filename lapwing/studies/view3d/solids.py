@@ -6,6 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 SIDES = 24  # of a solid of revolution
+THIN = 10  # sides of a thin one
+TIP = 1e-9  # [m] largest radius of a ring that is a point
 _CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _SQUARES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 _BOX = np.array([face for a, b, c, d in _SQUARES for face in ((a, b, c), (a, c, d))])
@@ -21,6 +23,7 @@ class Solid(NamedTuple):
     faces: np.ndarray  # (m, 3) rows of `vertices`
     colour: str  # "#RRGGBB"
     opacity: float = 1.0
+    open: bool = False  # seen from both sides; a translucent one is drawn twice
 
 
 def box(centre: Point, size: Point, colour: str, opacity: float = 1.0) -> Solid:
@@ -28,13 +31,13 @@ def box(centre: Point, size: Point, colour: str, opacity: float = 1.0) -> Solid:
     return Solid(_CORNERS * np.asarray(size, float) + np.asarray(centre, float), _BOX, colour, opacity)
 
 
-def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 1.0) -> Solid:
+def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:
     """Return a cylinder between two points; empty if they coincide."""
     axis = np.subtract(stop, start).astype(float)
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
         return Solid(np.empty((0, 3)), np.empty((0, 3), int), colour, opacity)
-    upright = turned([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)], colour, opacity)
+    upright = turned([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)], colour, opacity, sides)
     z = axis / length
     x = np.cross(z, (0.0, 0.0, 1.0) if abs(z[2]) < 0.9 else (1.0, 0.0, 0.0))
     x /= np.linalg.norm(x)
@@ -42,10 +45,10 @@ def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 
     return upright._replace(vertices=upright.vertices @ frame + np.asarray(start, float))
 
 
-def ball(centre: Point, radius: float, colour: str, opacity: float = 1.0) -> Solid:
+def ball(centre: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:
     """Return a sphere."""
-    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, SIDES // 2 + 1)
-    solid = turned(radius * np.column_stack([np.cos(angle), np.sin(angle)]), colour, opacity)
+    angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, sides // 2 + 1)
+    solid = turned(radius * np.column_stack([np.cos(angle), np.sin(angle)]), colour, opacity, sides)
     return solid._replace(vertices=solid.vertices + np.asarray(centre, float))
 
 
@@ -57,33 +60,38 @@ def lifted(point: Point, height: float) -> np.ndarray:
 def arrow(colour: str, radius: float, opacity: float = 1.0) -> Solid:
     """Return an arrow of length 1 from the origin along z."""
     head = 2.5 * radius
-    return turned([(0.0, 0.0), (radius, 0.0), (radius, 0.8), (head, 0.8), (0.0, 1.0)], colour, opacity)
+    return turned([(0.0, 0.0), (radius, 0.0), (radius, 0.8), (head, 0.8), (0.0, 1.0)], colour, opacity, THIN)
 
 
-def turned(profile: Sequence[Sequence[float]] | np.ndarray, colour: str, opacity: float = 1.0) -> Solid:
+def turned(
+    profile: Sequence[Sequence[float]] | np.ndarray, colour: str, opacity: float = 1.0, sides: int = SIDES
+) -> Solid:
     """Return the solid that a profile makes about z; its rows are distance from z and height [m], from below."""
     rings = np.asarray(profile, float)
-    angle = 2.0 * np.pi * np.arange(SIDES) / SIDES
-    radius, height = rings[:, :1], np.repeat(rings[:, 1:], SIDES, axis=1)
+    angle = 2.0 * np.pi * np.arange(sides) / sides
+    radius, height = rings[:, :1], np.repeat(rings[:, 1:], sides, axis=1)
     vertices = np.stack([radius * np.cos(angle), radius * np.sin(angle), height], axis=2).reshape(-1, 3)
-    k, n = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
+    k, n = np.arange(sides), (np.arange(sides) + 1) % sides
     faces = []
-    for low in SIDES * np.arange(len(rings) - 1):
-        high = low + SIDES
-        faces += [np.column_stack([low + k, low + n, high + n]), np.column_stack([low + k, high + n, high + k])]
+    for i in range(len(rings) - 1):
+        low, high = sides * i, sides * (i + 1)
+        if abs(rings[i, 0]) > TIP:  # else a ring is a point, and its triangles have no area
+            faces.append(np.column_stack([low + k, low + n, high + n]))
+        if abs(rings[i + 1, 0]) > TIP:
+            faces.append(np.column_stack([low + k, high + n, high + k]))
     return Solid(vertices, np.concatenate(faces), colour, opacity)
 
 
 def merged(solids: Iterable[Solid]) -> list[Solid]:
     """Join the solids of one colour and opacity, so that each is drawn in one call."""
-    groups: dict[tuple[str, float], list[Solid]] = {}
+    groups: dict[tuple[str, float, bool], list[Solid]] = {}
     for solid in solids:
         if len(solid.faces):
-            groups.setdefault((solid.colour, solid.opacity), []).append(solid)
+            groups.setdefault((solid.colour, solid.opacity, solid.open), []).append(solid)
     joined = []
-    for (colour, opacity), group in groups.items():
+    for (colour, opacity, is_open), group in groups.items():
         starts = np.cumsum([0, *(len(solid.vertices) for solid in group[:-1])])
         vertices = np.concatenate([solid.vertices for solid in group])
         faces = np.concatenate([solid.faces + start for solid, start in zip(group, starts, strict=True)])
-        joined.append(Solid(vertices, faces, colour, opacity))
+        joined.append(Solid(vertices, faces, colour, opacity, is_open))
     return joined

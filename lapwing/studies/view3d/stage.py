@@ -9,19 +9,20 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import BOUND, FLOWN, QUIET
 from lapwing.studies.view3d.beams import Beam
 from lapwing.studies.view3d.bodies import Body, Link, Motion
+from lapwing.studies.view3d.coloured_mesh import coloured_mesh
+from lapwing.studies.view3d.rotors import BLADE, SHORTEST, Rotors
 from lapwing.studies.view3d.samples import Samples
 from lapwing.studies.view3d.sampling import along
-from lapwing.studies.view3d.solids import Solid, arrow, ball, box, lifted, merged, rod
+from lapwing.studies.view3d.solids import arrow, ball, box, lifted, merged, rod
 from lapwing.studies.view3d.surroundings import add_solid, rgb
 from lapwing.studies.view3d.vehicle_bodies import motion
 
-BLADE, WIND, THRUST, FORCE, REFERENCE, ESTIMATE = "#20262B", "#56B4E9", "#009E73", BOUND, QUIET, "#CC79A7"
+WIND, FORCE, REFERENCE, ESTIMATE = "#56B4E9", BOUND, QUIET, "#CC79A7"
 DESIRED = "#4A5560"
 FLOWN_WIDTH, DESIRED_WIDTH, CABLE_WIDTH = 4.0, 2.0, 2.5  # [pixel]
 WIND_SCALE = 0.12  # [m] of arrow for 1 m/s
 SIGMAS = 3.0  # of the drawn ellipsoid
 SAG = 12  # parts of a drawn cable
-HIDDEN = 1e-3  # [m] shortest arrow that is shown
 EVERY = 3  # frames between two changes of an arrow
 # Ends of the colour scale of a trail, from no error to the largest: dark blue to yellow, told apart by lightness too.
 SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (224, 110, 20)], float)
@@ -30,45 +31,42 @@ SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (
 class Vehicle:
     """One vehicle: its bodies, arrows and ghosts."""
 
-    def __init__(self, scene: Any, number: int, flight: FlightData, name: str, colour: str, ghost: bool = False):
-        """Add the nodes; `number` makes their names unique, and marks the vehicle for the camera of the page."""
+    def __init__(
+        self,
+        scene: Any,
+        number: int,
+        flight: FlightData,
+        name: str,
+        colour: str,
+        ghost: bool = False,
+        named: bool = False,
+    ):
+        """Add the nodes; `number` makes their paths unique, `named` writes the name above the vehicle."""
         self.name, self.colour, self.motion = name, colour, motion(flight)
         self._scene, self._root = scene, f"/{number} {name.replace('/', '_')}"
         self._sent: dict[tuple[str, str], Any] = {}
         self._size = reach(self.motion)
         self._frames: list[Any] = []
-        self._spins: list[list[Any]] = []
-        self._thrusts: list[list[Any]] = []
+        self._rotors: list[Rotors | None] = []
         self._per_newton = self._thrust_scale()
         self._optional: dict[str, Any] = {}
         self._beams: dict[str, Beam] = {}
         for k, body in enumerate(self.motion.bodies):
             self._add_body(f"{self._root}/{k} {body.name.replace('/', '_')}", body, ghost)
-        marker = Solid(1e-4 * np.eye(3), np.array([[0, 1, 2]]), f"#0102{number:02x}")
-        add_solid(scene, f"{self._frames[0].name}/marker", marker)
-        if number or ghost:
+        if named:
             scene.add_label(f"{self._frames[0].name}/label", name, position=(0.0, 0.0, 0.9 * self._size))
 
     def _add_body(self, node: str, body: Body, ghost: bool) -> None:
         self._frames.append(self._scene.add_frame(node, show_axes=False))
-        for k, solid in enumerate(body.solids):
-            looks = solid._replace(colour=self.colour, opacity=0.45) if ghost else solid
-            add_solid(self._scene, f"{node}/solid {k}", looks)
-        spins, thrusts = [], []
-        for k, rotor in enumerate(body.rotors):
-            hub, r = f"{node}/rotor {k + 1}", rotor.radius
-            self._scene.add_frame(hub, show_axes=False, position=tuple(rotor.hub))
-            up = 0.05 * r
-            disc = rod((0.0, 0.0, up), (0.0, 0.0, 1.2 * up), r, self.colour, 0.28)
-            add_solid(self._scene, f"{hub}/disc", disc)
-            spin = self._scene.add_frame(f"{hub}/turning", show_axes=False)
-            blades = box((0.0, 0.0, 1.2 * up), (1.9 * r, 0.12 * r, 0.02 * r), BLADE, 0.9)
-            add_solid(self._scene, f"{hub}/turning/blades", blades)
-            spins.append(spin)
-            has_arrow = rotor.thrust is not None and not ghost
-            thrusts.append(self._arrow(f"{hub}/thrust", THRUST, 0.04 * r, 0.75) if has_arrow else None)
-        self._spins.append(spins)
-        self._thrusts.append(thrusts)
+        looks = [s._replace(colour=self.colour, opacity=0.45) if ghost else s for s in body.solids]
+        opaque = merged(solid for solid in looks if solid.opacity >= 1.0)
+        if len(opaque) > 1:
+            self._scene.add_glb(f"{node}/body", coloured_mesh(opaque))
+        for k, solid in enumerate(merged(solid for solid in looks if len(opaque) < 2 or solid.opacity < 1.0)):
+            add_solid(self._scene, f"{node}/solid {k}", solid)
+        scale = 0.0 if ghost else self._per_newton
+        rotors = Rotors(self._scene, node, body.rotors, self.colour, scale) if body.rotors else None
+        self._rotors.append(rotors)
 
     def _thrust_scale(self) -> float:
         """Return the length of a thrust arrow for 1 N: two radii at the mean thrust."""
@@ -89,17 +87,13 @@ class Vehicle:
 
     def show(self, samples: Samples, k: int) -> None:
         """Move all nodes to the k-th of the samples."""
-        for frame, spins, thrusts, body in zip(self._frames, self._spins, self._thrusts, samples.bodies, strict=True):
+        for frame, rotors, body in zip(self._frames, self._rotors, samples.bodies, strict=True):
             self._set(frame, "position", body.position[k])
             self._set(frame, "wxyz", body.orientation[k])
-            for spin, turned in zip(spins, body.spin, strict=True):
-                if turned is not None:
-                    self._set(spin, "wxyz", turned[k])
-            if k % EVERY:
-                continue
-            for handle, thrust in zip(thrusts, body.thrust, strict=True):
-                if handle is not None and thrust is not None:
-                    self._lengthen(handle, self._per_newton * float(thrust[k]))
+            if rotors is not None and body.angles is not None:
+                rotors.turn(body.angles[k])
+            if rotors is not None and body.thrusts is not None and k % EVERY == 0:
+                rotors.push(body.thrusts[k])
         place = samples.bodies[0].position[k]
         if samples.wind is not None:
             node = self._node("wind", lambda name: self._arrow(name, WIND, 0.035 * self._size))
@@ -155,8 +149,8 @@ class Vehicle:
         handle.points = pairs
 
     def _lengthen(self, handle: Any, length: float) -> None:
-        self._set(handle, "visible", length > HIDDEN)
-        if length > HIDDEN:
+        self._set(handle, "visible", length > SHORTEST)
+        if length > SHORTEST:
             self._set(handle, "scale", (1.0, 1.0, round(length, 2) or 0.01))
 
     def _point(self, handle: Any, place: np.ndarray, vector: np.ndarray, scale: float, k: int) -> None:
@@ -172,14 +166,23 @@ class Vehicle:
             self._sent[handle.name, field] = plain
             setattr(handle, field, plain)
 
-    def trail(self, name: str, path: np.ndarray, error: np.ndarray | None, most: float, visible: bool = True) -> Any:
-        """Add a piece of the flown path, coloured by the error [m] up to `most`; return its handle."""
+    def trail(
+        self, path: np.ndarray, error: np.ndarray | None, most: float, name: str = "trail", line: Any = None
+    ) -> Any:
+        """Add the flown path, shape (n, 3) [m], coloured by the error [m] up to `most`, or set it in a line of before.
+
+        Returns:
+            The handle of the line.
+        """
         points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
-        if error is None or most <= 0.0:
-            return _lines(self._scene, f"{self._root}/trail/{name}", points, self.colour, FLOWN_WIDTH, visible)
-        colours = error_colours(error / most)
-        pairs = np.stack([colours[:-1], colours[1:]], axis=1)
-        return _lines(self._scene, f"{self._root}/trail/{name}", points, pairs, FLOWN_WIDTH, visible)
+        colours: Any = np.array(rgb(self.colour), np.uint8)
+        if error is not None and most > 0.0:
+            ends = error_colours(error / most)
+            colours = np.stack([ends[:-1], ends[1:]], axis=1)
+        if line is None:
+            return _lines(self._scene, f"{self._root}/{name}", points, colours, FLOWN_WIDTH)
+        line.points, line.colors = points, colours
+        return line
 
     def desired_path(self, path: np.ndarray) -> None:
         """Add the desired path, shape (n, 3) [m], as a thin line."""
@@ -189,8 +192,10 @@ class Vehicle:
 
 def add_shaders(scene: Any) -> None:
     """Add specks that are drawn as vehicles are: a browser compiles for seconds what it draws for the first time."""
-    for k, opacity in enumerate((1.0, 0.5)):
-        add_solid(scene, f"/speck {k}", box((0.0, 0.0, 0.0), (1e-4,) * 3, BLADE, opacity))
+    speck = box((0.0, 0.0, 0.0), (1e-4,) * 3, BLADE)
+    for k, looks in enumerate((speck, speck._replace(open=True), speck._replace(opacity=0.5))):
+        add_solid(scene, f"/speck {k}", looks)
+    scene.add_glb("/speck of colours", coloured_mesh([speck]))
     _lines(scene, "/speck line", np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1e-4]]], np.float32), BLADE, CABLE_WIDTH)
 
 
@@ -213,9 +218,9 @@ def vehicle_colours(count: int, compared: bool) -> Sequence[str]:
     return (FLOWN, BOUND)[:count] if compared else (FLOWN,) * count
 
 
-def _lines(scene: Any, name: str, points: np.ndarray, colour: Any, width: float, visible: bool = True) -> Any:
+def _lines(scene: Any, name: str, points: np.ndarray, colour: Any, width: float) -> Any:
     colours = rgb(colour) if isinstance(colour, str) else colour
-    return scene.add_line_segments(name, points, colours, thickness=width, thickness_units="screen", visible=visible)
+    return scene.add_line_segments(name, points, colours, thickness=width, thickness_units="screen")
 
 
 def _sag(start: np.ndarray, stop: np.ndarray, length: float) -> np.ndarray:

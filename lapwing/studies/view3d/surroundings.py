@@ -75,7 +75,7 @@ def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
         color=rgb(solid.colour),
         opacity=None if opaque else solid.opacity,
         flat_shading=True,
-        side="double",
+        side="double" if solid.open else "front",
         cast_shadow=opaque,
         **options,
     )
@@ -106,7 +106,7 @@ def _relief(relief: Any, path: np.ndarray) -> Solid:
     corner = (np.arange(POINTS - 1)[:, None] * POINTS + np.arange(POINTS - 1)).ravel()
     one = np.column_stack([corner, corner + 1, corner + POINTS + 1])
     other = np.column_stack([corner, corner + POINTS + 1, corner + POINTS])
-    return Solid(vertices, np.concatenate([one, other]), EARTH)
+    return Solid(vertices, np.concatenate([one, other]), EARTH, open=True)
 
 
 def _fence(flight: FlightData) -> Iterator[Solid]:
@@ -116,7 +116,7 @@ def _fence(flight: FlightData) -> Iterator[Solid]:
         vertices = np.concatenate([np.column_stack([corners, np.full(count, z)]) for z in (0.0, FENCE_HEIGHT)])
         k, n = np.arange(count), (np.arange(count) + 1) % count
         faces = np.concatenate([np.column_stack([k, n, n + count]), np.column_stack([k, n + count, k + count])])
-        yield Solid(vertices, faces, AXIS_COLOURS[2] if shape.stay_in else BOUND, 0.18)
+        yield Solid(vertices, faces, AXIS_COLOURS[2] if shape.stay_in else BOUND, 0.18, True)
 
 
 def _plan(flight: FlightData) -> Iterator[Solid]:

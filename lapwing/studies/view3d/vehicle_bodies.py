@@ -9,7 +9,7 @@ from lapwing.services.common.mesh_schema import Meshes, unpack
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, FLOWN, QUIET
 from lapwing.studies.view3d.bodies import LEVEL, Body, Link, Motion, Rotor, body_of_truth, recorded_bodies
-from lapwing.studies.view3d.solids import Solid, ball, box, lifted, merged, rod
+from lapwing.studies.view3d.solids import THIN, Solid, ball, box, lifted, merged, rod
 
 FRAME, MOTOR, LEG, FRONT, PAYLOAD, HULL = "#3A4149", "#14181C", "#6B757E", "#E69F00", "#B9834B", "#C3CAD1"
 DENSITY = 400.0  # [kg/m^3] of a payload or load, which fixes the size of its box
@@ -60,7 +60,7 @@ def _hull(scene: dict[str, Any], centre: np.ndarray) -> list[Solid]:
     if (name := scene["airframe"].get("mesh")) is None:
         return []
     mesh = unpack(scene[Meshes.TABLE][name])
-    return [Solid(mesh.vertices - centre, mesh.faces, HULL)]
+    return [Solid(mesh.vertices - centre, mesh.faces, HULL, open=True)]
 
 
 def _airframe(airframe: dict[str, Any], hubs: np.ndarray, origin: np.ndarray, radius: float) -> list[Solid]:
@@ -76,11 +76,12 @@ def _airframe(airframe: dict[str, Any], hubs: np.ndarray, origin: np.ndarray, ra
     ]
     for hub in hubs:
         ahead = hub[0] - centre[0] > 0.3 * front
-        solids.append(rod(centre, lifted(hub, -0.4 * thick), 0.5 * thick, FRONT if ahead else FRAME))
+        solids.append(rod(centre, lifted(hub, -0.4 * thick), 0.5 * thick, FRONT if ahead else FRAME, sides=THIN))
         solids.append(rod(lifted(hub, -thick), lifted(hub, 0.2 * thick), 0.14 * radius, MOTOR))
     for foot in np.array(airframe.get("contact", {}).get("feet", ())).reshape(-1, 3) - origin:
         top = centre + 0.75 * (np.array([foot[0], foot[1], centre[2]]) - centre)
-        solids += [rod(top, lifted(foot, 0.3 * thick), 0.25 * thick, LEG), ball(foot, 0.4 * thick, MOTOR)]
+        solids.append(rod(top, lifted(foot, 0.3 * thick), 0.25 * thick, LEG, sides=THIN))
+        solids.append(ball(foot, 0.4 * thick, MOTOR, sides=THIN))
     payload = airframe.get("mass", {}).get("payload", 0.0)
     if payload > 0.0:
         edge = (payload / DENSITY) ** (1.0 / 3.0)

@@ -8,7 +8,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.plan_shapes import fence_shapes, waypoints
 from lapwing.studies.report.key_numbers import trouble
 from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
-from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, QUIET
+from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
 
 ORDER = -10
 TITLE = "Mission map"
@@ -24,7 +24,10 @@ def draw(flight: FlightData) -> Plot:
     x, y, _ = flight.truth.position.T
     if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
         raise NotRecordedError("it never leaves its place")
-    marks = [*_obstacles(flight), Line(x, y, "flown", width=2.2)]
+    name, colour = "flown", FLOWN
+    if len(flight.fleet) > 1:
+        name, colour = flight.vehicle, COLOURS[list(flight.fleet).index(flight.vehicle) % len(COLOURS)]
+    marks = [*_obstacles(flight), Line(x, y, name, colour, width=2.2)]
     if len(flight.reference):
         marks.append(reference(*flight.reference.T[:2]))
     if len(places := waypoints(flight)):
@@ -33,6 +36,7 @@ def draw(flight: FlightData) -> Plot:
     marks.append(Line(x[:1], y[:1], "start", AXIS_COLOURS[2], marker="open", size=9.0, joined=False))
     marks.append(Line(x[-1:], y[-1:], "end", AXIS_COLOURS[2], marker="square", size=8.0, joined=False))
     marks += _events(flight)
+    marks += _others(flight)
     low, high = _extent(marks)
     fence = list(_fence(flight))
     caption = ""
@@ -46,6 +50,14 @@ def draw(flight: FlightData) -> Plot:
     panel = Panel(tuple(marks), "y north [m]", "x east [m]", timed=False, equal=True)
     panel = panel._replace(x_range=(float(low[0]), float(high[0])), y_range=(float(low[1]), float(high[1])))
     return Plot((panel,), caption, 4.6)
+
+
+def _others(flight: FlightData) -> Iterator[Line]:
+    """Yield the paths of the other vehicles of a fleet."""
+    for i, (name, truth) in enumerate(flight.fleet.items()):
+        if name != flight.vehicle:
+            x, y, _ = truth.position.T
+            yield Line(x, y, name, COLOURS[i % len(COLOURS)], 1.2)
 
 
 def _extent(lines: list[Line]) -> tuple[np.ndarray, np.ndarray]:
