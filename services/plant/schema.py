@@ -13,7 +13,7 @@ from lapwing.services.common.communication_schema import Communication
 CONTACT_SHARE = 3e-5  # of solver.accuracy, for one part of a step in contact: bounces amplify its errors
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 
-PART_SHARE, PART_TOLERANCE = 0.1, 1e-5  # the same of systems with contacts of their own, and where nobody asks
+PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # the same of systems with contacts of their own, and without an accuracy
 
 
 class Solver(SceneTable):
