@@ -20,7 +20,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorParameters, MultirotorState
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.plant.schema import CONTACT_SHARE
+from lapwing.services.plant.schema import contact_tolerance
 from lapwing.studies.accuracy.coordinates import coordinates, of_state
 from lapwing.studies.accuracy.landings.reference import LandingBody, LandingGround, landing
 from lapwing.studies.accuracy.solver_selection import IMPACT_SHARE
@@ -128,7 +128,7 @@ def contact_of(p: MultirotorParameters) -> GroundContact:
     return next(e for e in p.effects if isinstance(e, GroundContact))
 
 
-def exact(case: Landing, tolerance: float = 1e-13) -> tuple[np.ndarray, int]:
+def exact(case: Landing, tolerance: float = 3e-14) -> tuple[np.ndarray, int]:
     """Return (states at the moments compared by the reference, shape (k, 22), number of its events)."""
     p, state = plant(case)
     e, layout = contact_of(p), p.layout
@@ -176,7 +176,7 @@ def flown(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") 
     p, state = plant(case)
     n = airborne_steps(accuracy, integrator)  # compiles or loads, too
     began = time.perf_counter()
-    rows = _rows(integrator, p._replace(tolerance=CONTACT_SHARE * accuracy), state, n)
+    rows = _rows(integrator, p._replace(tolerance=contact_tolerance(accuracy)), state, n)
     return rows, time.perf_counter() - began
 
 
@@ -186,7 +186,7 @@ def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
     A sample, not a bound: a landing multiplies a difference of its start by up to 3e5.
     """
     p, state = plant(case)
-    p, n = p._replace(tolerance=CONTACT_SHARE * ACCURACIES[-1]), airborne_steps(ACCURACIES[-1], integrator)
+    p, n = p._replace(tolerance=contact_tolerance(ACCURACIES[-1])), airborne_steps(ACCURACIES[-1], integrator)
     first, *others = (
         _rows(integrator, p, state._replace(motion=state.motion._replace(velocity_world=velocity)), n)
         for velocity in _last_bits(state.motion.velocity_world)
