@@ -1,4 +1,4 @@
-"""python -m benchmarks.landings: error got over error asked in 200 random landings, in pieces if wanted."""
+"""python -m benchmarks.landings: error got over error asked in 200 random landings, on steps, toppling; in pieces."""
 
 import argparse
 from collections.abc import Collection
@@ -6,13 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from lapwing.studies.accuracy.landings.cases import ACCURACIES
+from lapwing.studies.accuracy.landings.cases import ACCURACIES, DRAWS
 from lapwing.studies.accuracy.landings.measure import LandingErrors, measure, ratios, read, write
 
 
 def main() -> None:
     """Print the table of docs/explanation/accuracy.md."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.landings")
+    parser.add_argument(
+        "--kind", choices=list(DRAWS), default="random", help="random landings, at steps, or toppling [default: random]"
+    )
     parser.add_argument("--first", type=int, default=0, help="number of the first landing [default: 0]")
     parser.add_argument("--count", type=int, default=200, help="number of landings [default: 200]")
     parser.add_argument("--processes", type=int, help="landings flown at once [default: number of processors]")
@@ -22,7 +25,7 @@ def main() -> None:
     given = parser.parse_args()
     found = read(given.json) if given.json else {}
     seeds = [k for k in range(given.first, given.first + given.count) if k not in found]
-    for landing in measure(seeds, given.processes):
+    for landing in measure(seeds, given.processes, given.kind):
         found[landing.seed] = landing
         if given.json:
             write(given.json, found.values())

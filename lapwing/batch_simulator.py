@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from lapwing.cosim.scene import Overrides, Scene, SceneError
+from lapwing import batch_members
+from lapwing.cosim.scene import Overrides, Scene
 from lapwing.dynamics import simd_batch
 from lapwing.dynamics.effects._types import Motion
 from lapwing.dynamics.rate_control import RateController
@@ -22,16 +23,12 @@ from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.motor import RPM
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.common.vehicle_schema import Vehicle
-from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.models._common import noise_key
-from lapwing.services.plant.service_config import PlantSetup
-from lapwing.services.scene_resolver import load, load_one, resolve
+from lapwing.services.scene_resolver import load, load_one
 from lapwing.studies.campaign.distributions import Distribution
 from lapwing.studies.campaign.plan import plan
 
 RATE_BANDWIDTH = 15.0  # [rad/s] of the body-rate controller
-UNIT = 1e-6  # largest difference of the norm of an attitude from 1
-DEEPEST = 1e-3  # [m] largest depth of a centre of mass below the ground
 
 
 class BatchState(NamedTuple):
@@ -80,13 +77,14 @@ class BatchSimulator:
 
         Raises:
             SceneError: the scene is invalid, or has another model.
-            ValueError: n is below 1, or the members have different effects or solvers.
+            ValueError: n is below 1, or the members differ in their effects, solvers, or tables of numbers, such as the
+                heights of a terrain.
         """
         if n < 1:
             raise ValueError(f"n: expected at least 1 member, got {n}")
         base = with_solver(load_one(scene, overrides))
         batch_plan = plan(base.name, (), n, seed, vary)
-        first = _plant(load(base, batch_plan.given(0)))
+        first = batch_members.plant_of(load(base, batch_plan.given(0)))
         self._core, self.n, self.interval = first.core, n, first.core.interval
         self._like = simd_batch.member(first.core.vehicle, first.start.vehicle)
         self._motion = row_width(self._like.motion)
@@ -97,20 +95,25 @@ class BatchSimulator:
         self._keys = np.array([noise_key(batch_plan.seed_of(min(k, n - 1)), name) for k in range(members)], np.int64)
         self._ticks = np.zeros(members, np.int64)
         self._valid = np.ones(members, bool)
-        self._on_ground = any(hasattr(e, "terrain") for e in first.core.vehicle.effects)
+        self._terrains = [batch_members.terrain_of(first.core)] * n
         self._initial_rows = np.empty((members, row_width(self._like)))  # rows of the members before their first step
         self._initial_rows[:] = pack_row(self._like)
         self._commands = np.zeros((members, len(self._like.voltage)))  # [V]
         self.setpoints = np.zeros((members, 4))  # thrust [N], body rates [rad/s]
         for k in range(1, n) if batch_plan.keys else ():
-            plant = _plant(load(base, batch_plan.given(k)))
-            if _kinds(plant.core) != _kinds(first.core):
-                raise ValueError(f"member {k}: has other effects or another solver than member 0")
+            plant = batch_members.plant_of(load(base, batch_plan.given(k)))
+            batch_members.check_alike(k, plant.core, first.core)
+            self._terrains[k] = batch_members.terrain_of(plant.core)
             self._initial_rows[k] = pack_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))
         self._place(np.arange(n))
         self._fill()
         self._pool = ThreadPoolExecutor(cpu_count())
         self._scene = base
+
+    @property
+    def level_ground(self) -> bool:
+        """True if no member can touch other than level ground."""
+        return not any(isinstance(ground, Relief) for ground in self._terrains)
 
     @property
     def weight(self) -> float:
@@ -164,10 +167,12 @@ class BatchSimulator:
         if not isinstance(ticks, int) or ticks < 1:
             raise ValueError(f"step: expected ticks = 1, 2, ..., got {ticks!r}")
         if motor_voltages is not None:
-            self._advance(_finite_array("motor_voltages", motor_voltages, (self.n, len(self._like.voltage))), ticks)
+            self._advance(
+                batch_members.finite_array("motor_voltages", motor_voltages, (self.n, len(self._like.voltage))), ticks
+            )
         else:
-            self.setpoints[: self.n, 0] = _finite_array("thrust", thrust, (self.n,))
-            self.setpoints[: self.n, 1:] = _finite_array("body_rates", body_rates, (self.n, 3))
+            self.setpoints[: self.n, 0] = batch_members.finite_array("thrust", thrust, (self.n,))
+            self.setpoints[: self.n, 1:] = batch_members.finite_array("body_rates", body_rates, (self.n, 3))
             self.setpoints[self.n :] = self.setpoints[self.n - 1]
             self.run_blocks(lambda first, last: self.advance_under_rates(first, last, ticks))
         if strict and not self._valid[: self.n].all():
@@ -195,13 +200,14 @@ class BatchSimulator:
             selected = np.flatnonzero(selected)
         if selected.size and not (selected.dtype.kind in "iu" and selected.min() >= 0 and selected.max() < self.n):
             raise ValueError(f"members: expected numbers from 0 to {self.n - 1}")
-        self._check_start(state)
+        batch_members.check_start(state, selected, self._terrains)
         self._place(selected)
         column = 0
         for name, part in zip(Motion._fields, self._like.motion, strict=True):
             if name in state:
                 shape, start = (len(selected), len(part)), state.pop(name)
-                value = _finite_array(name, np.broadcast_to(start, shape) if np.ndim(start) == 1 else start, shape)
+                start = np.broadcast_to(start, shape) if np.ndim(start) == 1 else start
+                value = batch_members.finite_array(name, start, shape)
                 for k in range(len(part)):
                     self._blocks[selected // simd_batch.WIDTH, column + k, selected % simd_batch.WIDTH] = value[:, k]
             column += len(part)
@@ -258,20 +264,6 @@ class BatchSimulator:
         self._ticks[self.n :] = self._ticks[self.n - 1]
         self._valid[self.n :] = True
 
-    def _check_start(self, state: Mapping[str, ArrayLike]) -> None:
-        """Raise ValueError for a state that no vehicle can have."""
-        checks = {
-            "attitude": ("unit quaternions", lambda v: abs(np.linalg.norm(v, axis=1) - 1.0) <= UNIT),
-            "rotor_speed": ("speeds of at least 0 rad/s", lambda v: (v >= 0.0).all(axis=1)),
-        }
-        if self._on_ground:
-            checks["position_world"] = ("a centre of mass above the ground", lambda v: v[:, 2] >= -DEEPEST)
-        for name, (expected, is_valid) in checks.items():
-            if name in state:
-                value = np.atleast_2d(np.asarray(state[name], float))
-                if not is_valid(value).all():
-                    raise ValueError(f"{name}: expected {expected}, got {value[~is_valid(value)][0].tolist()}")
-
     def _advance(self, voltages: np.ndarray, ticks: int) -> None:
         self._commands[: self.n], self._commands[self.n :] = voltages, voltages[-1]
 
@@ -284,37 +276,3 @@ class BatchSimulator:
     def _mark_invalid(self, first: int, last: int) -> None:
         layout = (self._flat, self._blocks.shape[1], self._motion, self._core.step)
         simd_batch.mark_invalid(*layout, self._valid, first, last)
-
-
-def _plant(scene: Scene) -> PlantSetup:
-    plant: PlantSetup = resolve(scene).services["plant"].parameters
-    if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
-        raise SceneError("vehicle.model", f"got {plant.model!r}", '"rigid_body", the only one that batches step')
-    if any(isinstance(getattr(e, "terrain", None), Relief) for e in plant.core.vehicle.effects):
-        raise SceneError("environment", "batches step over level ground", "a scene without slope, bumps and steps")
-    for effect in plant.core.vehicle.effects:
-        if any(isinstance(part, np.ndarray) for part in effect):
-            name = type(effect).__module__.rpartition(".")[2]
-            raise SceneError(f"effects.{name}", "batches step effects without tables of numbers", "a scene without it")
-    if plant.others:
-        raise SceneError(
-            "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"
-        )
-    return plant
-
-
-def _kinds(core: MultirotorPlant) -> tuple:
-    return (type(core.method), core.step, core.steps, *map(type, core.vehicle.effects))
-
-
-def _finite_array(name: str, values: ArrayLike | None, shape: tuple[int, ...]) -> np.ndarray:
-    """Return an array of finite numbers of a shape."""
-    try:
-        result = np.asarray(values, float)
-    except (TypeError, ValueError):
-        result = np.empty(0)
-    if result.shape != shape:
-        raise ValueError(f"{name}: expected numbers of shape {shape}, got {np.shape(values)}")  # type: ignore[arg-type]
-    if not np.isfinite(result).all():
-        raise ValueError(f"{name}: expected finite numbers")
-    return result

@@ -12,7 +12,9 @@ from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import warn_of_gains, with_solver_selected
 
 if TYPE_CHECKING:
+    from lapwing.cosim.config.run_config import RunConfig
     from lapwing.cosim.scene import Scene
+    from lapwing.studies.flight_data import FlightData
 
 
 @app.command()
@@ -85,11 +87,29 @@ def _accuracy_met(scene: "Scene", step_selected: bool, json: Path | None) -> boo
     from lapwing.studies.accuracy import flight_accuracy
     from lapwing.studies.terminal import console
 
-    result = flight_accuracy.measure(scene, step_selected)
+    result = flight_accuracy.measure(scene, _fly_with_bar, step_selected)
     flight_accuracy.show(console(), result)
     if json:
         flight_accuracy.write_json(json, result)
     return result.worst.error <= result.asked
+
+
+def _fly_with_bar(setup: "RunConfig", description: str) -> "list[FlightData]":
+    """Fly in this process, with a line of what is flown and a progress bar."""
+    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.runs.work_progress import WorkProgress
+    from lapwing.studies.accuracy.flight_accuracy import TOPICS
+    from lapwing.studies.simulate import fly_each
+
+    duration = setup.last_tick * setup.interval
+    typer.echo(f"flying up to {duration:g} s: {description}")
+    with WorkProgress(setup.scene, duration, "s") as bar, notify_on_compile(setup, bar.compiling, alone=False) as watch:
+
+        def observe(tick: int) -> None:
+            watch.stop()
+            bar.show(tick * setup.interval)
+
+        return fly_each(setup, TOPICS, observe=observe)
 
 
 @app.command()

@@ -223,13 +223,13 @@ def _poke(context, array, index, value):
 
 
 def take(like: Any, memory: np.ndarray, at: int) -> Any:
-    """Return a tree with the type of `like` from numbers `WIDTH` apart, starting at `at`."""
+    """Return a tree with the type and the arrays of `like` from numbers `WIDTH` apart, starting at `at`."""
     raise NotImplementedError("compiled code only")
 
 
 @overload_for(take, inline=True)
 def _take(like: types.Type, memory: types.Type, at: types.Type) -> Callable:
-    result, names = construction(like, lambda column: f"peek(memory, at + {column * WIDTH})")
+    result, names = construction(like, lambda column: f"peek(memory, at + {column * WIDTH})", "like")
     return compile_source("take(like, memory, at)", {"peek": _peek, **names}, f"return {result}")
 
 

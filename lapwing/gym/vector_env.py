@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.batch_simulator import BatchSimulator
-from lapwing.cosim.scene import Overrides, Scene
+from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.gym import step_kernels
 from lapwing.gym.step_kernels import BOUNDS, Episodes, Results
 from lapwing.gym.tasks import TASKS, starts
@@ -64,6 +64,10 @@ class DroneVectorEnv(VectorEnv):
             raise ValueError(f"task: expected one of {', '.join(TASKS)}, got {task!r}")
         self.task, self.num_envs, self.render_mode = TASKS[task], num_envs, render_mode
         self.batch = BatchSimulator(scene, num_envs, vary, overrides)
+        if not self.batch.level_ground:
+            raise SceneError(
+                "environment.terrain", "tasks are over level ground", "a scene without slope, bumps and steps"
+            )
         self._ticks = max(1, round(1.0 / (RATE * self.batch.interval)))
         self._ground = float(self.batch.state.position_world[0, 2])
         self._vehicles = step_kernels.Vehicles(*self.batch.memory, self.batch.interval, self._ground)

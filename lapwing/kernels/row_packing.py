@@ -1,8 +1,8 @@
 """Trees of numbers packed into rows of a float64 array, the form in which compiled code exchanges NamedTuples.
 
 A tree is a tuple or NamedTuple of floats, integers, booleans and further trees. Every number takes one column, in
-order; booleans are 0 or 1, integers are exact up to 2^53. Functions are generated from the type of the tree, so that
-reading a row costs only the numbers that the caller uses.
+order; booleans are 0 or 1, integers are exact up to 2^53. Arrays take no column: all rows share them. Functions are
+generated from the type of the tree, so that reading a row costs only the numbers that the caller uses.
 """
 
 # numba.core.types fills itself at import
@@ -25,7 +25,9 @@ from lapwing.kernels.codegen import compile_source
 
 def row_width(tree: Any) -> int:
     """Return the number of columns of a tree."""
-    return sum(map(row_width, tree)) if isinstance(tree, tuple) else 1
+    if isinstance(tree, tuple):
+        return sum(map(row_width, tree))
+    return 0 if isinstance(tree, np.ndarray) else 1
 
 
 def pack_row(tree: Any) -> np.ndarray:
@@ -36,7 +38,7 @@ def pack_row(tree: Any) -> np.ndarray:
         if isinstance(part, tuple):
             for item in part:
                 walk(item)
-        else:
+        elif not isinstance(part, np.ndarray):
             flat.append(float(part))
 
     walk(tree)
@@ -84,12 +86,13 @@ def _kind(tree: types.Type) -> str:
     raise TypingError(f"expected numbers, tuples or NamedTuples in a row, got {tree}")
 
 
-def construction(tree: types.Type, number: Callable[[int], str]) -> tuple[str, dict[str, Any]]:
+def construction(tree: types.Type, number: Callable[[int], str], like: str = "") -> tuple[str, dict[str, Any]]:
     """Return source text that builds a tree of this type from its numbers, and the classes that it names.
 
     Args:
         tree: numba type of tuples, NamedTuples and numbers.
         number: maps a column to the source text of its number.
+        like: source text of a tree that has the arrays; "" if there are none.
 
     Raises:
         TypingError: the tree contains another type.
@@ -97,19 +100,21 @@ def construction(tree: types.Type, number: Callable[[int], str]) -> tuple[str, d
     names: dict[str, Any] = {}
     column = 0
 
-    def expression(part: types.Type) -> str:
+    def expression(part: types.Type, path: str) -> str:
         nonlocal column
+        if like and isinstance(part, types.Array):
+            return path
         if not isinstance(part, types.BaseTuple):
             column += 1
             return _kind(part).format(number(column - 1))
-        items = [expression(item) for item in part.types]
+        items = [expression(item, f"{path}[{k}]") for k, item in enumerate(part.types)]
         if isinstance(part, types.BaseNamedTuple):
             name = f"Node{len(names)}"
             names[name] = part.instance_class
             return f"{name}({', '.join(items)})"
         return f"({', '.join(items)}{',' if len(items) == 1 else ''})"
 
-    return expression(tree), names
+    return expression(tree, like), names
 
 
 def leaves(tree: types.Type, path: str) -> list[str]:

@@ -43,10 +43,13 @@ def fly(
 
 
 def fly_each(
-    setup: RunConfig, only: Collection[Topic] | None = None, rows: dict[str, np.ndarray] | None = None
+    setup: RunConfig,
+    only: Collection[Topic] | None = None,
+    rows: dict[str, np.ndarray] | None = None,
+    observe: Callable[[int], None] | None = None,
 ) -> list[FlightData]:
     """Return the flights of all vehicles of a run. See `fly` for arguments."""
-    return FlightData.of_each(*_flown(setup, only, no_operator, rows))
+    return FlightData.of_each(*_flown(setup, only, no_operator, rows, observe))
 
 
 def _flown(

@@ -8,12 +8,21 @@ from lapwing.cosim.scene import KeyOrigin, Scene, SceneError, SceneTable
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
+from lapwing.kernels import math
 from lapwing.services.common.communication_schema import Communication
 
 CONTACT_SHARE = 3e-5  # of solver.accuracy, for one part of a step in contact: bounces amplify its errors
+MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 
-PART_SHARE, PART_TOLERANCE = 0.1, 1e-5  # the same of systems with contacts of their own, and where nobody asks
+PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # the same of systems with contacts of their own, and without an accuracy
+LEAST_PART_TOLERANCE = 1e-12  # its shortest substep, 1e-14 s, still advances a time of 10 s
+
+
+def contact_tolerance(accuracy: float) -> float:
+    """Return the error of a part of a step in contact that leaves an accuracy to a whole flight."""
+    share = CONTACT_SHARE * math.pow(min(1.0, accuracy / MANY_SUBSTEPS), 0.2)
+    return max(share * accuracy, LEAST_CONTACT_TOLERANCE)
 
 
 class Solver(SceneTable):
@@ -42,15 +51,15 @@ class Solver(SceneTable):
 
     @property
     def contact_tolerance(self) -> float:
-        """Error of a part of a step in contact that leaves the accuracy to a whole flight; the usual one without."""
-        return (
-            CONTACT_TOLERANCE if self.accuracy is None else max(CONTACT_SHARE * self.accuracy, LEAST_CONTACT_TOLERANCE)
-        )
+        """Error of a part of a step in contact; the usual one without an accuracy."""
+        return CONTACT_TOLERANCE if self.accuracy is None else contact_tolerance(self.accuracy)
 
     @property
     def part_tolerance(self) -> float:
         """Return the error of a part of a step of systems that are no multirotors (`integrate_step_doubling`)."""
-        return PART_TOLERANCE if self.accuracy is None else PART_SHARE * self.accuracy
+        if self.accuracy is None:
+            return PART_TOLERANCE
+        return max(PART_SHARE * self.accuracy, LEAST_PART_TOLERANCE)
 
     def steps(self, exchange: Communication) -> int:
         """Return the integrator steps per communication step."""

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import lapwing
+from lapwing.batch_members import terrain_of
 from lapwing.dynamics import simd_batch as kernels
+from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.kernels import kernel
 from lapwing.kernels.row_packing import pack_row
@@ -15,6 +17,8 @@ from lapwing.services.scene_resolver import load, resolve
 N = 19  # more than a block, less than two
 LOADED = ["effects.shared_slung_load.mass=1.0", "effects.shared_slung_load.length=1.0"]
 MISSION = "delivery_mission"  # random wind, ground contact, air density
+HILL = {"environment.terrain.slope": [0.25, 0.0]}
+STAIRS = {"environment.terrain.steps.distance": [0.3, 0.9], "environment.terrain.steps.rise": [0.15, -0.1]}
 VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.random_wind_force.sigma": lapwing.uniform(0.0, 2.0)}
 
 
@@ -140,12 +144,8 @@ def test_elements_that_fill_last_block_repeat_last_member():
         (lambda b: b.reset(rotor_speed=np.full(4, -300.0)), "rotor_speed: expected speeds of at least 0 rad/s"),
         (lambda b: b.reset(velocity_world=(np.nan, 0.0, 0.0)), "velocity_world: expected finite numbers"),
         (
-            lambda b: lapwing.BatchSimulator("hover", 1, overrides={"environment.terrain.slope": [0.1, 0.0]}),
-            "environment: batches step over level ground",
-        ),
-        (
-            lambda b: lapwing.BatchSimulator("hover", 1, overrides={"effects.rotor_interference": {}}),
-            "effects.rotor_interference: batches step effects without tables of numbers",
+            lambda b: lapwing.BatchSimulator("hover", 1, overrides=HILL).reset(position_world=(3.0, 0.0, 0.6)),
+            "position_world: expected a centre of mass above the ground",
         ),
         (lambda b: b.reset([1], speed=1.0), "speed: unknown; expected one of position_world, attitude"),
     ],
@@ -163,6 +163,55 @@ def test_member_that_turns_too_fast_is_marked():
     with pytest.raises(ValueError, match="step: members 1 are not finite or turn too fast"):
         batch.step(motor_voltages=np.zeros((3, 4)), strict=True)
     assert batch.reset([1]).valid.all()
+
+
+@pytest.mark.parametrize("ground", ["slope", "bumps", "steps", "box and cylinder", "grid", "rotor table"])
+def test_members_over_any_terrain_have_bits_of_one_alone(ground):
+    """Drops onto the terrain, each at its own place, so that some land on an edge or beside it."""
+    overrides = {
+        "slope": HILL,
+        "bumps": {"environment.terrain.bump_height": 0.05, "environment.terrain.bump_length": 0.7},
+        "steps": STAIRS,
+        "box and cylinder": {
+            "environment.terrain.box": [{"position": [0.5, 0.2], "size": [0.6, 0.4], "top": 0.3, "heading": 0.4}],
+            "environment.terrain.cylinder": [{"position": [-0.6, 0.0], "radius": 0.3, "top": 0.2}],
+        },
+        "grid": {
+            "environment.terrain.grid.heights": [[0.0, 0.1, 0.3], [0.1, 0.0, 0.2], [0.0, 0.3, 0.1]],
+            "environment.terrain.grid.corner": [-1.0, -1.0],
+        },
+        "rotor table": {"effects.rotor_interference": {}},
+    }[ground]
+    batch = lapwing.BatchSimulator("hover", N, overrides=overrides, seed=3)
+    starts = np.column_stack([np.linspace(-1.0, 1.0, N), np.linspace(-0.2, 0.3, N), np.full(N, 0.9)])
+    batch.reset(position_world=starts, velocity_world=(0.3, 0.0, -1.0))
+    end = batch.step(motor_voltages=np.zeros((N, 4)), ticks=100)
+    assert end.valid.all()
+    plant = resolve(load("hover", overrides)).services["plant"].parameters
+    core = plant.core
+    for k in (0, 7, 15, 18):
+        motion = plant.start.vehicle.motion._replace(
+            position_world=tuple(starts[k].tolist()), velocity_world=(0.3, 0.0, -1.0)
+        )
+        state, key = plant.start.vehicle._replace(motion=motion), tuple(map(int, batch._keys[k]))
+        one = flown(core.method, core.vehicle, key, state, (0.0,) * 4, core.step, core.steps, 100)
+        assert np.array_equal(rows(end)[k], pack_row(one.motion))
+    heights = np.array([surface(terrain_of(core), x, y)[0] for x, y, _ in end.position_world])
+    assert (end.position_world[:, 2] > heights).all()
+
+
+def test_bumps_of_members_differ():
+    vary = {"environment.terrain.bump_height": lapwing.uniform(0.01, 0.3)}
+    batch = lapwing.BatchSimulator("hover", 3, vary, {"environment.terrain.bump_length": 4.0})
+    batch.reset(position_world=(1.0, 1.0, 2.0))  # on the summit of a bump
+    end = batch.step(motor_voltages=np.zeros((3, 4)), ticks=400)
+    assert len({round(float(z), 3) for z in end.position_world[:, 2]}) == 3
+
+
+def test_members_share_tables_of_numbers():
+    vary = {"environment.terrain.steps.rise.0": lapwing.uniform(0.1, 0.2)}
+    with pytest.raises(ValueError, match=r"member 1: has other numbers in terrain.boxes than member 0"):
+        lapwing.BatchSimulator("hover", 2, vary, STAIRS)
 
 
 @pytest.mark.long

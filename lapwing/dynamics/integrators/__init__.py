@@ -14,10 +14,12 @@ from typing import Any
 from lapwing.dynamics import discovery
 from lapwing.dynamics.integrators._adaptive import integrate_adaptive
 from lapwing.dynamics.integrators._fixed_step import RATES, integrate_fixed, rate, record, step
+from lapwing.dynamics.integrators._pieces import BREAKPOINTS
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
 from lapwing.dynamics.integrators._step_doubling import SHORTEST, StepDoubling, integrate_step_doubling, shorter
 
 __all__ = [
+    "BREAKPOINTS",
     "RATES",
     "SHORTEST",
     "StepDoubling",

@@ -1,9 +1,13 @@
-"""Any method with its error controlled, for systems whose forces jump: each part of a step whole, and in halves."""
+"""Any method with its error controlled, for systems whose forces jump: each part of a step whole, and in halves.
+
+Steps end at the breakpoints of a system; contacts that begin and end shorten them.
+"""
 
 import math
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.integrators._fixed_step import step
+from lapwing.dynamics.integrators._pieces import piece
 from lapwing.kernels import always_inline
 from lapwing.kernels import noinline as never_inlined
 from lapwing.kernels.state_tree import finite, relative_difference
@@ -33,6 +37,16 @@ def _once(method, p, t, x, h):
 @never_inlined
 def integrate_step_doubling(how, p, t, x, h, end):
     """Return the state at time `end` by step doubling; the result of the halves is kept, none longer than h."""
+    while True:
+        part, until = piece(p, t, end)
+        x = _smooth(how, part, t, x, h, until)
+        if not until < end:
+            return x
+        t = until
+
+
+@never_inlined
+def _smooth(how, p, t, x, h, end):
     allowed, part = how.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
     while True:

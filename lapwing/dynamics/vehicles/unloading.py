@@ -7,7 +7,7 @@ The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which gives the
 
 from typing import NamedTuple
 
-from lapwing.dynamics.integrators import RATES
+from lapwing.dynamics.integrators import BREAKPOINTS, RATES
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vector import Vec3, add, apply_transposed, cross, divide, dot, multiply, scale, subtract
 from lapwing.dynamics.vehicles.unloading_contact_points import CORNERS, ROLLERS, SIDES, Y, contacts, frames
@@ -128,6 +128,19 @@ def rate(p, t, x):
 
 
 RATES[UnloadingParameters] = rate
+
+
+@always_inline
+def _next_breakpoint(p, t):
+    """Return the next time [s] at which the rollers start or reach their speed, or the pack is taken up."""
+    first = math.inf
+    for time in (p.ramp_start, p.ramp_start + p.ramp_duration, p.pickup):
+        if t < time < first:
+            first = time
+    return first
+
+
+BREAKPOINTS[UnloadingParameters] = _next_breakpoint
 
 
 def initial_state(p: UnloadingParameters, gap: float = 0.01) -> UnloadingState:

@@ -4,6 +4,7 @@ Both flights are closed loops with the same random numbers. Their difference is 
 each vehicle as it is recorded, with all that the autopilot makes of it.
 """
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,6 +13,7 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
 from lapwing.messages.topics import BATTERY, TRUTH
 from lapwing.services.common.communication_schema import Communication
@@ -20,12 +22,14 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies import json_file
 from lapwing.studies.accuracy.coordinates import matrices
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.simulate import fly_each
 
 FINER = 8  # times as many steps in a communication step
 STRICTER = 1e-3  # times the accuracy, in contact
 STRICTEST = 1e-10  # beyond which contact is limited by round-off
+TOPICS = (TRUTH, BATTERY)
 BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState; its current jumps where a motor is switched off
+
+Fly = Callable[[RunConfig, str], list[FlightData]]  # of a run and its description
 
 
 class Quantity(NamedTuple):
@@ -54,11 +58,12 @@ class FlightAccuracy(NamedTuple):
         return max(self.quantities, key=lambda quantity: quantity.error)
 
 
-def measure(scene: Scene, step_selected: bool = False) -> FlightAccuracy:
+def measure(scene: Scene, fly: Fly, step_selected: bool = False) -> FlightAccuracy:
     """Return the accuracy of a scene with a selected solver.
 
     Args:
         scene: any scene.
+        fly: flies a run and returns the flights of its vehicles with `TOPICS`.
         step_selected: True if its step was selected for its accuracy.
 
     Raises:
@@ -73,15 +78,16 @@ def measure(scene: Scene, step_selected: bool = False) -> FlightAccuracy:
     step = interval / (FINER * solver.steps(scene[Communication]))
     strict = max(STRICTER * solver.accuracy, STRICTEST)
     finer = load(scene.path, [*scene.overrides, f"solver.step={step!r}", f"solver.accuracy={strict!r}"])
-    coarse, fine = _flights(scene), _flights(finer)
+    coarse, fine = _flights(scene, fly), _flights(finer, fly)
     quantities = [q for pair in zip(coarse, fine, strict=True) for q in differences(*pair)]
     duration = min(flight.truth.times[-1] for flight in (*coarse, *fine))
     taken = FINER * step
     return FlightAccuracy(solver.accuracy, solver.integrator, taken, step, step_selected, float(duration), quantities)
 
 
-def _flights(scene: Scene) -> list[FlightData]:
-    flights = fly_each(resolve(scene), (TRUTH, BATTERY))
+def _flights(scene: Scene, fly: Fly) -> list[FlightData]:
+    solver = (scene.vehicles or (scene,))[0][Solver]
+    flights = fly(resolve(scene), f"{solver.integrator}, step {1e3 * solver.step:g} ms")
     for flight in flights:
         if flight.failure:
             raise ValueError(f"{scene.path}: {flight.failure}")

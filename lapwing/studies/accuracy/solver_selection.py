@@ -18,6 +18,7 @@ from lapwing.services.plant.schema import Solver
 from lapwing.studies.accuracy import scenes
 from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
 
+CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # cheapest on some system at some error
 IMPACT_SHARE = 3e-3  # of the accuracy: an impact turns an error of position into one of velocity 300 times as large
 
 
@@ -35,9 +36,8 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     if not solver.undecided:
         return []
     assert solver.accuracy is not None
-    points = _points(scene, say)
-    if "integrator" in solver.model_fields_set:
-        points = [p for p in points if p.way == solver.integrator]
+    names = (solver.integrator,) if "integrator" in solver.model_fields_set else CANDIDATES
+    points = [p for p in _points(scene, names, say) if p.way in names or len(names) > 1]
     try:
         chosen = cheapest(points, _share(scene, points, solver.accuracy))
     except ConfigError as error:
@@ -54,13 +54,19 @@ def _share(scene: Scene, points: list[Point], accuracy: float) -> float:
     return strict if impacts else accuracy
 
 
-def _points(scene: Scene, say: Callable[[str], None]) -> list[Point]:
-    """Return the points of the scene's plant, from the user's cache so that later runs select the same."""
-    path = _file(scene)
+def _points(scene: Scene, names: tuple[str, ...], say: Callable[[str], None]) -> list[Point]:
+    """Return the points of the scene's plant, from the user's cache so that later runs select the same.
+
+    Compiling an integrator takes 3 s and more, so only those `names` are measured; all if none fits the plant.
+    """
+    path = _file(scene, names)
     if path and (known := _read(path)):
         return known
-    say("measuring the integrators on this plant for solver.accuracy (first time only; minutes if they are compiled)")
-    points = measure(scenes.problem(scene))
+    problem = scenes.problem(scene)
+    ways = [way for way in problem.ways if way.name in names] or problem.ways
+    measured = ", ".join(way.name for way in ways)
+    say(f"measuring {measured} on this plant for solver.accuracy (first time only)")
+    points = measure(problem._replace(ways=ways))
     if path is not None:
         with suppress(OSError):  # where nothing can be kept, they are measured again
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -77,8 +83,8 @@ def _read(path: Path) -> list[Point]:
     return []
 
 
-def _file(scene: Scene) -> Path | None:
-    """Return the cache file, named by sources and plant without its solver. Return None without a cache."""
+def _file(scene: Scene, names: tuple[str, ...]) -> Path | None:
+    """Return the cache file, named by sources, integrators and plant without its step. Return None without a cache."""
     folder = cache_folder()
     if folder is None:
         return None
@@ -90,6 +96,7 @@ def _file(scene: Scene) -> Path | None:
     digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
     run = scene[Run]
     for part in (
+        names,
         run.seed,
         scene[Vehicle].name,
         run.duration,

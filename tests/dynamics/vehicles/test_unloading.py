@@ -5,12 +5,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from lapwing.dynamics.integrators import StepDoubling, get, integrate_fixed, integrate_step_doubling, rate
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vehicles.unloading import UnloadingParameters, energy, initial_state
 from lapwing.dynamics.vehicles.unloading_contact_points import roller_speed
-from lapwing.kernels.state_tree import retract, scale
+from lapwing.kernels.state_tree import flatten, retract, scale, unflatten
 
 RK4 = get("rk4_renormalised").Method()
 G, H = 9.81, 2.5e-4
@@ -100,6 +101,61 @@ def test_fall_bounces_lower_every_time():
     free = [e for e, z in zip(total, at, strict=True) if z > 0.13]
     assert all(b <= a + 1e-6 for a, b in pairwise(free))
     assert at[-1] == pytest.approx(HALF[2], abs=1e-3)
+
+
+TIMES = (0.0123, 0.0430, 0.0779)  # [s] the rollers start, reach their speed, the pack is taken up; between two ticks
+
+
+def split_reference(x, end):
+    """SciPy's DOP853 over the pieces, each with parameters that do not change in it."""
+    start, full, taken = TIMES
+    pieces = (
+        (0.0, start, P._replace(ramp_start=NEVER, pickup=NEVER)),
+        (start, full, P._replace(ramp_start=start, ramp_duration=full - start, pickup=NEVER)),
+        (full, taken, P._replace(ramp_start=-1.0, ramp_duration=0.5, pickup=NEVER)),
+        (taken, end, P._replace(ramp_start=-1.0, ramp_duration=0.5, pickup=-1.0)),
+    )
+    y = np.array(flatten(x))
+    for a, b, p in pieces:
+        y = solve_ivp(
+            lambda t, y, p=p: ambient(x, p, t, y), (a, b), y, "DOP853", rtol=1e-12, atol=1e-12, max_step=1e-3
+        ).y[:, -1]
+    return y
+
+
+def ambient(x, p, t, y):
+    """Slope of the flat state; the attitude's is half the product of its quaternion with the body rates."""
+    state = unflatten(x, tuple(map(float, y)))
+    q, o = np.array(state.attitude), np.array(state.omega_body)
+    turned = 0.5 * np.array([-q[1:] @ o, *(q[0] * o + np.cross(q[1:], o))])
+    tangent = rate(p, t, state)
+    return np.concatenate([tangent[0], turned, np.array(flatten(tangent))[6:]])
+
+
+def test_ramp_and_pickup_between_ticks_are_exact():
+    """0.1 s of a pack that has settled on the rollers, in ticks of 4 ms and steps of 1 ms."""
+    x = settled = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)
+    p = P._replace(ramp_start=TIMES[0], ramp_duration=TIMES[1] - TIMES[0], pickup=TIMES[2])
+    for tick in range(25):
+        x = integrate_step_doubling(StepDoubling(RK4, 1e-11), p, tick * 0.004, x, 1e-3, (tick + 1) * 0.004)
+    assert np.array(flatten(x)) == pytest.approx(split_reference(settled, 0.1), abs=1e-8)
+
+
+def test_event_on_tick_takes_effect_there():
+    """12 ticks of 4 ms are 0.048 s only up to rounding; what is off by it is on the tick."""
+    x = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)
+    ends = [
+        integrate_step_doubling(StepDoubling(RK4, 1e-9), P._replace(pickup=pickup), start, x, 1e-3, start + 0.004)
+        for start, pickup in (
+            (0.048, 0.048),
+            (0.048, 0.048 * (1 + 1e-13)),
+            (0.044, 0.048),
+            (0.044, 0.048 * (1 - 1e-13)),
+        )
+    ]
+    assert flatten(ends[0]) == flatten(ends[1])
+    assert flatten(ends[2]) == flatten(ends[3])
+    assert ends[0].velocity_world[2] > 0.05 > abs(ends[2].velocity_world[2])
 
 
 @pytest.mark.long

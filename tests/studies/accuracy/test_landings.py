@@ -29,6 +29,16 @@ def test_random_landing_meets_accuracy(seed):
         assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
 
 
+@pytest.mark.parametrize(("kind", "seed"), [("steps", 0), ("steps", 3), ("toppling", 0)])
+def test_landing_at_step_or_toppling_meets_accuracy(kind, seed):
+    """Into a wall, over an edge and down, over one foot onto the hull: faces and points that come and go."""
+    case = cases.DRAWS[kind](seed)
+    exact, events = cases.exact(case)
+    assert events > 50
+    for accuracy in (1e-3, 1e-6, 1e-9):
+        assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
+
+
 def test_reference_is_independent_of_its_tolerance():
     case = cases.draw(2)
     coarse, fine = (cases.exact(case, tolerance)[0] for tolerance in (1e-11, 1e-13))

@@ -70,6 +70,23 @@ def test_cheapest_that_meets_accuracy_is_set(solver, chosen, measured, tmp_path)
     method(decided)
 
 
+@pytest.mark.parametrize(
+    ("solver", "names"),
+    [
+        ("accuracy = 1e-4", ["rk4_renormalised", "rk8_renormalised", "rkmk2", "rkmk54"]),
+        ('accuracy = 1e-4\nintegrator = "rkmk2"', ["rkmk2"]),
+        ('accuracy = 1e-4\nintegrator = "cf4"', ["cf4"]),
+    ],
+)
+def test_only_candidates_are_compiled(solver, names, measured, monkeypatch, tmp_path):
+    """Each integrator takes seconds to compile; the others win nowhere."""
+    problems = []
+    points = [Point(name, 4, "s", 0.004, 1e-9, 1e-5, 1, {}) for name in names]
+    monkeypatch.setattr(solver_selection, "measure", lambda problem: problems.append(problem) or points)
+    solver_selection.overrides(load(scene(tmp_path, solver)), lambda text: None)
+    assert sorted(way.name for way in problems[0].ways) == names
+
+
 def test_selection_is_measured_once_per_physics(measured, tmp_path):
     path, output = scene(tmp_path, "accuracy = 1e-4"), []
     first = solver_selection.overrides(load(path), output.append)

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -14,12 +15,12 @@ from lapwing.dynamics.effects._contact_parameters import GroundContact
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, multiply
 from lapwing.dynamics.terrain import relief
-from lapwing.dynamics.vector import Vec3
+from lapwing.dynamics.vector import Vec3, scale
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorParameters, MultirotorState
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.plant.schema import CONTACT_SHARE
+from lapwing.services.plant.schema import contact_tolerance
 from lapwing.studies.accuracy.coordinates import coordinates, of_state
 from lapwing.studies.accuracy.landings.reference import LandingBody, LandingGround, landing
 from lapwing.studies.accuracy.solver_selection import IMPACT_SHARE
@@ -31,6 +32,7 @@ GRAVITY = 9.80665
 CLEAR = 2e-3  # [m] the lowest point is above the ground at first
 WAVE = 2.0 * math.pi / 0.7  # [1/m] of bumps
 MOST_STEPS = 64  # in an interval
+NO_STEP = (math.inf, 0.0)
 HIGH = 50.0  # [m] above the ground, where no foot touches within the duration
 
 
@@ -45,6 +47,8 @@ class Landing(NamedTuple):
     heading: float  # [rad]
     spin: tuple[float, float, float]  # [rad/s] in the body
     rotor_speed: float  # [rad/s], slowing down
+    start: float = 0.0  # [m] x of the centre of mass
+    step: tuple[float, float] = NO_STEP  # x of its wall and rise [m]
 
 
 def draw(seed: int) -> Landing:
@@ -70,21 +74,51 @@ def draw(seed: int) -> Landing:
     )
 
 
+def draw_step(seed: int) -> Landing:
+    """Draw a landing at a step of 5 to 20 cm, into its wall (even seeds) or over its edge and down (odd seeds)."""
+    rng, down = np.random.default_rng([34, seed]), seed % 2 == 1
+    case, at = draw(seed), 0.6
+    slip = (float(rng.uniform(0.5, 2.0)) * (-1.0 if down else 1.0), float(rng.uniform(-0.3, 0.3)))
+    start = at + float(rng.uniform(0.05, 0.3)) * (1.0 if down else -1.5)
+    return case._replace(
+        slope=(0.0, 0.0), bump=0.0, slip=slip, start=start, step=(at, float(rng.uniform(0.05, 0.2))),
+        speed=min(case.speed, 1.0), tilt=scale(0.4, case.tilt),
+    )  # fmt: skip
+
+
+def draw_toppling(seed: int) -> Landing:
+    """Draw a landing on one foot or two that lean by 30 to 60 degrees, turning over onto the hull's points."""
+    rng = np.random.default_rng([35, seed])
+    tilt, about = math.radians(rng.uniform(30.0, 60.0)), float(rng.uniform(0.0, 2.0 * math.pi))
+    axis = (math.cos(about), math.sin(about), 0.0)
+    spin = float(rng.uniform(0.5, 3.0))  # [rad/s] further over
+    x, y, _ = (tilt * part for part in axis)
+    return draw(seed)._replace(
+        slope=(0.0, 0.0), bump=0.0, speed=float(rng.uniform(0.0, 0.5)), tilt=(x, y, 0.0),
+        slip=(float(rng.uniform(-0.5, 0.5)), float(rng.uniform(-0.5, 0.5))),
+        spin=(spin * axis[0], spin * axis[1], 0.0),
+    )  # fmt: skip
+
+
+DRAWS: dict[str, Callable[[int], Landing]] = {"random": draw, "steps": draw_step, "toppling": draw_toppling}
 FASTEST = Landing((0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0)  # after bounces
 
 
 def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
     """Return the plant's parameters and its state above the ground."""
     frame = load_airframe(AIRFRAME)
-    terrain = relief(case.slope, bump_height=case.bump, bump_length=2.0 * math.pi / WAVE)
+    steps = [case.step] if case.step != NO_STEP else []
+    terrain = relief(case.slope, bump_height=case.bump, bump_length=2.0 * math.pi / WAVE, steps=steps)
     tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
     p = multirotor.parameters(frame, effects.from_scene(tables, frame, Environment(terrain=terrain)))
     attitude = multiply(exp((0.0, 0.0, case.heading)), exp(case.tilt))
     matrix = of_state(Quaternion(*attitude)).reshape(3, 3)
     points = np.array(contact_of(p).feet) @ matrix.T
-    clear = max(case.slope[0] * x + case.slope[1] * y - z for x, y, z in points) + case.bump + CLEAR
+    edge, rise = case.step
+    under = (case.slope[0] * x + case.slope[1] * y + (rise if case.start + x > edge else 0.0) for x, y, _ in points)
+    clear = max(height - z for height, (_, _, z) in zip(under, points, strict=True)) + case.bump + CLEAR
     state = multirotor.initial_state(
-        p, (0.0, 0.0, float(clear)), attitude, case.rotor_speed, (*case.slip, -case.speed), case.spin
+        p, (case.start, 0.0, float(clear)), attitude, case.rotor_speed, (*case.slip, -case.speed), case.spin
     )
     return p, state
 
@@ -94,7 +128,7 @@ def contact_of(p: MultirotorParameters) -> GroundContact:
     return next(e for e in p.effects if isinstance(e, GroundContact))
 
 
-def exact(case: Landing, tolerance: float = 1e-13) -> tuple[np.ndarray, int]:
+def exact(case: Landing, tolerance: float = 3e-14) -> tuple[np.ndarray, int]:
     """Return (states at the moments compared by the reference, shape (k, 22), number of its events)."""
     p, state = plant(case)
     e, layout = contact_of(p), p.layout
@@ -106,7 +140,7 @@ def exact(case: Landing, tolerance: float = 1e-13) -> tuple[np.ndarray, int]:
     )  # fmt: skip
     ground = LandingGround(
         case.slope, case.bump, WAVE, e.stiffness, e.damping, 1.0 / e.inverse_width, e.static, e.dynamic,
-        e.tangential_stiffness, e.tangential_damping, 1.0 / e.inverse_stiction,
+        e.tangential_stiffness, e.tangential_damping, 1.0 / e.inverse_stiction, *case.step,
     )  # fmt: skip
     start = np.concatenate([of_state(state.motion), np.zeros(3 * len(e.feet))])
     states, events = landing(body, ground, start, times(), tolerance)
@@ -142,7 +176,7 @@ def flown(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") 
     p, state = plant(case)
     n = airborne_steps(accuracy, integrator)  # compiles or loads, too
     began = time.perf_counter()
-    rows = _rows(integrator, p._replace(tolerance=CONTACT_SHARE * accuracy), state, n)
+    rows = _rows(integrator, p._replace(tolerance=contact_tolerance(accuracy)), state, n)
     return rows, time.perf_counter() - began
 
 
@@ -152,7 +186,7 @@ def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
     A sample, not a bound: a landing multiplies a difference of its start by up to 3e5.
     """
     p, state = plant(case)
-    p, n = p._replace(tolerance=CONTACT_SHARE * ACCURACIES[-1]), airborne_steps(ACCURACIES[-1], integrator)
+    p, n = p._replace(tolerance=contact_tolerance(ACCURACIES[-1])), airborne_steps(ACCURACIES[-1], integrator)
     first, *others = (
         _rows(integrator, p, state._replace(motion=state.motion._replace(velocity_world=velocity)), n)
         for velocity in _last_bits(state.motion.velocity_world)

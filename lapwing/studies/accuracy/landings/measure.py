@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,9 +25,9 @@ class LandingErrors(NamedTuple):
     round_off: float  # difference that the last bit of the start makes
 
 
-def measured(seed: int) -> LandingErrors:
+def measured(kind: str, seed: int) -> LandingErrors:
     """Fly a landing at every accuracy and compare its whole state, at every moment, with the reference."""
-    case = cases.draw(seed)
+    case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)
     got, worst, taken = [], [], []
     for accuracy in cases.ACCURACIES:
@@ -38,12 +39,12 @@ def measured(seed: int) -> LandingErrors:
     return LandingErrors(seed, events, tuple(got), tuple(worst), tuple(taken), cases.round_off(case))
 
 
-def measure(seeds: Iterable[int], processes: int | None = None) -> Iterator[LandingErrors]:
-    """Yield measured landings in the order of their seeds; by default on all processors."""
+def measure(seeds: Iterable[int], processes: int | None = None, kind: str = "random") -> Iterator[LandingErrors]:
+    """Yield measured landings of a kind in `cases.DRAWS` in the order of their seeds; by default on all processors."""
     waiting = list(seeds)
     if waiting:
         with workers(max(1, min(len(waiting), processes or os.cpu_count() or 1))) as pool:
-            yield from pool.map(measured, waiting)
+            yield from pool.map(partial(measured, kind), waiting)
 
 
 def read(path: Path) -> dict[int, LandingErrors]:

@@ -2,7 +2,8 @@
 
 Written apart from `lapwing.dynamics`: attitudes are matrices, and the law of a foot is spelled out by cases, which
 change only at located events: touch-down and lift-off, full onset of the normal force, the end of its pull, sticking
-and sliding, and the slip at which the dynamic coefficient is reached (theory.md, section 2.8).
+and sliding, the slip at which the dynamic coefficient is reached (theory.md, section 2.8), and on ground with a step
+the nearest face: its top, its wall, or the ground before it (section 2.9).
 """
 
 import math
@@ -16,8 +17,9 @@ from lapwing.kernels import kernel
 
 TOLERANCE = 1e-12  # relative to 1 + size, of a step
 LONGEST = 1e-3  # [s] of a step, so that no foot touches and leaves within one
-GRAZING = 2e-3  # [m] of the ground, within which a step is searched for a touch
+GRAZING = 2e-3  # [m] of the ground or a wall, within which a step is searched for a touch
 FULL, SLOW = 1, 4  # other rows of the cases: 0 in the ground, 2 pressing, 3 sliding
+BEYOND, TOP, FLOOR = 5, 6, 7  # of a step: behind its wall, nearer to its top than to its wall, nearest to the ground
 
 
 class LandingBody(NamedTuple):
@@ -35,7 +37,7 @@ class LandingBody(NamedTuple):
 
 
 class LandingGround(NamedTuple):
-    """Ground z = a x + b y + A sin k x sin k y, and the law of contact."""
+    """Ground z = a x + b y + A sin k x sin k y, on it a step up along x, and the law of contact."""
 
     slope: tuple[float, float]
     bump: float  # [m] A
@@ -48,10 +50,12 @@ class LandingGround(NamedTuple):
     shear_stiffness: float  # [N/m]
     shear_damping: float  # [N s/m]
     slow: float  # [m/s] slip of the dynamic coefficient
+    edge: float = math.inf  # [m] x of the step's wall
+    rise: float = 0.0  # [m] z of its level top
 
 
 @kernel
-def _foot(body: Any, ground: Any, y: np.ndarray, i: int) -> Any:
+def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> Any:
     """Return (arm, normal, slip, depth [m], approach [m/s], slip [m/s], shear, shear [N]) of a point, world."""
     arm, spun = np.zeros(3), np.zeros(3)
     b = body.points[i]
@@ -73,6 +77,11 @@ def _foot(body: Any, ground: Any, y: np.ndarray, i: int) -> Any:
         ]
     )
     normal /= math.sqrt((normal * normal).sum())
+    depth = (height - y[2] - arm[2]) * normal[2]
+    if cases[BEYOND, i] and cases[TOP, i]:
+        normal, depth = np.array([0.0, 0.0, 1.0]), ground.rise - y[2] - arm[2]
+    elif cases[BEYOND, i] and not cases[FLOOR, i]:
+        normal, depth = np.array([-1.0, 0.0, 0.0]), y[0] + arm[0] - ground.edge
     velocity = y[12:15] + spun
     rising = (velocity * normal).sum()
     slip = velocity - rising * normal
@@ -80,7 +89,7 @@ def _foot(body: Any, ground: Any, y: np.ndarray, i: int) -> Any:
     along = (deflection * normal).sum()
     shear = ground.shear_stiffness * (deflection - along * normal) + ground.shear_damping * slip
     size, speed = math.sqrt((shear * shear).sum()), math.sqrt((slip * slip).sum())
-    return arm, normal, (height - y[2] - arm[2]) * normal[2], -rising, speed, shear, size
+    return arm, normal, depth, -rising, speed, shear, size
 
 
 @kernel
@@ -114,7 +123,7 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
         at = 18 + m + 3 * i
         stretch = -ground.shear_stiffness / ground.shear_damping * y[at : at + 3]
         if cases[0, i] and cases[2, i]:
-            arm, normal, depth, approach, speed, shear, size = _foot(body, ground, y, i)
+            arm, normal, depth, approach, speed, shear, size = _foot(body, ground, cases, y, i)
             press, limit = _limit(ground, cases, i, depth, approach, speed)
             held = shear * (limit / max(size, 1e-300)) if cases[3, i] else shear
             stretch = stretch + held / ground.shear_damping
@@ -145,21 +154,23 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
 
 @kernel
 def margins(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return what is positive where a case holds, shape (5, n); it changes its sign at an event."""
-    result = np.empty((5, len(body.points)))
+    """Return what is positive where a case holds, shape (8, n); it changes its sign at an event."""
+    result = np.empty((8, len(body.points)))
     for i in range(len(body.points)):
-        _, _, depth, approach, speed, _, size = _foot(body, ground, y, i)
+        arm, _, depth, approach, speed, _, size = _foot(body, ground, cases, y, i)
         result[0, i], result[1, i] = depth, depth - ground.width
         result[2, i] = ground.stiffness * depth + ground.damping * approach
         result[3, i] = size - _limit(ground, cases, i, depth, approach, speed)[1]
         result[4, i] = ground.slow - speed
+        behind, above = y[0] + arm[0] - ground.edge, y[2] + arm[2]
+        result[BEYOND, i], result[TOP, i], result[FLOOR, i] = behind, behind + above - ground.rise, -above - behind
     return result
 
 
 def cases_at(body: LandingBody, ground: LandingGround, y: np.ndarray) -> np.ndarray:
     """Return the cases of a state."""
-    cases = np.zeros((5, len(body.points)), dtype=bool)
-    for _ in range(2):  # the limit of the friction depends on the others
+    cases = np.zeros((8, len(body.points)), dtype=bool)
+    for _ in range(3):  # the depth depends on the face, the limit of the friction on the others
         cases = margins(body, ground, cases, y) > 0.0
     return cases
 
@@ -196,11 +207,14 @@ def landing(
             step = max(1e-9, 0.2 * (solver.t - solver.t_old))
             (t, flipped), y = crossed, _at(body, ground, held, solver, crossed[0], tolerance)
             cases = held ^ flipped
+            turned = flipped[BEYOND:].any(axis=0)  # another face: what counts there begins anew
+            for _ in range(2):
+                cases[:BEYOND, turned] = (margins(body, ground, cases, y) > 0.0)[:BEYOND, turned]
             fresh = cases[0] & (flipped[0] | flipped[2])  # what did not count there before
             now = margins(body, ground, cases, y) > 0.0
             now[3] |= fresh  # a point slides until it is pressed
             now[2] |= flipped[0]
-            cases[1:, fresh] = np.where(flipped[1:, fresh], cases[1:, fresh], now[1:, fresh])
+            cases[1:BEYOND, fresh] = np.where(flipped[1:, fresh], cases[1:, fresh], now[1:, fresh])[: BEYOND - 1]
             events += 1
     return out, events
 
@@ -228,13 +242,13 @@ def _first_crossing(
     def wrong(y: np.ndarray) -> np.ndarray:
         """Positive where a case does not hold any more; the friction of points that do not press has none."""
         result = np.where(cases, -1.0, 1.0) * margins(body, ground, cases, y)
-        result[1:, ~cases[0]] = -1.0  # in the air only the touch counts
+        result[1:BEYOND, ~cases[0]] = -1.0  # in the air only the touch and the faces count
         result[3, ~cases[2]] = -1.0
         return result
 
     at_end = wrong(solver.y)
     points = [solver.t]
-    near = np.abs(margins(body, ground, cases, solver.y)[0]).min() < GRAZING
+    near = np.abs(margins(body, ground, cases, solver.y)[[0, BEYOND]]).min() < GRAZING
     dense = None
     if near:
         dense = solver.dense_output()

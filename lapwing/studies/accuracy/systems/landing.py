@@ -9,7 +9,7 @@ import numpy as np
 from lapwing.dynamics import integrators
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.plant.schema import CONTACT_SHARE
+from lapwing.services.plant.schema import contact_tolerance
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.integrate import SAMPLES
 from lapwing.studies.accuracy.landings import cases
@@ -54,7 +54,7 @@ def _way(name: str, case: Landing) -> SolverMethod:
 
     def flown(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         p, start = cases.plant(case)
-        p, off = p._replace(tolerance=CONTACT_SHARE * accuracy), (0.0,) * len(p.layout.x_body)
+        p, off = p._replace(tolerance=contact_tolerance(accuracy)), (0.0,) * len(p.layout.x_body)
         steps = round(cases.INTERVAL / STEP)
 
         def fly() -> tuple[np.ndarray, np.ndarray]:
