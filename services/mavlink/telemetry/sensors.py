@@ -1,9 +1,9 @@
 """Sensor readings; ideal ones if the vehicle flies on the true state."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
-from lapwing.kernels import math
 from lapwing.messages import GPSStatus, NavSatStatus
 from lapwing.messages.topics import BARO, GPS, GPS_DETAILS, GPS_VELOCITY, IMU, MAG
 from lapwing.services.common.mavlink.dialect import mavlink
