@@ -105,5 +105,5 @@ def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immedi
             if not handled:
                 server.adapter.vehicle.put(topic, page.payloads[-1].tobytes())
                 continue
-            for tick, payload in zip(page.ticks, page.payloads, strict=True):
-                server.take(topic, int(tick) * interval_ns, payload.tobytes())
+            for i in range(len(page.ticks)):
+                server.take(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())
