@@ -69,6 +69,7 @@ class Adapter:
         )
         self.vehicle.mission = lambda: self.missions.items[mavlink.MAV_MISSION_TYPE_MISSION]
         self.parameters = ParameterStore(description, firmware, self.commands, self.broadcast, self.counts)
+        self.vehicle.parameter = self.parameters.value
         self.setpoints = SetpointKeeper(self.clock, self.commands, lambda: self.parameters.value("COM_OF_LOSS_T"))
         self.sessions: dict[Endpoint, Session] = {}
         store = TimeStampStore(time_stamps, key, description.system_id) if key and time_stamps else None
