@@ -62,7 +62,7 @@ def station(tmp_path):
 def test_satellites_of_simulated_gps_decide_fix_and_arming(station):
     station.receive("GPS_RAW_INT", lambda m: m.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX)
     assert station.set("SIM_GPS_USED", 3) == 3
-    assert station.receive("GPS_RAW_INT", lambda m: m.fix_type == 0).satellites_visible == 3
+    assert station.receive("GPS_RAW_INT", lambda m: m.fix_type == mavlink.GPS_FIX_TYPE_NO_FIX).satellites_visible == 3
     gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
     station.receive("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & gps)
     assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED
