@@ -51,8 +51,19 @@ def claim_plot(path: Path | None) -> None:
     claim(path)
 
 
-def claim_report(option: str, path: Path | None) -> None:
-    """Claim a report; raise ValueError unless its format is known and it can be written."""
+def claim_report(option: str, path: Path | None, log: Path | None = None) -> None:
+    """Claim a report.
+
+    Args:
+        option: option that names the report.
+        path: the report.
+        log: log that the name of the report comes from; an error about a lock names it.
+
+    Raises:
+        ValueError: unknown format, the report cannot be written, or another process writes it.
+    """
+    if path is not None and log is not None and is_locked(path):  # the other run has not opened its log yet
+        raise ValueError(f"{log}: another process is writing it, or its report; choose another name, or wait for it")
     if path is not None:
         from lapwing.studies.report import check_format
 

@@ -129,7 +129,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     check_distinct({"SCENE": options.scene, "--log": log, "--json": options.json, "--report": report})
     if table is None:
         check_log(log)
-    claim_report("--report", report)
+    claim_report("--report", report, None if options.report else log)
     claim(options.json)
     if realtime and (reason := unavailable_reason()):
         realtime = False

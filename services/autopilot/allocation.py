@@ -5,6 +5,8 @@ that four rotors in a cross get shares of +1 and -1. Thrusts are those of isolat
 includes the losses in the wakes of other rotors.
 """
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from lapwing.dynamics.effects._types import WakeSlopes
@@ -113,6 +115,12 @@ def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ..
         return (whole,)
     reduced = [shares for k in range(1, count + 1) if (shares := rotor_shares(B, k, weights)) is not None]
     return (whole, *reduced) if len(reduced) == count else (whole,)
+
+
+def tables_for_failures(tables: tuple[Shares, ...], values: Mapping[str, float]) -> tuple[Shares, ...]:
+    """Return the shares in use after failures, of the same number: all rotors' own if CA_FAILURE_MODE is 0."""
+    ignored = values.get("CA_FAILURE_MODE", 1.0) == 0.0  # absent from former logs
+    return tables[:1] * len(tables) if ignored else tables
 
 
 def _share(row: np.ndarray) -> Share:

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.cell import read
 from lapwing.services.autopilot import control, motor_failure
 from lapwing.services.autopilot.commander_wakeup import battery_warning
 from lapwing.services.autopilot.land_detector import FLYING, ON_GROUND
@@ -37,7 +38,7 @@ class Controller(NamedTuple):
     """Parameters of the block."""
 
     law: Any  # cell of `control.Parameters`
-    failure_detector: motor_failure.Parameters
+    failure_detector: Any  # cell of `motor_failure.Parameters`
     thresholds: Any  # cell of `BatteryThresholds`
     interval: float  # [s] length of a tick
     bounce: int  # [ticks] of possible motion after a touch-down
@@ -54,7 +55,9 @@ class ControllerState(NamedTuple):
 
 def start(p: Controller) -> ControllerState:
     """Return the initial state."""
-    return ControllerState(control.START, python_function(motor_failure.start)(p.failure_detector), 0, float("nan"))
+    return ControllerState(
+        control.START, python_function(motor_failure.start)(read(p.failure_detector)), 0, float("nan")
+    )
 
 
 @always_inline
@@ -83,7 +86,7 @@ def block_outputs(
         c: output of the control law.
     """
     height = e.position_world[2] - p.law.value.resting_height
-    watched = motor_failure.step(p.failure_detector, watched, p.interval, e.omega_body, height, c.thrust)
+    watched = motor_failure.step(p.failure_detector.value, watched, p.interval, e.omega_body, height, c.thrust)
     flying = landed_state == FLYING
     armed = flying if order.follow else order.armed
     finished = (c.finished and setpoint.final) if order.follow else order.finished
@@ -109,7 +112,7 @@ def step(
     setpoint = inputs[3].value if order.follow else order.setpoint
     controlled, watched, still_from = s.control, s.failure_detector, s.still_from
     if order.restart_at == tick:
-        controlled, watched, still_from = control.START, motor_failure.start(p.failure_detector), tick + p.bounce
+        controlled, watched, still_from = control.START, motor_failure.start(p.failure_detector.value), tick + p.bounce
     charge = battery.value.charge if battery.due else s.charge
     failed = watched.failed
     controlled, c = control.step(p.law.value, controlled, p.interval, e, setpoint, failed)

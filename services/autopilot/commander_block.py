@@ -13,6 +13,8 @@ from lapwing.kernels import math
 from lapwing.kernels.cell import Cell, write
 from lapwing.messages import CommandAcks, header
 from lapwing.messages import topics as topic
+from lapwing.services.autopilot import motor_failure
+from lapwing.services.autopilot.allocation import tables_for_failures
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, ControllerInput, Flight
 from lapwing.services.autopilot.commander.commander import Commander
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
@@ -59,6 +61,7 @@ class CommanderBlock:
         config: AutopilotSetup,
         law: Cell,
         thresholds: Cell,
+        detector: Cell,
         service: Service,
         operator: Operator,
         injection: Injection,
@@ -70,12 +73,13 @@ class CommanderBlock:
             config: configuration of the autopilot.
             law: cell of the controller's parameters.
             thresholds: cell of the battery thresholds.
+            detector: cell of the motor failure detector's parameters.
             service: receiver of the messages.
             operator: source of operator commands.
             injection: failure injection.
             px4: cell of the parameters of PX4's cascade, if it flies.
         """
-        self._px4 = px4
+        self._px4, self._detector = px4, detector
         unwritten = () if config.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
         self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *unwritten)
         a = config.airframe
@@ -158,6 +162,7 @@ class CommanderBlock:
         if request.parameters is not None:
             write(self._law, controller(self._config, dict(request.parameters)))
             write(self._thresholds, battery_thresholds(request.parameters))
+            write(self._detector, motor_failure.build(self._config.airframe, request.parameters))
             if self._px4 is not None:
                 write(self._px4, px4_law.build(request.parameters, self._config.airframe))
         if request.faults is not None and self._injection.faults is not None:
@@ -246,7 +251,8 @@ class CommanderBlock:
 def controller(config: AutopilotSetup, values: dict[str, float]) -> Any:
     """Return the controller's parameters with the commander's parameter `values`."""
     gains = config.gains if flies_px4_cascade(config) else with_gains(config.gains, values)
-    return build(gains, config.airframe, config.geometric)
+    law = build(gains, config.airframe, config.geometric)
+    return law._replace(shares=tables_for_failures(law.shares, values))
 
 
 def flies_px4_cascade(config: AutopilotSetup) -> bool:

@@ -4,6 +4,7 @@ An observer estimates the angular acceleration about body x and y that the comma
 causes one along its own arm. ArduPilot's thrust-loss check detects the same failure by saturation.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from lapwing.dynamics.vector import Vec3
@@ -28,6 +29,7 @@ class Parameters(NamedTuple):
     inertia_body: Vec3  # [kg m^2]
     time_constant: float  # of the rotor speeds [s]
     hovering: float  # thrust of each rotor [N]
+    enabled: bool  # False: no failure is detected
 
 
 class State(NamedTuple):
@@ -42,11 +44,13 @@ class State(NamedTuple):
     failed: int  # number of the failed rotor, from 1; 0: none
 
 
-def build(airframe: Airframe) -> Parameters:
-    """Return the detector of an airframe."""
+def build(airframe: Airframe, values: Mapping[str, float]) -> Parameters:
+    """Return the detector of an airframe with the autopilot's parameter `values`."""
     a = airframe
     _, roll, pitch, _ = rotor_effectiveness(a).tolist()
-    return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, a.mass * a.gravity / lift(a))
+    hovering = a.mass * a.gravity / lift(a)
+    enabled = values.get("FD_ACT_EN", 1.0) != 0.0  # absent from former logs
+    return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, hovering, enabled)
 
 
 @always_inline
@@ -108,8 +112,9 @@ def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, as
         thrust = root[k] * root[k]
         ax += p.roll_arm[k] * thrust / ix
         ay += p.pitch_arm[k] * thrust / iy
+    before = s.failed if p.enabled else 0
     if height < CLEAR:
-        return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, s.failed)
+        return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, before)
     ex, ey = wx - s.rate[0], wy - s.rate[1]
     gain = 2.0 * BANDWIDTH
     rate = (
@@ -120,5 +125,5 @@ def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, as
     disturbance = (s.disturbance[0] + square * ex, s.disturbance[1] + square * ey)
     suspected = suspect(p, root, disturbance)
     lasting = s.lasting + dt if suspected > 0 and suspected == s.suspect else 0.0
-    failed = suspected if lasting > DETECTION_TIME and s.failed == 0 else s.failed
+    failed = suspected if lasting > DETECTION_TIME and before == 0 and p.enabled else before
     return State(asked, root, rate, disturbance, suspected, lasting, failed)

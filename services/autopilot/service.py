@@ -35,7 +35,7 @@ from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
 from lapwing.services.common.airspeed_encoder import airspeed_wire
 from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGHT
-from lapwing.services.common.failure_types import SOUND, Faults
+from lapwing.services.common.failure_types import SOUND, Faults, with_satellites
 from lapwing.services.common.ports import EstimateCovariance
 
 NAME = "autopilot"
@@ -50,6 +50,7 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     values = {p.name: p.default for p in config.parameters}
     law, thresholds = Cell(controller(config, values)), Cell(battery_thresholds(values))
     px4 = Cell(px4_law.build(values, config.airframe)) if flies_px4_cascade(config) else None
+    detector = Cell(motor_failure.build(config.airframe, values))
     wakeup = WakeupParameters(thresholds)
     service = Service(NAME, [], [])
 
@@ -57,14 +58,13 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
         return [*(config.plan if tick == 0 else ()), *operator(tick)]
 
     sound, motors = (SOUND,) * config.imus, (SOUND,) * len(config.airframe.rotor_x)
-    faults = Cell(Faults(gyro=sound, accelerometer=sound, motors=motors)) if config.operator else None
+    no_faults = with_satellites(Faults(gyro=sound, accelerometer=sound, motors=motors), values)
+    faults = Cell(no_faults) if config.operator else None
     sensor_ports = () if config.own_estimator else [i.port for i in setup.services[NAME].inputs]
     injection = Injection(faults, setup, sensor_ports, config.airframe.motor)
-    commander = CommanderBlock(config, law, thresholds, service, operator_commands, injection, px4)
+    commander = CommanderBlock(config, law, thresholds, detector, service, operator_commands, injection, px4)
     reference = ports.TRAJECTORY if config.phases else NO_TRAJECTORY
-    common = Controller(
-        law, motor_failure.build(config.airframe), thresholds, setup.interval, round(BOUNCE / setup.interval)
-    )
+    common = Controller(law, detector, thresholds, setup.interval, round(BOUNCE / setup.interval))
     battery, actuators = injection.received(ports.BATTERY), outputs[ports.ACTUATORS]
     inputs = (InputPort(ports.ESTIMATE), InputPort(ORDER), InputPort(battery), InputPort(reference))
     control_outputs = (

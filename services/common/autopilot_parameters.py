@@ -100,6 +100,11 @@ _FAILSAFES = (
     Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"action on a lost position: {_ACTION}", True),
     Parameter("EKF2_HGT_REF", "", GPS_HEIGHT, 0, 2, f"height reference from the start: {_HEIGHTS}", True, True),
     Parameter("SYS_FAILURE_EN", "", 1, 0, 1, "1: failures may be injected", True),
+    Parameter("FD_ACT_EN", "", 1, 0, 1, "1: motor failures are detected", True),
+    Parameter(
+        "CA_FAILURE_MODE", "", 1, 0, 1, "0: a failed motor stays in the allocation, 1: the first one is left out", True
+    ),
+    Parameter("SIM_GPS_USED", "", 16, 0, 50, "satellites of the simulated GPS; below 4 it has no fix", True),
     Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"action outside the fence: {_ACTION}", True),
 )

@@ -1,5 +1,6 @@
 """Units and failure types of MAVLink's failure injection."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 KINDS = ("sound", "off", "stuck", "garbage", "wrong", "slow", "delayed", "intermittent")
@@ -28,6 +29,15 @@ class Faults(NamedTuple):
     battery: int = SOUND
     battery_charge: float = 0.0  # fraction that a wrong battery reports
     motors: tuple[int, ...] = ()  # of each motor
+
+
+SATELLITES, FIX_SATELLITES = "SIM_GPS_USED", 4  # parameter, and its least value with a fix, as in PX4
+
+
+def with_satellites(faults: Faults, values: Mapping[str, float]) -> Faults:
+    """Return the failures with GPS off if the parameter SIM_GPS_USED selects too few satellites for a fix."""
+    enough = values.get(SATELLITES, FIX_SATELLITES) >= FIX_SATELLITES  # absent from former logs
+    return faults if enough else faults._replace(gps=OFF)
 
 
 def possible(unit: str) -> tuple[int, ...]:

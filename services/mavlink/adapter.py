@@ -28,8 +28,10 @@ LINK_TIMEOUT = 3.5  # [s] after its last heartbeat, a ground station counts as l
 HEARTBEAT_INTERVAL = 1.0  # [s]
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 ALL = 0  # target system or component of a message for all receivers
-_NO_ACKS = len(CommandAcks(header(0, "world")).encode())  # bytes of acknowledgements without one
-_EMPTY = len(OperatorInput(header(0, "world")).encode())  # bytes of an input without a command
+EMPTY_SIZES = {  # [bytes] of messages without content
+    COMMAND_ACKS: len(CommandAcks(header(0, "world")).encode()),
+    OPERATOR: len(OperatorInput(header(0, "world")).encode()),
+}
 
 
 class Adapter:
@@ -67,6 +69,7 @@ class Adapter:
         )
         self.vehicle.mission = lambda: self.missions.items[mavlink.MAV_MISSION_TYPE_MISSION]
         self.parameters = ParameterStore(description, firmware, self.commands, self.broadcast, self.counts)
+        self.vehicle.parameter = self.parameters.value
         self.setpoints = SetpointKeeper(self.clock, self.commands, lambda: self.parameters.value("COM_OF_LOSS_T"))
         self.sessions: dict[Endpoint, Session] = {}
         store = TimeStampStore(time_stamps, key, description.system_id) if key and time_stamps else None
@@ -153,13 +156,12 @@ class Adapter:
             payload: encoded message.
             wall: monotonic wall time [s].
         """
-        if topic is OPERATOR:
-            if len(payload) > _EMPTY:
-                own_endpoints = {endpoint.name for endpoint in self.sessions} if self.commands.connected else ()
-                accepted = topic.message.decode(payload).commands
-                self.missions.observe([command for command in accepted if command.source not in own_endpoints], ())
+        if len(payload) <= EMPTY_SIZES.get(topic, 0):
             return
-        if topic is COMMAND_ACKS and len(payload) == _NO_ACKS:
+        if topic is OPERATOR:
+            own_endpoints = {endpoint.name for endpoint in self.sessions} if self.commands.connected else ()
+            accepted = topic.message.decode(payload).commands
+            self.missions.observe([command for command in accepted if command.source not in own_endpoints], ())
             return
         self.vehicle.put(topic, payload)
         if topic is ESTIMATE:

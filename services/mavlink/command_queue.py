@@ -76,6 +76,8 @@ class CommandQueue:
 
     def step(self) -> None:
         """Reject the commands that the autopilot has not acknowledged in time."""
+        if not self._waiting:
+            return
         expired = [n for n, (_, sent, _) in self._waiting.items() if self._clock.since(sent) > TIMEOUT]
         for number in expired:
             on_acknowledgement, *_ = self._waiting.pop(number)

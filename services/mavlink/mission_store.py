@@ -131,6 +131,8 @@ class MissionStore:
 
     def step(self) -> None:
         """Repeat requests for missing items until the limit; repeat the last acknowledgements."""
+        if not (self._repeats or self._uploads):
+            return
         for kind, repeat in list(self._repeats.items()):
             if repeat.due():
                 self._acknowledge(repeat.endpoint, kind, repeat.result)

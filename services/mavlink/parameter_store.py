@@ -71,6 +71,8 @@ class ParameterStore:
 
         PX4 sends a changed parameter twice, some milliseconds apart; MAVSDK's subscriptions need the second one.
         """
+        if not (self._repetitions or self._lists):
+            return
         for name, steps in list(self._repetitions.items()):
             self._repetitions[name] = steps - 1
             if steps <= 1:

@@ -55,6 +55,7 @@ _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency ch
     _LAND: (LAND, LAND),
     _RETURN_THEN_LAND: (RETURN, LAND),
 }
+_ROLL_PITCH = 1  # MC_AIRMODE
 EXCEPTIONS = 31  # COM_RCL_EXCEPT: all bits
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
 MULTIROTOR = 0  # CA_AIRFRAME
@@ -96,11 +97,6 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "GF_MAX_HOR_DIST": 0,
         "GF_MAX_VER_DIST": 0,
         "COM_OBS_AVOID": 0,
-        "RTL_APPR_FORCE": 0,  # a rally point needs no approach
-        "SIM_GPS_USED": SATELLITES * fitted("gps"),
-        "FD_ACT_EN": 1,  # a failed motor is detected
-        "CA_FAILURE_MODE": 1,  # and left out of the allocation
-        "MC_AIRMODE": 0,  # thrust is not raised for roll, pitch or yaw at low throttle
         "SDLOG_MODE": LOGGED_FROM_BOOT_TO_SHUTDOWN,
         "PD_GRIPPER_EN": int(d.gripper),
         "CA_AIRFRAME": MULTIROTOR,
@@ -124,6 +120,10 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         _translated("COM_ACT_FAIL_ACT", "FS_MOTOR_ACT", _MOTOR_LOSS, _DESCENT["COM_ACT_FAIL_ACT"]),
         # Modes that continue without sticks: all modes that need none, whatever the value
         Fact("COM_RCL_EXCEPT", lambda _: 0.0, assign=lambda x: {} if x in range(EXCEPTIONS + 1) else None),
+        # VTOL aircraft in forward flight only need an approach to their landing, as in PX4
+        Fact("RTL_APPR_FORCE", lambda _: 0.0, assign=lambda x: {} if x in (0.0, 1.0) else None),
+        # The mixer raises the collective for roll and pitch, not for yaw (theory.md, eq. (4.22))
+        Fact("MC_AIRMODE", lambda _: _ROLL_PITCH, assign=lambda x: {} if x == _ROLL_PITCH else None),
         Fact("CP_DIST", lambda _: NO_COLLISION_PREVENTION, False, "m"),
         Fact("SENS_DPRES_OFF", lambda _: 0.0, False, "Pa"),
         Fact("COM_RC_LOSS_T", lambda v: v.get("COM_DL_LOSS_T", 0.0), False, "s", lambda x: {"COM_DL_LOSS_T": x}),

@@ -18,6 +18,7 @@ from lapwing.cosim.transport.bus_keys import BATCH_KEY
 from lapwing.cosim.transport.packets import unpack_log_packet
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, template_topic
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.mavlink.adapter import EMPTY_SIZES
 from lapwing.services.mavlink.link_options import Options
 from lapwing.services.mavlink.link_server import LinkServer
 from lapwing.services.mavlink.links import for_vehicle_index
@@ -97,7 +98,12 @@ def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immedi
         topic = template_topic(page.topic)
         if topic is ESTIMATE and immediate:
             continue
-        indices = range(0 if topic in ALL else len(page.ticks) - 1, len(page.ticks))
+        if page.payloads.shape[1] <= EMPTY_SIZES.get(topic, 0):
+            continue
+        handled = topic in ALL
         for server in [servers[page.topic.vehicle]] if page.topic.vehicle else servers.values():
-            for i in indices:
+            if not handled:
+                server.adapter.vehicle.put(topic, page.payloads[-1].tobytes())
+                continue
+            for i in range(len(page.ticks)):
                 server.take(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())

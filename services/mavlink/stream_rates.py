@@ -4,10 +4,14 @@ from heapq import heapify, heappop, heappush
 from typing import Any
 
 from lapwing.services.mavlink.telemetry import streams
+from lapwing.services.mavlink.telemetry.message_stream import Builder, as_list
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 SECOND = 1_000_000_000
 MAX_INTERVAL = 0x7FFFFFFF * 1000  # [ns] largest value of MESSAGE_INTERVAL
+
+_Member = tuple[int, int, Builder]  # rank, message, builder
+_Group = tuple[int, int, int, list[_Member]]  # due time [ns], number of the group, interval [ns], messages by rank
 
 
 class Schedule:
@@ -20,7 +24,7 @@ class Schedule:
         self._onboard = False
         self._intervals: dict[int, int] = {}
         self._due: dict[int, int] = {}
-        self._queue: list[tuple[int, int, int]] = []  # heap: due time [ns], rank, message; without those never sent
+        self._queue: list[_Group] = []  # heap; without the messages that are never sent
         self._plan()
 
     def set_onboard(self, onboard: bool) -> None:
@@ -47,31 +51,37 @@ class Schedule:
 
     def due(self, built: dict[int, list[Any]]) -> list[Any]:
         """Return the messages that are due; `built` caches messages of this time for all endpoints."""
-        now, queue = self._vehicle.time_ns, self._queue
-        ready: list[tuple[int, int, int]] = []  # rank, message, due time [ns]
+        vehicle, queue = self._vehicle, self._queue
+        now = vehicle.time_ns
+        ready: list[_Group] = []
         while queue and queue[0][0] <= now:
-            due_ns, rank, number = heappop(queue)
-            ready.append((rank, number, due_ns))
-        ready.sort()
+            ready.append(heappop(queue))
+        members: list[_Member] = []
+        for due_ns, order, interval, group in ready:
+            members += group
+            heappush(queue, (max(due_ns + interval, now - interval), order, interval, group))  # mean rate, no bursts
+        if len(ready) > 1:
+            members.sort()
         messages: list[Any] = []
-        for rank, number, due_ns in ready:
-            interval = self._intervals[number]
-            due_ns = self._due[number] = max(due_ns + interval, now - interval)  # the mean rate without bursts
-            heappush(queue, (due_ns, rank, number))
+        for _, number, build in members:
             if number not in built:
-                built[number] = streams()[number].messages(self._vehicle)
+                built[number] = as_list(build(vehicle))
             messages += built[number]
         return messages
 
     def _plan(self) -> None:
-        """Set all intervals."""
-        for number, stream in streams().items():
+        """Set all intervals, and group the streams that are always due together."""
+        for due_ns, _, _, members in self._queue:
+            self._due.update((number, due_ns) for _, number, _ in members)
+        groups: dict[tuple[int, int], list[_Member]] = {}
+        for rank, (number, stream) in enumerate(streams().items()):
             rate = stream.onboard if self._onboard else stream.ground
             rate = self._vehicle.firmware.RATES.get(stream.name, rate)
             interval = self._requested.get(number, round(SECOND / rate) if rate else 0)
             if self._intervals.get(number) != interval:
                 self._intervals[number] = interval
                 self._due[number] = self._vehicle.time_ns
-        ranks = enumerate(self._intervals.items())
-        self._queue = [(self._due[number], rank, number) for rank, (number, interval) in ranks if interval]
+            if interval:
+                groups.setdefault((self._due[number], interval), []).append((rank, number, stream.build))
+        self._queue = [(due_ns, k, interval, group) for k, ((due_ns, interval), group) in enumerate(groups.items())]
         heapify(self._queue)

@@ -1,5 +1,6 @@
 """Newest state of the vehicle: all messages that it publishes, decoded on demand."""
 
+import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any
@@ -64,6 +65,7 @@ class VehicleCache:
         altitude = height + description.standing_height
         self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
         self.mission: Callable[[], Sequence[Any]] = lambda: ()  # its mission items, as endpoints wrote them
+        self.parameter: Callable[[str], float] = lambda name: math.nan  # value of a parameter; NaN if there is none
         self._home_heading = 0.0
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}

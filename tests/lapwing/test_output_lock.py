@@ -53,6 +53,19 @@ def test_run_rejects_log_that_is_being_written(tmp_path, mode):
     assert [path.name for path in tmp_path.iterdir()] == ["a.mcap"]
 
 
+def test_run_names_log_of_run_that_has_only_claimed_its_report(tmp_path):
+    """A run claims its report before its recorder opens the log."""
+    log, report = tmp_path / "a.mcap", tmp_path / "a.html"
+    report.touch()
+    lock = OutputLock(report)
+    run = start(tmp_path, "run", SCENE, "--mode", "single-process", "--log", log)
+    message = run.communicate()[1]
+    lock.close()
+    assert run.returncode == 2
+    assert message.startswith(f"lapwing: {log}: another process is writing it")
+    assert message.count("\n") == 1
+
+
 def test_simultaneous_runs_write_separate_logs(tmp_path):
     options = ["--mode", "single-process", "--set", "run.duration=1.0"]
     runs = [start(tmp_path, "run", SCENE, *options, "--set", f"run.seed={seed}") for seed in (1, 2, 3)]

@@ -27,7 +27,8 @@ class Subscription:
             notify: called after each arrival.
         """
         self._read, self._senders, self._on_rejected, self._notify = read, senders, on_rejected, notify
-        self._only_gid = next(iter(senders.values())) if senders and len(senders) == 1 else None
+        # with one known sender its GID is enough: converting the key of a message to text takes most of the time
+        self._only_key = next(iter(senders)) if senders and len(senders) == 1 and all(senders.values()) else None
         self._arrived: queue.SimpleQueue[tuple[str, int, bytes]] = queue.SimpleQueue()
 
     def get(self, timeout: float) -> tuple[int, bytes] | None:
@@ -45,17 +46,17 @@ class Subscription:
     def arrive(self, sample: Any) -> None:
         """Keep a sample of the bus, which has its `key_expr`; called by a thread of the bus."""
         message = self._read(sample)
-        if message is None or not self._has_expected_sender(sample, message[1]):
+        key = self._only_key or str(sample.key_expr)
+        if message is None or not self._has_expected_sender(key, message[1]):
             self._on_rejected()
             return
-        self._arrived.put((str(sample.key_expr), message[0], message[2]))
+        self._arrived.put((key, message[0], message[2]))
         if self._notify:
             self._notify()
 
-    def _has_expected_sender(self, sample: Any, gid: bytes) -> bool:
-        if self._only_gid or self._senders is None:  # converting the key to text takes most of the time
-            return self._only_gid in (None, gid)
-        key = str(sample.key_expr)
+    def _has_expected_sender(self, key: str, gid: bytes) -> bool:
+        if self._senders is None:
+            return True
         expected = self._senders.get(key, b"")
         if expected is None:
             expected = self._senders[key] = gid

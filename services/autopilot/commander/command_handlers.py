@@ -11,6 +11,7 @@ from lapwing.services.autopilot.commander.flight_mode import value
 from lapwing.services.autopilot.commander.mode_table import MODES
 from lapwing.services.autopilot.commander.transitions import Context
 from lapwing.services.common import status_texts
+from lapwing.services.common.failure_types import SATELLITES, with_satellites
 
 Handler = Callable[[Context, Any], None]
 HANDLERS: dict[str, Handler] = {}
@@ -158,6 +159,8 @@ def parameter(context: Context, command: Any) -> None:
     parameters = context.state.guidance.parameters
     parameters[known.name] = requested
     context.outbox.parameters = dict(parameters)
+    if known.name == SATELLITES:
+        context.outbox.faults = with_satellites(context.state.faults, parameters)
 
 
 @handles("finish")

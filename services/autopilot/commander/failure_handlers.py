@@ -7,7 +7,7 @@ from typing import Any
 from lapwing.services.autopilot.commander.command_handlers import Denied, handles
 from lapwing.services.autopilot.commander.flight_mode import value
 from lapwing.services.autopilot.commander.transitions import Context
-from lapwing.services.common.failure_types import KINDS, UNITS, possible, refusal
+from lapwing.services.common.failure_types import KINDS, UNITS, possible, refusal, with_satellites
 
 ENABLE = "SYS_FAILURE_EN"
 LEVEL, THRESHOLDS = "SYS_FAIL_BAT_LVL", ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")  # for its values from 1 on
@@ -38,7 +38,7 @@ def inject_failure(context: Context, command: Any) -> None:
     else:
         changes = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
     state.faults = state.faults._replace(**changes)
-    outbox.faults = state.faults
+    outbox.faults = with_satellites(state.faults, state.guidance.parameters)
     outbox.send_text(f"injected: {unit}{named} {KINDS[kind]}")
 
 

@@ -9,6 +9,7 @@ from numba import types
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.cell import read
 from lapwing.kernels.codegen import overload_for
 from lapwing.services.autopilot import motor_failure
 from lapwing.services.autopilot.block import Controller, block_outputs
@@ -55,7 +56,7 @@ class CustomState(NamedTuple):
 
 def start(p: CustomController) -> CustomState:
     """Return the initial state."""
-    detector = p.common.failure_detector
+    detector = read(p.common.failure_detector)
     held, watched = motors_off(len(detector.roll_arm)), python_function(motor_failure.start)(detector)
     return CustomState(INITIAL_LANDED_STATE, p.own_start, held, watched, 0, float("nan"))
 
@@ -106,7 +107,7 @@ def step(
     landed, watched, still_from = s.landed_state, s.failure_detector, s.still_from
     if order.restart_at == tick:
         landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
-        watched = motor_failure.start(c.failure_detector)
+        watched = motor_failure.start(c.failure_detector.value)
     charge = battery.value.charge if battery.due else s.charge
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     own, held, none = s.own, s.held, at_rest(c.law.value.shares[0])

@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import always_inline, python_function
+from lapwing.kernels.cell import read
 from lapwing.services.autopilot import motor_failure
 from lapwing.services.autopilot.block import Controller, block_outputs
 from lapwing.services.autopilot.control import Command
@@ -37,7 +38,7 @@ class Px4State(NamedTuple):
 
 def start(p: Px4Controller) -> Px4State:
     """Return the initial state."""
-    watched = python_function(motor_failure.start)(p.common.failure_detector)
+    watched = python_function(motor_failure.start)(read(p.common.failure_detector))
     return Px4State(INITIAL_LANDED_STATE, law.START, watched, 0, float("nan"))
 
 
@@ -50,7 +51,7 @@ def step(p: Px4Controller, s: Px4State, tick: int, inputs: tuple[InputSample, ..
     landed, watched, still_from = s.landed_state, s.failure_detector, s.still_from
     if order.restart_at == tick:
         landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
-        watched = motor_failure.start(c.failure_detector)
+        watched = motor_failure.start(c.failure_detector.value)
     charge = battery.value.charge if battery.due else s.charge
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     if landed.name == FLYING:

@@ -7,6 +7,7 @@ from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO, Vec3, norm, scale, subtract
 from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
+from lapwing.services.autopilot.allocation import tables_for_failures
 from lapwing.services.autopilot.control import Command, sign
 from lapwing.services.autopilot.controller_parameters import Airframe, hover_thrust, moments, shares
 from lapwing.services.autopilot.mixer import Shares, VirtualControls, active_allocation, clamp_to_range, mix, saturate
@@ -126,7 +127,7 @@ def build(values: Mapping[str, float], airframe: Airframe) -> Parameters:
         acceleration_cutoff=values["MPC_VELD_LP"],
         thrust_model=thrust_model,
         scale=normalisation(airframe),
-        shares=shares(airframe),
+        shares=tables_for_failures(shares(airframe), values),
         motor=airframe.motor,
         voltage_max=airframe.voltage_max,
     )

@@ -1,8 +1,8 @@
 """The true state, for clients that test estimators and log analyses."""
 
+import math
 from typing import Any
 
-from lapwing.kernels import math
 from lapwing.messages.topics import TRUTH
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import saturated, swap_world

@@ -19,10 +19,14 @@ class Stream(NamedTuple):
 
     def messages(self, vehicle: VehicleCache) -> list[Any]:
         """Return the current messages."""
-        result = self.build(vehicle)
-        if result is None:
-            return []
-        return result if isinstance(result, list) else [result]
+        return as_list(self.build(vehicle))
+
+
+def as_list(result: Any) -> list[Any]:
+    """Return the messages of a builder's result."""
+    if result is None:
+        return []
+    return result if isinstance(result, list) else [result]
 
 
 STREAMS: dict[int, Stream] = {}

@@ -1,8 +1,8 @@
 """Position, velocity and attitude."""
 
+import math
 from typing import Any
 
-from lapwing.kernels import math
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import compass, saturated
 from lapwing.services.mavlink.telemetry.external_sensors import indicated_airspeed

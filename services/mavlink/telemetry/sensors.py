@@ -1,11 +1,13 @@
 """Sensor readings; ideal ones if the vehicle flies on the true state."""
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
-from lapwing.kernels import math
 from lapwing.messages import GPSStatus, NavSatStatus
 from lapwing.messages.topics import BARO, GPS, GPS_DETAILS, GPS_VELOCITY, IMU, MAG
+from lapwing.services.common.failure_types import FIX_SATELLITES
+from lapwing.services.common.failure_types import SATELLITES as PARAMETER
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import compass, saturated, swap_body
 from lapwing.services.mavlink.px4_facts import SATELLITES
@@ -48,7 +50,7 @@ def good_baro(v: VehicleCache) -> bool:
 def good_gps(v: VehicleCache) -> bool:
     """Return True if the receiver has a fix."""
     m = v.get(GPS)
-    return m is not None and m.status.status >= NavSatStatus.STATUS_FIX
+    return m is not None and _satellites(v) >= FIX_SATELLITES and m.status.status >= NavSatStatus.STATUS_FIX
 
 
 @stream("HIGHRES_IMU", 1.5, 50.0)
@@ -104,7 +106,8 @@ def gps_raw(v: VehicleCache) -> Any:
         return None
     details = v.get(GPS_DETAILS)
     if not good_gps(v):
-        visible = details.status.satellites_visible if details else 0
+        used = _satellites(v)
+        visible = details.status.satellites_visible if details else used if used < FIX_SATELLITES else 0
         return mavlink.MAVLink_gps_raw_int_message(
             v.boot_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, *(UNKNOWN_16,) * 4, visible
         )
@@ -122,6 +125,12 @@ def gps_raw(v: VehicleCache) -> Any:
     return _fix(v, kind, place, velocity, spread, moving.twist.covariance[0], dilution, satellites)
 
 
+def _satellites(v: VehicleCache) -> int:
+    """Return the number of satellites that SIM_GPS_USED selects."""
+    value = v.parameter(PARAMETER)
+    return SATELLITES if math.isnan(value) else int(value)
+
+
 def _estimated(v: VehicleCache) -> Any:
     if (m := v.estimate) is None:
         return None
@@ -136,7 +145,7 @@ def _fix(
     spread: tuple[float, float],
     speed_variance: float,
     dilution: Sequence[int] = (100, 100),  # of precision, in hundredths
-    satellites: int = SATELLITES,
+    satellites: int | None = None,
 ) -> Any:
     latitude, longitude, altitude = place
     north, east = moving
@@ -150,7 +159,7 @@ def _fix(
         *dilution,
         saturated(100.0 * math.hypot(north, east), 16, unsigned=True),
         compass(math.atan2(east, north)),
-        satellites,
+        _satellites(v) if satellites is None else satellites,
         height,
         *[saturated(1e3 * s, 32, unsigned=True) for s in spread],
         saturated(1e3 * math.sqrt(max(0.0, speed_variance)), 32, unsigned=True),

@@ -11,6 +11,7 @@ from lapwing.services.autopilot.allocation import (
     effectiveness,
     rotor_shares,
     tables,
+    tables_for_failures,
     tilted_effectiveness,
     virtual_control_effectiveness,
 )
@@ -137,3 +138,10 @@ def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, rol
         assert result == pytest.approx(expected, abs=1e-9)
     elif result.yaw != yaw and any(share[3] for share in shares):
         assert not possible(result._replace(yaw=result.yaw + 1e-3 * np.sign(yaw - result.yaw)))
+
+
+def test_failed_motor_stays_in_allocation_if_failure_mode_is_ignore():
+    whole, failed = ((1.0, 1.0, 1.0, 1.0),), ((0.0, 0.0, 0.0, 0.0),)
+    assert tables_for_failures((whole, failed), {}) == (whole, failed)
+    assert tables_for_failures((whole, failed), {"CA_FAILURE_MODE": 1.0}) == (whole, failed)
+    assert tables_for_failures((whole, failed), {"CA_FAILURE_MODE": 0.0}) == (whole, whole)

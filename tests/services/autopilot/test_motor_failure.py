@@ -16,9 +16,9 @@ FRAME = Airframe(
 HOVER = 0.25 * FRAME.mass * FRAME.gravity
 
 
-def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0):
+def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0, values=None):
     """State of the watch over a body whose rotors give the shares `left` of what a shaking command asks for."""
-    p, omega = watch.build(FRAME), np.zeros(3)
+    p, omega = watch.build(FRAME, values or {}), np.zeros(3)
     s = python_function(watch.start)(p)
     random = np.random.default_rng(seed)
     thrust = np.full(4, HOVER)
@@ -39,6 +39,12 @@ def test_rotor_that_lacks_thrust_is_named(rotor, share):
     left = np.ones(4)
     left[rotor - 1] = share
     assert campaign_setup(left).failed == rotor
+
+
+def test_disabled_detector_names_no_rotor():
+    left = np.array([0.0, 1.0, 1.0, 1.0])
+    assert campaign_setup(left, values={"FD_ACT_EN": 1.0}).failed == 1
+    assert campaign_setup(left, values={"FD_ACT_EN": 0.0}).failed == 0
 
 
 def test_equal_thrust_loss_is_no_motor_failure():

@@ -134,6 +134,8 @@ def set_whole(bench, station, name, value):
         ("COM_ACT_FAIL_ACT", 3, {"FS_MOTOR_ACT": 2}),
         ("COM_ACT_FAIL_ACT", 1, {"FS_MOTOR_ACT": 1}),
         ("COM_RCL_EXCEPT", 7, {}),
+        ("RTL_APPR_FORCE", 1, {}),
+        ("MC_AIRMODE", 1, {}),
     ],
 )
 def test_px4_parameter_sets_its_counterparts(name, value, counterparts):
@@ -146,7 +148,9 @@ def test_px4_parameter_sets_its_counterparts(name, value, counterparts):
     assert {integer(m) for m in other.all("PARAM_VALUE") if m.param_id == name} == {value}
 
 
-@pytest.mark.parametrize(("name", "value"), [("GF_ACTION", 4), ("COM_LOW_BAT_ACT", 1), ("COM_RCL_EXCEPT", 32)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("GF_ACTION", 4), ("COM_LOW_BAT_ACT", 1), ("COM_RCL_EXCEPT", 32), ("MC_AIRMODE", 0)]
+)
 def test_px4_value_without_counterpart_is_rejected(name, value):
     bench = Bench()
     station = bench.station()
@@ -166,7 +170,8 @@ def test_changed_counterpart_is_shown_in_px4_parameter():
 
 def test_parameters_of_client_tests_exist():
     names = "COM_RCL_EXCEPT RTL_APPR_FORCE SIM_GPS_USED FD_ACT_EN MC_AIRMODE CA_FAILURE_MODE COM_ACT_FAIL_ACT"
-    assert set(names.split()) <= set(facts("lapwing/scenes/hover.toml"))
+    scene = "lapwing/scenes/hover.toml"
+    assert set(names.split()) <= {*facts(scene), *table(load(scene))}
     assert table(load("lapwing/scenes/hover.toml"))["SYS_FAILURE_EN"].default == 1.0
 
 
