@@ -15,7 +15,7 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.ports import BarometerReading, BatteryReading, GpsReading, ImuReading, MagnetometerReading
 from lapwing.services.px4.link import MAVLINK_PORT, PORT, Px4Link
 from lapwing.services.px4.resolve import Px4Setup
-from tests.services.firmware_links import Background, firmware_setup, free_instance, never
+from tests.services.firmware_links import Background, Exchange, firmware_setup, free_instance, never
 from tests.services.px4.peer import Px4Peer, finite
 
 PERIODS = {ports.IMU: 1, ports.MAGNETOMETER: 5, ports.BAROMETER: 5, ports.GPS: 25}
@@ -25,6 +25,7 @@ SAMPLES = {
     ports.MAGNETOMETER: MagnetometerReading((2e-5, 1e-6, -4e-5), valid=True),
     ports.BAROMETER: BarometerReading(98000.0, valid=True),
     ports.GPS: GpsReading(40.0, 14.0, 280.0, valid=True),
+    ports.BATTERY: BatteryReading(),
 }
 
 
@@ -32,6 +33,7 @@ SAMPLES = {
 def link():
     instance = free_instance((socket.SOCK_STREAM, PORT, 1), (socket.SOCK_DGRAM, MAVLINK_PORT, 1))
     link = Px4Link(firmware_setup("px4", OWN, instance))
+    link.steps = Exchange(link, SAMPLES)
     yield link
     link.close()
 
@@ -41,7 +43,7 @@ def port_of(link):
 
 
 def fly(link, steps, begin=0, samples=SAMPLES):
-    return [link.step(tick, samples.__getitem__, never) for tick in range(begin, begin + steps)]
+    return [link.steps.step(tick, **samples) for tick in range(begin, begin + steps)]
 
 
 def begun(link, script):
@@ -299,7 +301,7 @@ def test_battery_of_scene_is_told_to_firmware(link):
         background = begun(link, script)
         told = []
         for tick in range(300):
-            link.step(tick, samples.__getitem__, never)
+            link.steps.step(tick, **samples)
         link.close()
         background.join()
         vehicle.setblocking(False)
