@@ -58,7 +58,9 @@ def step(p: ArduPilotExchange, s: int, tick: int, inputs: tuple) -> tuple[int, t
     e, d = p.shared, p.datagrams
     if tick % e.period != 0:
         return s, (), CONTINUE
-    begun, time = begin(e), tick * e.interval
+    if not begin(e, tick):
+        return s, (), NON_FINITE
+    time = tick * e.interval
     size = write_state(d.sent, time + tick * MARGIN, vehicle_state(p.samples, tick), extras(p.samples, tick))
     if size == NOT_WRITTEN:
         call_python(e, tick, INVALID, 0)
@@ -73,7 +75,7 @@ def step(p: ArduPilotExchange, s: int, tick: int, inputs: tuple) -> tuple[int, t
             e.outputs[k] = throttle(unsigned16(d.received, _HEAD + 2 * k), PWM_MIN, PWM_MAX)
     elif not call_python(e, tick, WAIT, size):
         return s, (), NON_FINITE
-    end(e, begun)
+    end(e)
     if tick >= e.next_poll[0] and not call_python(e, tick, POLL, 0):
         return s, (), NON_FINITE
     running = False

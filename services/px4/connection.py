@@ -5,10 +5,14 @@ import select
 import socket
 
 from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.mavlink_transport import UdpTransport
+from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.px4.framing import FrameParser, Layout, frame
 from lapwing.services.px4.messages import RECEIVED
 from lapwing.services.px4.sensor_frame import COMPONENT, SYSTEM, Sensors, sensor_frame
 from lapwing.services.px4.stream import CLOSED, PIECE, WAIT, Stream, connect
+
+PORT, MAVLINK_PORT = 4560, 14540
 
 
 class Connection:
@@ -147,3 +151,18 @@ class Connection:
             self._peer = None
         self._rejected += self._parser.rejected
         self._parser = FrameParser(RECEIVED)
+
+
+def claim(setup: FirmwareSetup, memory: Stream) -> tuple[Connection, UdpTransport]:
+    """Open the ports of an instance.
+
+    Raises:
+        FirmwareError: one is in use.
+    """
+    connection, port = Connection(setup.host, setup.port_at(PORT), memory), MAVLINK_PORT + setup.instance
+    try:
+        return connection, UdpTransport(setup.host, port)
+    except OSError as error:
+        connection.close()
+        message = f"px4: cannot listen on udp {setup.host}:{port} ({error.strerror})"
+        raise FirmwareError(f"{message}; end the other program, or set autopilot.instance") from None

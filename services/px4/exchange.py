@@ -60,7 +60,9 @@ def step(p: Px4Exchange, s: int, tick: int, inputs: tuple) -> tuple[int, tuple, 
     e, stream = p.shared, p.stream
     if tick % e.period != 0:
         return s, (), CONTINUE
-    begun, time_us = begin(e), p.epoch[0] + tick * p.interval_ns // 1000
+    if not begin(e, tick):
+        return s, (), NON_FINITE
+    time_us = p.epoch[0] + tick * p.interval_ns // 1000
     values = sensors(p.readings, tick)
     stream.sent_size[0] = write_sensors(stream.sent, p.sensor, stream.sequence[0], time_us, values)
     stream.sequence[0] = (stream.sequence[0] + 1) & 0xFF
@@ -72,7 +74,7 @@ def step(p: Px4Exchange, s: int, tick: int, inputs: tuple) -> tuple[int, tuple, 
         size = receive(stream)
         if not _is_answer(p, size, time_us) and not call_python(e, tick, WAIT, size):
             return s, (), NON_FINITE
-    end(e, begun)
+    end(e)
     if tick >= e.next_poll[0] and not call_python(e, tick, POLL, 0):
         return s, (), NON_FINITE
     publish(e, p.armed[0] != 0)

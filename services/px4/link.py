@@ -14,29 +14,23 @@ import numpy as np
 from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.exchange import POLL, SEND, Shared, unused
-from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
-from lapwing.services.common.firmware.mavlink_transport import UdpTransport
-from lapwing.services.common.firmware.mission import mission_messages, uploaded
-from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
-from lapwing.services.common.ports import AirspeedReading, BatteryReading
-from lapwing.services.px4.connection import Connection
+from lapwing.services.common.ports import AirspeedReading
+from lapwing.services.px4.connection import Connection, claim
 from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange
 from lapwing.services.px4.messages import HIL_ACTUATOR_CONTROLS, ActuatorControls, actuator_controls
-from lapwing.services.px4.modes import CONVENTIONS
 from lapwing.services.px4.resolve import Px4Setup
 from lapwing.services.px4.sample import RARE, Readings, Sampler, at_rest
 from lapwing.services.px4.sensor_frame import payload
-from lapwing.services.px4.stream import Stream, stream
+from lapwing.services.px4.stream import stream
+from lapwing.services.px4.vehicle_link import VehicleLink
 
-PORT, MAVLINK_PORT = 4560, 14540
 INSTANCES = 10  # with a MAVLink port of their own
 SECOND = 1_000_000  # [us]
 MISSED = 1.0  # [s] after which a step goes on without the answer of PX4
-BATTERY_EVERY = 0.5  # [s]
 OTHERS_EVERY = 1.0  # [s] between two looks for a second firmware
 
 
@@ -53,12 +47,12 @@ class Px4Link:
         self._sampler, self._stream = Sampler(setup.own), stream()
         self._program: Program | None = None
         self._connection: Connection | None = None
-        self._status: FlightStatus | None = None
-        self._client: MissionClient | None = None
+        self._vehicle: VehicleLink | None = None
         self._epoch = np.zeros(1, np.int64)  # [us] of PX4's clock at tick 0
         self._last_us = 0  # [us] of the last message
         self._time = 0.0  # [s] of the simulation
-        self._battery_at = self._others_at = 0.0  # [s] of the next message about the battery, look for others
+        self._step_us = setup.period * setup.interval_ns // 1000
+        self._others_at = 0.0  # [s] of the next look for a second firmware
         self._silent = np.zeros(1, np.int64)  # consecutive steps without an answer
         self._armed = np.zeros(1, np.int64)
 
@@ -68,7 +62,12 @@ class Px4Link:
         named = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *RARE)
         airspeed = ring(ports.AIRSPEED) if ports.AIRSPEED in periods else unused(AirspeedReading())
         readings = Readings(
-            *map(ring, named[:3]), airspeed, np.array([periods.get(port, 0) for port in named]), np.full(len(named), -1)
+            ring(ports.IMU),
+            ring(ports.MAGNETOMETER),
+            ring(ports.BAROMETER),
+            airspeed,
+            np.array([periods.get(port, 0) for port in named]),
+            np.full(len(named), -1),
         )
         return Px4Exchange(
             shared, readings, self._stream, payload(), payload(), self._epoch, self._setup.interval_ns, self._armed,
@@ -78,25 +77,18 @@ class Px4Link:
     def open(self, waits: Waits) -> None:
         """Start or await PX4, and run it up to a full second of its clock."""
         self._setup, (self._connection, transport) = first_free(
-            self._setup, INSTANCES, lambda candidate: _claim(candidate, self._stream)
+            self._setup, INSTANCES, lambda candidate: claim(candidate, self._stream)
         )
         setup = self._setup
-        items, parameters = uploaded(setup.plan), dict(setup.parameters)
         if setup.command:
             self._program = self._start(setup.instance)
-            parameters = {}
-        self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, self._own.datum), parameters)
-        self._status = FlightStatus("px4", self._client)
+        self._vehicle = VehicleLink(setup, transport)
         self._connect(waits, self._patience(setup.start_timeout))
         self._epoch[0] = -(-self._last_us // SECOND) * SECOND
         while self._last_us + self._step_us < self._epoch[0]:
             self._rest(self._last_us // self._step_us)
             self._await(self._connection.receive(), self._last_us, waits)
         self.report.late = 0  # answers to messages that were sent without waiting
-
-    @property
-    def _step_us(self) -> int:
-        return self._setup.period * self._setup.interval_ns // 1000
 
     def _start(self, instance: int) -> Program:
         """Start the program, with parameters in its environment."""
@@ -144,29 +136,22 @@ class Px4Link:
             return self._poll(tick, read)
         else:
             self._await(link.received(number), self._last_us, waits)
+            self.report.rejected = link.rejected + link.refused
         return None
 
     def _poll(self, tick: int, read: Read) -> FirmwareOutput:
         """Poll the MAVLink link, and look for other firmwares. Return the state of the flight."""
         link = self._connection
         assert link is not None
-        assert self._status is not None
-        assert self._client is not None
+        assert self._vehicle is not None
         if self._time >= self._others_at:
             self._others_at = self._time + OTHERS_EVERY
             self._look_for_others()
         self.report.rejected = link.rejected + link.refused
-        self._status.poll(self._time)
-        self.report.version = self._status.version
-        if self._own.battery and self._time >= self._battery_at:
-            self._battery_at = self._time + BATTERY_EVERY
-            self._tell_battery(read(ports.BATTERY))
-        self._shared.next_poll[0] = max(tick + 1, math.floor(self._client.next_poll / self._setup.interval))
-        return self._status.output((), running=False)
-
-    def _tell_battery(self, battery: BatteryReading) -> None:
-        if self._client and math.isfinite(battery.charge):
-            self._client.send_battery(battery.voltage, battery.current, battery.charge)
+        result = self._vehicle.poll(self._time, read)
+        self.report.version = self._vehicle.version
+        self._shared.next_poll[0] = max(tick + 1, math.floor(self._vehicle.next_poll / self._setup.interval))
+        return result
 
     def cpu(self) -> float:
         """Return the CPU time [s] of the program, 0 if somebody else has started it."""
@@ -174,13 +159,13 @@ class Px4Link:
 
     def close(self) -> None:
         """End the connections, and the program."""
-        if self._client:
-            self._client.close()
+        if self._vehicle:
+            self._vehicle.close()
         if self._connection:
             self._connection.close()
         if self._program:
             self._program.close()
-        self._program = self._connection = self._client = None
+        self._program = self._connection = self._vehicle = None
 
     def _await(self, messages: list[tuple[int, tuple]], time_us: int, waits: Waits) -> None:
         """Wait for the outputs of a time, which may be among `messages`; go on without them after a second."""
@@ -262,18 +247,3 @@ class Px4Link:
 
     def _fail(self, what: str, advice: str) -> None:
         raise FirmwareError(f"px4: {what} at t = {self._time:.3f} s; {advice}")
-
-
-def _claim(setup: FirmwareSetup, memory: Stream) -> tuple[Connection, UdpTransport]:
-    """Open the ports of an instance.
-
-    Raises:
-        FirmwareError: one is in use.
-    """
-    connection, port = Connection(setup.host, setup.port_at(PORT), memory), MAVLINK_PORT + setup.instance
-    try:
-        return connection, UdpTransport(setup.host, port)
-    except OSError as error:
-        connection.close()
-        message = f"px4: cannot listen on udp {setup.host}:{port} ({error.strerror})"
-        raise FirmwareError(f"{message}; end the other program, or set autopilot.instance") from None

@@ -78,6 +78,7 @@ class Exchange:
         rows = self._rows | {COMMAND: pack_row(FirmwareCommand((0.0,) * len(setup.order)))[None]}
         ports = {port: Port(port, like, LATCHED) for port, like in samples.items()}
         self._block = ExchangeBlock("autopilot", setup, (), lambda _: link)
+        self._block._opened = True  # by the test
         self._block.bind(_Diagram(ports, rows, self._samples))
         self._command = rows[COMMAND]
         self._code = self._block._graph.code

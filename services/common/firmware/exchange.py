@@ -21,8 +21,8 @@ from lapwing.kernels.row_packing import load, pack_row, store
 from lapwing.services.common.firmware.hold import FirmwareCommand
 from lapwing.services.common.ports import PerRotor
 
-WAIT, SEND, POLL, INVALID = range(4)
-"""Reasons to call Python: no ordinary answer; message not sent; poll is due; samples that cannot be sent."""
+OPEN, WAIT, SEND, POLL, INVALID = range(5)
+"""Reasons to call Python: first exchange; no ordinary answer; not sent; poll is due; samples that cannot be sent."""
 ARMED, LANDED, FINISHED, WORDS = range(4)  # `flags`
 WAITING, BEGAN, LAST, ENDED = range(4)  # `seconds`
 
@@ -89,21 +89,22 @@ def call_python(e: Shared, tick: int, reason: int, number: int) -> bool:
 
 
 @always_inline
-def begin(e: Shared) -> float:
-    """Count an exchange. Return the wall time [s]."""
-    time = now(e)
+def begin(e: Shared, tick: int) -> bool:
+    """Count an exchange, and store its wall time. Return False if there is no connection."""
     if e.steps[0] == 0:
-        e.seconds[BEGAN] = time
-    e.seconds[LAST] = time
+        if not call_python(e, tick, OPEN, 0):
+            return False
+        e.seconds[BEGAN] = now(e)
+    e.seconds[LAST] = now(e)
     e.steps[0] += 1
-    return time
+    return True
 
 
 @always_inline
-def end(e: Shared, begun: float) -> None:
-    """Add the wall time since `begun` [s] to the waiting time."""
+def end(e: Shared) -> None:
+    """Add the wall time since `begin` to the waiting time."""
     time = now(e)
-    e.seconds[WAITING] += time - begun
+    e.seconds[WAITING] += time - e.seconds[LAST]
     e.seconds[ENDED] = time
 
 

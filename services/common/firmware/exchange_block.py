@@ -14,8 +14,10 @@ from lapwing.services.common.firmware.exchange import (
     ENDED,
     FINISHED,
     LANDED,
+    OPEN,
     WAITING,
     WORDS,
+    Shared,
     shared_memory,
 )  # fmt: skip
 from lapwing.services.common.firmware.hold import COMMAND
@@ -26,10 +28,12 @@ _PYTHON = ctypes.CFUNCTYPE(*(ctypes.c_int64,) * 4)
 class ExchangeBlock(FirmwareBlock):
     """Steps an `ExchangeLink`."""
 
+    _shared: Shared | None = None
+    _error: BaseException | None = None
+
     def bind(self, graph: BlockDiagram) -> None:
         """Have the diagram run compiled code for this block."""
         self._graph, self._python = graph, _PYTHON(self._on_call)
-        self._error: BaseException | None = None
         self._shared = shared_memory(self._setup, graph.ring(COMMAND), self._link.outputs, self._python)
         parameters = self._link.exchange(self._shared, self._ring)
         code = graph.prepare(Block(self.name, parameters, Cell(0)))
@@ -49,9 +53,10 @@ class ExchangeBlock(FirmwareBlock):
     @property
     def reports(self) -> dict[str, str]:
         """Entries of the log's metadata."""
-        report, seconds = self._link.report, self._shared.seconds
-        report.steps, report.waiting = int(self._shared.steps[0]), float(seconds[WAITING])
-        report.wall = float(seconds[ENDED] - seconds[BEGAN])
+        if self._shared:
+            report, seconds = self._link.report, self._shared.seconds
+            report.steps, report.waiting = int(self._shared.steps[0]), float(seconds[WAITING])
+            report.wall = float(seconds[ENDED] - seconds[BEGAN])
         return super().reports
 
     def _ring(self, port: str) -> InputRing:
@@ -61,8 +66,12 @@ class ExchangeBlock(FirmwareBlock):
     def _on_call(self, tick: int, reason: int, number: int) -> int:
         """Run the link for compiled code. Return 0 to go on."""
         try:
+            if reason == OPEN:
+                if not self._opened:
+                    self.open(self._waits)
+                return 0
             output = self._link.attend(tick, reason, number, lambda port: self._graph.latest(port, tick), self._waits)
-            if output is not None:
+            if output is not None and self._shared:
                 flags: Any = self._shared.flags
                 flags[[ARMED, LANDED, FINISHED]] = output.armed, output.landed, output.finished
                 flags[WORDS] = self.words.number(output)

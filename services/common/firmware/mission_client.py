@@ -18,7 +18,7 @@ from lapwing.services.common.mavlink.frames import saturated
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
 RETRY = 1.0  # [s] until an unanswered message is sent again
-POLL_EVERY = 0.02  # [s] between two looks at the link
+POLL_EVERY = 0.1  # [s] between two looks at the link
 REJECTIONS = 20  # uploads, one per second, after which the mission is wrong
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
 BLOCKERS = 5  # last status texts kept while arming is rejected

@@ -13,7 +13,8 @@ from lapwing.services.common import ports
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.ports import BarometerReading, BatteryReading, GpsReading, ImuReading, MagnetometerReading
-from lapwing.services.px4.link import MAVLINK_PORT, PORT, Px4Link
+from lapwing.services.px4.connection import MAVLINK_PORT, PORT
+from lapwing.services.px4.link import Px4Link
 from lapwing.services.px4.resolve import Px4Setup
 from tests.services.firmware_links import Background, Exchange, firmware_setup, free_instance, never
 from tests.services.px4.peer import Px4Peer, finite
@@ -287,7 +288,7 @@ def test_port_in_use_is_named(link):
 
 
 def test_battery_of_scene_is_told_to_firmware(link):
-    link._own = link._own._replace(battery=True)
+    link._setup = link._setup._replace(own=OWN._replace(battery=True))
     samples = {**SAMPLES, ports.BATTERY: BatteryReading(0.42, 11.2, 20.0)}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.settimeout(20.0)

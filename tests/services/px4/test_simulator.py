@@ -24,8 +24,8 @@ from lapwing.services.common.ports import (
     ImuReading,
     MagnetometerReading,
 )
+from lapwing.services.px4.connection import MAVLINK_PORT, PORT
 from lapwing.services.px4.framing import frame
-from lapwing.services.px4.link import MAVLINK_PORT, PORT
 from lapwing.services.px4.messages import (
     DISTANCE_SENSOR,
     HIL_GPS,
