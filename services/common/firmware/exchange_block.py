@@ -26,7 +26,7 @@ _PYTHON = ctypes.CFUNCTYPE(*(ctypes.c_int64,) * 4)
 
 
 class ExchangeBlock(FirmwareBlock):
-    """Steps an `ExchangeLink`."""
+    """Has compiled code exchange samples with the firmware, and an `ExchangeLink` do the rest."""
 
     _shared: Shared | None = None
     _error: BaseException | None = None
