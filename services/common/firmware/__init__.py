@@ -25,11 +25,12 @@ Life of a link, in this order:
 
 For an `ExchangeLink`, compiled code takes the place of `step`: `exchange.py` of the adapter has a NamedTuple of
 parameters and `step(parameters, state, tick, inputs)`, which sends the samples, receives the outputs and writes the
-command (`exchange`: memory shared with Python, samples, times). It leaves to Python (`ExchangeLink.attend`) outputs that
-do not come within 0.2 s or are not the next ones, and every 0.1 s of simulation the MAVLink link of the mission.
+command (`exchange`: memory shared with Python, samples, times). It leaves to Python (`ExchangeLink.attend`) outputs
+that do not come within 0.2 s or are not the next ones, and every 0.1 s of simulation the MAVLink link of the mission.
 
-The block (`block.FirmwareBlock`, `exchange_block.ExchangeBlock`) reorders the outputs to the airframe's rotors (`motor_order`), and a compiled block
-(`hold`) makes volts of them at every tick: output times battery voltage, or times `airframe.motor.max_voltage` if no
-effect models the battery. `link.report` (a `LinkReport`) goes to the log's metadata as "firmware" and to the summary.
+The block (`block.FirmwareBlock`, `exchange_block.ExchangeBlock`) reorders the outputs to the airframe's rotors
+(`motor_order`), and a compiled block (`hold`) makes volts of them at every tick: output times battery voltage, or times
+`airframe.motor.max_voltage` if no effect models the battery. `link.report` (a `LinkReport`) goes to the log's metadata
+as "firmware" and to the summary.
 `lapwing resimulate` does not open a link: it flies the recorded actuator commands (`playback`).
 """
