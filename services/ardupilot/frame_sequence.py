@@ -6,6 +6,10 @@ answered but does not step the plant. A lower count means that the program has s
 
 from enum import Enum, auto
 
+import numpy as np
+
+ANY = -1  # no frame has come, or the program has started again
+
 
 class Frame(Enum):
     """Meaning of a frame count."""
@@ -19,7 +23,8 @@ class FrameSequence:
     """Classifies frame counts.
 
     Attributes:
-        steps: new frames.
+        next: (1,) count of the next frame, ANY before the first; compiled code, which takes in the frames that come in
+            order, increases it.
         resent: frames that came again.
         skipped: frames that never came.
         restarts: starts of the program after the first.
@@ -27,24 +32,25 @@ class FrameSequence:
 
     def __init__(self) -> None:
         """Create a sequence before its first frame."""
-        self.steps = self.resent = self.skipped = self.restarts = 0
-        self._last: int | None = None
+        self.resent = self.skipped = self.restarts = 0
+        self.next = np.full(1, ANY)
 
     def restart(self) -> None:
         """Count a restart of the program; its next frame is new."""
         self.restarts += 1
-        self._last = None
+        self.next[0] = ANY
 
     def receive(self, count: int) -> Frame:
         """Count a frame and return its meaning."""
-        last, self._last = self._last, count
-        if last is not None and count == last:
+        expected, self.next[0] = int(self.next[0]), count + 1
+        if expected == ANY:
+            return Frame.NEW
+        ahead = (count - expected) & 0xFFFFFFFF
+        if ahead == 0xFFFFFFFF:
             self.resent += 1
             return Frame.RESENT
-        self.steps += 1
-        if last is not None and (count - last) & 0xFFFFFFFF >= 1 << 31:
+        if ahead >= 1 << 31:
             self.restarts += 1
             return Frame.RESTARTED
-        if last is not None:
-            self.skipped += ((count - last) & 0xFFFFFFFF) - 1
+        self.skipped += ahead
         return Frame.NEW

@@ -1,19 +1,26 @@
 """Link to ArduPilot SITL: lock step over UDP, and MAVLink over TCP for the mission.
 
 ArduPilot sends a servo packet and waits for the state after that step, so that every exchange is an answer to the last
-packet followed by the wait for the next one.
+packet followed by the wait for the next one. Compiled code makes it (`exchange`) as long as the packets come in order
+and within 0.2 s.
 """
 
+import math
 import socket
 import time
+from collections.abc import Callable
 
+from lapwing.cosim.diagram.compiled_block import InputRing
+from lapwing.services.ardupilot.exchange import OUTPUTS, PWM_MAX, PWM_MIN, ArduPilotExchange
 from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
 from lapwing.services.ardupilot.modes import CONVENTIONS
 from lapwing.services.ardupilot.resolve import LOOP_RATE, ArduPilotSetup
-from lapwing.services.ardupilot.sample import extras, vehicle_state
+from lapwing.services.ardupilot.sample import Samples
 from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttle
 from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
-from lapwing.services.ardupilot.state_message import encode
+from lapwing.services.common import ports
+from lapwing.services.common.firmware.datagrams import DatagramSocket
+from lapwing.services.common.firmware.exchange import INVALID, LAST, POLL, SEND, Shared, unused
 from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
@@ -22,35 +29,30 @@ from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
+from lapwing.services.common.ports import AirspeedReading, DistanceReading, ImuReading
 
 PORT, MAVLINK_PORT, STRIDE = 9002, 5760, 10
 INSTANCES = 100
-WAIT = 0.2  # [s] of one wait for a datagram
 FORGOTTEN = 2.0  # [s] without an answer after which packets from another address are a restarted firmware
-MARGIN = 1e-9  # [s] added to each step: ArduPilot cuts steps to whole microseconds
 PARAMETERS_FILE = "lapwing.parm"
-PWM_MIN, PWM_MAX = 1000.0, 2000.0  # [us] MOT_PWM_MIN and MOT_PWM_MAX
-OUTPUTS = 4
 PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
 
 
 class ArduPilotLink:
     """Connection to one ArduPilot SITL."""
 
+    outputs = OUTPUTS
+
     def __init__(self, setup: FirmwareSetup) -> None:
         """Store the configuration."""
         self._setup = setup
         self._own: ArduPilotSetup = setup.own
         self.report = LinkReport("ardupilot")
-        self._sequence = FrameSequence()
+        self._sequence, self._socket = FrameSequence(), DatagramSocket()
         self._program: Program | None = None
-        self._socket: socket.socket | None = None
         self._client: MissionClient | None = None
         self._status: FlightStatus | None = None
         self._simulated: SimulatedSensors | None = None
-        self._peer: tuple[str, int] | None = None
-        self._sent = 0.0  # [s] of the wall clock at the last answer
-        self._answer = b""  # last state message
         self._time = 0.0  # [s] of the simulation
         self._packet: ServoPacket | None = None
 
@@ -59,9 +61,26 @@ class ArduPilotLink:
         """Address of the lock step, of this link's socket."""
         return self._setup.host, self._setup.port_at(PORT, STRIDE)
 
+    def exchange(self, shared: Shared, ring: Callable[[str], InputRing]) -> ArduPilotExchange:
+        """Return the parameters of the compiled exchange."""
+        own, self._shared = self._own, shared
+        samples = Samples(
+            own.gravity_world,
+            ring(ports.TRUTH),
+            ring(ports.IMU) if own.imu else unused(ImuReading()),
+            ring(own.range_port) if own.range_port else unused(DistanceReading()),
+            ring(ports.AIRSPEED) if own.airspeed else unused(AirspeedReading()),
+            ring(ports.BATTERY),
+            own.imu,
+            bool(own.range_port),
+            own.airspeed,
+        )
+        return ArduPilotExchange(shared, samples, self._socket.memory, self._sequence.next)
+
     def open(self, waits: Waits) -> None:
         """Start or await ArduPilot, and receive its first servo packet."""
-        self._setup, self._socket = first_free(self._setup, INSTANCES, _claim)
+        self._setup, bound = first_free(self._setup, INSTANCES, _claim)
+        self._socket.attach(bound)
         setup = self._setup
         items = uploaded(setup.plan)
         parameters = {**PARAMETERS, **setup.parameters} if items else dict(setup.parameters)
@@ -80,7 +99,7 @@ class ArduPilotLink:
         while self._packet is None:
             waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
             self._client.read()  # ArduPilot waits for a connection before it starts
-            self._receive(resend=False)
+            self._take(self._socket.receive(), resend=False)
             self._check(patience, "no servo packet", "start arducopter with --model JSON:127.0.0.1")
 
     def _arguments(self) -> list[str]:
@@ -97,27 +116,41 @@ class ArduPilotLink:
         given = set(self._setup.command)
         return [text for name, value in known.items() if value and name not in given for text in (name, value)]
 
-    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
-        """Answer the last servo packet with the state at the tick, and wait for the next packet."""
+    def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
+        """Do what compiled code leaves to Python; see `ExchangeLink`."""
         self._time = tick * self._setup.interval
-        self._answer = encode(self._time + tick * MARGIN, vehicle_state(self._own, read), extras(self._own, read))
-        self._packet, begun, self._sent = None, time.perf_counter(), time.monotonic()
-        self._send()
-        patience: Patience | None = None
-        while self._packet is None:
-            self._receive(resend=True)
-            if self._packet is None:
-                patience = patience or self._patience()
-                waits("ardupilot")
-                self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
-        self.report.waiting += time.perf_counter() - begun
+        if reason == INVALID:
+            raise ValueError("the state of the vehicle is not finite")
+        if reason == SEND:
+            self._send()
+        elif reason == POLL:
+            return self._poll(tick, read)
+        else:
+            self._await(number, waits)
+        return None
+
+    def _poll(self, tick: int, read: Read) -> FirmwareOutput:
+        """Poll the MAVLink link. Return the state of the flight."""
+        assert self._client is not None
         assert self._status is not None
         assert self._simulated is not None
         self._status.poll(self._time)
         self.report.version = self._status.version
-        motors = tuple(throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS])
-        self._simulated.update(self._time, read, motors)
-        return self._status.output(motors, running=max(motors) > 0.0)  # a heartbeat comes only once a second
+        self._simulated.update(self._time, read, tuple(self._shared.outputs))
+        self._shared.next_poll[0] = max(tick + 1, math.floor(self._client.next_poll / self._setup.interval))
+        return self._status.output((), running=False)
+
+    def _await(self, size: int, waits: Waits) -> None:
+        """Wait for the next servo packet, after the receipt of `size` bytes that are not simply this packet."""
+        self._packet = None
+        self._take(size, resend=True)
+        patience: Patience | None = None
+        while self._packet is None:
+            patience = patience or self._patience()
+            waits("ardupilot")
+            self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
+            self._take(self._socket.receive(), resend=True)
+        self._shared.outputs[:] = [throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS]]
 
     def cpu(self) -> float:
         """Return the CPU time [s] of the program, 0 if somebody else has started it."""
@@ -127,11 +160,10 @@ class ArduPilotLink:
         """End the connections, and the program."""
         if self._client:
             self._client.close()
-        if self._socket:
-            self._socket.close()
+        self._socket.close()
         if self._program:
             self._program.close()
-        self._program = self._socket = self._client = None
+        self._program = self._client = None
 
     def _patience(self) -> Patience:
         return Patience(self._setup.step_timeout, self._program.pid if self._program else None)
@@ -142,34 +174,31 @@ class ArduPilotLink:
         if self._program:
             self._program.check(at)
         if patience.over:
-            timeout = self._setup.step_timeout if self._answer else self._setup.start_timeout
+            answered = self._socket.memory.sent_size[0] > 0
+            timeout = self._setup.step_timeout if answered else self._setup.start_timeout
             raise FirmwareError(f"ardupilot: {what} for {timeout:g} s{at}; {advice}")
 
     def _send(self) -> None:
-        if self._socket and self._peer and self._answer:
-            try:
-                self._socket.sendto(self._answer, self._peer)
-            except OSError as error:
-                self.report.note(f"cannot send to ArduPilot ({error.strerror})")
+        """Send the last answer."""
+        if reason := self._socket.send():
+            self.report.note(f"cannot send to ArduPilot ({reason})")
 
-    def _receive(self, resend: bool) -> None:
-        """Wait for one datagram, and take it in; answer a resent frame if `resend`."""
-        assert self._socket is not None
-        try:
-            data, sender = self._socket.recvfrom(2048)
-        except OSError:  # none, or the port of a firmware that has ended
+    def _take(self, size: int, resend: bool) -> None:
+        """Take in a datagram of `size` bytes, negative: none has come; answer a resent frame if `resend`."""
+        link = self._socket
+        if size < 0:  # none, or the port of a firmware that has ended
             return
         try:
-            packet = decode(data)
+            packet = decode(link.datagram(size))
         except ValueError as error:
-            self._reject(f"packet from {sender[0]}:{sender[1]} is no servo packet: {error}")
+            self._reject(f"packet from {link.sender} is no servo packet: {error}")
             return
-        if self._peer not in (None, sender):
-            if time.monotonic() < self._sent + FORGOTTEN:
-                self._reject(f"another ArduPilot sends from {sender[0]}:{sender[1]}")
+        if link.has_peer and not link.knows_sender:
+            if time.monotonic() < self._shared.seconds[LAST] + FORGOTTEN:
+                self._reject(f"another ArduPilot sends from {link.sender}")
                 return
             self._sequence.restart()
-        self._peer = sender
+        link.answer_sender()
         meaning = self._sequence.receive(packet.frame_count)
         self.report.resent, self.report.missed = self._sequence.resent, self._sequence.skipped
         self.report.reconnected = self._sequence.restarts
@@ -204,5 +233,4 @@ def _claim(setup: FirmwareSetup) -> socket.socket:
         result.close()
         message = f"ardupilot: cannot listen on udp {address[0]}:{address[1]} ({error.strerror})"
         raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
-    result.settimeout(WAIT)
     return result

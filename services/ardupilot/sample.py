@@ -1,43 +1,58 @@
-"""Samples of the ports as ArduPilot's state message."""
+"""Samples of the ports as ArduPilot's state message, in compiled code."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
+from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import math, python_function
-from lapwing.services.ardupilot.resolve import ArduPilotSetup
+from lapwing.kernels import always_inline, math
 from lapwing.services.ardupilot.state_message import Extras, VehicleState
-from lapwing.services.common import ports
-from lapwing.services.common.firmware.link import Read
+from lapwing.services.common.firmware.exchange import newest
+from lapwing.services.common.ports import TrueState
 
 SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] of indicated airspeed
-_rotate_back = python_function(quaternion.rotate_back)
 
 
-def specific_force(gravity_world: Vec3, x: Any) -> Vec3:
+class Samples(NamedTuple):
+    """Ports of the vehicle, and which of them it has."""
+
+    gravity_world: Vec3  # [m/s^2]
+    truth: InputRing
+    imu: InputRing
+    distance: InputRing
+    airspeed: InputRing
+    battery: InputRing
+    has_imu: bool  # rates and specific force of the IMU, otherwise ground truth
+    has_distance: bool
+    has_airspeed: bool
+
+
+@always_inline
+def specific_force(gravity_world: Vec3, x: TrueState) -> Vec3:
     """Return R^T (a - g) [m/s^2], body, of a true state."""
     a, g = x.acceleration_world, gravity_world
-    return _rotate_back(x.attitude, (a[0] - g[0], a[1] - g[1], a[2] - g[2]))  # type: ignore[no-any-return]
+    return quaternion.rotate_back(x.attitude, (a[0] - g[0], a[1] - g[1], a[2] - g[2]))  # type: ignore[no-any-return]
 
 
-def vehicle_state(own: ArduPilotSetup, read: Read) -> VehicleState:
+@always_inline
+def vehicle_state(p: Samples, tick: int) -> VehicleState:
     """Return the state of the vehicle: ground truth, or rates and specific force of the IMU."""
-    x = read(ports.TRUTH)
-    if own.imu:
-        imu = read(ports.IMU)
+    x = newest(p.truth, tick)
+    omega, force = x.omega_body, specific_force(p.gravity_world, x)
+    if p.has_imu:
+        imu = newest(p.imu, tick)
         omega, force = imu.omega_body, imu.specific_force_body
-    else:
-        omega, force = x.omega_body, specific_force(own.gravity_world, x)
     return VehicleState(x.position_world, x.velocity_world, x.attitude, omega, force)
 
 
-def extras(own: ArduPilotSetup, read: Read) -> Extras:
+@always_inline
+def extras(p: Samples, tick: int) -> Extras:
     """Return the optional fields that the vehicle's sensors fill."""
-    ranges: tuple[float, ...] = ()
-    if own.range_port and (reading := read(own.range_port)).valid:
-        ranges = (reading.range,)
-    airspeed = None
-    if own.airspeed and (pressure := read(ports.AIRSPEED)).valid:
-        airspeed = math.sqrt(2.0 * max(pressure.pressure, 0.0) / SEA_LEVEL_DENSITY)
-    battery = read(ports.BATTERY)
-    return Extras(ranges, airspeed, battery.voltage, battery.current)
+    distance, airspeed = math.nan, math.nan
+    range_reading, pressure_reading = newest(p.distance, tick), newest(p.airspeed, tick)
+    if p.has_distance and range_reading.valid:
+        distance = range_reading.range
+    if p.has_airspeed and pressure_reading.valid:
+        airspeed = math.sqrt(2.0 * max(pressure_reading.pressure, 0.0) / SEA_LEVEL_DENSITY)
+    battery: Any = newest(p.battery, tick)
+    return Extras((distance,), airspeed, battery.voltage, battery.current)

@@ -7,6 +7,8 @@ Source: ArduPilot, libraries/SITL/examples/JSON/readme.md.
 import struct
 from typing import NamedTuple
 
+from lapwing.kernels import always_inline
+
 MAGIC_16, MAGIC_32 = 18458, 29569
 _HEAD = struct.Struct("<HHI")
 _LAYOUTS = {MAGIC_16: struct.Struct("<HHI16H"), MAGIC_32: struct.Struct("<HHI32H")}
@@ -43,6 +45,7 @@ def decode(data: bytes) -> ServoPacket:
     return ServoPacket(rate, count, pwm)
 
 
+@always_inline
 def throttle(pwm: int, low: float, high: float) -> float:
     """Return the fraction, 0 to 1, of a pulse width [us]; `low` and `high` [us] are MOT_PWM_MIN and MOT_PWM_MAX."""
     return min(max((pwm - low) / (high - low), 0.0), 1.0)

@@ -5,20 +5,30 @@ an earlier one. Position and velocity are north, east, down; body vectors are fo
 rotates body to earth, scalar first. Sources: ArduPilot, libraries/SITL/examples/JSON/readme.md and SIM_JSON.cpp.
 """
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.kernels import math
-from lapwing.services.common.mavlink.frames import swap_attitude, swap_body, swap_world
+from lapwing.kernels import always_inline, math
+from lapwing.services.ardupilot.decimal_text import LIMIT, write_number, write_text
+from lapwing.services.common.mavlink import frames
 
-RANGEFINDERS = 6  # rng_1 to rng_6
-_FORMAT = (
-    "\n"
-    '{"timestamp":%.10f,"imu":{"gyro":[%.9g,%.9g,%.9g],"accel_body":[%.9g,%.9g,%.9g]},'
-    '"position":[%.12g,%.12g,%.12g],"quaternion":[%.9g,%.9g,%.9g,%.9g],"velocity":[%.9g,%.9g,%.9g]'
-)
+
+def _text(text: str) -> np.ndarray:
+    return np.frombuffer(text.encode(), np.uint8).copy()
+
+
+_TIME, _GYRO, _FORCE = _text('\n{"timestamp":'), _text(',"imu":{"gyro":['), _text('],"accel_body":[')
+_POSITION, _QUATERNION = _text(']},"position":['), _text('],"quaternion":[')
+_VELOCITY, _END, _COMMA = _text('],"velocity":['), _text("}\n"), _text(",")
+_RANGE, _AFTER_RANGE, _AIRSPEED = _text(',"rng_'), _text('":'), _text(',"airspeed":')
+_BATTERY, _CURRENT, _CLOSE, _BRACE = _text(',"battery":{"voltage":'), _text(',"current":'), _text("]"), _text("}")
+_swap_world, _swap_body = always_inline(frames.swap_world), always_inline(frames.swap_body)
+_swap_attitude = always_inline(frames.swap_attitude)
+_NANO, _TENTH_NANO, _MICRO = 10**9, 10**10, 10**6
+INVALID = -1
 
 
 class VehicleState(NamedTuple):
@@ -32,47 +42,77 @@ class VehicleState(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """Optional fields; None or empty: left out."""
+    """Optional fields; those that are not finite are left out."""
 
-    ranges: Sequence[float] = ()  # [m] of the rangefinders, at most 6; infinite: nothing in range
-    airspeed: float | None = None  # [m/s]
-    voltage: float | None = None  # [V] of the battery
-    current: float | None = None  # [A] drawn
+    ranges: tuple[float, ...] = (math.nan,)  # [m] of the rangefinders, at most 6
+    airspeed: float = math.nan  # [m/s]
+    voltage: float = math.nan  # [V] of the battery
+    current: float = math.nan  # [A] drawn
 
 
 NO_EXTRAS = Extras()
 
 
-def encode(time: float, state: VehicleState, extras: Extras = NO_EXTRAS) -> bytes:
-    """Return the message.
+@always_inline
+def _is_written(values: Any) -> bool:
+    fits = True
+    for value in values:
+        fits = fits and math.fabs(value) < LIMIT
+    return fits
+
+
+@always_inline
+def _numbers(out: Any, at: int, values: Any) -> int:
+    """Write numbers with nine decimals, separated by commas."""
+    first = True
+    for value in values:
+        if not first:
+            at = write_text(out, at, _COMMA)
+        first = False
+        at = write_number(out, at, value, 9, _NANO)
+    return at
+
+
+@always_inline
+def write_state(out: Any, time: float, state: VehicleState, extras: Extras) -> int:
+    """Write the message into `out`.
+
+    Numbers have 9 decimals, the time 10, optional fields 6.
 
     Args:
+        out: bytes, shape (2048,).
         time: [s] of the simulation.
         state: state of the vehicle.
         extras: optional fields.
 
-    Raises:
-        ValueError: a required number is not finite.
+    Returns:
+        Its length [bytes]; INVALID if a number of the state is not finite, or is 9e8 or more.
     """
-    position, velocity = swap_world(state.position_world), swap_world(state.velocity_world)
-    gyro, force = swap_body(state.omega_body), swap_body(state.specific_force_body)
-    quaternion = swap_attitude(state.attitude)
-    values = (time, *gyro, *force, *position, *quaternion, *velocity)
-    text = _FORMAT % values
-    if "nan" in text or "inf" in text:  # as written by the format; no key contains them
-        raise ValueError("the state of the vehicle is not finite")
-    return f"{text}{_optional(extras)}}}\n".encode()
+    position, velocity = _swap_world(state.position_world), _swap_world(state.velocity_world)
+    gyro, force = _swap_body(state.omega_body), _swap_body(state.specific_force_body)
+    quaternion = _swap_attitude(state.attitude)
+    if not _is_written((time, *gyro, *force, *position, *quaternion, *velocity)):
+        return INVALID
+    at = write_number(out, write_text(out, 0, _TIME), time, 10, _TENTH_NANO)
+    at = _numbers(out, write_text(out, at, _GYRO), gyro)
+    at = _numbers(out, write_text(out, at, _FORCE), force)
+    at = _numbers(out, write_text(out, at, _POSITION), position)
+    at = _numbers(out, write_text(out, at, _QUATERNION), quaternion)
+    at = write_text(out, _numbers(out, write_text(out, at, _VELOCITY), velocity), _CLOSE)
+    return write_text(out, _optional(out, at, extras), _END)
 
 
-def _optional(extras: Extras) -> str:
-    """Return the optional fields, each after a comma."""
-    text = "".join(
-        f',"rng_{k}":{distance:.6g}'
-        for k, distance in enumerate(extras.ranges[:RANGEFINDERS], start=1)
-        if math.isfinite(distance)
-    )
-    if extras.airspeed is not None and math.isfinite(extras.airspeed):
-        text += f',"airspeed":{extras.airspeed:.6g}'
-    if extras.voltage is not None and extras.current is not None and math.isfinite(extras.voltage):
-        text += f',"battery":{{"voltage":{extras.voltage:.6g},"current":{extras.current:.6g}}}'
-    return text
+@always_inline
+def _optional(out: Any, at: int, extras: Extras) -> int:
+    """Write the optional fields, each after a comma."""
+    for k in range(len(extras.ranges)):
+        if math.fabs(extras.ranges[k]) < LIMIT:
+            at = write_number(out, write_text(out, at, _RANGE), k + 1.0, 0, 1)
+            at = write_number(out, write_text(out, at, _AFTER_RANGE), extras.ranges[k], 6, _MICRO)
+    if math.fabs(extras.airspeed) < LIMIT:
+        at = write_number(out, write_text(out, at, _AIRSPEED), extras.airspeed, 6, _MICRO)
+    if math.fabs(extras.voltage) < LIMIT and math.fabs(extras.current) < LIMIT:
+        at = write_number(out, write_text(out, at, _BATTERY), extras.voltage, 6, _MICRO)
+        at = write_number(out, write_text(out, at, _CURRENT), extras.current, 6, _MICRO)
+        at = write_text(out, at, _BRACE)
+    return at

@@ -5,23 +5,26 @@ import select
 import socket
 
 from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.mavlink_transport import UdpTransport
+from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.px4.framing import FrameParser, Layout, frame
 from lapwing.services.px4.messages import RECEIVED
+from lapwing.services.px4.sensor_frame import COMPONENT, SYSTEM, Sensors, sensor_frame
+from lapwing.services.px4.stream import CLOSED, PIECE, WAIT, Stream, connect
 
-WAIT = 0.2  # [s] of one wait
-PIECE = 65536  # [bytes]
-SYSTEM, COMPONENT = 1, 51  # ids of the simulator; PX4 does not check them
+PORT, MAVLINK_PORT = 4560, 14540
 
 
 class Connection:
     """Server and its connection.
 
     Attributes:
+        memory: of the connection, shared with compiled code.
         connected: False before a firmware has connected, and after it has gone.
         refused: further firmwares that have tried to connect.
     """
 
-    def __init__(self, host: str, port: int):
+    def __init__(self, host: str, port: int, memory: Stream):
         """Listen.
 
         Raises:
@@ -38,7 +41,7 @@ class Connection:
             message = f"px4: cannot listen on {self.where} ({error.strerror})"
             raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
         self._peer: socket.socket | None = None
-        self._parser, self._sequence = FrameParser(RECEIVED), 0
+        self._parser, self.memory = FrameParser(RECEIVED), memory
         self.refused = self._rejected = 0
 
     @property
@@ -60,6 +63,7 @@ class Connection:
             return False
         self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._peer.setblocking(False)
+        connect(self.memory, self._peer.fileno())
         self._poll = select.poll()
         self._poll.register(self._peer, select.POLLIN)
         return True
@@ -74,18 +78,22 @@ class Connection:
             other.close()
             self.refused += 1
 
-    def send(self, messages: list[tuple[Layout, tuple]]) -> None:
-        """Send messages in one piece; they are lost if the firmware has gone."""
+    def send_sensors(self, time_us: int, sensors: Sensors) -> None:
+        """Send HIL_SENSOR; it is lost if the firmware has gone."""
         if self._peer is None:
             return
-        data = b""
-        for layout, values in messages:
-            data += frame(layout, self._sequence, values, SYSTEM, COMPONENT)
-            self._sequence = (self._sequence + 1) & 0xFF
         try:
-            self._peer.sendall(data)
+            self._peer.sendall(sensor_frame(self._next_sequence(), time_us, sensors))
         except OSError:  # also a full buffer: a firmware that has not read for a long time
-            self._lose()
+            self.lose()
+
+    def append(self, messages: list[tuple[Layout, tuple]]) -> None:
+        """Append messages to those that compiled code sends."""
+        for layout, values in messages:
+            data = frame(layout, self._next_sequence(), values, SYSTEM, COMPONENT)
+            begin = int(self.memory.sent_size[0])
+            self.memory.sent[begin : begin + len(data)] = bytearray(data)
+            self.memory.sent_size[0] = begin + len(data)
 
     def receive(self, wait: bool = True) -> list[tuple[int, tuple]]:
         """Return the messages that have come; wait for some at most 0.2 s if `wait`."""
@@ -99,10 +107,26 @@ class Connection:
             return []
         except OSError:
             data = b""
-        if not data:
-            self._lose()
+        return self._take(data)
+
+    def received(self, size: int) -> list[tuple[int, tuple]]:
+        """Return the messages in the `size` bytes that compiled code has received; see `stream.receive`."""
+        if size < CLOSED or self._peer is None:
             return []
-        return self._parser.parse(data)
+        return self._take(self.memory.received[:size].tobytes())
+
+    def _take(self, data: bytes) -> list[tuple[int, tuple]]:
+        if not data:
+            self.lose()
+            return []
+        result = self._parser.parse(data)
+        self.memory.rest[0] = self._parser.rest
+        return result
+
+    def _next_sequence(self) -> int:
+        sequence = int(self.memory.sequence[0])
+        self.memory.sequence[0] = (sequence + 1) & 0xFF
+        return sequence
 
     @staticmethod
     def _gone(peer: socket.socket) -> bool:
@@ -116,12 +140,29 @@ class Connection:
 
     def close(self) -> None:
         """Close the connection and the server."""
-        self._lose()
+        self.lose()
         self._server.close()
 
-    def _lose(self) -> None:
+    def lose(self) -> None:
+        """Close the connection."""
+        connect(self.memory, -1)
         if self._peer is not None:
             self._peer.close()
             self._peer = None
         self._rejected += self._parser.rejected
         self._parser = FrameParser(RECEIVED)
+
+
+def claim(setup: FirmwareSetup, memory: Stream) -> tuple[Connection, UdpTransport]:
+    """Open the ports of an instance.
+
+    Raises:
+        FirmwareError: one is in use.
+    """
+    connection, port = Connection(setup.host, setup.port_at(PORT), memory), MAVLINK_PORT + setup.instance
+    try:
+        return connection, UdpTransport(setup.host, port)
+    except OSError as error:
+        connection.close()
+        message = f"px4: cannot listen on udp {setup.host}:{port} ({error.strerror})"
+        raise FirmwareError(f"{message}; end the other program, or set autopilot.instance") from None

@@ -57,6 +57,11 @@ class FrameParser:
         self._garbage = False
         self.rejected = 0
 
+    @property
+    def rest(self) -> int:
+        """Return the number of bytes of an incomplete frame."""
+        return len(self._data)
+
     def parse(self, data: bytes) -> list[tuple[int, tuple]]:
         """Return (message id, values in the order of the wire) of the frames that `data` completes."""
         data, result = self._data + data, []

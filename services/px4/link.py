@@ -2,77 +2,93 @@
 
 PX4's clock is the time of the last HIL_SENSOR. While PX4 starts, messages of a vehicle at rest are sent without waiting
 ("free-wheel"), until its first HIL_ACTUATOR_CONTROLS; from then on every HIL_SENSOR is answered by one with its time.
+Compiled code makes this exchange (`exchange`) as long as nothing else comes.
 """
 
 import math
 import time
+from collections.abc import Callable
 
+import numpy as np
+
+from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.exchange import POLL, SEND, Shared, unused
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
-from lapwing.services.common.firmware.mavlink_transport import UdpTransport
-from lapwing.services.common.firmware.mission import mission_messages, uploaded
-from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
-from lapwing.services.common.ports import BatteryReading
-from lapwing.services.px4.connection import Connection
+from lapwing.services.common.ports import AirspeedReading
+from lapwing.services.px4.connection import Connection, claim
+from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange
 from lapwing.services.px4.messages import HIL_ACTUATOR_CONTROLS, ActuatorControls, actuator_controls
-from lapwing.services.px4.modes import CONVENTIONS
 from lapwing.services.px4.resolve import Px4Setup
-from lapwing.services.px4.sample import Sampler, at_rest
+from lapwing.services.px4.sample import RARE, Readings, Sampler, at_rest
+from lapwing.services.px4.sensor_frame import payload
+from lapwing.services.px4.stream import stream
+from lapwing.services.px4.vehicle_link import VehicleLink
 
-PORT, MAVLINK_PORT = 4560, 14540
 INSTANCES = 10  # with a MAVLink port of their own
 SECOND = 1_000_000  # [us]
 MISSED = 1.0  # [s] after which a step goes on without the answer of PX4
-OUTPUTS = 4
-BATTERY_EVERY = 0.5  # [s]
-OTHERS_EVERY = 250  # steps between two looks for a second firmware
+OTHERS_EVERY = 1.0  # [s] between two looks for a second firmware
 
 
 class Px4Link:
     """Connection to one PX4 SITL."""
+
+    outputs = OUTPUTS
 
     def __init__(self, setup: FirmwareSetup) -> None:
         """Store the configuration."""
         self._setup = setup
         self._own: Px4Setup = setup.own
         self.report = LinkReport("px4")
-        self._sampler = Sampler(setup.own)
+        self._sampler, self._stream = Sampler(setup.own), stream()
         self._program: Program | None = None
         self._connection: Connection | None = None
-        self._status: FlightStatus | None = None
-        self._client: MissionClient | None = None
-        self._epoch = 0  # [us] of PX4's clock at tick 0
+        self._vehicle: VehicleLink | None = None
+        self._epoch = np.zeros(1, np.int64)  # [us] of PX4's clock at tick 0
         self._last_us = 0  # [us] of the last message
         self._time = 0.0  # [s] of the simulation
-        self._battery_at = 0.0  # [s] of the next message about the battery
-        self._silent = 0  # consecutive steps without an answer
-        self._motors: tuple[float, ...] = (0.0,) * OUTPUTS
-        self._armed = False
+        self._step_us = setup.period * setup.interval_ns // 1000
+        self._others_at = 0.0  # [s] of the next look for a second firmware
+        self._silent = np.zeros(1, np.int64)  # consecutive steps without an answer
+        self._armed = np.zeros(1, np.int64)
+
+    def exchange(self, shared: Shared, ring: Callable[[str], InputRing]) -> Px4Exchange:
+        """Return the parameters of the compiled exchange."""
+        self._shared, periods = shared, self._own.periods
+        named = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *RARE)
+        airspeed = ring(ports.AIRSPEED) if ports.AIRSPEED in periods else unused(AirspeedReading())
+        readings = Readings(
+            ring(ports.IMU),
+            ring(ports.MAGNETOMETER),
+            ring(ports.BAROMETER),
+            airspeed,
+            np.array([periods.get(port, 0) for port in named]),
+            np.full(len(named), -1),
+        )
+        return Px4Exchange(
+            shared, readings, self._stream, payload(), payload(), self._epoch, self._setup.interval_ns, self._armed,
+            self._silent,
+        )  # fmt: skip
 
     def open(self, waits: Waits) -> None:
         """Start or await PX4, and run it up to a full second of its clock."""
-        self._setup, (self._connection, transport) = first_free(self._setup, INSTANCES, _claim)
+        self._setup, (self._connection, transport) = first_free(
+            self._setup, INSTANCES, lambda candidate: claim(candidate, self._stream)
+        )
         setup = self._setup
-        items, parameters = uploaded(setup.plan), dict(setup.parameters)
         if setup.command:
             self._program = self._start(setup.instance)
-            parameters = {}
-        self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, self._own.datum), parameters)
-        self._status = FlightStatus("px4", self._client)
+        self._vehicle = VehicleLink(setup, transport)
         self._connect(waits, self._patience(setup.start_timeout))
-        self._epoch = -(-self._last_us // SECOND) * SECOND
-        while self._last_us + self._step_us < self._epoch:
+        self._epoch[0] = -(-self._last_us // SECOND) * SECOND
+        while self._last_us + self._step_us < self._epoch[0]:
             self._rest(self._last_us // self._step_us)
-            self._await(self._last_us, waits)
+            self._await(self._connection.receive(), self._last_us, waits)
         self.report.late = 0  # answers to messages that were sent without waiting
-
-    @property
-    def _step_us(self) -> int:
-        return self._setup.period * self._setup.interval_ns // 1000
 
     def _start(self, instance: int) -> Program:
         """Start the program, with parameters in its environment."""
@@ -104,33 +120,38 @@ class Px4Link:
         """Send the next message of a vehicle at rest."""
         assert self._connection is not None
         self._last_us += self._step_us
-        self._connection.send(at_rest(self._own, count, self._last_us))
+        self._connection.send_sensors(self._last_us, at_rest(self._own, count))
 
-    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
-        """Send the readings at the tick, and wait for the outputs of the same time."""
+    def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
+        """Do what compiled code leaves to Python; see `ExchangeLink`."""
         link, setup = self._connection, self._setup
         assert link is not None
-        assert self._status is not None
         self._time = tick * setup.interval
-        time_us = self._epoch + tick * setup.interval_ns // 1000
-        messages, answered = self._sampler.messages(tick, time_us, read)
-        self._last_us = time_us
-        link.send(messages)
-        if answered:
-            self._await(time_us, waits)
-        if tick // setup.period % OTHERS_EVERY == 0:
+        self._last_us = int(self._epoch[0]) + tick * setup.interval_ns // 1000
+        if reason == MESSAGES:
+            link.append(self._sampler.messages(tick, self._last_us, read))
+        elif reason == SEND:  # also a full buffer: a firmware that has not read for a long time
+            link.lose()
+        elif reason == POLL:
+            return self._poll(tick, read)
+        else:
+            self._await(link.received(number), self._last_us, waits)
+            self.report.rejected = link.rejected + link.refused
+        return None
+
+    def _poll(self, tick: int, read: Read) -> FirmwareOutput:
+        """Poll the MAVLink link, and look for other firmwares. Return the state of the flight."""
+        link = self._connection
+        assert link is not None
+        assert self._vehicle is not None
+        if self._time >= self._others_at:
+            self._others_at = self._time + OTHERS_EVERY
             self._look_for_others()
         self.report.rejected = link.rejected + link.refused
-        self._status.poll(self._time)
-        self.report.version = self._status.version
-        if self._own.battery and self._time >= self._battery_at:
-            self._battery_at = self._time + BATTERY_EVERY
-            self._tell_battery(read(ports.BATTERY))
-        return self._status.output(self._motors, running=self._armed)
-
-    def _tell_battery(self, battery: BatteryReading) -> None:
-        if self._client and math.isfinite(battery.charge):
-            self._client.send_battery(battery.voltage, battery.current, battery.charge)
+        result = self._vehicle.poll(self._time, read)
+        self.report.version = self._vehicle.version
+        self._shared.next_poll[0] = max(tick + 1, math.floor(self._vehicle.next_poll / self._setup.interval))
+        return result
 
     def cpu(self) -> float:
         """Return the CPU time [s] of the program, 0 if somebody else has started it."""
@@ -138,27 +159,28 @@ class Px4Link:
 
     def close(self) -> None:
         """End the connections, and the program."""
-        if self._client:
-            self._client.close()
+        if self._vehicle:
+            self._vehicle.close()
         if self._connection:
             self._connection.close()
         if self._program:
             self._program.close()
-        self._program = self._connection = self._client = None
+        self._program = self._connection = self._vehicle = None
 
-    def _await(self, time_us: int, waits: Waits) -> None:
-        """Wait for the outputs of a time; go on without them if they do not come within a second."""
-        link, report, begun = self._connection, self.report, time.perf_counter()
+    def _await(self, messages: list[tuple[int, tuple]], time_us: int, waits: Waits) -> None:
+        """Wait for the outputs of a time, which may be among `messages`; go on without them after a second."""
+        link, report = self._connection, self.report
         assert link is not None
         patience: Patience | None = None
         while True:
-            result = self._answers(link.receive())
+            result = self._answers(messages)
             if result and result.time_us >= time_us:
                 report.skew_max = max(report.skew_max, 1e-6 * (result.time_us - time_us))
-                self._silent = 0
+                self._silent[0] = 0
                 break
             if result:
                 report.late += 1
+                messages = link.receive()
                 continue
             waits("px4")
             patience = patience or self._patience(MISSED)
@@ -168,11 +190,11 @@ class Px4Link:
             self._check_program()
             if patience.over:
                 report.missed += 1
-                self._silent += 1
-                if self._silent * MISSED >= self._setup.step_timeout:
+                self._silent[0] += 1
+                if self._silent[0] * MISSED >= self._setup.step_timeout:
                     self._fail(f"no HIL_ACTUATOR_CONTROLS for {self._setup.step_timeout:g} s", "check that it runs")
                 break
-        report.waiting += time.perf_counter() - begun
+            messages = link.receive()
 
     def _reconnect(self, waits: Waits) -> None:
         """Await a firmware that is started again; the vehicle keeps its state, with its motors off."""
@@ -180,10 +202,10 @@ class Px4Link:
             self._check_program()
             self._fail("it closed its connection", "see its output")
         self.report.note(f"PX4 closed its connection at t = {self._time:.3f} s")
-        self._motors, self._armed = (0.0,) * OUTPUTS, False
+        self._shared.outputs[:], self._armed[0] = 0.0, False
         self._connect(waits, self._patience(self._setup.start_timeout))
         self.report.reconnected += 1
-        self._epoch = self._last_us - round(self._time * 1e6)
+        self._epoch[0] = self._last_us - round(self._time * 1e6)
 
     def _answers(self, messages: list[tuple[int, tuple]]) -> ActuatorControls | None:
         """Take in the outputs among messages. Return the newest."""
@@ -196,7 +218,7 @@ class Px4Link:
                 self._fail("it runs without lock step", "build px4_sitl_default")
             motors = result.controls[:OUTPUTS]
             if all(map(math.isfinite, motors)):
-                self._motors, self._armed = motors, result.armed
+                self._shared.outputs[:], self._armed[0] = motors, result.armed
             else:
                 self.report.missed += 1
                 self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are held")
@@ -225,18 +247,3 @@ class Px4Link:
 
     def _fail(self, what: str, advice: str) -> None:
         raise FirmwareError(f"px4: {what} at t = {self._time:.3f} s; {advice}")
-
-
-def _claim(setup: FirmwareSetup) -> tuple[Connection, UdpTransport]:
-    """Open the ports of an instance.
-
-    Raises:
-        FirmwareError: one is in use.
-    """
-    connection, port = Connection(setup.host, setup.port_at(PORT)), MAVLINK_PORT + setup.instance
-    try:
-        return connection, UdpTransport(setup.host, port)
-    except OSError as error:
-        connection.close()
-        message = f"px4: cannot listen on udp {setup.host}:{port} ({error.strerror})"
-        raise FirmwareError(f"{message}; end the other program, or set autopilot.instance") from None

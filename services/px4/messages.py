@@ -6,7 +6,6 @@ Sources: MAVLink common message set; PX4, src/modules/simulation/simulator_mavli
 import struct
 from typing import NamedTuple
 
-from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import math
 from lapwing.services.common.mavlink.frames import saturated, swap_world
 from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, DistanceReading, GpsReading
@@ -29,44 +28,6 @@ FIX_TYPES = {0: FIX_3D, GPS_SINGLE: FIX_3D, GPS_SBAS: 4, GPS_FLOAT: 5, GPS_RTK: 
 SATELLITES = 12  # reported with a fix
 UNKNOWN = 65535
 DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
-
-
-class Sensors(NamedTuple):
-    """Readings of one step, body FLU; None: not updated."""
-
-    omega_body: Vec3 | None = None  # [rad/s]
-    specific_force_body: Vec3 | None = None  # [m/s^2]
-    field_body: Vec3 | None = None  # [T]
-    pressure: float | None = None  # [Pa]
-    dynamic_pressure: float | None = None  # [Pa]
-
-
-def sensor_values(time_us: int, s: Sensors, identifier: int = 0) -> tuple:
-    """Return the values of HIL_SENSOR: FRD, gauss and hPa; `identifier` 0 sets PX4's clock."""
-    mask = 0
-    gyro = force = field = ZERO
-    pressure = dynamic = 0.0
-    if s.specific_force_body is not None:
-        (x, y, z), mask = s.specific_force_body, mask | ACCELEROMETER
-        force = (x, -y, -z)
-    if s.omega_body is not None:
-        (x, y, z), mask = s.omega_body, mask | GYRO
-        gyro = (x, -y, -z)
-    if s.field_body is not None:
-        (x, y, z), mask = s.field_body, mask | MAGNETOMETER
-        field = (1e4 * x, -1e4 * y, -1e4 * z)
-    altitude = 0.0
-    if s.pressure is not None:
-        pressure, mask = 0.01 * s.pressure, mask | BAROMETER
-        altitude = pressure_altitude(s.pressure)
-    if s.dynamic_pressure is not None:
-        dynamic, mask = 0.01 * s.dynamic_pressure, mask | AIRSPEED
-    return time_us, *force, *gyro, *field, pressure, dynamic, altitude, TEMPERATURE, mask, identifier
-
-
-def pressure_altitude(pressure: float) -> float:
-    """Return the altitude [m] in the International Standard Atmosphere (below 11 km) of a pressure [Pa]."""
-    return 44330.77 * (1.0 - math.pow(max(pressure, 0.0) / 101325.0, 0.190263))
 
 
 def gps_values(time_us: int, r: GpsReading) -> tuple:

@@ -1,65 +1,108 @@
-"""Readings of the ports as messages of PX4's simulator interface, each once."""
+"""Readings of the ports as messages of PX4's simulator interface, each once.
 
-from lapwing.kernels import math
+HIL_SENSOR, of every step, is written by compiled code (`sensors`); the rarer messages by Python (`Sampler`).
+"""
+
+from typing import Any, NamedTuple
+
+from lapwing.cosim.diagram.compiled_block import InputRing
+from lapwing.kernels import always_inline, math
 from lapwing.services.common import ports
+from lapwing.services.common.firmware.exchange import newest
 from lapwing.services.common.firmware.link import Read
 from lapwing.services.px4.framing import Layout
-from lapwing.services.px4.messages import (
-    DISTANCE_SENSOR,
-    HIL_GPS,
-    HIL_SENSOR,
-    Sensors,
-    distance_values,
-    gps_values,
-    sensor_values,
-)
+from lapwing.services.px4.messages import DISTANCE_SENSOR, HIL_GPS, distance_values, gps_values
 from lapwing.services.px4.resolve import Px4Setup
+from lapwing.services.px4.sensor_frame import NONE, Sensors
 
 DITHER = 0.02  # [m/s^2] and 2e-3 rad/s of the readings at rest: PX4 rejects sensors that repeat their values
+RARE = (ports.GPS, ports.RANGEFINDER, ports.SONAR)  # ports whose messages Python writes
+_IMU, _MAGNETOMETER, _BAROMETER, _AIRSPEED = range(4)
+
+
+class Readings(NamedTuple):
+    """Ports of HIL_SENSOR and their stamps."""
+
+    imu: InputRing
+    magnetometer: InputRing
+    barometer: InputRing
+    airspeed: InputRing
+    periods: Any  # (n,) int64 [ticks] of these ports, then of those in RARE; 0: none
+    stamps: Any  # (n,) int64 [ticks] of their last readings
+
+
+@always_inline
+def is_new(p: Readings, k: int, tick: int) -> bool:
+    """Return True if port k has a reading that has not been sent."""
+    period = p.periods[k]
+    if period == 0:
+        return False
+    stamp = tick - tick % period
+    if stamp == p.stamps[k]:
+        return False
+    p.stamps[k] = stamp
+    return True
+
+
+@always_inline
+def has_rare(p: Readings, tick: int) -> bool:
+    """Return True if a port in RARE has a reading that has not been sent."""
+    found = False
+    for k in range(_AIRSPEED + 1, len(p.periods)):
+        found = is_new(p, k, tick) or found
+    return found
+
+
+@always_inline
+def sensors(p: Readings, tick: int) -> Sensors:
+    """Return the new readings of HIL_SENSOR."""
+    imu, magnetometer = newest(p.imu, tick), newest(p.magnetometer, tick)
+    barometer, airspeed = newest(p.barometer, tick), newest(p.airspeed, tick)
+    omega = force = field = NONE
+    pressure = dynamic = math.nan
+    if is_new(p, _IMU, tick) and imu.valid:
+        omega, force = imu.omega_body, imu.specific_force_body
+    if is_new(p, _MAGNETOMETER, tick) and magnetometer.valid:
+        field = magnetometer.field_body
+    if is_new(p, _BAROMETER, tick) and barometer.valid:
+        pressure = barometer.pressure
+    if is_new(p, _AIRSPEED, tick) and airspeed.valid:
+        dynamic = airspeed.pressure
+    return Sensors(omega, force, field, pressure, dynamic)
 
 
 class Sampler:
-    """Selects the readings that are new at a tick."""
+    """Selects the rare readings that are new at a tick."""
 
     def __init__(self, own: Px4Setup):
         """Create a sampler before the first tick."""
-        self._own = own
-        self._stamps = dict.fromkeys(own.periods, -1)  # [ticks] of the last reading, by port
+        self._periods = {port: own.periods[port] for port in RARE if port in own.periods}
+        self._stamps = dict.fromkeys(self._periods, -1)  # [ticks] of the last reading, by port
 
-    def messages(self, tick: int, time_us: int, read: Read) -> tuple[list[tuple[Layout, tuple]], bool]:
-        """Return the messages at a tick, and whether they have rates, without which PX4 sends no outputs."""
-        new = {port for port in self._own.periods if self._is_new(port, tick)}
-        omega = force = field = pressure = dynamic = None
-        if ports.IMU in new and (imu := read(ports.IMU)).valid:
-            omega, force = imu.omega_body, imu.specific_force_body
-        if ports.MAGNETOMETER in new and (magnetometer := read(ports.MAGNETOMETER)).valid:
-            field = magnetometer.field_body
-        if ports.BAROMETER in new and (barometer := read(ports.BAROMETER)).valid:
-            pressure = barometer.pressure
-        if ports.AIRSPEED in new and (airspeed := read(ports.AIRSPEED)).valid:
-            dynamic = airspeed.pressure
-        result = [(HIL_SENSOR, sensor_values(time_us, Sensors(omega, force, field, pressure, dynamic)))]
-        if ports.GPS in new:
-            result.append((HIL_GPS, gps_values(time_us, read(ports.GPS))))
-        for port in (ports.RANGEFINDER, ports.SONAR):
-            if port in new and (reading := read(port)).valid and math.isfinite(reading.range):
+    def messages(self, tick: int, time_us: int, read: Read) -> list[tuple[Layout, tuple]]:
+        """Return the messages at a tick."""
+        result = []
+        for port in [port for port in self._periods if self._is_new(port, tick)]:
+            reading = read(port)
+            if port == ports.GPS:
+                result.append((HIL_GPS, gps_values(time_us, reading)))
+            elif reading.valid and math.isfinite(reading.range):
                 result.append((DISTANCE_SENSOR, distance_values(time_us, reading)))
-        return result, omega is not None
+        return result
 
     def _is_new(self, port: str, tick: int) -> bool:
-        stamp = tick - tick % self._own.periods[port]
+        stamp = tick - tick % self._periods[port]
         if stamp == self._stamps[port]:
             return False
         self._stamps[port] = stamp
         return True
 
 
-def at_rest(own: Px4Setup, count: int, time_us: int) -> list[tuple[Layout, tuple]]:
-    """Return the `count`-th message of a vehicle that rests at its start, before the run begins."""
+def at_rest(own: Px4Setup, count: int) -> Sensors:
+    """Return the `count`-th readings of a vehicle that rests at its start, before the run begins."""
     dither = DITHER * (count * 7 % 5 - 2)
     x, y, z = own.force_body
     rates = (0.1 * dither, -0.1 * dither, 0.05 * dither)
-    field = own.field_body if count % 5 == 0 else None
-    pressure = own.pressure + 50.0 * dither if count % 5 == 0 else None
-    sensors = Sensors(rates, (x + dither, y - dither, z + dither), field, pressure)
-    return [(HIL_SENSOR, sensor_values(time_us, sensors))]
+    field = own.field_body if count % 5 == 0 else NONE
+    pressure = own.pressure + 50.0 * dither if count % 5 == 0 else math.nan
+    return Sensors(rates, (x + dither, y - dither, z + dither), field, pressure)

@@ -4,7 +4,10 @@ LAPWING_PX4=PATH python -m tests.services.firmware_figures px4 --starts 20
 LAPWING_ARDUCOPTER=PATH python -m tests.services.firmware_figures ardupilot --starts 20
 LAPWING_BETAFLIGHT=PATH python -m tests.services.firmware_figures betaflight
 
-Each start is a `lapwing run` of the scene with its own program; `--set KEY=VALUE` goes to it.
+python -m tests.services.firmware_figures ardupilot --scripted --set run.duration=15
+
+Each start is a `lapwing run` of the scene with its own program; `--set KEY=VALUE` goes to it. With `--scripted` the
+program is the scripted one of the tests: then the CPU time of Lapwing per exchange counts, not its share.
 """
 
 import argparse
@@ -25,13 +28,17 @@ from lapwing.services.common.vehicle_schema import airframe, gravity, thrust_coe
 from lapwing.services.scene_resolver import load
 
 VARIABLES = {"px4": "LAPWING_PX4", "ardupilot": "LAPWING_ARDUCOPTER", "betaflight": "LAPWING_BETAFLIGHT"}
+SCRIPTED = {"px4": "px4/scripted_px4.py", "ardupilot": "ardupilot/scripted_ardupilot.py"}
 SQUARE = 10.0 * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])  # [m] of the shipped missions
 SLOW = 0.1  # [m/s] of a vehicle that hovers
 ALOFT = 1.0  # [m] above the start of a vehicle that flies
 
 
 def overrides(firmware: str, program: str) -> list[str]:
-    """Return the options of `lapwing run` that start a program."""
+    """Return the options of `lapwing run` that start a program; "" is the scripted one."""
+    if not program:
+        command = [sys.executable, str(Path(__file__).parent / SCRIPTED[firmware])]
+        return ["--set", f"autopilot.command={json.dumps(command)}"]
     path = Path(program).resolve()
     if firmware == "px4":
         command = [str(path), "-d", str(path.parents[1] / "etc")]
@@ -79,6 +86,7 @@ def figures(log: Path, summary: Path, full: float) -> dict:
         return float(found[1]) if found else math.nan
 
     cpu = re.search(r"CPU ([\d.e+-]+) s of Lapwing and ([\d.e+-]+) s", report)
+    steps = int(re.search(r"(\d+) steps", report)[1])
     return {
         "outcome": flight.outcome.kind,
         "text": str(flight.outcome),
@@ -86,10 +94,12 @@ def figures(log: Path, summary: Path, full: float) -> dict:
         "off_rms": float(np.sqrt((off**2).mean())) if len(off) else math.nan,
         "off_max": float(off.max()) if len(off) else math.nan,
         "hover": hovering_duty(flight, full),
-        "steps": int(re.search(r"(\d+) steps", report)[1]),
+        "steps": steps,
         **{name: count(name) for name in ("skew", "resent", "late", "missed", "rejected", "waiting")},
         "factor": result["real_time_factor"],
         "share": float(cpu[1]) / float(cpu[2]) if cpu else math.nan,
+        "own_us": 1e6 * float(cpu[1]) / steps if cpu else math.nan,  # CPU time of an exchange
+        "firmware_us": 1e6 * float(cpu[2]) / steps if cpu else math.nan,
         "digest": result["digest"],
     }
 
@@ -110,11 +120,14 @@ def main() -> None:
     """Fly, and print a line for each start and one for all."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("firmware", choices=VARIABLES)
+    parser.add_argument("--scripted", action="store_true", help="fly the scripted program of the tests")
     parser.add_argument("--starts", type=int, default=1)
     parser.add_argument("--set", action="append", default=[])
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
-    program = os.environ[VARIABLES[given.firmware]]
+    if given.scripted and given.firmware not in SCRIPTED:
+        parser.error(f"--scripted: expected {' or '.join(SCRIPTED)}")
+    program = "" if given.scripted else os.environ[VARIABLES[given.firmware]]
     folder = given.out or Path(tempfile.mkdtemp(prefix="lapwing_figures_"))
     folder.mkdir(parents=True, exist_ok=True)
     options = [part for value in given.set for part in ("--set", value)]
@@ -122,9 +135,11 @@ def main() -> None:
     for k in range(given.starts):
         results.append(fly(given.firmware, program, folder, f"flight_{k}", *options))
         print(json.dumps(results[-1]), flush=True)
-    flown = [r for r in results if r["outcome"] == "landed"]
-    print(f"{len(flown)} of {len(results)} landed; hover by the airframe {hover_duty(f'{given.firmware}_quad'):.4f}")
-    for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share"):
+    landed = [r for r in results if r["outcome"] == "landed"]
+    flown = [r for r in results if r["outcome"] != "failed"] if given.scripted else landed
+    print(f"{len(landed)} of {len(results)} landed; hover by the airframe {hover_duty(f'{given.firmware}_quad'):.4f}")
+    for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share",
+                 "own_us", "firmware_us"):  # fmt: skip
         values = [r[name] for r in flown]
         if values:
             print(f"{name:8} mean {np.mean(values):.4g}, least {min(values):.4g}, greatest {max(values):.4g}")

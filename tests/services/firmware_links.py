@@ -1,10 +1,17 @@
 """Configurations of firmware links for tests with scripted peers."""
 
+import ctypes
 import os
 import socket
 import threading
 from contextlib import ExitStack, suppress
 
+from lapwing.cosim.diagram.compiled_block import CONTINUE, bind
+from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
+from lapwing.kernels.row_packing import pack_row
+from lapwing.services.common.firmware.exchange_block import ExchangeBlock
+from lapwing.services.common.firmware.hold import COMMAND, FirmwareCommand
+from lapwing.services.common.firmware.link import FirmwareOutput
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
 HOST = "127.0.0.1"
@@ -58,3 +65,56 @@ class Background:
 
 def never(_):
     """Wait without end of the run."""
+
+
+class Exchange:
+    """The compiled exchange of a link with fixed samples, and the outputs in the firmware's order."""
+
+    def __init__(self, link, samples):
+        """Compile it; a sample is the value of a port."""
+        self.link, setup = link, link._setup
+        self._rows = {port: pack_row(like)[None] for port, like in samples.items()}
+        self._samples = dict(samples)
+        rows = self._rows | {COMMAND: pack_row(FirmwareCommand((0.0,) * len(setup.order)))[None]}
+        ports = {port: Port(port, like, LATCHED) for port, like in samples.items()}
+        self._block = ExchangeBlock("autopilot", setup, (), lambda _: link)
+        self._block._opened = True  # by the test
+        self._block.bind(_Diagram(ports, rows, self._samples))
+        self._command = rows[COMMAND]
+        self._code = self._block._graph.code
+        self._advance = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)(self._code.function)
+
+    def step(self, tick, **samples):
+        """Exchange at a tick, with other samples from now on; return the outputs and the state."""
+        for port, value in samples.items():
+            self._rows[port][0], self._samples[port] = pack_row(value), value
+        if self._advance(self._code.memory, tick) != CONTINUE:
+            raise self._block.failure(tick)
+        *duty, armed, landed, finished, words, _, _, _ = self._command[0]
+        order = self.link._setup.order
+        outputs = tuple(duty[order.index(k)] for k in range(len(order)))
+        text = self._block.words.table[int(words)]
+        return FirmwareOutput(outputs, bool(armed), bool(landed), bool(finished), text.mode, text.failsafe)
+
+
+class _Diagram:
+    """Diagram of one block whose inputs never change by themselves."""
+
+    def __init__(self, ports, rows, samples):
+        self.ports, self._rows, self._samples = ports, rows, samples
+
+    def ring(self, port):
+        return self._rows[port]
+
+    def latest(self, port, tick):
+        return self._samples[port]
+
+    def part(self, name):
+        return name
+
+    def prepare(self, part):
+        self.code = bind(part, self.ports, self._rows)
+        return self.code
+
+    def replace(self, part, code):
+        pass

@@ -9,7 +9,8 @@ in `schema.FIRMWARES`, and:
   resolved values. `from lapwing.services.common.firmware.setup import fleet` numbers the instances of a fleet.
 - `schema.py` (optional): a `SceneTable` with the adapter's own keys, for example `[px4]`.
 - `service.py`: `create(setup, recorded=None)` returns `service.firmware_service(setup, NAME, Link, recorded)`.
-- `link.py`: a class with the methods of `link.FirmwareLink`, constructed with a `setup.FirmwareSetup`.
+- `link.py`: a class with the methods of `link.ExchangeLink` (lock step, the exchange in compiled code) or of
+  `link.FirmwareLink` (every exchange in Python), constructed with a `setup.FirmwareSetup`.
 
 Life of a link, in this order:
 
@@ -22,8 +23,14 @@ Life of a link, in this order:
    (0 to 1), and its state.
 3. `close()` once, always: ends the program if this link started it.
 
-The block (`block.FirmwareBlock`) reorders the outputs to the airframe's rotors (`motor_order`), and a compiled block
-(`hold`) makes volts of them at every tick: output times battery voltage, or times `airframe.motor.max_voltage` if no
-effect models the battery. `link.report` (a `LinkReport`) goes to the log's metadata as "firmware" and to the summary.
+For an `ExchangeLink`, compiled code takes the place of `step`: `exchange.py` of the adapter has a NamedTuple of
+parameters and `step(parameters, state, tick, inputs)`, which sends the samples, receives the outputs and writes the
+command (`exchange`: memory shared with Python, samples, times). It leaves to Python (`ExchangeLink.attend`) outputs
+that do not come within 0.2 s or are not the next ones, and every 0.1 s of simulation the MAVLink link of the mission.
+
+The block (`block.FirmwareBlock`, `exchange_block.ExchangeBlock`) reorders the outputs to the airframe's rotors
+(`motor_order`), and a compiled block (`hold`) makes volts of them at every tick: output times battery voltage, or times
+`airframe.motor.max_voltage` if no effect models the battery. `link.report` (a `LinkReport`) goes to the log's metadata
+as "firmware" and to the summary.
 `lapwing resimulate` does not open a link: it flies the recorded actuator commands (`playback`).
 """

@@ -3,12 +3,12 @@
 import math
 import time
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.services.common.firmware.hold import COMMAND, FirmwareCommand
-from lapwing.services.common.firmware.link import FirmwareError, FirmwareLink, FirmwareOutput, Waits
+from lapwing.services.common.firmware.link import ExchangeLink, FirmwareError, FirmwareLink, FirmwareOutput, Waits
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
 NO_MISSION = 1  # MISSION_STATE of MAVLink
@@ -54,11 +54,12 @@ class FirmwareBlock:
         name: str,
         setup: FirmwareSetup,
         inputs: tuple[InputPort, ...],
-        create: Callable[[FirmwareSetup], FirmwareLink],
+        create: Callable[[FirmwareSetup], FirmwareLink | ExchangeLink],
     ):
         """Create the block; `create` is the class of the link."""
         self.name, self.inputs = f"{name}.link", inputs
-        self._setup, self._link = setup, create(setup)
+        self._setup = setup
+        self._link: Any = create(setup)
         self._none = FirmwareCommand((0.0,) * len(setup.order))
         self.outputs = (Port(COMMAND, self._none, LATCHED),)
         self.words = StatusWords()

@@ -91,3 +91,44 @@ class FirmwareLink(Protocol):
 
     def close(self) -> None:
         """End the connection, and the program if this link has started it."""
+
+
+class ExchangeLink(Protocol):
+    """Connection to one running firmware, with which compiled code exchanges samples and outputs (`exchange`)."""
+
+    report: LinkReport
+    outputs: int  # number of outputs
+
+    def __init__(self, setup: FirmwareSetup) -> None:
+        """Store the configuration; open nothing."""
+
+    def exchange(self, shared: Any, ring: Callable[[str], Any]) -> Any:
+        """Return the parameters of the compiled exchange.
+
+        Args:
+            shared: `exchange.Shared` memory.
+            ring: returns the `InputRing` of a port.
+        """
+
+    def open(self, waits: Waits) -> None:
+        """Start or await the firmware, and connect."""
+
+    def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
+        """Do what compiled code leaves to Python at `tick`: wait for outputs, send again, or poll the other link.
+
+        Args:
+            tick: tick of the exchange.
+            reason: WAIT, SEND, POLL or INVALID of `exchange`.
+            number: WAIT: result of the receipt [bytes].
+            read: returns the newest sample of a port.
+            waits: see `FirmwareLink.step`.
+
+        Returns:
+            The state of the vehicle without outputs after a poll, otherwise None.
+        """
+
+    def cpu(self) -> float:
+        """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
+
+    def close(self) -> None:
+        """End the connection, and the program if this link has started it."""

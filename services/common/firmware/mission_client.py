@@ -18,7 +18,7 @@ from lapwing.services.common.mavlink.frames import saturated
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
 RETRY = 1.0  # [s] until an unanswered message is sent again
-POLL_EVERY = 0.02  # [s] between two looks at the link
+POLL_EVERY = 0.1  # [s] between two looks at the link
 REJECTIONS = 20  # uploads, one per second, after which the mission is wrong
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
 BLOCKERS = 5  # last status texts kept while arming is rejected
@@ -79,6 +79,7 @@ class MissionClient:
         blockers: status texts since arming was rejected.
         error: reason why the flight is impossible, "" as long as it is possible.
         version: of the firmware, "" until it reports it.
+        next_poll: [s] simulation time.
         reached: number of the last item that the vehicle has reached, -1: none.
     """
 
@@ -100,7 +101,7 @@ class MissionClient:
         self._codec.robust_parsing = True
         self._filter = FrameFilter(NEEDED)
         self._target = 0  # system id of the firmware
-        self._next = self._beat = self._sent = -1.0  # [s] of the next poll, heartbeat, last request
+        self.next_poll = self._beat = self._sent = -1.0  # [s] of the next poll, heartbeat, last request
         self._in_mode = False
         self._rejections = 0
         self.stage = Stage.CONNECTING
@@ -111,9 +112,9 @@ class MissionClient:
 
     def poll(self, time: float) -> None:
         """Read and answer messages at simulation `time` [s]."""
-        if time < self._next:
+        if time < self.next_poll:
             return
-        self._next = time + POLL_EVERY
+        self.next_poll = time + POLL_EVERY
         self.read()
         if time >= self._beat:
             self._beat = time + 1.0

@@ -12,16 +12,20 @@ from lapwing.messages import topics as topic
 from lapwing.services.common import ports
 from lapwing.services.common.command_encoder import actuators_wire, status_wire
 from lapwing.services.common.firmware.block import FirmwareBlock
+from lapwing.services.common.firmware.exchange_block import ExchangeBlock
 from lapwing.services.common.firmware.hold import COMMAND, HeldState, Hold
 from lapwing.services.common.firmware.hold_reference import HoldReference
-from lapwing.services.common.firmware.link import FirmwareLink
+from lapwing.services.common.firmware.link import ExchangeLink, FirmwareLink
 from lapwing.services.common.firmware.playback import TOPICS, Playback, Recorded
 from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.common.setpoint_encoder import setpoint_encoder
 
 
 def firmware_service(
-    setup: RunConfig, name: str, create: Callable[[FirmwareSetup], FirmwareLink], recorded: Recorded | None = None
+    setup: RunConfig,
+    name: str,
+    create: Callable[[FirmwareSetup], FirmwareLink | ExchangeLink],
+    recorded: Recorded | None = None,
 ) -> Service:
     """Return the service of an adapter.
 
@@ -38,7 +42,8 @@ def firmware_service(
         service.parts = [Playback(name, config.ports, recorded, service)]
         service.python_topics = TOPICS if own.phases else TOPICS[:2]
         return service
-    link = FirmwareBlock(name, own, config.inputs, create)
+    kind = ExchangeBlock if hasattr(create, "exchange") else FirmwareBlock
+    link = kind(name, own, config.inputs, create)
     none = (0.0,) * len(own.order)
     parameters: Any = Hold(own.voltage_max, none)
     inputs = [InputPort(COMMAND), InputPort(ports.BATTERY)]

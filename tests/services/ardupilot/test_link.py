@@ -13,28 +13,25 @@ from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.ports import BatteryReading, TrueState
 from tests.services.ardupilot.peer import ArduPilotPeer, servo_packet
-from tests.services.firmware_links import Background, firmware_setup, free_instance, never
+from tests.services.firmware_links import Background, Exchange, firmware_setup, free_instance, never
 
 OWN = ArduPilotSetup(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False, False)
 
 
-def read(port):
-    return {ports.TRUTH: TrueState(position_world=(1.0, 2.0, 3.0)), ports.BATTERY: BatteryReading(1.0, 11.1, 2.0)}[port]
-
-
-BROKEN = {ports.TRUTH: {"position_world": (math.nan, 0.0, 0.0)}}
+SAMPLES = {ports.TRUTH: TrueState(position_world=(1.0, 2.0, 3.0)), ports.BATTERY: BatteryReading(1.0, 11.1, 2.0)}
 
 
 @pytest.fixture
 def link():
     instance = free_instance((socket.SOCK_DGRAM, PORT, STRIDE), (socket.SOCK_STREAM, MAVLINK_PORT, STRIDE))
     link = ArduPilotLink(firmware_setup("ardupilot", OWN, instance))
+    link.steps = Exchange(link, SAMPLES)
     yield link
     link.close()
 
 
 def fly(link, steps, begin=0):
-    return [link.step(tick, read, never) for tick in range(begin, begin + steps)]
+    return [link.steps.step(tick) for tick in range(begin, begin + steps)]
 
 
 def begun(link, script):
@@ -203,4 +200,4 @@ def test_slow_loop_rate_is_noted(link):
 def test_non_finite_state_ends_run(link):
     begun(link, lambda peer: peer.exchange())
     with pytest.raises(ValueError, match="not finite"):
-        link.step(0, lambda port: read(port)._replace(**BROKEN.get(port, {})), never)
+        link.steps.step(0, truth=TrueState(position_world=(math.nan, 0.0, 0.0)))

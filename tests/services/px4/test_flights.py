@@ -12,7 +12,7 @@ import pytest
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.scene.scene_error import SceneError
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.px4.link import MAVLINK_PORT, PORT
+from lapwing.services.px4.connection import MAVLINK_PORT, PORT
 from lapwing.services.scene_resolver import load, resolve
 from tests.services.firmware_links import free_instance
 

@@ -13,7 +13,7 @@ import pytest
 from lapwing.flight import Flight
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.firmware.setup import first_free
-from lapwing.services.px4.link import MAVLINK_PORT, PORT
+from lapwing.services.px4.connection import MAVLINK_PORT, PORT
 from tests.services.firmware_links import HOST, firmware_setup
 
 PEER = Path(__file__).parent / "scripted_px4.py"

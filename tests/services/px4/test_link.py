@@ -13,9 +13,10 @@ from lapwing.services.common import ports
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.ports import BarometerReading, BatteryReading, GpsReading, ImuReading, MagnetometerReading
-from lapwing.services.px4.link import MAVLINK_PORT, PORT, Px4Link
+from lapwing.services.px4.connection import MAVLINK_PORT, PORT
+from lapwing.services.px4.link import Px4Link
 from lapwing.services.px4.resolve import Px4Setup
-from tests.services.firmware_links import Background, firmware_setup, free_instance, never
+from tests.services.firmware_links import Background, Exchange, firmware_setup, free_instance, never
 from tests.services.px4.peer import Px4Peer, finite
 
 PERIODS = {ports.IMU: 1, ports.MAGNETOMETER: 5, ports.BAROMETER: 5, ports.GPS: 25}
@@ -25,6 +26,7 @@ SAMPLES = {
     ports.MAGNETOMETER: MagnetometerReading((2e-5, 1e-6, -4e-5), valid=True),
     ports.BAROMETER: BarometerReading(98000.0, valid=True),
     ports.GPS: GpsReading(40.0, 14.0, 280.0, valid=True),
+    ports.BATTERY: BatteryReading(),
 }
 
 
@@ -32,6 +34,7 @@ SAMPLES = {
 def link():
     instance = free_instance((socket.SOCK_STREAM, PORT, 1), (socket.SOCK_DGRAM, MAVLINK_PORT, 1))
     link = Px4Link(firmware_setup("px4", OWN, instance))
+    link.steps = Exchange(link, SAMPLES)
     yield link
     link.close()
 
@@ -41,7 +44,7 @@ def port_of(link):
 
 
 def fly(link, steps, begin=0, samples=SAMPLES):
-    return [link.step(tick, samples.__getitem__, never) for tick in range(begin, begin + steps)]
+    return [link.steps.step(tick, **samples) for tick in range(begin, begin + steps)]
 
 
 def begun(link, script):
@@ -285,7 +288,7 @@ def test_port_in_use_is_named(link):
 
 
 def test_battery_of_scene_is_told_to_firmware(link):
-    link._own = link._own._replace(battery=True)
+    link._setup = link._setup._replace(own=OWN._replace(battery=True))
     samples = {**SAMPLES, ports.BATTERY: BatteryReading(0.42, 11.2, 20.0)}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.settimeout(20.0)
@@ -299,7 +302,7 @@ def test_battery_of_scene_is_told_to_firmware(link):
         background = begun(link, script)
         told = []
         for tick in range(300):
-            link.step(tick, samples.__getitem__, never)
+            link.steps.step(tick, **samples)
         link.close()
         background.join()
         vehicle.setblocking(False)

@@ -7,23 +7,22 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from lapwing.dynamics.environment import STANDARD
+from lapwing.kernels import kernel
 from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, GpsReading
 from lapwing.services.px4.framing import frame
 from lapwing.services.px4.messages import (
+    HIL_ACTUATOR_CONTROLS,
     HIL_GPS,
     HIL_SENSOR,
-    Sensors,
     actuator_controls,
     gps_values,
-    pressure_altitude,
-    sensor_values,
 )
+from lapwing.services.px4.sensor_frame import Sensors, payload, pressure_altitude, read_controls, sensor_frame
+from tests.services.px4 import hil_sensor
 
 
 def sensor(time_us=4000, **readings):
-    return mavlink.MAVLink(None).parse_buffer(frame(HIL_SENSOR, 0, sensor_values(time_us, Sensors(**readings)), 1, 1))[
-        0
-    ]
+    return mavlink.MAVLink(None).parse_buffer(sensor_frame(0, time_us, Sensors(**readings)))[0]
 
 
 def gps(reading, time_us=4000):
@@ -59,6 +58,48 @@ def test_pressure_is_in_hectopascal():
     assert result.abs_pressure == pytest.approx(980.0)
     assert result.diff_pressure == pytest.approx(0.5)
     assert result.pressure_alt == pytest.approx(pressure_altitude(98000.0))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_compiled_frame_has_bytes_of_struct(seed):
+    random = np.random.default_rng(seed)
+    readings = {
+        "omega_body": tuple(random.normal(size=3)),
+        "specific_force_body": tuple(random.normal(size=3) * 9.81),
+        "field_body": tuple(random.normal(size=3) * 1e-5),
+        "pressure": random.uniform(5e4, 1.1e5),
+        "dynamic_pressure": random.uniform(0.0, 500.0),
+    }
+    readings = {name: value for name, value in readings.items() if random.random() < 0.6}
+    time_us, sequence = int(random.integers(2**50)), int(random.integers(256))
+    expected = hil_sensor.sensor_values(time_us, hil_sensor.Sensors(**readings))
+    result = sensor_frame(sequence, time_us, Sensors(**readings))
+    assert result == frame(HIL_SENSOR, sequence, expected, 1, 51)
+
+
+@kernel
+def controls(data, size, m):
+    return read_controls(data, size, m)
+
+
+def test_compiled_reading_accepts_one_frame_only():
+    values = (2**40, 1, *np.linspace(0.0, 0.75, 16).tolist(), 129)
+    data = frame(HIL_ACTUATOR_CONTROLS, 7, values, 1, 1)
+    m = payload()
+
+    def read(content):
+        return controls(np.frombuffer(content + bytes(300), np.uint8).copy(), len(content), m)
+
+    assert read(data)
+    assert (m.words[0], m.words[1], m.floats[4], m.floats[19], m.bytes[80]) == (2**40, 1, 0.0, 0.75, 129)
+    for k in range(len(data)):
+        assert not read(data[:k] + bytes((data[k] ^ 1,)) + data[k + 1 :]), k
+        assert not read(data[:k])
+    assert not read(data + data)
+    assert not read(b"")
+    short = frame(HIL_ACTUATOR_CONTROLS, 7, (5, 0, *(0.0,) * 16, 0), 1, 1)  # zeros at the end are not sent
+    assert read(short)
+    assert (m.words[0], m.floats[19], m.bytes[80]) == (5, 0.0, 0)
 
 
 @pytest.mark.parametrize(("pressure", "altitude"), [(101325.0, 0.0), (89874.6, 1000.0), (54019.9, 5000.0)])

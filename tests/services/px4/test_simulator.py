@@ -24,22 +24,21 @@ from lapwing.services.common.ports import (
     ImuReading,
     MagnetometerReading,
 )
+from lapwing.services.px4.connection import MAVLINK_PORT, PORT
 from lapwing.services.px4.framing import frame
-from lapwing.services.px4.link import MAVLINK_PORT, PORT
 from lapwing.services.px4.messages import (
     DISTANCE_SENSOR,
     HIL_GPS,
     HIL_SENSOR,
-    Sensors,
     actuator_controls,
     distance_values,
     gps_values,
-    sensor_values,
 )
 from lapwing.services.px4.simulator_client import SimulatorClient
 from lapwing.services.px4.simulator_readings import readings
 from lapwing.services.scene_resolver import load, resolve
 from tests.services.firmware_links import Background, free_instance, never
+from tests.services.px4.hil_sensor import Sensors, sensor_values
 
 NOMINAL = {
     ports.IMU: ImuReading(omega_variance=1e-6, specific_force_variance=1e-3),

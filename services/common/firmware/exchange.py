@@ -1,0 +1,121 @@
+"""Compiled exchange with a firmware: memory that it shares with Python, and the command that it publishes.
+
+The parameters of an adapter's exchange are a NamedTuple in whose module `step` sends the samples of a tick and receives
+the firmware's outputs. Python runs (`call_python`) only if these do not come at once or are not what is expected, and
+to poll the firmware's other link.
+"""
+
+import ctypes
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.diagram.compiled_block import InputRing, ring_index
+from lapwing.cosim.diagram.tick_schedule import LATCHED
+from lapwing.dynamics.vector import ZERO
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels.native_calls import address_of, call_int, call_long
+from lapwing.kernels.row_packing import load, pack_row, store
+from lapwing.services.common.firmware.hold import FirmwareCommand
+from lapwing.services.common.ports import PerRotor
+
+OPEN, WAIT, SEND, POLL, INVALID = range(5)
+"""Reasons to call Python: first exchange; no ordinary answer; not sent; poll is due; samples that cannot be sent."""
+ARMED, LANDED, FINISHED, WORDS = range(4)  # `flags`
+WAITING, BEGAN, LAST, ENDED = range(4)  # `seconds`
+
+
+class Shared(NamedTuple):
+    """Memory of an exchange, which Python reads and writes."""
+
+    period: int  # [ticks] between two exchanges
+    interval: float  # [s] of a tick
+    order: tuple[int, ...]  # output that drives each rotor
+    none: PerRotor  # zero for each rotor
+    command: Any  # row of the port `hold.COMMAND`
+    outputs: Any  # (n,) of the firmware, 0 to 1
+    flags: Any  # int64: state of the vehicle by the firmware's other link, number of the status words
+    next_poll: Any  # (1,) tick
+    steps: Any  # (1,) exchanges
+    seconds: Any  # [s] waited; wall time at the first exchange, at the last one, after it
+    clock: Any  # int64: `struct timespec`
+    clock_address: int
+    clock_id: int
+    clock_gettime: int  # addresses of functions
+    python: int  # `python(tick, reason, number) -> 0 to go on`
+
+
+def shared_memory(setup: Any, command: np.ndarray, outputs: int, python: Any) -> Shared:
+    """Return the memory of an exchange.
+
+    Args:
+        setup: `FirmwareSetup` of the adapter.
+        command: row of the port `hold.COMMAND`.
+        outputs: number of outputs of the firmware.
+        python: function of ctypes that compiled code calls.
+    """
+    clock = np.zeros(2, np.int64)
+    return Shared(
+        setup.period, setup.interval, setup.order, (0.0,) * len(setup.order), command, np.zeros(outputs),
+        np.array([0, 1, 0, 0]), np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(4), clock, clock.ctypes.data,
+        time.CLOCK_MONOTONIC, address_of(ctypes.CDLL(None).clock_gettime), address_of(python),
+    )  # fmt: skip
+
+
+def unused(like: Any) -> InputRing:
+    """Return the ring of a port that the vehicle does not have."""
+    return InputRing(like, pack_row(like)[None], LATCHED, 0)
+
+
+@always_inline
+def newest(ring: InputRing, tick: int) -> Any:
+    """Return the newest sample up to `tick`."""
+    return load(ring.like, ring.rows, ring_index(tick, ring.period, ring.rows))
+
+
+@always_inline
+def now(e: Shared) -> float:
+    """Return the monotonic wall time [s]."""
+    call_int(e.clock_gettime, (e.clock_id, e.clock_address))
+    return e.clock[0] + 1e-9 * e.clock[1]
+
+
+@always_inline
+def call_python(e: Shared, tick: int, reason: int, number: int) -> bool:
+    """Return True if the run goes on."""
+    return call_long(e.python, (tick, reason, number)) == 0
+
+
+@always_inline
+def begin(e: Shared, tick: int) -> bool:
+    """Count an exchange, and store its wall time. Return False if there is no connection."""
+    if e.steps[0] == 0:
+        if not call_python(e, tick, OPEN, 0):
+            return False
+        e.seconds[BEGAN] = now(e)
+    e.seconds[LAST] = now(e)
+    e.steps[0] += 1
+    return True
+
+
+@always_inline
+def end(e: Shared) -> None:
+    """Add the wall time since `begin` to the waiting time."""
+    time = now(e)
+    e.seconds[WAITING] += time - e.seconds[LAST]
+    e.seconds[ENDED] = time
+
+
+@always_inline
+def _duty(given: tuple[Any, bool], output: int, _: float) -> float:
+    return min(max(given[0][output], 0.0), 1.0) if given[1] else 0.0
+
+
+@always_inline
+def publish(e: Shared, running: bool) -> None:
+    """Write the command. `running`: the outputs prove that the vehicle is armed."""
+    armed, landed = e.flags[ARMED] != 0 or running, e.flags[LANDED] != 0 and not running
+    duty = map_tuple(_duty, (e.outputs, armed), e.order, e.none)
+    store(FirmwareCommand(duty, armed, landed, e.flags[FINISHED] != 0, e.flags[WORDS], ZERO), e.command, 0)

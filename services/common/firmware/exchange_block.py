@@ -1,0 +1,81 @@
+"""Block that exchanges samples with a firmware in compiled code (`exchange`), with its link for all that is unusual."""
+
+import ctypes
+from typing import Any
+
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram
+from lapwing.cosim.diagram.compiled_block import Block, InputRing
+from lapwing.cosim.run_errors import LockStepError
+from lapwing.kernels.cell import Cell
+from lapwing.services.common.firmware.block import FirmwareBlock
+from lapwing.services.common.firmware.exchange import (
+    ARMED,
+    BEGAN,
+    ENDED,
+    FINISHED,
+    LANDED,
+    OPEN,
+    WAITING,
+    WORDS,
+    Shared,
+    shared_memory,
+)  # fmt: skip
+from lapwing.services.common.firmware.hold import COMMAND
+
+_PYTHON = ctypes.CFUNCTYPE(*(ctypes.c_int64,) * 4)
+
+
+class ExchangeBlock(FirmwareBlock):
+    """Has compiled code exchange samples with the firmware, and an `ExchangeLink` do the rest."""
+
+    _shared: Shared | None = None
+    _error: BaseException | None = None
+
+    def bind(self, graph: BlockDiagram) -> None:
+        """Have the diagram run compiled code for this block."""
+        self._graph, self._python = graph, _PYTHON(self._on_call)
+        self._shared = shared_memory(self._setup, graph.ring(COMMAND), self._link.outputs, self._python)
+        parameters = self._link.exchange(self._shared, self._ring)
+        code = graph.prepare(Block(self.name, parameters, Cell(0)))
+        graph.replace(graph.part(self.name), code)
+
+    def on_tick(self, tick: int) -> int:
+        """Return NEVER: the compiled code has replaced this function."""
+        return NEVER
+
+    def failure(self, tick: int) -> Exception:
+        """Return the error of `tick`. Raise an exception that interrupted the exchange."""
+        assert self._error is not None
+        if isinstance(self._error, LockStepError):
+            return self._error
+        raise self._error
+
+    @property
+    def reports(self) -> dict[str, str]:
+        """Entries of the log's metadata."""
+        if self._shared:
+            report, seconds = self._link.report, self._shared.seconds
+            report.steps, report.waiting = int(self._shared.steps[0]), float(seconds[WAITING])
+            report.wall = float(seconds[ENDED] - seconds[BEGAN])
+        return super().reports
+
+    def _ring(self, port: str) -> InputRing:
+        graph = self._graph
+        return InputRing(graph.ports[port].like, graph.ring(port), graph.ports[port].period, 0)
+
+    def _on_call(self, tick: int, reason: int, number: int) -> int:
+        """Run the link for compiled code. Return 0 to go on."""
+        try:
+            if reason == OPEN:
+                if not self._opened:
+                    self.open(self._waits)
+                return 0
+            output = self._link.attend(tick, reason, number, lambda port: self._graph.latest(port, tick), self._waits)
+            if output is not None and self._shared:
+                flags: Any = self._shared.flags
+                flags[[ARMED, LANDED, FINISHED]] = output.armed, output.landed, output.finished
+                flags[WORDS] = self.words.number(output)
+        except BaseException as error:  # exceptions do not pass through compiled code; `failure` raises it
+            self._error = error
+            return 1
+        return 0

@@ -1,0 +1,48 @@
+"""MAVLink over UDP between PX4 and a run: mission, state of the flight, battery of the scene."""
+
+from lapwing.kernels import math
+from lapwing.services.common import ports
+from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.link import FirmwareOutput, Read
+from lapwing.services.common.firmware.mavlink_transport import UdpTransport
+from lapwing.services.common.firmware.mission import mission_messages, uploaded
+from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.px4.modes import CONVENTIONS
+
+BATTERY_EVERY = 0.5  # [s]
+
+
+class VehicleLink:
+    """The link, polled from the lock step."""
+
+    def __init__(self, setup: FirmwareSetup, transport: UdpTransport):
+        """Create it before PX4 has sent anything."""
+        items, parameters = uploaded(setup.plan), {} if setup.command else dict(setup.parameters)
+        self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, setup.own.datum), parameters)
+        self._status = FlightStatus("px4", self._client)
+        self._battery, self._battery_at = setup.own.battery, 0.0  # [s] of the next message
+
+    @property
+    def next_poll(self) -> float:
+        """Return the simulation time [s] of the next poll."""
+        return self._client.next_poll
+
+    @property
+    def version(self) -> str:
+        """Return the version of the firmware, "" if it is not known."""
+        return self._status.version
+
+    def poll(self, time: float, read: Read) -> FirmwareOutput:
+        """Poll at simulation `time` [s], and send the battery. Return the state of the flight, without outputs."""
+        self._status.poll(time)
+        if self._battery and time >= self._battery_at:
+            self._battery_at = time + BATTERY_EVERY
+            battery = read(ports.BATTERY)
+            if math.isfinite(battery.charge):
+                self._client.send_battery(battery.voltage, battery.current, battery.charge)
+        return self._status.output((), running=False)
+
+    def close(self) -> None:
+        """Close the link."""
+        self._client.close()
