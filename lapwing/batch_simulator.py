@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.dynamics import simd_batch
+from lapwing.dynamics.effects._external_inputs import inputs_of
 from lapwing.dynamics.effects._types import Motion
 from lapwing.dynamics.rate_control import RateController
 from lapwing.dynamics.terrain import Relief
@@ -296,6 +297,8 @@ def _plant(scene: Scene) -> PlantSetup:
         if any(isinstance(part, np.ndarray) for part in effect):
             name = type(effect).__module__.rpartition(".")[2]
             raise SceneError(f"effects.{name}", "batches step effects without tables of numbers", "a scene without it")
+    if inputs_of(plant.core.vehicle.effects):
+        raise SceneError("services", "batches step the plant without FMUs", "no FMU with inputs of effects")
     if plant.others:
         raise SceneError(
             "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"
