@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lapwing.cosim.scene import Scene, SceneError
+from lapwing.dynamics.effects._external_inputs import inputs_of
 from lapwing.dynamics.effects._types import Motion
 from lapwing.dynamics.terrain import surface
 from lapwing.kernels import kernel
@@ -27,6 +28,8 @@ def plant_of(scene: Scene) -> PlantSetup:
     plant: PlantSetup = resolve(scene).services["plant"].parameters
     if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
         raise SceneError("vehicle.model", f"got {plant.model!r}", '"rigid_body", the only one that batches step')
+    if inputs_of(plant.core.vehicle.effects):
+        raise SceneError("services", "batches step the plant without FMUs", "no FMU with inputs of effects")
     if plant.others:
         raise SceneError(
             "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"

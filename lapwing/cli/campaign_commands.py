@@ -62,12 +62,14 @@ def campaign(
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="run part I of N only, for arrays of batch jobs")
     ] = None,
+    allow_code: Annotated[bool, typer.Option("--allow-code", help="allow FMUs of the scene to run")] = False,
 ) -> None:
     """Fly a scene many times with random parameters.
 
     Reports error distributions, the failure probability, and which parameters matter.
     """
     from lapwing.file_schemas.key_units import key_units
+    from lapwing.services.common import foreign_code
     from lapwing.studies.campaign import console_output
     from lapwing.studies.campaign.campaign_report import write
     from lapwing.studies.campaign.distributions import parse
@@ -77,6 +79,7 @@ def campaign(
     from lapwing.studies.terminal import console
 
     with user_errors():
+        foreign_code.allow(allow_code)
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
         if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:

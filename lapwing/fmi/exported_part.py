@@ -106,7 +106,8 @@ def _check(part: Any) -> None:
         return
     inner = getattr(part, "_part", part)
     module = type(inner).__module__
-    if any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
+    is_connected = hasattr(inner, "reports")  # to a firmware, or another program
+    if is_connected or any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
         raise ValueError(f"{part.name}: runs Python code of the scene; only compiled blocks can be exported")
     if type(inner).__name__ == "PropellerFailures":
         raise ValueError(f"{part.name}: [multibody.event] replaces code in flight; remove the event from the scene")

@@ -17,6 +17,7 @@ OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
 ESTIMATE_COVARIANCE = "estimate_covariance"
 LIFT = "lift"
+EFFECT = "effect."  # prefix of the ports with the named inputs of an effect: "effect.battery"
 
 GPS_SINGLE, GPS_SBAS, GPS_FLOAT, GPS_RTK = 1, 2, 3, 4  # `GpsReading.fix`: alone, augmented, RTK float and fixed
 

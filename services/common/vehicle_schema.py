@@ -21,7 +21,7 @@ from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.ground_equilibrium import Pose, resting_pose
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.kernels import math, python_function
-from lapwing.services.common import mesh_schema
+from lapwing.services.common import effect_inputs, mesh_schema
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.named_tables import NamedTables
 from lapwing.services.common.run_schema import SHIPPED, Pair
@@ -132,7 +132,9 @@ def active(scene: Scene) -> tuple:
 def _active(scene: Scene) -> tuple:
     tables = scene[Effects].tables
     scene[Effects].load(scene)
-    return effects.from_scene(tables, airframe(scene), environment(scene)) if tables else ()
+    if not tables:
+        return ()
+    return effects.from_scene(tables, airframe(scene), environment(scene), effect_inputs.external(scene))
 
 
 class RotorConstants(NamedTuple):

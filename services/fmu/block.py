@@ -13,6 +13,7 @@ from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import math
 from lapwing.kernels.cell import Cell
 from lapwing.kernels.native_calls import address_of
+from lapwing.kernels.row_packing import pack_row
 from lapwing.services.fmu.exchange import FmuExchange
 from lapwing.services.fmu.host_process import HostError, HostProcess
 from lapwing.services.fmu.pipe_polling import LOOKS, poll_entry
@@ -50,6 +51,8 @@ class FmuBlock:
     def bind(self, graph: BlockDiagram) -> None:
         """Have the diagram run compiled code for this block; the process of the FMU starts at the first tick."""
         self._interval = graph.setup.interval
+        for port in self.outputs:  # columns that the FMU does not compute
+            graph.ring(port.name)[:] = pack_row(port.like)
         code = graph.prepare(Block(self.name, self._exchange(graph), Cell(0)))
         graph.replace(graph.part(self.name), code)
 

@@ -9,6 +9,7 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.field_units import field_unit, parse_unit
+from lapwing.services.common.ports import EFFECT
 from lapwing.services.fmu.description import Description, NamedUnit, content_of, start_elements
 from lapwing.services.fmu.schema import FmuTable
 from lapwing.services.fmu.service_config import (
@@ -47,12 +48,15 @@ class ImportedFmu:
             columns.append(self.exported.index(element))
         return columns, [self.description.unit(key, self.exported[k]) for k in columns]
 
-    def config(self, ports: Mapping[str, Port], fmus: Mapping[str, "ImportedFmu"]) -> FmuConfig:
+    def config(
+        self, ports: Mapping[str, Port], fmus: Mapping[str, "ImportedFmu"], effects: Mapping[str, Port]
+    ) -> FmuConfig:
         """Connect all variables; the exported ones follow by `with_exports`.
 
         Args:
             ports: of the other services.
             fmus: all FMUs by name.
+            effects: ports of named inputs of effects.
 
         Raises:
             ConfigError: a connection does not fit.
@@ -64,7 +68,7 @@ class ImportedFmu:
             inputs += self._connections(key, variable, "input", source, place)
         for column, variable in table.outputs.items():
             key = f'{self.key}.outputs."{column}"'
-            outputs += self._connections(key, variable, "output", column, _columns(key, column, ports))
+            outputs += self._connections(key, variable, "output", column, _columns(key, column, {**ports, **effects}))
         for variable, value in table.start.items():
             key = f"{self.key}.start.{variable}"
             elements = self.description.elements(key, variable, "")
@@ -133,7 +137,9 @@ def _columns_of_fmu(key: str, source: str, name: str, fmus: Mapping[str, Importe
 
 def _columns(key: str, name: str, ports: Mapping[str, Port]) -> _Place:
     """Return the columns of "PORT.COLUMN", or of all columns below it, named as by `lapwing protocol`."""
-    port_name, _, path = name.partition(".")
+    prefix = EFFECT if name.startswith(EFFECT) else ""
+    port_name, _, path = name.removeprefix(prefix).partition(".")
+    port_name = prefix + port_name
     if port_name not in ports:
         raise ConfigError.unknown(key, "port", port_name, ports)
     leaves: dict[str, NamedUnit | None] = {}

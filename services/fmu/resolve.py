@@ -7,6 +7,9 @@ from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port, execut
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.common import effect_inputs
+from lapwing.services.common.ports import EFFECT
+from lapwing.services.common.vehicle_schema import active
 from lapwing.services.fmu.model import ImportedFmu
 from lapwing.services.fmu.schema import Services
 from lapwing.services.fmu.service_config import FmuConfig, FmuSetup, own_port, replaced_port
@@ -28,7 +31,8 @@ def connect(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Se
     table = scene[Services]
     known = {port.name: port for service in services.values() for port in service.ports}
     imported = {name: ImportedFmu(name, table.fmu(name)) for name in table.tables}
-    configs = [fmu.config(known, imported) for fmu in imported.values()]
+    effects = _effect_ports(scene, services)
+    configs = [fmu.config(known, imported, effects) for fmu in imported.values()]
     fmus = tuple(_ordered([imported[each.name].with_exports(each) for each in configs]))
     inputs: dict[tuple[str, int], None] = {}
     ports: dict[str, Port] = {}
@@ -41,8 +45,11 @@ def connect(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Se
             if port == own:
                 ports[port] = Port(own, (0.0,) * len(imported[fmu.name].exported))
                 continue
-            if any(replaced_port(other.name, port) in ports for other in fmus):
+            if port in ports or any(replaced_port(other.name, port) in ports for other in fmus):
                 raise ConfigError(key, f"two FMUs compute columns of {port}", "one FMU for each port")
+            if port in effects:
+                ports[port] = effects[port]
+                continue
             if known[port].period == LATCHED:
                 raise ConfigError(key, f"{port} changes at events only", "a port that is published periodically")
             ports[replaced_port(fmu.name, port)] = known[port]._replace(name=replaced_port(fmu.name, port))
@@ -55,6 +62,16 @@ def connect(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Se
     result[NAME] = ServiceConfig(setup, tuple(InputPort(*each) for each in inputs), tuple(ports.values()))
     _check_loops(result, fmus)
     return result
+
+
+def _effect_ports(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Port]:
+    """Return the ports of named inputs of effects that FMUs compute. Raise ConfigError if the scene has none such."""
+    for name, table in scene[Services].tables.items():
+        for column in table.get("outputs", {}):
+            if column.startswith(EFFECT):
+                effect_inputs.check(scene, f'services.{name}.outputs."{column}"', column)
+    read = {i.port for service in services.values() for i in service.inputs if i.port.startswith(EFFECT)}
+    return effect_inputs.ports_of(scene, active(scene)) if read else {}
 
 
 def _ordered(fmus: list[FmuConfig]) -> list[FmuConfig]:

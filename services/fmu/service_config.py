@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+from lapwing.services.common.ports import EFFECT
+
 CO_SIMULATION, MODEL_EXCHANGE = "co_simulation", "model_exchange"
 
 
@@ -61,13 +63,18 @@ class FmuSetup(NamedTuple):
             each.port: replaced_port(fmu.name, each.port)
             for fmu in self.fmus
             for each in fmu.outputs
-            if each.port != own_port(fmu.name)
+            if not is_new(each.port)
         }
 
 
 def own_port(name: str) -> str:
     """Return the name of the port with the outputs of an FMU that other FMUs read."""
     return f"fmu.{name}"
+
+
+def is_new(port: str) -> bool:
+    """Return True for a port that exists only because an FMU writes it: its own one, or named inputs of an effect."""
+    return port.startswith((own_port(""), EFFECT))
 
 
 def replaced_port(name: str, port: str) -> str:

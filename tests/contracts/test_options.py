@@ -102,7 +102,10 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--ros2-router": "tests/services/ros2/test_service.py",
     },
     "autopilot": dict.fromkeys(("--px4-sim", "--set", "--log"), "tests/services/px4/test_simulator.py"),
-    "campaign": {"--cluster": "tests/studies/campaign/test_cluster.py"},
+    "campaign": {
+        "--cluster": "tests/studies/campaign/test_cluster.py",
+        "--allow-code": "tests/services/fmu/test_effect_inputs.py",
+    },
     "replay": {
         **dict.fromkeys(("--speed", "--from", "--to", "--loop", "--topics", "--listen"), "tests/cosim/test_replay.py"),
         **dict.fromkeys(("--key-prefix", "--record"), "tests/cosim/test_replay.py"),

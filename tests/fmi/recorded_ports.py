@@ -43,19 +43,19 @@ class RecordedPorts:
         return iter(range(self.ticks))
 
 
-class DrivenPlant(RecordedPorts):
-    """The plant of a scene under random inputs, where the autopilot is a program that does not run here."""
+class DrivenService(RecordedPorts):
+    """A service of a scene under random inputs, where the autopilot is a program that does not run here."""
 
-    def __init__(self, setup: RunConfig):
+    def __init__(self, setup: RunConfig, name: str):
         self.setup, rng = setup, random.Random(1)
-        plant = create(setup, "plant")
-        own = {port.name for part in plant.parts for port in part.outputs}
-        read = {i.port for part in plant.parts for i in part.inputs} - own
-        self.diagram = BlockDiagram(setup, [plant], 1, whole=own | read)
+        service = create(setup, name)
+        own = {port.name for part in service.parts for port in part.outputs}
+        read = {i.port for part in service.parts for i in part.inputs} - own
+        self.diagram = BlockDiagram(setup, [service], 1, whole=own | read)
         for tick in range(setup.last_tick + 1):
-            for name in read:
-                if tick % self.diagram.ports[name].period == 0:
-                    self.diagram.put(name, tick, _random(self.diagram.ports[name].like, rng))
+            for port in sorted(read):
+                if tick % self.diagram.ports[port].period == 0:
+                    self.diagram.put(port, tick, _random(self.diagram.ports[port].like, rng))
             self.diagram.advance(tick + 1)
         self.ticks = self.diagram.tick
 

@@ -1,26 +1,39 @@
-"""The plant of every shipped scene as an FMU: driven with recorded inputs, it has the recorded outputs bit for bit."""
+"""Each part of every shipped scene as an FMU: driven with recorded inputs, it has the recorded outputs bit for bit."""
 
 from pathlib import Path
 
 import pytest
-from recorded_ports import DrivenPlant, RecordedPorts, scene_config
+from recorded_ports import DrivenService, RecordedPorts, scene_config
 
 pytest.importorskip("fmpy")
 from driven_fmu import assert_recorded_outputs
 
+from lapwing.fmi.exported_part import PARTS, VEHICLE
 from lapwing.fmi.fmu import export_fmu
 
-pytestmark = pytest.mark.long
 FIRMWARE = {"ardupilot_quad", "betaflight_quad", "px4_quad"}
 SCENES = sorted(path.stem for path in Path("lapwing/scenes").glob("*.toml"))
 TICKS = 60
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scene", SCENES)
-def test_plant_has_recorded_outputs(scene: str, tmp_path: Path) -> None:
-    interval = scene_config(scene).interval
-    setup = scene_config(scene, **{"run.duration": TICKS * interval})
-    recorded = (DrivenPlant if scene in FIRMWARE else RecordedPorts)(setup)
-    exported = export_fmu(setup, "plant", tmp_path / "plant.fmu", cpu="x86-64-v3")
-    assert recorded.ticks > TICKS // 2
-    assert_recorded_outputs(tmp_path / "plant.fmu", exported, recorded)
+def test_parts_have_recorded_outputs(scene: str, tmp_path: Path) -> None:
+    setup = scene_config(scene, **{"run.duration": TICKS * scene_config(scene).interval})
+    own = [part for part in PARTS if part in setup.services]
+    recorded = {}
+    if scene not in FIRMWARE:
+        recorded = dict.fromkeys([*own, VEHICLE], RecordedPorts(setup))
+    for part in own:
+        recorded.setdefault(part, None)
+    for part, ports in recorded.items():
+        ports = ports or DrivenService(setup, part)
+        exported = export_fmu(setup, part, tmp_path / "part.fmu", cpu="x86-64-v3")
+        assert ports.ticks > TICKS // 2
+        assert_recorded_outputs(tmp_path / "part.fmu", exported, ports)
+
+
+@pytest.mark.parametrize("scene", sorted(FIRMWARE))
+def test_vehicle_with_firmware_is_rejected(scene: str, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="runs Python code of the scene; only compiled blocks can be exported"):
+        export_fmu(scene_config(scene), VEHICLE, tmp_path / "vehicle.fmu")

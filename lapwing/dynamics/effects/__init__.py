@@ -10,7 +10,7 @@ An effect of the user's own is such a file elsewhere, which Python finds; the sc
 """
 
 import importlib
-from collections.abc import Mapping
+from collections.abc import Collection, Iterable, Mapping
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -22,7 +22,7 @@ from lapwing.dynamics.environment import STANDARD, Environment
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-__all__ = ["checked", "from_scene", "get", "names", "parameter_class"]
+__all__ = ["checked", "from_scene", "get", "names", "ordered", "parameter_class"]
 
 # Effects are evaluated in the order of these keys, by default their names. Sums round differently in another order, so
 # an effect that is renamed keeps its key.
@@ -76,8 +76,24 @@ def parameter_class(name: str, module: str | None = None) -> type:
     return getattr(defining, expected)
 
 
-def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment: Environment = STANDARD) -> tuple:
+def ordered(active: Iterable[str]) -> list[str]:
+    """Return names of effects in the order of evaluation."""
+    return sorted(active, key=lambda name: _ORDER.get(name, name))
+
+
+def from_scene(
+    tables: Mapping[str, Mapping],
+    airframe: "Airframe",
+    environment: Environment = STANDARD,
+    external: Collection[str] = (),
+) -> tuple:
     """Return the active effects of a scene in the order of evaluation, from the table of each.
+
+    Args:
+        tables: of the effects, by name.
+        airframe: of the vehicle.
+        environment: air, gravity and ground.
+        external: names of effects whose named inputs an external model computes (see `_external_inputs`).
 
     Raises:
         KeyedError: of the key `effects.<name>.<key>`, for an unknown effect, a parameter that is missing, unknown, of
@@ -85,7 +101,7 @@ def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment:
     """
     active = []
     kinds: dict[str, str] = {}
-    for name in sorted(tables, key=lambda name: _ORDER.get(name, name)):
+    for name in ordered(tables):
         table = dict(tables[name])
         module = table.pop("module", None)
         kind = getattr(get(name, module), "KIND", name)
@@ -103,5 +119,6 @@ def from_scene(tables: Mapping[str, Mapping], airframe: "Airframe", environment:
             effect = build(table, airframe) if build else checked(cls, table)
         except ConfigError as error:
             raise error.with_prefix(f"effects.{name}") from None
-        active.append(effect.in_environment(environment) if hasattr(effect, "in_environment") else effect)
+        effect = effect.in_environment(environment) if hasattr(effect, "in_environment") else effect
+        active.append(effect.with_inputs() if name in external else effect)
     return tuple(active)

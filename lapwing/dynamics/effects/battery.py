@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
+from lapwing.dynamics.effects._external_inputs import external, given_or, initial_state
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
@@ -51,6 +52,29 @@ class Battery(NamedTuple):
         """Return (charge, voltage [V] under load, current [A])."""
         return (self.initial_charge, self.cells * python_function(open_circuit_voltage)(self.initial_charge), 0.0)
 
+    def with_inputs(self) -> "ExternalBattery":
+        """Return the battery with named inputs."""
+        return ExternalBattery(self)
+
+
+class BatteryInputs(NamedTuple):
+    """Named inputs of a battery; NaN: the battery computes it."""
+
+    voltage: float = math.nan  # [V] of all cells under load
+    charge: float = math.nan  # fraction of the capacity
+
+
+@external
+class ExternalBattery(NamedTuple):
+    """Battery whose voltage or charge comes from an external model; the cut-off acts on that voltage."""
+
+    own: Battery
+    inputs: BatteryInputs = BatteryInputs()
+
+    def initial_discrete_state(self) -> tuple:
+        """Return the battery's own discrete state, and its inputs."""
+        return initial_state(self)
+
 
 @always_inline
 def open_circuit_voltage(charge):
@@ -86,3 +110,25 @@ def battery(e, memory, voltage):
 def read(e, memory):
     """Return charge, voltage [V] under load, current [A]; no temperature."""
     return memory[0], memory[1], memory[2], math.nan
+
+
+@discrete_update(ExternalBattery)
+def discharge_external(e, memory, s, rotors, key, tick, interval):
+    """Return the discrete state after an interval, with the inputs in place of the battery's own numbers."""
+    before, inputs = memory
+    charge, own_voltage, current = discharge(e.own, before, s, rotors, key, tick, interval)
+    voltage = given_or(own_voltage, inputs.voltage)
+    is_on = before[1] != 0.0 and voltage > e.own.cutoff_voltage
+    return (given_or(charge, inputs.charge), voltage if is_on else 0.0, current), inputs
+
+
+@supply_voltage(ExternalBattery)
+def external_battery(e, memory, voltage):
+    """Return the voltage [V] of each motor."""
+    return battery(e.own, memory[0], voltage)
+
+
+@battery_state(ExternalBattery)
+def read_external(e, memory):
+    """Return charge, voltage [V] under load, current [A]; no temperature."""
+    return read(e.own, memory[0])

@@ -6,10 +6,11 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.atmosphere import temperature as air_temperature
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.effects._external_inputs import external, given_or, initial_state
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
-from lapwing.dynamics.effects.battery import KIND, at_most, open_circuit_voltage
+from lapwing.dynamics.effects.battery import KIND, BatteryInputs, at_most, open_circuit_voltage
 from lapwing.dynamics.environment import Environment
 from lapwing.kernels import math
 from lapwing.kernels.codegen import map_tuple
@@ -107,6 +108,22 @@ class BatteryThevenin(NamedTuple):
             1.0,
         )
 
+    def with_inputs(self) -> "ExternalBatteryThevenin":
+        """Return the battery with named inputs."""
+        return ExternalBatteryThevenin(self)
+
+
+@external
+class ExternalBatteryThevenin(NamedTuple):
+    """Battery whose voltage or charge comes from an external model; cut-off and restart act on that voltage."""
+
+    own: BatteryThevenin
+    inputs: BatteryInputs = BatteryInputs()
+
+    def initial_discrete_state(self) -> tuple:
+        """Return the battery's own discrete state, and its inputs."""
+        return initial_state(self)
+
 
 @discrete_update(BatteryThevenin)
 def discharge(e, memory, s, rotors, key, tick, interval):
@@ -142,3 +159,25 @@ def battery_thevenin(e, memory, voltage):
 def read(e, memory):
     """Return charge, terminal voltage [V], current [A], temperature [K]."""
     return memory[0], memory[1], memory[2], memory[3]
+
+
+@discrete_update(ExternalBatteryThevenin)
+def discharge_external(e, memory, s, rotors, key, tick, interval):
+    """Return the discrete state after an interval, with the inputs in place of the battery's own numbers."""
+    before, inputs = memory
+    charge, voltage, current, temperature, fast, slow, _ = discharge(e.own, before, s, rotors, key, tick, interval)
+    voltage = max(given_or(voltage, inputs.voltage), 0.0)
+    on = 1.0 if voltage > (e.own.cutoff_voltage if before[6] > 0.0 else e.own.restart) else 0.0
+    return (given_or(charge, inputs.charge), voltage, current, temperature, fast, slow, on), inputs
+
+
+@supply_voltage(ExternalBatteryThevenin)
+def external_battery(e, memory, voltage):
+    """Return the voltage [V] of each motor."""
+    return battery_thevenin(e.own, memory[0], voltage)
+
+
+@battery_state(ExternalBatteryThevenin)
+def read_external(e, memory):
+    """Return charge, terminal voltage [V], current [A], temperature [K]."""
+    return read(e.own, memory[0])

@@ -7,6 +7,7 @@ from annotated_types import Ge, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import by_axis
+from lapwing.dynamics.effects._external_motor import DcMotorInputs, ExternalDcMotor, idle_current
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import discrete_update, motor
 from lapwing.dynamics.vector import pair
@@ -18,7 +19,6 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "motor model"
-FULL_FRICTION = 1.0  # [rad/s] above which the idle current is drawn in full
 LARGEST = 0.9  # of the inductance at which speed and current oscillate
 
 
@@ -81,6 +81,11 @@ class DcMotor(NamedTuple):
         """Return () without inductance; else the time [s] and, of each rotor, (transient current [A], voltage [V])."""
         return (0.0, ((0.0, 0.0),) * self.rotors) if self.winding else ()
 
+    def with_inputs(self) -> "ExternalDcMotor":
+        """Return the motors with named inputs."""
+        unknown = (math.nan,) * self.rotors
+        return ExternalDcMotor(self, DcMotorInputs(unknown, unknown, unknown))
+
 
 def _winding(inductance: float, resistance: float, constant: float, efficiency: float, inertia: float) -> tuple:
     """Return (lag, effective inverse inertia, rate) from the roots of the linear motor (theory.md, eq. (2.76))."""
@@ -114,7 +119,7 @@ def _limited(e, speed, current):
 
 @always_inline
 def _acceleration(e, inverse_inertia, speed, current, torque):
-    friction = e.no_load_current * min(speed * (1.0 / FULL_FRICTION), 1.0)
+    friction = idle_current(e, speed)
     return (e.efficiency * e.motor_constant * inverse_inertia) * (current - friction) - torque * inverse_inertia
 
 

@@ -7,6 +7,7 @@ from numba import types
 
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics import effects
+from lapwing.dynamics.effects._external_inputs import with_inputs_stored
 from lapwing.dynamics.effects.payload_release import RELEASED, PayloadRelease
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vehicles.multirotor import advance, observe
@@ -45,10 +46,14 @@ class MultirotorPlantState(NamedTuple):
 def step(
     p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:
-    """Advance to `tick` under the command given; at tick 0 leave the vehicle where it is."""
-    actuators, status = inputs
+    """Advance to `tick` under the command given; at tick 0 leave the vehicle where it is.
+
+    The inputs are actuators, status, and the named inputs of effects.
+    """
+    actuators, status = inputs[0], inputs[1]
     command = actuators.value.motor_voltage if actuators.due else p.off
-    vehicle = s.vehicle
+    memory = with_inputs_stored(p.vehicle.effects, s.vehicle.memory, inputs[2:])
+    vehicle = MultirotorState(s.vehicle.motion, memory)
     if status.due and status.value.released:
         vehicle = MultirotorState(vehicle.motion, release_payload(p.vehicle.effects, vehicle.memory))
     if tick > 0:

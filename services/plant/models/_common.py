@@ -14,7 +14,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
-from lapwing.services.common import ports
+from lapwing.services.common import effect_inputs, ports
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.ports import BatteryReading, BodyMotions, TrueState
 from lapwing.services.common.run_schema import Run
@@ -110,10 +110,10 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
     start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     truth = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
-    delay = exchange.loop_delay
+    delay, external = exchange.loop_delay, effect_inputs.ports_of(scene, p.effects)
     return ServiceConfig(
         PlantSetup("rigid_body", core, start, wiring(scene, odometry=True, battery=frame.battery)),
-        (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay)),
+        (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay), *(InputPort(i, delay) for i in external)),
         (Port(ports.TRUTH, truth), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
     )
 

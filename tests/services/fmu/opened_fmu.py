@@ -20,7 +20,7 @@ class OpenedFmu:
         fmu = ImportedFmu("a", FmuTable(fmu=str(path), timeout=300.0, **table))
         for name in outputs:
             fmu.export("outputs", name)
-        config = fmu.with_exports(fmu.config({}, {"a": fmu}))
+        config = fmu.with_exports(fmu.config({}, {"a": fmu}, {}))
         elements = [element for name in inputs for element in fmu.description.elements("inputs", name, "input")]
         config = config._replace(inputs=tuple(Connection("u", k, each, 1.0) for k, each in enumerate(elements)))
         self._request, self._reply = np.zeros(2 + len(config.inputs)), np.zeros(1 + len(config.outputs))

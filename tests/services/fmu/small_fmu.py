@@ -11,7 +11,7 @@ SOURCE = r"""
 #include <stdlib.h>
 #include <unistd.h>
 typedef struct { double u, y, gain; int fault; } model;
-enum { NONE, CRASH, HANG, FAIL, NAN_OUTPUT, EXIT };
+enum { NONE, CRASH, HANG, FAIL, NAN_OUTPUT, EXIT, SLOW };
 const char *fmi2GetTypesPlatform(void) { return "default"; }
 const char *fmi2GetVersion(void) { return "2.0"; }
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const void *c, int v, int l) {
@@ -46,6 +46,7 @@ int fmi2DoStep(void *c, double t, double h, int p) {
     if (m->fault == FAIL) return 3;
     if (m->fault == NAN_OUTPUT) m->y = NAN;
     if (m->fault == EXIT) _exit(7);
+    if (m->fault == SLOW && t < 0.5 - 1e-9) sleep(4);
     return 0;
 }
 #define NO(f) int f(void) { return 3; }

@@ -27,7 +27,7 @@ start = {{ {start} }}
 [services.motor.outputs]
 {outputs}
 """
-CRASH, HANG, FAIL, NAN_OUTPUT, EXIT = 1, 2, 3, 4, 5
+CRASH, HANG, FAIL, NAN_OUTPUT, EXIT, SLOW = 1, 2, 3, 4, 5, 6
 
 
 def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -129,6 +129,23 @@ def test_hanging_fmu_is_ended_after_its_timeout(folder: Path) -> None:
     done = fly(scene_with(folder, start=f"fault = {HANG}", timeout=1.0), folder / "hang.mcap")
     assert done.returncode == 1
     assert "services.motor: small.fmu: no answer for 1 s at t = 0.500 s" in done.stderr
+
+
+def test_step_longer_than_stall_is_awaited_in_multi_process_mode(folder: Path, plain_log: Path) -> None:
+    """A step of 4 s; a service that reports no wait counts as stalled after 2.5 s."""
+    log = folder / "slow.mcap"
+    done = fly(scene_with(folder, start=f"fault = {SLOW}"), log, "--mode", "multi-process")
+    assert done.returncode == 0, done.stderr
+    assert payloads(log, "/ground_truth") == payloads(plain_log, "/ground_truth")
+
+
+def test_timeout_longer_than_stall_is_named_in_multi_process_mode(folder: Path) -> None:
+    log = folder / "hang_processes.mcap"
+    done = fly(scene_with(folder, start=f"fault = {HANG}", timeout=4.0), log, "--mode", "multi-process")
+    assert done.returncode == 1
+    assert "services.motor: small.fmu: no answer for 4 s at t = 0.500 s" in done.stderr
+    assert "stalled" not in done.stderr
+    assert len(payloads(log, "/ground_truth")) >= 124
 
 
 def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:

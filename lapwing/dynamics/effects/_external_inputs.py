@@ -1,0 +1,77 @@
+"""Named inputs of effects: quantities that an external model, such as an FMU, computes in place of the effect's own.
+
+An effect that can have them has a method `with_inputs(self)`. It returns the parameters of another class, declared by
+`external`, with the fields `own` (the effect's parameters) and `inputs`: a NamedTuple of all named inputs, with units
+in the comments of its fields, and NaN in each number. A number that stays NaN is computed by the effect itself.
+
+The discrete state of such an effect is (its own, inputs). The plant stores new inputs once a communication step.
+"""
+
+from typing import Any
+
+from numba import types
+
+from lapwing.kernels import always_inline, math
+from lapwing.kernels.codegen import compile_source, generated_overload, map_tuple
+
+_CLASSES: set[type] = set()
+
+
+def external(parameters: type) -> type:
+    """Declare the parameter class of an effect with named inputs."""
+    _CLASSES.add(parameters)
+    return parameters
+
+
+def inputs_of(effects: tuple) -> list[Any]:
+    """Return the prototypes of the named inputs, one of each effect that has them, in the order of the effects."""
+    return [e.inputs for e in effects if type(e) in _CLASSES]
+
+
+def initial_state(e: Any) -> tuple:
+    """Return the discrete state of an effect with named inputs before its first sample."""
+    return (e.own.initial_discrete_state() if hasattr(e.own, "initial_discrete_state") else (), e.inputs)
+
+
+@always_inline
+def given_or(own, value):
+    """Return the input `value`, or `own` where the external model computes none."""
+    return own if math.isnan(value) else value
+
+
+@always_inline
+def _given_or(_, own, value):
+    return given_or(own, value)
+
+
+@always_inline
+def all_given_or(own, values):
+    """Return `given_or` of each entry of two tuples."""
+    return map_tuple(_given_or, 0.0, own, values)
+
+
+def _stored(effects: types.BaseTuple, memory: types.BaseTuple, samples: types.BaseTuple) -> Any:
+    members: list[str] = []
+    names = {"latest": _latest}
+    for i, e in enumerate(effects.types):
+        is_external = e.instance_class in _CLASSES
+        k = sum(member.startswith("(") for member in members)
+        members.append(f"(memory[{i}][0], latest(samples[{k}], memory[{i}][1]))" if is_external else f"memory[{i}]")
+    result = "".join(f"{member}, " for member in members)
+    changed = any(member.startswith("(") for member in members)
+    return compile_source(
+        "with_inputs_stored(effects, memory, samples)", names, f"return ({result})" if changed else "return memory"
+    )
+
+
+@always_inline
+def _latest(sample, former):
+    return sample.value if sample.due else former
+
+
+with_inputs_stored = generated_overload(
+    "with_inputs_stored(effects, memory, samples)",
+    _stored,
+    "Return the discrete states with the samples of named inputs, one for each effect that has them.",
+    inline=True,
+)
