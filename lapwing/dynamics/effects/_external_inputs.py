@@ -55,7 +55,7 @@ def _stored(effects: types.BaseTuple, memory: types.BaseTuple, samples: types.Ba
     names = {"latest": _latest}
     for i, e in enumerate(effects.types):
         is_external = e.instance_class in _CLASSES
-        k = sum(member.startswith("(") for member in members)
+        k = len([member for member in members if member.startswith("(")])
         members.append(f"(memory[{i}][0], latest(samples[{k}], memory[{i}][1]))" if is_external else f"memory[{i}]")
     result = "".join(f"{member}, " for member in members)
     changed = any(member.startswith("(") for member in members)
