@@ -13,7 +13,6 @@ from lapwing.services.common.mavlink.dialect import mavlink
 pytestmark = pytest.mark.long
 
 WAIT = 300.0  # [s] for a message on a busy machine
-MOTOR, WRONG = 103, 4  # FAILURE_UNIT_SYSTEM_MOTOR, FAILURE_TYPE_WRONG
 
 
 class Station:
@@ -82,7 +81,12 @@ def test_detection_of_motor_failures_is_switched_in_flight(station):
     assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
     assert station.command(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
     now = station.receive("GLOBAL_POSITION_INT", lambda m: m.relative_alt > 2000).time_boot_ms
-    assert station.command(mavlink.MAV_CMD_INJECT_FAILURE, MOTOR, WRONG, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    assert (
+        station.command(
+            mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_WRONG, 1.0
+        )
+        == mavlink.MAV_RESULT_ACCEPTED
+    )
     while (m := station.receive(["GLOBAL_POSITION_INT", "HEARTBEAT"])).get_type() == "HEARTBEAT" or (
         m.time_boot_ms < now + 3000
     ):
