@@ -102,6 +102,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 def test_wind_equal_to_own_does_not_change_flight(folder: Path) -> None:
     steady = "[3.0, 1.5, 0.0]"
     own, external = folder / "own.mcap", folder / "external.mcap"
@@ -110,6 +111,7 @@ def test_wind_equal_to_own_does_not_change_flight(folder: Path) -> None:
     assert true_states(own) == true_states(external)
 
 
+@pytest.mark.long
 def test_wind_of_fmu_acts_one_tick_after_its_sample(folder: Path) -> None:
     log = folder / "wind.mcap"
     fly(scene_with(folder, "\n".join(WIND.splitlines()[:2])), log)
@@ -133,6 +135,7 @@ def test_battery_of_fmu_supplies_motors_and_own_charge_is_counted(folder: Path) 
     assert battery.percentage[-1] < battery.percentage[0]
 
 
+@pytest.mark.long
 def test_charge_of_fmu_is_published(folder: Path) -> None:
     log = folder / "charge.mcap"
     fly(scene_with(folder, f'{ALL}\n"effect.battery.charge" = "charge"'), log)
@@ -140,6 +143,7 @@ def test_charge_of_fmu_is_published(folder: Path) -> None:
     assert battery.percentage[1:] == pytest.approx(1.0 - 0.01 * (battery.times[1:] - 0.004), abs=1e-6)
 
 
+@pytest.mark.long
 def test_voltage_below_cutoff_stops_motors_for_good(folder: Path) -> None:
     log = folder / "cutoff.mcap"
     fly(scene_with(folder, ALL, "open_circuit = 35.9, resistance = 0.0"), log)
@@ -147,6 +151,7 @@ def test_voltage_below_cutoff_stops_motors_for_good(folder: Path) -> None:
     assert (truth.motor_voltage[1:] == 0.0).all()
 
 
+@pytest.mark.long
 def test_motors_of_fmu_fly_like_own_ones(folder: Path) -> None:
     """Motors without friction; differences: the coupling of 1 ms, and the current limit of the own ones."""
     logs = [folder / "own_motors.mcap", folder / "fmu_motors.mcap"]
@@ -159,6 +164,7 @@ def test_motors_of_fmu_fly_like_own_ones(folder: Path) -> None:
     assert 0.0 < np.abs(other.position - one.position).max() < 0.05
 
 
+@pytest.mark.long
 def test_speed_of_fmu_is_reached_one_tick_later(folder: Path) -> None:
     log = folder / "speed.mcap"
     outputs = "\n".join(f'"effect.dc_motor.speed.{k}" = "next_speed"' for k in range(ROTORS))
@@ -167,6 +173,7 @@ def test_speed_of_fmu_is_reached_one_tick_later(folder: Path) -> None:
     assert truth.rotor_speed[1:, 2] == pytest.approx(10.0 + truth.times[:-1], rel=1e-12)
 
 
+@pytest.mark.long
 def test_modes_campaign_and_resimulation_have_equal_bits(folder: Path) -> None:
     scene, log, campaign = scene_with(folder, ALL), folder / "bits.mcap", str(folder / "campaign")
     assert fly(scene, log) == fly(scene, folder / "bits_processes.mcap", mode="multi-process")
