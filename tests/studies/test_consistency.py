@@ -9,6 +9,16 @@ from lapwing.services.autopilot.estimator.filter_state import SIZE
 from lapwing.studies import consistency
 from lapwing.studies.metrics import metrics
 
+HOVER = {
+    "trajectory.phase": [
+        {"name": "align", "duration": 2.0},
+        {"name": "climb", "z": {"kind": "ramp", "to": 5.0, "rate": 1.0}},
+        {"name": "hover", "duration": 40.0},
+        {"name": "descend", "z": {"kind": "ramp", "to": 0.0, "rate": 1.0}},
+        {"name": "land", "duration": 5.0},
+    ]
+}
+GPS_LOSS = {"sensors.gps.faults": [{"kind": "dropout", "start": 30.0, "stop": 45.0}]}
 WIND = {"effects.random_wind_force.mean": (9.0, 3.0, 0.0), "effects.random_wind_force.sigma": 3.0}
 
 
@@ -51,9 +61,9 @@ def vertical_speed_sigmas(flight):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("overrides", [{}, WIND], ids=["light wind", "strong wind"])
+@pytest.mark.parametrize("overrides", [HOVER, {}, WIND, GPS_LOSS], ids=["hover", "mission", "wind", "gps loss"])
 def test_joint_nees_is_within_its_bounds(overrides):
-    flights = lapwing.campaign("delivery_mission", range(1, 13), overrides=overrides)
+    flights = lapwing.campaign("delivery_mission", range(101, 201), overrides=overrides)
     low, high = consistency.bounds(consistency.JOINT, len(flights))
     assert low < np.mean([metrics(flight)["nees"] for flight in flights]) < high
 

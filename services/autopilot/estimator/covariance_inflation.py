@@ -17,8 +17,10 @@ from lapwing.services.autopilot.estimator.filter_state import (
     GYRO,
     IRON,
     MAG,
+    MAG_SCALE,
     NEVER,
     POSITION,
+    SIZE,
     THETA,
     VELOCITY,
     Memory,
@@ -75,6 +77,8 @@ def forget_imu(p: Estimator, s: State) -> State:
             c[k, :] = 0.0
             c[:, k] = 0.0
             c[k, k] = deviation * deviation
+            s.memory.considered[k, :] = 0.0
+    s.memory.considered[:SIZE, :MAG_SCALE] = 0.0
     nominal = Nominal(
         n.attitude, n.velocity_world, n.position_world, ZERO, ZERO, n.gps_correlated_error,
         n.magnetometer_bias, n.heading_bias, n.barometer_bias, n.sonar_scale,

@@ -16,6 +16,9 @@ from lapwing.services.common.ports import StateEstimate
 SIZE = 24
 THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
 HEADING, BAROMETER, SCALE = 21, 22, 23
+CONSIDERED = 12  # constant errors of instruments that are considered and not estimated (theory.md, eq. (3.60))
+GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT = 0, 3, 6, 9
+VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2  # rows of `considered`: theirs, of H, covariance with the innovation
 
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
 IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
@@ -63,6 +66,7 @@ class Memory(NamedTuple):
     correction: np.ndarray  # (24,) pending correction of the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
+    considered: np.ndarray  # (27, 12) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
     history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, noise added to velocity and attitude
     since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
     refused: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
@@ -101,6 +105,7 @@ def new_memory() -> Memory:
         np.zeros(SIZE),
         np.zeros(SIZE),
         np.zeros(SIZE),
+        np.zeros((SIZE + 3, CONSIDERED)),
         np.zeros((HISTORY, 8)),
         np.zeros(WATCHED, np.int64),
         np.zeros(WATCHED, np.int64),
@@ -133,9 +138,14 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
         covariance[WANDER + i, WANDER + i] = p.gps_correlated_error_horizontal * p.gps_correlated_error_horizontal
         covariance[IRON + i, IRON + i] = p.magnetometer_bias_std * p.magnetometer_bias_std
     covariance[WANDER + 2, WANDER + 2] = p.gps_correlated_error_vertical * p.gps_correlated_error_vertical
-    covariance[HEADING, HEADING] = p.heading_std * p.heading_std
     covariance[BAROMETER, BAROMETER] = 50.0 * 50.0
     covariance[SCALE, SCALE] = p.sonar_scale_std * p.sonar_scale_std
+    m.considered[:] = 0.0
+    m.considered[VARIANCE, GYRO_SCALE : GYRO_SCALE + 3] = p.gyro_scale_std * p.gyro_scale_std
+    m.considered[VARIANCE, GYRO_ALIGNMENT : GYRO_ALIGNMENT + 3] = p.gyro_alignment_std * p.gyro_alignment_std
+    m.considered[VARIANCE, MAG_SCALE : MAG_SCALE + 3] = p.magnetometer_scale_std * p.magnetometer_scale_std
+    alignment = p.magnetometer_alignment_std * p.magnetometer_alignment_std
+    m.considered[VARIANCE, MAG_ALIGNMENT : MAG_ALIGNMENT + 2] = covariance[HEADING, HEADING] = alignment
     m.correction[:] = m.row[:] = m.product[:] = 0.0
     m.history[:] = 0.0
     m.since[:] = NEVER

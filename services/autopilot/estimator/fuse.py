@@ -1,4 +1,4 @@
-"""Sequential Kalman update by scalar measurements (theory.md, eqs. (3.26) to (3.28)).
+"""Sequential Kalman update by scalar measurements (theory.md, eqs. (3.26) to (3.28) and (3.62)).
 
 The caller fills `memory.row` with a row of the measurement matrix. Corrections accumulate in `memory.correction`, so
 that all rows of a reading are linearised about the same estimate.
@@ -7,15 +7,27 @@ that all rows of a reading are linearised about the same estimate.
 from lapwing.dynamics.vector import Mat3, Vec3
 from lapwing.kernels import always_inline, kernel, noinline
 from lapwing.kernels.simd import load, splat, store
-from lapwing.services.autopilot.estimator.filter_state import ACCELEROMETER, SIZE, THETA, Memory
+from lapwing.services.autopilot.estimator.filter_state import (
+    ACCELEROMETER,
+    CONSIDERED,
+    PRODUCT,
+    ROW,
+    SIZE,
+    THETA,
+    VARIANCE,
+    Memory,
+)
 
 FLOOR = 1e-12  # minimum measurement variance, which keeps S positive with ideal instruments
 
 
 @always_inline
 def clear(m: Memory) -> None:
-    """Clear the row."""
-    m.row[:] = 0.0
+    """Clear the row of the error and of the considered parameters."""
+    for i in range(0, SIZE, 4):
+        store(m.row, i, splat(0.0))
+    for k in range(0, CONSIDERED, 4):
+        store(m.considered, CONSIDERED * ROW + k, splat(0.0))
 
 
 @noinline
@@ -28,7 +40,25 @@ def innovation_variance(m: Memory, variance: float) -> float:
         if h != 0.0:  # rows are sparse
             for i in range(0, SIZE, 4):
                 store(m.product, i, load(m.product, i) + h * load(m.covariance, SIZE * j + i))
+    first = load(m.considered, CONSIDERED * ROW) * load(m.considered, CONSIDERED * VARIANCE)
+    second = load(m.considered, CONSIDERED * ROW + 4) * load(m.considered, CONSIDERED * VARIANCE + 4)
+    third = load(m.considered, CONSIDERED * ROW + 8) * load(m.considered, CONSIDERED * VARIANCE + 8)
+    for j in range(SIZE):
+        h = m.row[j]
+        if h != 0.0:
+            first = first + h * load(m.considered, CONSIDERED * j)
+            second = second + h * load(m.considered, CONSIDERED * j + 4)
+            third = third + h * load(m.considered, CONSIDERED * j + 8)
+    store(m.considered, CONSIDERED * PRODUCT, first)
+    store(m.considered, CONSIDERED * PRODUCT + 4, second)
+    store(m.considered, CONSIDERED * PRODUCT + 8, third)
     total = variance + FLOOR
+    for k in range(CONSIDERED):
+        g = m.considered[ROW, k]
+        if g != 0.0:
+            total += g * m.considered[PRODUCT, k]
+            for i in range(SIZE):
+                m.product[i] += g * m.considered[i, k]
     for i in range(SIZE):
         if m.row[i] != 0.0:
             total += m.row[i] * m.product[i]
@@ -56,6 +86,14 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
         for j in range(0, SIZE, 4):
             change = (one * load(m.product, j)) * inverse  # exactly symmetric
             store(m.covariance, SIZE * i + j, load(m.covariance, SIZE * i + j) - change)
+    first = load(m.considered, CONSIDERED * PRODUCT) * inverse
+    second = load(m.considered, CONSIDERED * PRODUCT + 4) * inverse
+    third = load(m.considered, CONSIDERED * PRODUCT + 8) * inverse
+    for i in range(SIZE):
+        one, place = m.product[i], CONSIDERED * i
+        store(m.considered, place, load(m.considered, place) - one * first)
+        store(m.considered, place + 4, load(m.considered, place + 4) - one * second)
+        store(m.considered, place + 8, load(m.considered, place + 8) - one * third)
     return y * y * inverse
 
 

@@ -1,11 +1,22 @@
-"""Fusion of the magnetometer's heading (theory.md, eq. (3.33))."""
+"""Fusion of the magnetometer's heading (theory.md, eqs. (3.33) and (3.63))."""
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.vector import ZERO, Vec3, apply, subtract
+from lapwing.dynamics.vector import ZERO, Vec3, apply, cross, subtract
 from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
-from lapwing.services.autopilot.estimator.filter_state import HEADING, IRON, MAG, THETA, State, corrected
+from lapwing.services.autopilot.estimator.filter_state import (
+    HEADING,
+    IRON,
+    MAG,
+    MAG_ALIGNMENT,
+    MAG_SCALE,
+    ROW,
+    THETA,
+    State,
+    corrected,
+    three,
+)
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
@@ -28,7 +39,8 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
     bx, by, bz = p.magnetic_field_world
     horizontal = bx * bx + by * by
     r = rotation_matrix(s.nominal.attitude)
-    fx, fy, _ = apply(r, subtract(field_body, s.nominal.magnetometer_bias))
+    field = subtract(field_body, s.nominal.magnetometer_bias)
+    fx, fy, _ = apply(r, field)
     turn = math.atan2(fx * by - fy * bx, fx * bx + fy * by)  # from the measured to the true field
     clear(m)
     m.row[THETA] = -bz * bx / horizontal
@@ -36,8 +48,13 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
     m.row[THETA + 2] = 1.0
     for i in range(3):
         m.row[IRON + i] = (by * r[i] - bx * r[3 + i]) / horizontal
-    m.row[HEADING] = 1.0
-    innovation = turn - s.nominal.heading_bias
+        m.considered[ROW, MAG_SCALE + i] = m.row[IRON + i] * field[i]
+    iron = three(m.row, IRON)
+    turned = cross(field, iron)  # (a x field) . iron = a . (field x iron)
+    m.considered[ROW, MAG_ALIGNMENT] = turned[0]
+    m.considered[ROW, MAG_ALIGNMENT + 1] = turned[1]
+    m.row[HEADING] = -turned[2]
+    innovation = turn + turned[2] * s.nominal.heading_bias
     nis = innovation * innovation / innovation_variance(m, variance / horizontal)
     accepted = nis < p.gate * p.gate
     if accepted:

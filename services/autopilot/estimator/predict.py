@@ -1,13 +1,9 @@
 """Prediction by IMU readings (theory.md, eqs. (3.21) to (3.24))."""
 
-from typing import Any
-
-import numpy as np
-
 from lapwing.dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
-from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, norm, scale, subtract
+from lapwing.dynamics.vector import Vec3, add, apply, norm, scale, subtract
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.simd import load, store
+from lapwing.services.autopilot.estimator.covariance_propagation import fade, propagate_considered, propagate_covariance
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
@@ -16,8 +12,6 @@ from lapwing.services.autopilot.estimator.filter_state import (
     HISTORY,
     IMU,
     IRON,
-    POSITION,
-    SIZE,
     THETA,
     VELOCITY,
     WANDER,
@@ -25,7 +19,6 @@ from lapwing.services.autopilot.estimator.filter_state import (
     Inertial,
     Nominal,
     State,
-    three,
 )
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck
 
@@ -36,63 +29,6 @@ _REBOUND = (
 )
 _TIPPING = 2.5e-3  # [rad^2/s] the same of the attitude
 _BOUNCE = 1.0  # [s] after which the vehicle rests
-
-
-@always_inline
-def _transformed(
-    theta: Any, velocity: Any, position: Any, gyro: Any, accelerometer: Any, f: Vec3, r: Mat3, dt: float
-) -> tuple[Any, Any, Any]:
-    """Return the changed rows (theta, velocity, position) of F c with F = I + A dt; c is a column or SIMD columns."""
-    return (
-        subtract(theta, scale(dt, apply(r, gyro))),
-        add(velocity, scale(dt, subtract(cross(theta, f), apply(r, accelerometer)))),
-        add(position, scale(dt, velocity)),
-    )
-
-
-@always_inline
-def _loaded(c: np.ndarray, i: int, j: int) -> Any:
-    """Return rows i to i + 2 and columns j to j + 3 of c as SIMD vectors."""
-    return load(c, SIZE * i + j), load(c, SIZE * (i + 1) + j), load(c, SIZE * (i + 2) + j)
-
-
-@always_inline
-def _stored(c: np.ndarray, i: int, j: int, rows: Any) -> None:
-    for k in range(3):
-        store(c, SIZE * (i + k) + j, rows[k])
-
-
-@always_inline
-def _propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
-    """Compute c <- F c F^T for a symmetric c."""
-    for j in range(0, SIZE, 4):
-        theta, velocity, position = _transformed(
-            _loaded(c, THETA, j), _loaded(c, VELOCITY, j), _loaded(c, POSITION, j),
-            _loaded(c, GYRO, j), _loaded(c, ACCELEROMETER, j), f, r, dt,
-        )  # fmt: skip
-        _stored(c, THETA, j, theta)
-        _stored(c, VELOCITY, j, velocity)
-        _stored(c, POSITION, j, position)
-    for i in range(GYRO):  # F changes no row below
-        row = c[i]
-        theta, velocity, position = _transformed(
-            three(row, THETA), three(row, VELOCITY), three(row, POSITION),
-            three(row, GYRO), three(row, ACCELEROMETER), f, r, dt,
-        )  # fmt: skip
-        for k in range(3):
-            row[THETA + k], row[VELOCITY + k], row[POSITION + k] = theta[k], velocity[k], position[k]
-    for i in range(SIZE):  # the two passes round differently: keep it exactly symmetric
-        for j in range(min(i, GYRO)):
-            c[i, j] = c[j, i]
-
-
-@always_inline
-def _fade(c: np.ndarray, keep: float) -> None:
-    """Apply the first-order decay of the receiver's correlated error."""
-    for i in range(WANDER, WANDER + 3):
-        for j in range(SIZE):
-            c[i, j] *= keep
-            c[j, i] *= keep
 
 
 @always_inline
@@ -154,15 +90,15 @@ def predict(
         m.history[tick % HISTORY, k] = velocity_gain[k]
         m.history[tick % HISTORY, 3 + k] = distance_gain[k]
 
-    c = m.covariance
-    _propagate_covariance(c, scale(0.5, add(f0, f1)), r, dt)
+    c, force_mean = m.covariance, scale(0.5, add(f0, f1))
+    propagate_covariance(c, force_mean, r, dt)
+    propagate_considered(m, omega_mean, force_mean, r, dt)
     keep = math.exp(-dt / p.gps_correlation_time)
-    _fade(c, keep)
+    fade(m, keep)
 
-    rate = norm(omega_mean)
     jolt = norm(subtract(specific_force_body, i.force))
     twist = norm(subtract(omega_body, i.omega))
-    q_theta = dt * dt * omega_variance + dt * rate * (p.gyro_scale_std * p.gyro_scale_std)
+    q_theta = dt * dt * omega_variance
     q_velocity = dt * dt * specific_force_variance
     if not first:  # error of the trapezoidal rule between distant readings
         q_theta += math.square(dt * max(twist - _STRAIGHT * p.jolt_rate, 0.0) / 6.0)

@@ -19,7 +19,8 @@ from lapwing.dynamics.lie.quaternion import (
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import covariance_inflation, filter_state, fuse
-from lapwing.services.autopilot.estimator.predict import _propagate_covariance
+from lapwing.services.autopilot.estimator.covariance_propagation import propagate_considered, propagate_covariance
+from lapwing.services.sensors.error_models import scale_and_misalignment
 
 pytestmark = pytest.mark.long
 
@@ -79,9 +80,67 @@ def test_covariance_propagation_against_dense_matrices():
     a[6:9, 3:6] = np.eye(3)
     transition = np.eye(filter_state.SIZE) + dt * a
     ours = covariance.copy()
-    _propagate_covariance(ours, tuple(f), tuple(r.ravel()), dt)
+    propagate_covariance(ours, tuple(f), tuple(r.ravel()), dt)
     np.testing.assert_allclose(ours, transition @ covariance @ transition.T, atol=1e-13)
     np.testing.assert_array_equal(ours, ours.T)
+
+
+def dense_joint(rng):
+    """Draw memory with a positive definite joint covariance of errors and considered parameters, and return both."""
+    m, n = at_rest().memory, filter_state.SIZE + filter_state.CONSIDERED
+    a = rng.normal(size=(n, n))
+    a[filter_state.SIZE :] = np.diag(rng.uniform(0.5, 2.0, filter_state.CONSIDERED)) @ np.eye(n)[filter_state.SIZE :]
+    joint = a @ a.T  # the parameters are independent of each other
+    m.covariance[:] = joint[: filter_state.SIZE, : filter_state.SIZE]
+    m.considered[: filter_state.SIZE] = joint[: filter_state.SIZE, filter_state.SIZE :]
+    m.considered[filter_state.VARIANCE] = np.diag(joint)[filter_state.SIZE :]
+    return m, joint
+
+
+def test_considered_propagation_against_dense_matrices():
+    """Gyroscopes with M of (3.14) read M omega: the joint covariance of 24 errors and 12 parameters, F P F^T."""
+    rng = np.random.default_rng(2)
+    m, joint = dense_joint(rng)
+    n, f, omega, dt = len(joint), rng.normal(size=3), rng.normal(size=3), 0.01
+    r = np.array(rotation_matrix(from_roll_pitch_yaw(0.3, -0.5, 2.0))).reshape(3, 3)
+    a = np.zeros((n, n))
+    a[0:3, 9:12] = -r
+    a[3:6, 0:3] = -skew(f)
+    a[3:6, 12:15] = -r
+    a[6:9, 3:6] = np.eye(3)
+    for k in range(6):
+        draw = np.eye(6)[k]
+        matrix = scale_and_misalignment(1.0, 1.0, tuple(draw[:3]), tuple(draw[3:]))
+        wrong = (np.reshape(matrix, (3, 3)) - np.eye(3)) @ omega
+        a[0:3, filter_state.SIZE + k] = -r @ wrong
+    transition = np.eye(n) + dt * a
+    expected = transition @ joint @ transition.T
+    propagate_covariance(m.covariance, tuple(f), tuple(r.ravel()), dt)
+    propagate_considered(m, tuple(omega), tuple(f), tuple(r.ravel()), dt)
+    np.testing.assert_allclose(m.covariance, expected[: filter_state.SIZE, : filter_state.SIZE], atol=1e-13)
+    np.testing.assert_allclose(
+        m.considered[: filter_state.SIZE], expected[: filter_state.SIZE, filter_state.SIZE :], atol=1e-13
+    )
+    np.testing.assert_array_equal(m.covariance, m.covariance.T)
+
+
+def test_considered_update_against_joseph_form():
+    """Schmidt's gain does not change the parameters; Joseph's form of the joint covariance holds for any gain."""
+    rng = np.random.default_rng(3)
+    m, joint = dense_joint(rng)
+    h, y, variance = rng.normal(size=len(joint)), 0.7, 0.3
+    m.row[:], m.considered[filter_state.ROW] = h[: filter_state.SIZE], h[filter_state.SIZE :]
+    nis = fuse.fuse(m, y, variance)
+    s = h @ joint @ h + variance
+    gain = np.where(np.arange(len(joint)) < filter_state.SIZE, joint @ h / s, 0.0)
+    rest = np.eye(len(joint)) - np.outer(gain, h)
+    expected = rest @ joint @ rest.T + variance * np.outer(gain, gain)
+    assert nis == pytest.approx(y * y / s)
+    np.testing.assert_allclose(m.correction, (gain * y)[: filter_state.SIZE], atol=1e-12)
+    np.testing.assert_allclose(m.covariance, expected[: filter_state.SIZE, : filter_state.SIZE], atol=1e-11)
+    np.testing.assert_allclose(
+        m.considered[: filter_state.SIZE], expected[: filter_state.SIZE, filter_state.SIZE :], atol=1e-11
+    )
 
 
 def test_scalar_updates_one_by_one_equal_joint_update():
@@ -146,6 +205,30 @@ def test_row_of_heading_against_differences():
         assert row[filter_state.IRON + i] == pytest.approx(change, rel=1e-4, abs=1.0)
 
 
+def test_considered_row_of_heading_against_differences():
+    """Turn the reading as M of (3.14) does, and compare the change of the heading's innovation with the row."""
+    attitude = from_roll_pitch_yaw(0.3, -0.2, 1.0)
+    true_body = np.array(rotate_back(attitude, STANDARD.magnetic_field_world))
+    bx, by, _ = STANDARD.magnetic_field_world
+
+    def turn(field):
+        f = np.array(rotation_matrix(attitude)).reshape(3, 3) @ field
+        return math.atan2(by, bx) - math.atan2(f[1], f[0])
+
+    s = at_rest()
+    s = s._replace(nominal=s.nominal._replace(attitude=attitude))
+    s.memory.covariance[:] = np.eye(filter_state.SIZE) * 1e-30
+    s.memory.considered[filter_state.VARIANCE] = 0.0
+    m = estimator.update_magnetometer(P._replace(gate=1e30), s, tuple(true_body), 1.0, True).memory
+    h = 1e-7
+    for k in range(6):
+        draw = np.eye(6)[k]
+        matrix = scale_and_misalignment(h, h, tuple(draw[:3]), tuple(draw[3:]))
+        change = turn(np.reshape(matrix, (3, 3)) @ true_body) / h
+        row = m.considered[filter_state.ROW, filter_state.MAG_SCALE + k] if k < 5 else -m.row[filter_state.HEADING]
+        assert row == pytest.approx(change, abs=1e-5), k
+
+
 def ensemble(**arguments):
     """Flights of 100 seeds, stacked along a first axis."""
     flights = [ef.flight(seed=seed, **arguments) for seed in range(SEEDS)]
@@ -188,13 +271,15 @@ def textbook():
     )
     p = P._replace(
         gyro_scale_std=0.0,
+        gyro_alignment_std=0.0,
         gyro_bias_std=1.75e-3,
         gyro_bias_walk=2.28e-6,
         accelerometer_bias_std=0.0294,
         accelerometer_bias_walk=3.6e-5,
         magnetometer_bias_std=5.1e-8,
         magnetometer_bias_walk=5.1e-10,
-        heading_std=1e-5,
+        magnetometer_scale_std=0.0,
+        magnetometer_alignment_std=0.0,
     )
     return {"instruments": instruments, "p": p}
 
@@ -232,7 +317,7 @@ def test_consistent_in_world_as_modelled(agility):
 
 
 def test_consistent_on_presets():
-    """Consistency with all errors of the presets; scale and alignment are not filter states."""
+    """Consistency with all errors of the presets; scale and alignment are considered and not estimated."""
     flights = ensemble()
     _, mean_inside = inside(flights.nees[:, SETTLED], 9)
     assert mean_inside

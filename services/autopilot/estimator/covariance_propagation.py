@@ -1,0 +1,135 @@
+"""Propagation of the covariance over one interval (theory.md, eqs. (3.22), (3.23) and (3.61))."""
+
+from typing import Any
+
+import numpy as np
+
+from lapwing.dynamics.vector import Mat3, Vec3, add, apply, cross, scale, subtract
+from lapwing.kernels import always_inline
+from lapwing.kernels.simd import load, pack4, store, unpack4
+from lapwing.services.autopilot.estimator.filter_state import (
+    ACCELEROMETER,
+    CONSIDERED,
+    GYRO,
+    POSITION,
+    SIZE,
+    THETA,
+    VARIANCE,
+    VELOCITY,
+    WANDER,
+    Memory,
+    three,
+)
+
+
+@always_inline
+def _transformed(
+    theta: Any, velocity: Any, position: Any, gyro: Any, accelerometer: Any, f: Vec3, r: Mat3, dt: float
+) -> tuple[Any, Any, Any]:
+    """Return the changed rows (theta, velocity, position) of F c with F = I + A dt; c is a column or SIMD columns."""
+    return (
+        subtract(theta, scale(dt, apply(r, gyro))),
+        add(velocity, scale(dt, subtract(cross(theta, f), apply(r, accelerometer)))),
+        add(position, scale(dt, velocity)),
+    )
+
+
+@always_inline
+def _loaded(c: np.ndarray, width: int, i: int, j: int) -> Any:
+    """Return rows i to i + 2 and columns j to j + 3 of c as SIMD vectors."""
+    return load(c, width * i + j), load(c, width * (i + 1) + j), load(c, width * (i + 2) + j)
+
+
+@always_inline
+def _transform_rows(c: np.ndarray, width: int, f: Vec3, r: Mat3, dt: float) -> None:
+    """Compute c <- F c."""
+    for j in range(0, width, 4):
+        changed = _transformed(
+            _loaded(c, width, THETA, j), _loaded(c, width, VELOCITY, j), _loaded(c, width, POSITION, j),
+            _loaded(c, width, GYRO, j), _loaded(c, width, ACCELEROMETER, j), f, r, dt,
+        )  # fmt: skip
+        for k in range(3):
+            store(c, width * (THETA + k) + j, changed[0][k])
+            store(c, width * (VELOCITY + k) + j, changed[1][k])
+            store(c, width * (POSITION + k) + j, changed[2][k])
+
+
+@always_inline
+def propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
+    """Compute c <- F c F^T for a symmetric c (24, 24), with the specific force f [m/s^2] and r body to world."""
+    _transform_rows(c, SIZE, f, r, dt)
+    for i in range(GYRO):  # F changes no row below
+        row = c[i]
+        theta, velocity, position = _transformed(
+            three(row, THETA), three(row, VELOCITY), three(row, POSITION),
+            three(row, GYRO), three(row, ACCELEROMETER), f, r, dt,
+        )  # fmt: skip
+        for k in range(3):
+            row[THETA + k], row[VELOCITY + k], row[POSITION + k] = theta[k], velocity[k], position[k]
+    for i in range(SIZE):  # the two passes round differently: keep it exactly symmetric
+        for j in range(min(i, GYRO)):
+            c[i, j] = c[j, i]
+
+
+@always_inline
+def _turns(omega: Vec3, r: Mat3, dt: float) -> Any:
+    """Return the columns of J, the turn [rad] by each error of the gyroscopes, as SIMD vectors with a zero."""
+    x, y, z = scale(-dt, omega)
+    a, b, c = (r[0], r[3], r[6]), (r[1], r[4], r[7]), (r[2], r[5], r[8])
+    p, q, u = subtract(scale(y, c), scale(z, b)), subtract(scale(z, a), scale(x, c)), subtract(scale(x, b), scale(y, a))
+    a, b, c = scale(x, a), scale(y, b), scale(z, c)
+    return (
+        pack4(a[0], a[1], a[2], 0.0), pack4(b[0], b[1], b[2], 0.0), pack4(c[0], c[1], c[2], 0.0),
+        pack4(p[0], p[1], p[2], 0.0), pack4(q[0], q[1], q[2], 0.0), pack4(u[0], u[1], u[2], 0.0),
+    )  # fmt: skip
+
+
+@always_inline
+def _turn_half(m: Memory, turns: Any) -> None:
+    """Add half of J V, the covariance of the turn by the gyroscopes' errors with these errors themselves."""
+    for i in range(6):
+        turned = unpack4(turns[i] * (0.5 * m.considered[VARIANCE, i]))
+        for a in range(3):
+            m.considered[THETA + a, i] += turned[a]
+
+
+@always_inline
+def _turned(k: np.ndarray, j: int, turns: Any) -> Any:
+    """Return row j of C^T J^T as a SIMD vector."""
+    row = k[j]
+    first = turns[0] * row[0] + turns[1] * row[1] + turns[2] * row[2]
+    return first + (turns[3] * row[3] + turns[4] * row[4] + turns[5] * row[5])
+
+
+@always_inline
+def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) -> None:
+    """Propagate the covariance with the considered parameters, and add their effect on the attitude.
+
+    Call after `propagate_covariance`; `omega` is the rate [rad/s].
+    """
+    c, k = m.covariance, m.considered
+    _transform_rows(k, CONSIDERED, f, r, dt)
+    turns = _turns(omega, r, dt)
+    _turn_half(m, turns)
+    block = (unpack4(_turned(k, 0, turns)), unpack4(_turned(k, 1, turns)), unpack4(_turned(k, 2, turns)))
+    for i in range(3):
+        for j in range(3):
+            c[THETA + i, THETA + j] += block[i][j] + block[j][i]
+    for j in range(THETA + 3, SIZE):
+        store(c, SIZE * j + THETA, load(c, SIZE * j + THETA) + _turned(k, j, turns))
+        for i in range(3):
+            c[THETA + i, j] = c[j, THETA + i]
+    _turn_half(m, turns)
+
+
+@always_inline
+def fade(m: Memory, keep: float) -> None:
+    """Apply the first-order decay of the receiver's correlated error."""
+    c = m.covariance
+    for i in range(WANDER, WANDER + 3):
+        for j in range(0, SIZE, 4):
+            store(c, SIZE * i + j, keep * load(c, SIZE * i + j))
+        for j in range(SIZE):
+            c[j, i] *= keep
+        for j in range(0, CONSIDERED, 4):
+            store(m.considered, CONSIDERED * i + j, keep * load(m.considered, CONSIDERED * i + j))
