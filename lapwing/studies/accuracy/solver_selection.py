@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -17,6 +16,7 @@ from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver
 from lapwing.studies.accuracy import scenes
 from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
+from lapwing.studies.complete_file import complete_file
 
 CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # cheapest on some system at some error
 IMPACT_SHARE = 3e-3  # of the accuracy: an impact turns an error of position into one of velocity 300 times as large
@@ -70,9 +70,8 @@ def _points(scene: Scene, names: tuple[str, ...], say: Callable[[str], None]) ->
     if path is not None:
         with suppress(OSError):  # where nothing can be kept, they are measured again
             path.parent.mkdir(parents=True, exist_ok=True)
-            complete = path.with_suffix(f".{os.getpid()}")  # another run may be reading
-            complete.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
-            complete.replace(path)
+            with complete_file(path) as file:
+                file.write_text(json.dumps([p._asdict() for p in points]), encoding="utf-8")
     return points
 
 

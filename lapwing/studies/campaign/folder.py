@@ -11,8 +11,6 @@ import contextlib
 import hashlib
 import json
 import math
-import os
-import platform
 from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
@@ -27,6 +25,7 @@ from lapwing.studies.campaign import run_table
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import Plan
 from lapwing.studies.campaign.runs import Reference, Row, columns, scene_of, sources, vehicles
+from lapwing.studies.complete_file import complete_file
 
 MANIFEST = "campaign.json"
 LAST = "last_shard"
@@ -58,7 +57,7 @@ class Folder:
 
     def write(self, shard: int, rows: list[Row]) -> None:
         """Keep the rows of a shard: whole, or not at all. RunFailed where they cannot be written."""
-        with _kept(self._shard(shard)) as file:
+        with _campaign_file(self._shard(shard)) as file:
             run_table.write_csv(file, self.kinds, [rows])
 
     def rows(self, shard: int) -> list[Row]:
@@ -86,7 +85,7 @@ class Folder:
         if shard is None:
             (self.path / LAST).unlink(missing_ok=True)
             return
-        with _kept(self.path / LAST) as file:
+        with _campaign_file(self.path / LAST) as file:
             file.write_text(f"{shard}\n", encoding="utf-8")
 
     def _last(self) -> int | None:
@@ -107,10 +106,10 @@ class Folder:
                 digest.update(line)
         if run_table.has_parquet():
             about = {name: v if isinstance(v, str) else json.dumps(v) for name, v in self.about.items()}
-            with _kept(self.path / "runs.parquet") as file:
+            with _campaign_file(self.path / "runs.parquet") as file:
                 run_table.write_parquet(file, self.kinds, self.pages(), about | {"digest": digest.hexdigest()})
         if csv or not run_table.has_parquet():
-            with _kept(self.path / "runs.csv") as file:
+            with _campaign_file(self.path / "runs.csv") as file:
                 run_table.write_csv(file, self.kinds, self.pages())
         return digest.hexdigest()
 
@@ -161,7 +160,7 @@ def _make(path: Path, about: dict[str, Any]) -> None:
         raise ValueError(f"{path}: holds something else; expected a new folder, or one of a campaign")
     try:
         (path / "shards").mkdir(parents=True, exist_ok=True)
-        with _whole(path / MANIFEST) as file:
+        with complete_file(path / MANIFEST) as file:
             file.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
     except OSError as fault:
         raise ValueError(f"{path}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
@@ -189,22 +188,11 @@ def read(path: Path) -> Folder:
 
 
 @contextlib.contextmanager
-def _kept(path: Path) -> Iterator[Path]:
-    """Yield a file as `_whole` does. Raise RunFailed if it cannot be written."""
+def _campaign_file(path: Path) -> Iterator[Path]:
+    """Yield a file as `complete_file` does. Raise RunFailed if it cannot be written."""
     try:
-        with _whole(path) as file:
+        with complete_file(path) as file:
             yield file
     except OSError as fault:
         reason = (fault.strerror or str(fault)).lower()
         raise RunFailed(f"{path}: cannot be written: {reason}; the same command goes on where it stopped") from None
-
-
-@contextlib.contextmanager
-def _whole(path: Path) -> Iterator[Path]:
-    """Yield a temporary file that replaces the path when it is complete."""
-    new = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}")  # several machines may share the folder
-    try:
-        yield new
-        os.replace(new, path)
-    finally:
-        new.unlink(missing_ok=True)

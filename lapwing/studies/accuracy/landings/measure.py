@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.studies.accuracy.landings import cases
+from lapwing.studies.complete_file import complete_file
 from lapwing.studies.json_file import write_json
 from lapwing.studies.workers import workers
 
@@ -56,9 +57,8 @@ def read(path: Path) -> dict[int, LandingErrors]:
 
 def write(path: Path, landings: Iterable[LandingErrors]) -> None:
     """Write landings as JSON in the order of their seeds."""
-    complete = path.with_name(f"{path.name}.{os.getpid()}")  # an interrupted write leaves the file as it was
-    write_json(complete, sorted(landings))
-    complete.replace(path)
+    with complete_file(path) as file:
+        write_json(file, sorted(landings))
 
 
 def ratios(landings: Iterable[LandingErrors]) -> np.ndarray:
