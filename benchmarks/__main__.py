@@ -13,16 +13,16 @@ import benchmarks
 from benchmarks._targets import show
 from lapwing.dynamics import discovery
 
-found = discovery.modules(benchmarks)
+measured = discovery.modules(benchmarks)
 parser = argparse.ArgumentParser(prog="python -m benchmarks")
-parser.add_argument("names", metavar="NAME", nargs="*", help=f"one of {', '.join(found)}; all if none is named")
+parser.add_argument("names", metavar="NAME", nargs="*", help=f"one of {', '.join(measured)}; all if none is named")
 parser.add_argument("--quick", action="store_true", help="leave out those that take many minutes")
-given = parser.parse_args()
-if unknown := set(given.names) - found.keys():
-    parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; expected one of {', '.join(found)}")
+options = parser.parse_args()
+if unknown := set(options.names) - measured.keys():
+    parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; expected one of {', '.join(measured)}")
 rows, failed = [], []
-for name, module in found.items():
-    if (given.names and name not in given.names) or (given.quick and getattr(module, "SLOW", False)):
+for name, module in measured.items():
+    if (options.names and name not in options.names) or (options.quick and getattr(module, "SLOW", False)):
         continue
     print(f"== {name}", flush=True)
     try:

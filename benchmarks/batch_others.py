@@ -86,8 +86,8 @@ class Crazyflow:
         from crazyflow.sim import Sim
         from crazyflow.sim.sim import Dynamics, Integrator
 
-        given = {"dynamics": Dynamics.first_principles, "control": Control.rotor_vel, "integrator": Integrator.rk4}
-        self.sim = Sim(n_worlds=n, freq=round(1.0 / step), **given)
+        options = {"dynamics": Dynamics.first_principles, "control": Control.rotor_vel, "integrator": Integrator.rk4}
+        self.sim = Sim(n_worlds=n, freq=round(1.0 / step), **options)
         mass, (_, _, thrust) = float(self.sim.data.params.mass[0]), self.sim.data.params.rpm2thrust[0]
         command = jnp.full((n, 1, 4), np.sqrt(mass * 9.81 / 4 / float(thrust)))
         states = self.sim.data.states

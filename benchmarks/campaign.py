@@ -45,15 +45,15 @@ def main(runs=20):
     return result
 
 
-def flown(given):
+def flown(options):
     """Return processor time [s], ratio of other work to the flight, and simulated time [s] of the runs of a plan."""
     rows, total, simulated = {}, [], 0.0
-    row_of(given, 0, rows)  # loads what is compiled
+    row_of(options, 0, rows)  # loads what is compiled
     with ExitStack() as stack:
         spent = {part: stack.enter_context(timed(*place)) for part, place in PARTS.items()}
-        for run in range(given.runs):
+        for run in range(options.runs):
             began = time.process_time()
-            simulated += row_of(given, run, rows)["duration"]
+            simulated += row_of(options, run, rows)["duration"]
             total.append(time.process_time() - began)
     print(", ".join(f"{part} {1e3 * median(times):.2f} ms" for part, times in spent.items()), flush=True)
     besides = median((whole - flight) / flight for whole, flight in zip(total, spent[FLIGHT], strict=True))

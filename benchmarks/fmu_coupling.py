@@ -79,9 +79,9 @@ def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) 
         part.fmu.exitInitializationMode()
     rows = [plant.outputs(references)]
     for k in range(ticks - 1):
-        given = [part.values() for part in parts] if jacobi else []
+        options = [part.values() for part in parts] if jacobi else []
         for i, part in enumerate(parts):
-            part.set(given[i] if jacobi else part.values())
+            part.set(options[i] if jacobi else part.values())
             part.fmu.doStep(k * setup.interval, setup.interval)
         rows.append(plant.outputs(references))
     for part in parts:

@@ -22,14 +22,14 @@ def main() -> None:
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="add the results to FILE; landings that it holds are not flown again"
     )
-    given = parser.parse_args()
-    found = read(given.json) if given.json else {}
-    seeds = [k for k in range(given.first, given.first + given.count) if k not in found]
-    for landing in measure(seeds, given.processes, given.kind):
-        found[landing.seed] = landing
-        if given.json:
-            write(given.json, found.values())
-    show(sorted(found.values()))
+    options = parser.parse_args()
+    landings = read(options.json) if options.json else {}
+    seeds = [k for k in range(options.first, options.first + options.count) if k not in landings]
+    for landing in measure(seeds, options.processes, options.kind):
+        landings[landing.seed] = landing
+        if options.json:
+            write(options.json, landings.values())
+    show(sorted(landings.values()))
 
 
 def show(landings: Collection[LandingErrors]) -> None:

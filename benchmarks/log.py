@@ -57,14 +57,14 @@ def setup(rate, seconds):
     )
 
 
-def batch(given, first, stop):
+def batch(options, first, stop):
     """All messages of some ticks; their numbers are noise, as those of a flight nearly are."""
     ticks = np.arange(first, stop)
     noise = np.random.default_rng(first)
     pages = []
     for topic, sample in SAMPLES.items():
         record = Record.of(sample)
-        columns = stamp_columns(ticks * given.interval_ns)
+        columns = stamp_columns(ticks * options.interval_ns)
         for name in ("pose.position", "velocity", "acceleration", "rotor_speed", "linear_acceleration"):
             if record.dtype.names and name in record.dtype.names:
                 columns[name] = noise.normal(size=(len(ticks), *record.dtype[name].shape))
@@ -72,33 +72,33 @@ def batch(given, first, stop):
     return pack_log_packet(pages, first, stop)
 
 
-def hand_over(given, endpoints, seconds):
+def hand_over(options, endpoints, seconds):
     """At the rate of the set-up, ten times a second; messages handed over, and seconds it took."""
     listen, connect = mesh(SOURCE, endpoints)
     with ZenohBus(listen, connect, gid=PARTICIPANTS.gid(SOURCE)) as bus:
-        process = Participant(SOURCE, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
+        process = Participant(SOURCE, options, bus, PARTICIPANTS, [SOURCE, RECORDER])
         backlog, put = (
             LogBackpressure(process, RECORDER),
             bus.publisher(f"{PARTICIPANTS.key_prefix}/{BATCH_KEY}/{SOURCE}"),
         )
         process.join()
-        step = -(-given.rate // 10)
-        started, first, end = time.perf_counter(), 0, int(given.rate * seconds)
+        step = -(-options.rate // 10)
+        started, first, end = time.perf_counter(), 0, int(options.rate * seconds)
         while first < end:
             stop = min(first + step, end)
             for tick in range(first, stop):
                 backlog.wait_for_log(tick)
-            payload = batch(given, first, stop)
-            time.sleep(max(0.0, started + stop / given.rate - time.perf_counter()))
-            put(payload, (stop - 1) * given.interval_ns)
+            payload = batch(options, first, stop)
+            time.sleep(max(0.0, started + stop / options.rate - time.perf_counter()))
+            put(payload, (stop - 1) * options.interval_ns)
             first = stop
         taken = time.perf_counter() - started
-        put(b"", end * given.interval_ns)
-        process.leave(lambda: put(b"", end * given.interval_ns))
+        put(b"", end * options.interval_ns)
+        process.leave(lambda: put(b"", end * options.interval_ns))
         return end * len(SAMPLES), taken
 
 
-def record(given, endpoints, log, disk):
+def record(options, endpoints, log, disk):
     """The recorder, on a disk that takes so many bytes a second."""
     if disk:
         write = Container._write
@@ -110,7 +110,7 @@ def record(given, endpoints, log, disk):
         Container._write = slow
     listen, connect = mesh(RECORDER, endpoints)
     with ZenohBus(listen, connect, gid=PARTICIPANTS.gid(RECORDER)) as bus:
-        process = Participant(RECORDER, given, bus, PARTICIPANTS, [SOURCE, RECORDER])
+        process = Participant(RECORDER, options, bus, PARTICIPANTS, [SOURCE, RECORDER])
         recorder.run(process, SimpleNamespace(log=log, mode="bench", external=None, sources=None))
     print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 

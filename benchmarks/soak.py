@@ -155,5 +155,5 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak")
     parser.add_argument("--minutes", type=float, default=2.0, help="of wall time, a process for each service")
     parser.add_argument("--hours", type=float, default=0.0, help="simulated, in one process, instead")
-    given = parser.parse_args()
-    main(given.minutes, given.hours)
+    options = parser.parse_args()
+    main(options.minutes, options.hours)

@@ -153,8 +153,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description="Kubernetes manifests of a run: a pod a service.")
     parser.add_argument("scene", help="the name of a scene that ships")
     parser.add_argument("--image", default="lapwing:latest")
-    given = parser.parse_args()
-    print(json.dumps({"apiVersion": "v1", "kind": "List", "items": manifests(given.scene, given.image)}, indent=2))
+    options = parser.parse_args()
+    print(json.dumps({"apiVersion": "v1", "kind": "List", "items": manifests(options.scene, options.image)}, indent=2))
 
 
 if __name__ == "__main__":

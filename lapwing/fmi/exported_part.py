@@ -80,11 +80,11 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
         ScheduledBlock(part, bound, getattr(part, "every", 1), vehicles.index(getattr(part, "vehicle", "")))
         for part, bound in zip(parts, diagram._codes, strict=True)
     ]
-    given = {port.name for part in parts for port in part.outputs}
+    produced = {port.name for part in parts for port in part.outputs}
     lags: dict[str, int] = {}
     for part in parts:
         for needed in getattr(part, "inputs", ()):
-            if needed.port not in given:
+            if needed.port not in produced:
                 lags[needed.port] = min(lags.get(needed.port, 1), needed.delay)
     published = [port for each in names for port in setup.services[each].ports]
     roots = [(block.part.name, block.bound.cell) for block in blocks if block.bound]

@@ -117,14 +117,14 @@ def export_library(setup: RunConfig, part_name: str, out: Path, cpu: str = PORTA
             (out / folder).mkdir(parents=True, exist_ok=True)
         build.link(objects, out / f"lib/lib{name}.so", f"{name}_*")
         archive([*objects, *build.objects], out / f"lib/lib{name}.a")
-    given = {"name": name, "part": part.name, "scene": setup.scene, "version": package_version()}
+    fields = {"name": name, "part": part.name, "scene": setup.scene, "version": package_version()}
     texts = {
         f"include/{name}.h": header(part, name),
         f"include/{name}.hpp": wrapper(part, name),
-        f"lib/cmake/{name}/{name}-config.cmake": _CMAKE.format(**given),
-        f"lib/pkgconfig/{name}.pc": _PKG_CONFIG.format(**given),
-        "example/CMakeLists.txt": _EXAMPLE_CMAKE.format(**given),
-        "example/main.cpp": _EXAMPLE.format(cls=_class(name), report=_report(part), **given),
+        f"lib/cmake/{name}/{name}-config.cmake": _CMAKE.format(**fields),
+        f"lib/pkgconfig/{name}.pc": _PKG_CONFIG.format(**fields),
+        "example/CMakeLists.txt": _EXAMPLE_CMAKE.format(**fields),
+        "example/main.cpp": _EXAMPLE.format(cls=_class(name), report=_report(part), **fields),
     }
     for path, text in texts.items():
         (out / path).write_text(text, encoding="utf-8")

@@ -85,15 +85,15 @@ def description(part: ExportedPart, variables: Sequence[Variable], names: ModelN
 
 def _capabilities(part: ExportedPart, identifier: str, version: int) -> dict[str, str]:
     state = "State" if version == 3 else "state"
-    given = {
+    attributes = {
         "modelIdentifier": identifier,
         "canHandleVariableCommunicationStepSize": "true",
         f"canGetAndSetFMU{state}": "true",
         f"canSerializeFMU{state}": "true",
     }
     if version == 3:
-        given |= {"hasEventMode": "true", "fixedInternalStepSize": repr(part.setup.interval)}
-    return given
+        attributes |= {"hasEventMode": "true", "fixedInternalStepSize": repr(part.setup.interval)}
+    return attributes
 
 
 def _units(root: Xml.Element, variables: Sequence[Variable], version: int) -> None:
@@ -107,41 +107,43 @@ def _units(root: Xml.Element, variables: Sequence[Variable], version: int) -> No
     known = Xml.SubElement(root, "TypeDefinitions")
     for name in names:
         if quantity := QUANTITIES.get(name):
-            given = {"quantity": quantity, "unit": name}
+            attributes = {"quantity": quantity, "unit": name}
             if version == 3:
-                Xml.SubElement(known, "Float64Type", {"name": quantity, **given})
+                Xml.SubElement(known, "Float64Type", {"name": quantity, **attributes})
             else:
-                Xml.SubElement(Xml.SubElement(known, "SimpleType", {"name": quantity}), "Real", given)
+                Xml.SubElement(Xml.SubElement(known, "SimpleType", {"name": quantity}), "Real", attributes)
 
 
 def _time(listed: Xml.Element, version: int) -> None:
-    given = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
+    attributes = {"name": "time", "valueReference": "0", "causality": "independent", "variability": "continuous"}
     if version == 3:
-        Xml.SubElement(listed, "Float64", {**given, "declaredType": "Time", "unit": "s"})
+        Xml.SubElement(listed, "Float64", {**attributes, "declaredType": "Time", "unit": "s"})
     else:
-        Xml.SubElement(Xml.SubElement(listed, "ScalarVariable", given), "Real", {"declaredType": "Time", "unit": "s"})
+        Xml.SubElement(
+            Xml.SubElement(listed, "ScalarVariable", attributes), "Real", {"declaredType": "Time", "unit": "s"}
+        )
 
 
 def _common(reference: int, v: Variable) -> dict[str, str]:
-    given = {"name": v.name, "valueReference": str(reference), "causality": v.causality}
+    attributes = {"name": v.name, "valueReference": str(reference), "causality": v.causality}
     if v.causality == kinds.PARAMETER:
-        given["variability"] = "tunable"
+        attributes["variability"] = "tunable"
     elif v.type != kinds.REAL:
-        given["variability"] = "discrete"
+        attributes["variability"] = "discrete"
     if v.causality == kinds.STATE:
-        given["initial"] = "exact"
-    return given
+        attributes["initial"] = "exact"
+    return attributes
 
 
 def _typed(v: Variable) -> dict[str, str]:
-    given = {}
+    attributes = {}
     if v.unit in QUANTITIES:
-        given["declaredType"] = QUANTITIES[v.unit]
+        attributes["declaredType"] = QUANTITIES[v.unit]
     if v.unit:
-        given["unit"] = v.unit
+        attributes["unit"] = v.unit
     if v.start is not None:
-        given["start"] = _text(v)
-    return given
+        attributes["start"] = _text(v)
+    return attributes
 
 
 def _text(v: Variable) -> str:

@@ -57,10 +57,10 @@ def _structure(setup: RunConfig, connectors: dict[str, list[tuple[str, str]]], v
     )
     system = Xml.SubElement(root, f"{{{DESCRIPTION}}}System", {"name": setup.scene, "description": setup.title})
     elements = Xml.SubElement(system, f"{{{DESCRIPTION}}}Elements")
-    given = {"type": "application/x-fmu-sharedlibrary", "implementation": "CoSimulation"}
+    common = {"type": "application/x-fmu-sharedlibrary", "implementation": "CoSimulation"}
     source: dict[str, str] = {}
     for part, listed in connectors.items():
-        attributes = {"name": part, **given, "source": f"resources/{part}.fmu"}
+        attributes = {"name": part, **common, "source": f"resources/{part}.fmu"}
         component = Xml.SubElement(elements, f"{{{DESCRIPTION}}}Component", attributes)
         own = Xml.SubElement(component, f"{{{DESCRIPTION}}}Connectors") if listed else component
         for name, kind in listed:

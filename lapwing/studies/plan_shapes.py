@@ -22,8 +22,8 @@ def waypoints(flight: FlightData) -> np.ndarray:
     """Return the places of the mission of the plan in order [m], world, shape (n, 3)."""
     items = _uploads(flight, "mission_upload")
     places = [(i.position.x, i.position.y, i.position.z) for i in items if i.action in ACTIONS]
-    found = np.array(places, float).reshape(-1, 3)
-    return found[np.isfinite(found).all(axis=1)]
+    points = np.array(places, float).reshape(-1, 3)
+    return points[np.isfinite(points).all(axis=1)]
 
 
 def fence_shapes(flight: FlightData) -> Iterator[FenceShape]:
@@ -47,5 +47,5 @@ def _uploads(flight: FlightData, kind: str) -> tuple[Any, ...]:
         plan = getattr(flight.setup.services["autopilot"].parameters, "plan", ())
     except (KeyError, ValueError):
         return ()
-    found = [command.items for command in plan if command.kind == kind]
-    return tuple(found[-1]) if found else ()
+    matching = [command.items for command in plan if command.kind == kind]
+    return tuple(matching[-1]) if matching else ()

@@ -42,8 +42,10 @@ def handed(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
     result: dict[tuple[str, str], list[str]] = {}
     producers = setup.producers
     for name, service in setup.services.items():
-        for taken in service.inputs:
-            result.setdefault((producers[taken.port], name), []).append(taken.port + ("*" if taken.delay else ""))
+        for port_read in service.inputs:
+            result.setdefault((producers[port_read.port], name), []).append(
+                port_read.port + ("*" if port_read.delay else "")
+            )
     return result
 
 
@@ -68,8 +70,8 @@ def arrows(setup: RunConfig) -> list[Arrow]:
             result.append(Arrow(*_beside(at[producer], at[consumer], offset if producer == one else -offset), text))
     for entry, (x, y) in _listening(setup).items():
         steers = entry.name == MAVLINK
-        left, taken = x - ASIDE * steers, TAKEN.get(entry.name, "every topic")
-        result.append(Arrow((left, TOP), (left, y + LOW), taken, GREY))
+        left, label = x - ASIDE * steers, TAKEN.get(entry.name, "every topic")
+        result.append(Arrow((left, TOP), (left, y + LOW), label, GREY))
         if steers:
             result.append(Arrow((x + ASIDE, y + LOW), (x + ASIDE, TOP), "commands", GREY))
             result.append(Arrow((x, y - LOW), (x, LAST + LOW), LINK, GREY, both_ways=True))

@@ -69,9 +69,9 @@ def form(scene: Scene, schema: Schema) -> list[Group]:
         if part is None or (scene.vehicles and name in OWN):
             continue
         value = written[name] if name == "vehicle" and scene.vehicles else tables[name]
-        found = reader.group(name, name, part, written.get(name), value)
-        if found.fields or found.groups:
-            groups.append(found._replace(open=name in OPEN))
+        group = reader.group(name, name, part, written.get(name), value)
+        if group.fields or group.groups:
+            groups.append(group._replace(open=name in OPEN))
     return groups
 
 
@@ -141,9 +141,9 @@ class _Reader:
             below, inner = f"{key}.{name}", known.get(name, {})
             own, full = written.get(name), value.get(name)
             if _is_tables(own) or isinstance(own, dict) or (own is None and isinstance(full, dict)):
-                found = self.group(below, name, inner, own, full)
-                if found.fields or found.groups or isinstance(own, dict):
-                    groups.append(found)
+                group = self.group(below, name, inner, own, full)
+                if group.fields or group.groups or isinstance(own, dict):
+                    groups.append(group)
             elif not (_is_tables(full) or full == []):
                 fields += self._field(below, name, inner, full if own is None else own)
         return Group(key, label, meaning, tuple(fields), tuple(groups))

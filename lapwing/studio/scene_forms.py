@@ -27,7 +27,7 @@ def schema() -> Schema:
 
 def scene_files() -> dict[str, Path]:
     """Return the scenes by the name that `lapwing run` takes: those that ship, then those of this folder."""
-    found = {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
+    shipped = {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
     own = {}
     for path in sorted(Path().glob("*.toml")):
         try:
@@ -36,7 +36,7 @@ def scene_files() -> dict[str, Path]:
             continue
         if "[vehicle" in text and "[run]" in text:
             own[path.name] = path
-    return {**own, **found}
+    return {**own, **shipped}
 
 
 def load_named(name: str, changed: Iterable[Change] = ()) -> Scene:

@@ -113,8 +113,8 @@ class ArduPilotLink:
             "--sim-port-out": str(self.address[1]) if self._setup.port else "",
             "--defaults": PARAMETERS_FILE,
         }
-        given = set(self._setup.command)
-        return [text for name, value in known.items() if value and name not in given for text in (name, value)]
+        arguments = set(self._setup.command)
+        return [text for name, value in known.items() if value and name not in arguments for text in (name, value)]
 
     def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
         """Do what compiled code leaves to Python; see `ExchangeLink`."""

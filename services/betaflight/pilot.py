@@ -63,14 +63,14 @@ class Pilot:
         self.attitude_reference: Vec3 = ZERO
         self.stage, self.finished = "waiting", False
 
-    def step(self, time: float, interval: float, wanted: Setpoint, motion: Motion) -> Sticks:
+    def step(self, time: float, interval: float, setpoint: Setpoint, motion: Motion) -> Sticks:
         """Return the sticks at `time` [s], `interval` [s] after the last step."""
         if self.stage == "waiting":
-            if time > ARM_AT and wanted.position_world[2] > self._start[2] + LIFTED:
+            if time > ARM_AT and setpoint.position_world[2] > self._start[2] + LIFTED:
                 self.stage = "flying"
             return OFF._replace(arm=RC_HIGH if time > ARM_AT else RC_LOW)
         low = motion.position_world[2] < self._start[2] + LOW
-        if self.stage == "flying" and wanted.final and low and self._ends(wanted):
+        if self.stage == "flying" and setpoint.final and low and self._ends(setpoint):
             self.stage = "landing"
         if self.stage == "landing":
             self._descent += DESCENT * interval
@@ -84,18 +84,18 @@ class Pilot:
             self._landed += interval
             self.finished = self._landed > DISARMED
             return OFF._replace(arm=RC_HIGH if self._landed < 0.5 * DISARMED else RC_LOW)
-        return self._fly(interval, wanted, motion)
+        return self._fly(interval, setpoint, motion)
 
-    def _ends(self, wanted: Setpoint) -> bool:
+    def _ends(self, setpoint: Setpoint) -> bool:
         """Return True if the reference has come to the ground and rests there."""
-        return wanted.position_world[2] < self._start[2] + LIFTED and abs(wanted.velocity_world[2]) < 0.05
+        return setpoint.position_world[2] < self._start[2] + LIFTED and abs(setpoint.velocity_world[2]) < 0.05
 
-    def _fly(self, interval: float, wanted: Setpoint, motion: Motion) -> Sticks:
+    def _fly(self, interval: float, setpoint: Setpoint, motion: Motion) -> Sticks:
         s = self._setup
         down = (0.0, 0.0, min(self._descent, REACH))
-        target = tuple(w - d for w, d in zip(wanted.position_world, down, strict=True))
+        target = tuple(w - d for w, d in zip(setpoint.position_world, down, strict=True))
         error = [max(-REACH, min(REACH, a - b)) for a, b in zip(target, motion.position_world, strict=True)]
-        slower = [a - b for a, b in zip(wanted.velocity_world, motion.velocity_world, strict=True)]
+        slower = [a - b for a, b in zip(setpoint.velocity_world, motion.velocity_world, strict=True)]
         if self.stage == "landing":
             slower[2] -= DESCENT
         else:
@@ -105,18 +105,18 @@ class Pilot:
             )
         ax, ay, az = (
             feed + s.position_gain * e + s.velocity_gain * v + i
-            for feed, e, v, i in zip(wanted.acceleration_world, error, slower, self._integral, strict=True)
+            for feed, e, v, i in zip(setpoint.acceleration_world, error, slower, self._integral, strict=True)
         )
         az = max(-0.6 * s.gravity, min(CLIMB_LIMIT, az)) + s.gravity
         c, sine = math.cos(motion.yaw), math.sin(motion.yaw)
         forward, left = c * ax + sine * ay, c * ay - sine * ax
         pitch, roll = math.atan2(forward, az), math.atan2(-left, math.hypot(forward, az))  # nose down, to the right
         limit = math.radians(s.tilt_limit_deg)
-        self.attitude_reference = (max(-limit, min(limit, roll)), max(-limit, min(limit, pitch)), wanted.yaw)
+        self.attitude_reference = (max(-limit, min(limit, roll)), max(-limit, min(limit, pitch)), setpoint.yaw)
         thrust = math.sqrt(forward * forward + left * left + az * az) / s.gravity
         output = min(s.hover_output * math.sqrt(thrust), 1.0)
-        turn = (wanted.yaw - motion.yaw + math.pi) % (2.0 * math.pi) - math.pi
-        rate = wanted.yaw_rate + s.yaw_gain * turn
+        turn = (setpoint.yaw - motion.yaw + math.pi) % (2.0 * math.pi) - math.pi
+        rate = setpoint.yaw_rate + s.yaw_gain * turn
         return Sticks(
             _stick(roll / limit),
             _stick(pitch / limit),

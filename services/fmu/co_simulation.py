@@ -97,12 +97,12 @@ class CoSimulation(FmuInstance):
 def channel(requests: int, replies: int, request: bytearray, reply: bytearray) -> Cell:
     """Return the channel of `CoSimulation.serve`: file descriptors, and the bytes of a request and a reply."""
     libc, received = ctypes.CDLL(None), np.zeros(1, np.int64)
-    asked, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
-    places = asked.ctypes.data, answer.ctypes.data
+    question, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
+    places = question.ctypes.data, answer.ctypes.data
     functions = map(address_of, (libc.poll, libc.read, libc.write))
     entry = poll_entry(requests)
     return Cell(
-        Channel(requests, replies, asked, answer, *places, received, entry, entry.ctypes.data, LOOKS, *functions)
+        Channel(requests, replies, question, answer, *places, received, entry, entry.ctypes.data, LOOKS, *functions)
     )
 
 

@@ -151,7 +151,7 @@ def _read(key: str, path: Path, content: bytes) -> tuple[Any, list[str]]:
 
 def _interface(key: str, path: Path, model: Any, desired: str | None) -> str:
     interfaces = {CO_SIMULATION: model.coSimulation, MODEL_EXCHANGE: model.modelExchange}
-    available = [name for name, given in interfaces.items() if given is not None]
+    available = [name for name, interface in interfaces.items() if interface is not None]
     if desired is not None and desired not in available:
         has = ", ".join(available) or "scheduled execution"
         raise ConfigError(key, f"{path}: has no {desired}, but {has}", "an interface that the FMU has")

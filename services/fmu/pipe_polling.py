@@ -27,8 +27,8 @@ def soon_readable(poll: int, entry: int, looks: int) -> bool:
         entry: address of a `struct pollfd`.
         looks: see `LOOKS`.
     """
-    found = False
-    while looks > 0 and not found:
-        found = call_int(poll, (entry, 1, 0)) != 0
+    readable = False
+    while looks > 0 and not readable:
+        readable = call_int(poll, (entry, 1, 0)) != 0
         looks -= 1
-    return found
+    return readable

@@ -29,10 +29,10 @@ def create(setup: RunConfig) -> Service:
         ValueError: foreign code is not allowed.
     """
     foreign_code.check(setup)
-    given: FmuSetup = setup.services[NAME].parameters
+    config: FmuSetup = setup.services[NAME].parameters
     own = {port.name: port for port in setup.services[NAME].ports}
     blocks = []
-    for fmu in given.fmus:
+    for fmu in config.fmus:
         names = dict.fromkeys(each.port for each in fmu.outputs)
         blocks.append(FmuBlock(fmu, {name: own.get(name) or own[replaced_port(fmu.name, name)] for name in names}))
     return Service(NAME, blocks, [_encoder(setup.vehicle, port) for port in own.values()])

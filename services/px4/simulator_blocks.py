@@ -37,9 +37,9 @@ class SimulatorSetup(NamedTuple):
 class Receiver:
     """Waits for the readings of a tick and writes them to the ports."""
 
-    def __init__(self, setup: SimulatorSetup, client: SimulatorClient, given: tuple[Port, ...]):
-        """Create the block; `given` are the ports of the readings and of the battery."""
-        self.name, self.outputs = f"{NAME}.receive", given
+    def __init__(self, setup: SimulatorSetup, client: SimulatorClient, outputs: tuple[Port, ...]):
+        """Create the block; `outputs` are the ports of the readings and of the battery."""
+        self.name, self.outputs = f"{NAME}.receive", outputs
         self.time_us = 0  # of the last HIL_SENSOR
         self._setup, self._client = setup, client
         self._waits: Waits = lambda text: None
@@ -110,8 +110,8 @@ class Receiver:
         before, self._last = self._last, self.time_us
         step = setup.imu_every * setup.interval_ns // 1000
         if tick == setup.imu_every and abs(self.time_us - before - step) > TOLERANCE * step:
-            found = 1e-3 * (self.time_us - before)
-            message = f"simulator: it steps by {found:g} ms, the scene's IMU by {1e-3 * step:g} ms"
+            text = 1e-3 * (self.time_us - before)
+            message = f"simulator: it steps by {text:g} ms, the scene's IMU by {1e-3 * step:g} ms"
             raise FirmwareError(f"{message}; set communication.rate and sensors.imu.rate to the simulator's rate")
         expected = self._epoch + tick * setup.interval_ns // 1000
         if tick == 0 or self.time_us < before:
@@ -132,8 +132,8 @@ class Receiver:
         home = self._setup.home
         east, north, _ = _to_enu(home, fix.latitude_deg, fix.longitude_deg, fix.height)
         if max(abs(east), abs(north)) > NEAR:
-            found = f"{fix.latitude_deg:.6f}, {fix.longitude_deg:.6f}, {fix.height:.1f}"
-            message = f"simulator: it is at {found} (degrees, metres), far from the scene's home"
+            text = f"{fix.latitude_deg:.6f}, {fix.longitude_deg:.6f}, {fix.height:.1f}"
+            message = f"simulator: it is at {text} (degrees, metres), far from the scene's home"
             raise FirmwareError(f"{message}; set environment.home to the simulator's")
 
 

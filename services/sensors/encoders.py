@@ -59,7 +59,7 @@ class GpsWiring(NamedTuple):
 
 def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[TopicEncoder]:
     """Return the encoders of the vehicle's sensors in `PORTS`."""
-    frame, given = setup.vehicle, setup.ports
+    frame, port_of = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
         (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
         (topic.MAG, ports.MAGNETOMETER, _magnetometer, MagneticField(header(0, frame))),
@@ -70,9 +70,9 @@ def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[T
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
     return [
-        TopicEncoder(which, port, given[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
+        TopicEncoder(which, port, port_of[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
         for which, port, fields, sample in known
-        if port in given
+        if port in port_of
     ]
 
 

@@ -54,7 +54,7 @@ def _lost(gaps: tuple[Gap, ...] | None, time: float) -> bool:
 
 
 @kernel
-def solved(r: Rtk | None, s: RtkState, interval: float, time: float, used: int, found: bool) -> RtkState:
+def solved(r: Rtk | None, s: RtkState, interval: float, time: float, used: int, has_fix: bool) -> RtkState:
     """Return the state of the solution at a sample.
 
     Args:
@@ -63,13 +63,13 @@ def solved(r: Rtk | None, s: RtkState, interval: float, time: float, used: int, 
         interval: [s] since then.
         time: [s] of the simulation.
         used: satellites of the fix; 0 if they are not modelled.
-        found: True if there is a fix.
+        has_fix: True if there is a fix.
     """
     if r is None:
         return s
     age = s.age + interval if _lost(r.corrections_lost, time) else 0.0
     single = age > r.age_max
-    converged = 0.0 if single or not found else s.converged + interval
+    converged = 0.0 if single or not has_fix else s.converged + interval
     few = 0 < used < r.satellites_min
     if few:
         converged = 0.0

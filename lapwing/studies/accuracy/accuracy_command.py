@@ -57,10 +57,10 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     problem = scenes.problem(scene) if scene else find(target)
     compiled = statistics().compiled
 
-    def told() -> None:
+    def notify() -> None:
         screen.print("compiling, and measuring ..." if statistics().compiled > compiled else "measuring ...")
 
-    notice = threading.Timer(SLOW, told)
+    notice = threading.Timer(SLOW, notify)
     notice.daemon = True
     notice.start()
     try:
@@ -73,20 +73,20 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
         notice.cancel()
 
 
-def show(screen: Console, found: Study) -> None:
+def show(screen: Console, study: Study) -> None:
     """Print the table, and that of the errors of a scene's flight."""
-    console_output.show(screen, found.problem, found.points, found.chosen, found.rounding)
-    if found.parts:
-        console_output.show_parts(screen, found.parts, found.cost)
+    console_output.show(screen, study.problem, study.points, study.chosen, study.rounding)
+    if study.parts:
+        console_output.show_parts(screen, study.parts, study.cost)
 
 
-def write_json(path: Path, found: Study) -> None:
+def write_json(path: Path, study: Study) -> None:
     """Write all points for other programs."""
     console_output.write_json(
-        path, found.target, found.problem, found.points, found.chosen, found.parts, found.rounding, found.cost
+        path, study.target, study.problem, study.points, study.chosen, study.parts, study.rounding, study.cost
     )
 
 
-def plot(path: Path, found: Study) -> None:
+def plot(path: Path, study: Study) -> None:
     """Draw error over time."""
-    picture.draw(path, found.problem.title, found.points, found.parts)
+    picture.draw(path, study.problem.title, study.points, study.parts)

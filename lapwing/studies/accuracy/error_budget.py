@@ -54,7 +54,7 @@ def errors(scene: Scene) -> list[Part]:
     base = [*scene.overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
     rate, interval = scene[Communication].rate, scene[Communication].interval
 
-    def flown(factor: int, coupling: str, solver: list[str]) -> FlightData:
+    def flight_with(factor: int, coupling: str, solver: list[str]) -> FlightData:
         settings = [*base, *_exchange(scene, rate * factor), f"communication.coupling={coupling}", *solver]
         flight: FlightData = fly(load(scene.path, settings), (TRUTH,))
         if flight.failure:
@@ -67,20 +67,20 @@ def errors(scene: Scene) -> list[Part]:
 
     coupling = scene[Communication].coupling
     parts = []
-    exact = flown(1, coupling, fine(1))
+    exact = flight_with(1, coupling, fine(1))
     for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
-        flight = flown(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={FINEST_ACCURACY!r}"])
+        flight = flight_with(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={FINEST_ACCURACY!r}"])
         parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", flight, exact))
     for accuracy in ACCURACIES if touches(scene) else ():
-        flight = flown(1, coupling, fine(1, accuracy))
+        flight = flight_with(1, coupling, fine(1, accuracy))
         parts.append(_part(SOURCES[1], accuracy, f"accuracy {accuracy:g}", flight, exact))
-    sequential = {factor: flown(factor, "gauss_seidel", fine(factor)) for factor in (*FINER, FINEST_RATE)}
+    sequential = {factor: flight_with(factor, "gauss_seidel", fine(factor)) for factor in (*FINER, FINEST_RATE)}
     for factor in FINER:
         label = f"{rate * factor} Hz"
         parts.append(_part(SOURCES[2], interval / factor, label, sequential[factor], sequential[FINEST_RATE]))
     for factor in FINER:
         label = f"Jacobi at {rate * factor} Hz"
-        parallel = flown(factor, "jacobi", fine(factor))
+        parallel = flight_with(factor, "jacobi", fine(factor))
         parts.append(_part(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
     return parts
 

@@ -81,8 +81,10 @@ def measure(scene: Scene, fly: Fly, step_selected: bool = False) -> FlightAccura
     coarse, fine = _flights(scene, fly), _flights(finer, fly)
     quantities = [q for pair in zip(coarse, fine, strict=True) for q in differences(*pair)]
     duration = min(flight.truth.times[-1] for flight in (*coarse, *fine))
-    taken = FINER * step
-    return FlightAccuracy(solver.accuracy, solver.integrator, taken, step, step_selected, float(duration), quantities)
+    step_used = FINER * step
+    return FlightAccuracy(
+        solver.accuracy, solver.integrator, step_used, step, step_selected, float(duration), quantities
+    )
 
 
 def _flights(scene: Scene, fly: Fly) -> list[FlightData]:
@@ -128,32 +130,32 @@ def _largest(times: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[float, fl
     return float(errors.max()), float(times[errors.argmax()])
 
 
-def show(console: Console, found: FlightAccuracy) -> None:
+def show(console: Console, result: FlightAccuracy) -> None:
     """Print the errors as one table."""
-    fleet = len({quantity.vehicle for quantity in found.quantities}) > 1
+    fleet = len({quantity.vehicle for quantity in result.quantities}) > 1
     table = Table(box=SIMPLE, pad_edge=False)
     for name in ("quantity", "largest error", "got / asked", "at (s)"):
         table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
-    for q in found.quantities:
+    for q in result.quantities:
         label = f"{q.vehicle}: {q.name}" if fleet else q.name
-        table.add_row(label, f"{q.error:.1e}", f"{q.error / found.asked:.2g}", f"{q.time:.3f}")
+        table.add_row(label, f"{q.error:.1e}", f"{q.error / result.asked:.2g}", f"{q.time:.3f}")
     console.print(
-        f"{found.integrator}, step {1e3 * found.step:g} ms, against steps of {1e3 * found.reference_step:g} ms; "
-        f"{found.duration:g} s, errors relative to 1 + size",
+        f"{result.integrator}, step {1e3 * result.step:g} ms, against steps of {1e3 * result.reference_step:g} ms; "
+        f"{result.duration:g} s, errors relative to 1 + size",
         highlight=False,
     )
     console.print(table)
-    worst = found.worst
-    verdict = "met" if worst.error <= found.asked else "missed"
+    worst = result.worst
+    verdict = "met" if worst.error <= result.asked else "missed"
     console.print(
-        f"accuracy {verdict}: asked {found.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)",
+        f"accuracy {verdict}: asked {result.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)",
         highlight=False,
     )
-    if verdict == "missed" and not found.step_selected:
-        cause = f"solver.step: set to {found.step:g} s, which does not depend on the accuracy"
+    if verdict == "missed" and not result.step_selected:
+        cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
         console.print(f"{cause}; remove it, and a step is selected", highlight=False, soft_wrap=True)
 
 
-def write_json(path: Path, found: FlightAccuracy) -> None:
+def write_json(path: Path, result: FlightAccuracy) -> None:
     """Write the errors."""
-    json_file.write_json(path, {**found._asdict(), "got": found.worst.error, "worst": found.worst})
+    json_file.write_json(path, {**result._asdict(), "got": result.worst.error, "worst": result.worst})

@@ -92,7 +92,7 @@ def problem(scene: Scene) -> Problem:
     duration = SAMPLES * every * exchange.interval
     key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
 
-    def flown(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+    def flight_of(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         out = np.empty((rows, len(flatten(motion))))
         token, h = method.Method(), exchange.interval / steps
         return lambda: (flight(token, p, key, state, volts, phase, h, steps, every, out), out)[1]
@@ -119,8 +119,8 @@ def problem(scene: Scene) -> Problem:
 
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return SolverMethod(
-            name, method.ORDER, "s", settings, lambda h: flown(method, round(exchange.interval / h)), read,
-            flown(method, 1, rows=1), extended_flight if form in EXTENDED else None,
+            name, method.ORDER, "s", settings, lambda h: flight_of(method, round(exchange.interval / h)), read,
+            flight_of(method, 1, rows=1), extended_flight if form in EXTENDED else None,
         )  # fmt: skip
 
     return Problem(
@@ -128,7 +128,7 @@ def problem(scene: Scene) -> Problem:
         "s",
         duration,
         [way(name) for name in integrators.compatible_methods(p, state.motion)],
-        lambda: coordinates(motion, flown(rkmk54, FINEST)())[-1],
+        lambda: coordinates(motion, flight_of(rkmk54, FINEST)())[-1],
         f"rkmk54 with {FINEST} steps in an exchange interval",
         {},
     )

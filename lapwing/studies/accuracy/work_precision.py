@@ -77,14 +77,14 @@ def drift(problem: Problem, outcome: SolverRun) -> dict[str, float]:
 
 def clock(work: Callable[[], Any]) -> tuple[float, Any]:
     """Return (median wall time [s], result) of a call."""
-    taken: list[float] = []
-    while len(taken) < REPEATS[0] or (sum(taken) < TIMED and len(taken) < REPEATS[1]):
+    times: list[float] = []
+    while len(times) < REPEATS[0] or (sum(times) < TIMED and len(times) < REPEATS[1]):
         started = time.perf_counter()
         result = work()
-        taken.append(time.perf_counter() - started)
-        if taken[-1] > LONGEST:
+        times.append(time.perf_counter() - started)
+        if times[-1] > LONGEST:
             break
-    return statistics.median(taken), result
+    return statistics.median(times), result
 
 
 def cheapest(points: list[Point], target: float) -> Point:
@@ -103,14 +103,14 @@ def cheapest(points: list[Point], target: float) -> Point:
 
 def pareto_points(points: list[Point], levels: list[float]) -> list[Point]:
     """Return the fastest point of each method at each of these errors."""
-    kept: list[Point] = []
+    selected: list[Point] = []
     for way in dict.fromkeys(p.way for p in points):
         own = [p for p in points if p.way == way]
         for level in levels:
             met = [p for p in own if p.error <= level]
-            if met and (result := min(met, key=lambda p: p.time)) not in kept:
-                kept.append(result)
-    return kept
+            if met and (result := min(met, key=lambda p: p.time)) not in selected:
+                selected.append(result)
+    return selected
 
 
 def check_target(target: float | None) -> None:

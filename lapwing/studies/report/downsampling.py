@@ -10,8 +10,8 @@ def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray
     """Return about `points` samples of a line without gaps, shapes (n,), including its ends and extremes."""
     if len(y) <= points:
         return x, y
-    kept = extremes(y, points)
-    return x[kept], y[kept]
+    rows = extremes(y, points)
+    return x[rows], y[rows]
 
 
 def extremes(y: np.ndarray, points: int = POINTS) -> np.ndarray:
@@ -19,15 +19,15 @@ def extremes(y: np.ndarray, points: int = POINTS) -> np.ndarray:
     length = -(-2 * len(y) // points)
     stretches = np.pad(y, (0, -len(y) % length), mode="edge").reshape(-1, length)
     starts = length * np.arange(len(stretches))
-    kept = np.concatenate([[0], starts + stretches.argmin(axis=1), starts + stretches.argmax(axis=1), [len(y) - 1]])
-    return np.unique(kept.clip(max=len(y) - 1))
+    rows = np.concatenate([[0], starts + stretches.argmin(axis=1), starts + stretches.argmax(axis=1), [len(y) - 1]])
+    return np.unique(rows.clip(max=len(y) - 1))
 
 
 def every(values: np.ndarray, points: int = POINTS) -> np.ndarray:
     """Return every k-th sample and the last, shape (m, ...), of data without a time axis: a path, a point cloud."""
     step = max(1, -(-len(values) // points))
-    kept = values[::step]
-    return kept if (len(values) - 1) % step == 0 else np.concatenate([kept, values[-1:]])
+    rows = values[::step]
+    return rows if (len(values) - 1) % step == 0 else np.concatenate([rows, values[-1:]])
 
 
 def drawn(mark: Line, of_x: bool) -> Line:

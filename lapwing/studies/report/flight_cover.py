@@ -21,9 +21,9 @@ def cover(flights: Sequence[FlightData]) -> Cover:
         (f"{row.axis} [{row.unit}]", *("" if value is None else f"{value:.4f}" for value in row.values))
         for row in accuracy(flights, published.get("rmse", {}))
     ]
-    told = [facts(flight) for flight in flights]
-    keys = dict.fromkeys(key for one in told for key in one)
-    values = {key: list(dict.fromkeys(one.get(key, "") for one in told)) for key in keys}
+    tables = [facts(flight) for flight in flights]
+    keys = dict.fromkeys(key for one in tables for key in one)
+    values = {key: list(dict.fromkeys(one.get(key, "") for one in tables)) for key in keys}
     return Cover(
         " and ".join(names) if many else flights[0].metadata.get("scene") or names[0],
         " · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),

@@ -12,14 +12,14 @@ MANY = 12  # keys in which two scenes differ that are listed
 
 def facts(flight: FlightData) -> dict[str, str]:
     """Return facts on the vehicle and its simulation by name; those that the log lacks are left out."""
-    said, scene = flight.metadata, flight.origin.scene
+    metadata, scene = flight.metadata, flight.origin.scene
     t = flight.truth.times
     vehicle, autopilot = scene.get("vehicle", {}), scene.get("autopilot", {})
     kind = vehicle.get("airframe") or vehicle.get("model", "")
     mass = scene.get("airframe", {}).get("mass", {}).get("total")
     steered = "autopilot" in flight.origin.scene and flight.has("actuators")
-    found = {
-        "scene": said.get("scene", ""),
+    table = {
+        "scene": metadata.get("scene", ""),
         "log": flight.origin.source if flight.origin.recorded else "",
         "vehicle": ", ".join(filter(None, (flight.vehicle, kind, f"{mass:g} kg" if mass else ""))),
         "effects": "; ".join(_with_keys(name, keys) for name, keys in scene.get("effects", {}).items()),
@@ -29,26 +29,30 @@ def facts(flight: FlightData) -> dict[str, str]:
         "gains": _gains(scene) if steered and uses_gains(scene) else "",
         "duration": f"{t[-1] - t[0]:.2f} s",
         "landed": "yes" if flight.landed else "no" if flight.has("status") else "",
-        "seed": said.get("seed", ""),
-        "mode": said.get("mode", ""),
-        "solver": f"{said['solver_integrator']}, step {said['solver_step']} s" if "solver_integrator" in said else "",
-        "exchange": f"{said['exchange_rate']} Hz, {said.get('coupling', '')}" if "exchange_rate" in said else "",
-        "deadlines missed": f"{said[MISSED]} ticks; at most {said[WORST]} late" if MISSED in said else "",
-        "version": said.get("version", ""),
-        "commit": said.get("commit", ""),
+        "seed": metadata.get("seed", ""),
+        "mode": metadata.get("mode", ""),
+        "solver": f"{metadata['solver_integrator']}, step {metadata['solver_step']} s"
+        if "solver_integrator" in metadata
+        else "",
+        "exchange": f"{metadata['exchange_rate']} Hz, {metadata.get('coupling', '')}"
+        if "exchange_rate" in metadata
+        else "",
+        "deadlines missed": f"{metadata[MISSED]} ticks; at most {metadata[WORST]} late" if MISSED in metadata else "",
+        "version": metadata.get("version", ""),
+        "commit": metadata.get("commit", ""),
         "digest": flight.digest or "none: the log has no end",
     }
-    return {name: value for name, value in found.items() if value}
+    return {name: value for name, value in table.items() if value}
 
 
 def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
     """Return the keys of two scenes with different values, and both values; the first ones and a count of the rest."""
     first, second = (_leaves_in_use(scene, uses_gains(one) and uses_gains(other)) for scene in (one, other))
     keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
-    found = {key: (_cut(first.get(key, "")), _cut(second.get(key, ""))) for key in keys[:MANY]}
+    table = {key: (_cut(first.get(key, "")), _cut(second.get(key, ""))) for key in keys[:MANY]}
     if len(keys) > MANY:
-        found[f"{len(keys) - MANY} more"] = ("", "")
-    return found
+        table[f"{len(keys) - MANY} more"] = ("", "")
+    return table
 
 
 def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -72,13 +76,13 @@ def _leaves_in_use(scene: dict[str, Any], gains: bool) -> dict[str, Any]:
 
 
 def _gains(scene: dict[str, Any]) -> str:
-    name, told = str(scene["autopilot"].get("gains", "")), scene.get("gains", {}).get("description", "")
-    return f"{name}: {told}" if name and told else name
+    name, text = str(scene["autopilot"].get("gains", "")), scene.get("gains", {}).get("description", "")
+    return f"{name}: {text}" if name and text else name
 
 
 def _with_keys(name: str, keys: dict[str, Any]) -> str:
-    told = ", ".join(f"{key} {_short(value)}" for key, value in keys.items())
-    return f"{name} ({told if len(told) <= LONG else f'{len(keys)} keys'})" if told else name
+    text = ", ".join(f"{key} {_short(value)}" for key, value in keys.items())
+    return f"{name} ({text if len(text) <= LONG else f'{len(keys)} keys'})" if text else name
 
 
 def _cut(value: Any) -> str:

@@ -28,13 +28,13 @@ def runs(t: np.ndarray, values: np.ndarray) -> list[tuple[str, float, float]]:
     return [(str(values[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True)]
 
 
-def three_axes(flight: FlightData, first: int, flown: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
+def three_axes(flight: FlightData, first: int, actual: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
     """Plot three axes over time, one per row, with the tracking error if there is a setpoint.
 
     Args:
         flight: flight of the vehicle.
         first: 0 for the position, 3 for the angles.
-        flown: values in `unit`, shape (n, 3).
+        actual: values in `unit`, shape (n, 3).
         unit: unit of the plots.
         scale: 1 m or 1 rad in `unit`.
         caption: caption of the plot.
@@ -42,12 +42,12 @@ def three_axes(flight: FlightData, first: int, flown: np.ndarray, unit: str, sca
     Raises:
         NotRecordedError: the values are constant.
     """
-    if len(flown) > 1 and not np.ptp(flown, axis=0).any():
+    if len(actual) > 1 and not np.ptp(actual, axis=0).any():
         raise NotRecordedError("it never changes")
     t, n, panels = flight.truth.times, len(flight.reference), []
     followed = bool(flight.armed.any())
     for row, name in enumerate(AXES[first : first + 3]):
-        marks = [Line(t, flown[:, row], "flown", width=1.5)]
+        marks = [Line(t, actual[:, row], "flown", width=1.5)]
         if n:
             marks.append(reference(t[:n], scale * flight.reference[:, first + row], hidden=followed))
         panels.append(Panel(tuple(marks), f"{name} [{unit}]", row=row))
@@ -55,8 +55,8 @@ def three_axes(flight: FlightData, first: int, flown: np.ndarray, unit: str, sca
             rmse = scale * flight.rmse[name]
             error = Line(t[:n][flight.armed], scale * flight.errors[name], width=1.0)
             bounds = Level(rmse, "± RMSE"), Level(-rmse, "± RMSE")
-            said = f"RMSE {rmse:.4f} {unit}"
-            panels.append(Panel((error, *bounds), f"{name} error [{unit}]", title=said, row=row, column=1))
+            title = f"RMSE {rmse:.4f} {unit}"
+            panels.append(Panel((error, *bounds), f"{name} error [{unit}]", title=title, row=row, column=1))
     if followed:
         caption += " On the right reference minus truth while the motors are armed."
     widths = (1.0, 1.0) if followed else (1.0,)

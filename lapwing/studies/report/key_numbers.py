@@ -32,27 +32,27 @@ class KeyNumber(NamedTuple):
 
 def key_numbers(flight: FlightData) -> list[KeyNumber]:
     """Return up to five numbers: errors, touch-down, distance from the target, battery or energy."""
-    found, outcome = [], flight.outcome
+    numbers, outcome = [], flight.outcome
     published = flight.origin.scene.get("published", {}).get("rmse", {})
     if flight.rmse:
         axes = ("x", "y", "z")
         limit = float(np.linalg.norm([published[a] for a in axes])) if set(axes) <= set(published) else None
         rmse = float(np.linalg.norm([flight.rmse[axis] for axis in axes]))
         source = flight.origin.scene.get("published", {}).get("source", "published") if limit else ""
-        found.append(KeyNumber("position error, RMS", rmse, "m", limit, source))
-        found.append(KeyNumber("largest distance from reference", float(flight.reach[0]), "m"))
+        numbers.append(KeyNumber("position error, RMS", rmse, "m", limit, source))
+        numbers.append(KeyNumber("largest distance from reference", float(flight.reach[0]), "m"))
     if outcome.touchdown > 0.0:
-        found.append(KeyNumber("touch-down", outcome.touchdown, "m/s", HARD, "crash"))
+        numbers.append(KeyNumber("touch-down", outcome.touchdown, "m/s", HARD, "crash"))
     if outcome.target_distance is not None:
-        found.append(KeyNumber("distance from target", outcome.target_distance, "m", LANDING_RADIUS, "landed there"))
+        numbers.append(KeyNumber("distance from target", outcome.target_distance, "m", LANDING_RADIUS, "landed there"))
     if use := battery_use(flight):
         limit = None if use.low is None else 100.0 * use.low
         left = KeyNumber("battery left at landing", 100.0 * use.charge_left, "%", limit, "warning", at_least=True)
-        found.append(left._replace(label=f"{left.label}, {use.energy_left:.3g} W h"))
+        numbers.append(left._replace(label=f"{left.label}, {use.energy_left:.3g} W h"))
     elif "motor_power" in flight.truth.fields and np.isfinite(flight.truth.motor_power).all():
         with suppress(ValueError):  # the log has no run configuration
-            found.append(KeyNumber("energy of the motors", flight.energy / WATT_HOUR, "W h"))
-    return found
+            numbers.append(KeyNumber("energy of the motors", flight.energy / WATT_HOUR, "W h"))
+    return numbers
 
 
 def trouble(flight: FlightData) -> list:

@@ -74,23 +74,25 @@ class ShownFigure(Figure):
 
 def figure(plot: Plot) -> Figure:
     """Return the plot as a figure of `WIDTH`; call and save it within `styled`."""
-    made = ShownFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
-    draw_plot(plot, made)
-    return made
+    figure = ShownFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
+    draw_plot(plot, figure)
+    return figure
 
 
-def draw_plot(plot: Plot, made: Figure | SubFigure) -> None:
+def draw_plot(plot: Plot, figure: Figure | SubFigure) -> None:
     """Draw a plot into a figure or a part of one; call within `styled`."""
-    grid = made.add_gridspec(len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths)
+    grid = figure.add_gridspec(
+        len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths
+    )
     named: dict[str, Any] = {}
     first: Axes | None = None
     for index, panel in enumerate(plot.panels):
         place = grid[panel.row : panel.row + panel.rows, panel.column : panel.column + panel.columns]
         if panel.z_label:
-            axes = made.add_subplot(place, projection="3d")
+            axes = figure.add_subplot(place, projection="3d")
             _space(axes, panel)
         else:
-            axes = made.add_subplot(place, sharex=first if panel.timed else None)
+            axes = figure.add_subplot(place, sharex=first if panel.timed else None)
             _flat(axes, plot, panel)
         handles, names = axes.get_legend_handles_labels()
         named = dict(zip(names, handles, strict=True)) | named
@@ -101,7 +103,7 @@ def draw_plot(plot: Plot, made: Figure | SubFigure) -> None:
             axes.set_xlabel(f"time [{plot.unit}]" if bottom else "")
             _over_time(axes, plot, panel)
     if named:
-        made.legend(named.values(), named.keys(), loc="outside upper left", ncols=_columns(named), fontsize="small")
+        figure.legend(named.values(), named.keys(), loc="outside upper left", ncols=_columns(named), fontsize="small")
 
 
 def _columns(names: Iterable[str]) -> int:
@@ -143,8 +145,8 @@ def _draw(axes: Axes, mark: Mark, plot: Plot, panel: Panel, lanes: list[str]) ->
     if isinstance(mark, Level):
         axes.axhline(mark.y, color=mark.colour, linewidth=mark.width, linestyle=_DASHES[mark.dash], label=name)
     elif isinstance(mark, Band):
-        kept = extremes(mark.high)
-        x, low, high = mark.x[kept], mark.low[kept], mark.high[kept]
+        rows = extremes(mark.high)
+        x, low, high = mark.x[rows], mark.low[rows], mark.high[rows]
         axes.fill_between(x, low, high, color=mark.colour, alpha=0.16, linewidth=0, label=name)
     elif isinstance(mark, Stretch):
         lane = lanes.index(mark.lane)

@@ -80,11 +80,11 @@ def _same(one: Mark, other: Mark) -> bool:
 
 def _lanes(panel: Panel) -> dict[str, list[Stretch]]:
     """Return the bars of each lane of a timeline."""
-    found: dict[str, list[Stretch]] = {}
+    lanes: dict[str, list[Stretch]] = {}
     for mark in panel.marks:
         if isinstance(mark, Stretch):
-            found.setdefault(mark.lane, []).append(mark)
-    return found
+            lanes.setdefault(mark.lane, []).append(mark)
+    return lanes
 
 
 def _of(mark: Mark, label: str, colours: dict[str, str], dash: str, named: set[str]) -> Mark:

@@ -34,7 +34,7 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
     scenes = [flight.origin.scene for flight in flights]
     published = scenes[0].get("published", {})
     names = labels(flights)
-    told = [facts(flight) for flight in flights]
+    tables = [facts(flight) for flight in flights]
     others = flights[0].others if len(flights) == 1 else ()
     drawn = sections(flights)  # one by one, each when the page comes to it
     heads = list(names) if len(flights) > 1 else ["this flight"]
@@ -51,7 +51,7 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
         events=[flight.events for flight in flights],
         numbers=[key_numbers(flight) for flight in flights],
         trouble=[trouble(flight) for flight in flights],
-        facts={key: [one.get(key, "") for one in told] for key in dict.fromkeys(k for one in told for k in one)},
+        facts={key: [one.get(key, "") for one in tables] for key in dict.fromkeys(k for one in tables for k in one)},
         differences=differences(*scenes) if len(scenes) == 2 else {},
         accuracy=accuracy(flights, published.get("rmse", {})),
         heads=heads + ([published.get("source", "published")] if published.get("rmse") else []),
@@ -94,9 +94,9 @@ def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list
     """Return the root-mean-square error of each axis [m], [°] with the published one; empty without a reference."""
     if not any(flight.rmse for flight in flights):
         return []
-    found = []
+    rows = []
     for axis in AXES:
         unit, scale = shown(axis)
         values = [flight.rmse.get(axis) for flight in flights] + ([published.get(axis)] if published else [])
-        found.append(Accuracy(axis, unit, tuple(None if v is None else scale * v for v in values)))
-    return found
+        rows.append(Accuracy(axis, unit, tuple(None if v is None else scale * v for v in values)))
+    return rows

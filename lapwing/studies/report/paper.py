@@ -80,27 +80,27 @@ def _page(plots: Sequence[Titled]) -> Figure:
     rest = max(INNER[1] - sum(heights), 0.01)
     left, bottom = MARGIN / PAGE[0], (MARGIN + 0.2) / PAGE[1]
     layout = ConstrainedLayoutEngine(rect=(left, bottom, INNER[0] / PAGE[0], INNER[1] / PAGE[1]))
-    made = Figure(figsize=PAGE, layout=layout)
+    figure = Figure(figsize=PAGE, layout=layout)
     ratios = [ratio for height in heights for ratio in (HEADING, height - HEADING)]
-    parts: Any = made.subfigures(len(ratios) + 1, 1, height_ratios=[*ratios, rest])
+    parts: Any = figure.subfigures(len(ratios) + 1, 1, height_ratios=[*ratios, rest])
     for titled, heading, part in zip(plots, parts[0::2], parts[1::2], strict=False):
         heading.text(0.01, 0.1, titled.title, va="bottom", fontsize=10, fontweight="bold", color=TEXT)
         caption = "\n".join(_wrapped(titled.plot.caption))
         part.supxlabel(caption, x=0.01, ha="left", fontsize=7, color="#555555")
         draw_plot(titled.plot, part)
-    return made
+    return figure
 
 
 def _cover(cover: Cover) -> Figure:
     """Return the first page."""
-    made = Figure(figsize=PAGE)
+    figure = Figure(figsize=PAGE)
     left, line = MARGIN / PAGE[0], 0.19 / PAGE[1]
     y = 1.0 - MARGIN / PAGE[1]
 
     def write(text: str, size: float, **looks: Any) -> None:
         nonlocal y
         for part in textwrap.wrap(text, int(LETTERS * 8.0 / size)) or [""]:
-            made.text(left, y, part, va="top", fontsize=size, **{"color": TEXT, **looks})
+            figure.text(left, y, part, va="top", fontsize=size, **{"color": TEXT, **looks})
             y -= line * size / 8.0
 
     write(cover.title, 18, fontweight="bold")
@@ -115,16 +115,16 @@ def _cover(cover: Cover) -> Figure:
             for column, text in enumerate(row):
                 x = left + (0.0 if column == 0 else 0.12 + 0.16 * column)
                 looks: dict[str, Any] = {"ha": "left" if column == 0 else "right", "va": "top", "fontweight": weight}
-                made.text(x, y, text, fontsize=9, color=TEXT, **looks)
+                figure.text(x, y, text, fontsize=9, color=TEXT, **looks)
             y -= 1.15 * line
     if cover.facts:
         y -= line
         for name, value in cover.facts:
-            made.text(left, y, name, va="top", fontsize=8, color="#555555")
+            figure.text(left, y, name, va="top", fontsize=8, color="#555555")
             for part in textwrap.wrap(value, LETTERS - 22) or [""]:
-                made.text(left + 0.17, y, part, va="top", fontsize=8, color=TEXT)
+                figure.text(left + 0.17, y, part, va="top", fontsize=8, color=TEXT)
                 y -= line
-    return made
+    return figure
 
 
 def _wrapped(text: str) -> list[str]:

@@ -28,8 +28,8 @@ def script() -> str:
     Raises:
         ValueError: the package is not installed.
     """
-    found = find_spec("plotly")
-    for folder in (found.submodule_search_locations or ()) if found else ():
+    match = find_spec("plotly")
+    for folder in (match.submodule_search_locations or ()) if match else ():
         path = Path(folder) / "package_data" / "plotly.min.js"
         if path.exists():
             return path.read_text(encoding="utf-8")
@@ -46,9 +46,9 @@ def reduced(text: str, traces: tuple[str, ...] = TRACES) -> str:
     ends = [start for start, _ in starts[1:]] + [last]
     bodies = {name: text[start:end] for (start, name), end in zip(starts, ends, strict=True)}
     # The core registers scatter itself.
-    kept = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in traces]
+    names = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in traces]
     entry = register[2]
-    bodies[entry] = bodies[entry].replace(register[1], ",".join(f"{name}()" for name in kept))
+    bodies[entry] = bodies[entry].replace(register[1], ",".join(f"{name}()" for name in names))
     owners = {inner: name for name, body in bodies.items() for inner in _INNER.findall(body)}
     owners |= {name: name for name in bodies}
     needed: set[str] = set()
@@ -63,8 +63,8 @@ def reduced(text: str, traces: tuple[str, ...] = TRACES) -> str:
 
 def _kind(name: str, bodies: dict[str, str]) -> str:
     """Return the kind of traces of a registered module, which may only refer to another; "" for all others."""
-    if found := _KIND.search(bodies.get(name, "")):
-        return found[1]
+    if match := _KIND.search(bodies.get(name, "")):
+        return match[1]
     alias = _ALIAS.fullmatch(bodies.get(name, ""))
     return _kind(alias[1], bodies) if alias else ""
 

@@ -23,13 +23,13 @@ def traces(mark: Mark, plot: Plot, panel: Panel) -> list[dict[str, Any]]:
     if isinstance(mark, Stretch):
         return [_bar(mark)]
     if isinstance(mark, Band):
-        kept = extremes(mark.high)
+        rows = extremes(mark.high)
         exact = (panel.log_x, panel.log_y)
         looks = {"type": "scatter", "mode": "lines", "line": {"width": 0, "color": mark.colour}, "hoverinfo": "skip"}
-        x = _array(mark.x[kept], exact[0])
-        low = {**looks, "x": x, "y": _array(mark.low[kept], exact[1]), "name": text_of(mark.name), "showlegend": False}
+        x = _array(mark.x[rows], exact[0])
+        low = {**looks, "x": x, "y": _array(mark.low[rows], exact[1]), "name": text_of(mark.name), "showlegend": False}
         filled = {"fill": "tonexty", "fillcolor": _pale(mark.colour), "name": text_of(mark.name)}
-        return [low, {**looks, "x": x, "y": _array(mark.high[kept], exact[1]), **filled}]
+        return [low, {**looks, "x": x, "y": _array(mark.high[rows], exact[1]), **filled}]
     return [_line(mark, panel)]
 
 
@@ -46,7 +46,7 @@ def in_legend(trace: dict, named: set[tuple]) -> None:
 
 def _line(mark: Line, panel: Panel) -> dict:
     line = drawn(mark, panel.timed)
-    modes = [mode for mode, wanted in (("lines", line.joined), ("markers", line.marker)) if wanted]
+    modes = [mode for mode, is_on in (("lines", line.joined), ("markers", line.marker)) if is_on]
     trace: dict[str, Any] = {
         "type": "scatter",
         "mode": "+".join(modes) or "none",

@@ -35,10 +35,10 @@ def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
     They are drawn on demand, since each holds all samples that it shows.
     """
     models = {flight.origin.scene.get("vehicle", {}).get("model", "rigid_body") for flight in flights}
-    wanted = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
+    selected = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
     if all(len(flight.fleet) < 2 for flight in flights):
-        wanted = [module for module in wanted if not getattr(module, "FLEET", False)]
-    return (_section(module, flights) for module in wanted)
+        selected = [module for module in selected if not getattr(module, "FLEET", False)]
+    return (_section(module, flights) for module in selected)
 
 
 def labels(flights: Sequence[FlightData]) -> tuple[str, ...]:

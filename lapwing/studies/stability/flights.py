@@ -23,5 +23,7 @@ def fly(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> Fl
 
 def finite(flight: FlightData) -> bool:
     """Return True if all recorded motion is finite."""
-    told = flight.truth
-    return all(np.isfinite(a).all() for a in (told.position, told.orientation, told.velocity, told.angular_velocity))
+    truth = flight.truth
+    return all(
+        np.isfinite(a).all() for a in (truth.position, truth.orientation, truth.velocity, truth.angular_velocity)
+    )

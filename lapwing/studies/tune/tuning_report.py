@@ -47,8 +47,8 @@ def _outcome(tuning: Tuned) -> str:
     if tuning.failures:
         first, *others = tuning.failures
         return f"The new gains fail: {first}" + (f"; and {len(others)} more" if others else "")
-    flown = len(tuning.corners)
-    flights = f", and all {flown} flights of perturbed vehicles succeed" if flown else "; no flight was made"
+    corners = len(tuning.corners)
+    flights = f", and all {corners} flights of perturbed vehicles succeed" if corners else "; no flight was made"
     return f"The new gains pass: all {len(tuning.after.margins)} loops have their margins{flights}"
 
 

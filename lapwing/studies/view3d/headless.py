@@ -59,8 +59,8 @@ class Browser:
 
     def run(self, body: str) -> Any:
         """Run the body of an asynchronous function in the page and return its result."""
-        given = {"expression": f"(async () => {{{body}}})()", "awaitPromise": True, "returnByValue": True}
-        result = self.call("Runtime.evaluate", **given)
+        arguments = {"expression": f"(async () => {{{body}}})()", "awaitPromise": True, "returnByValue": True}
+        result = self.call("Runtime.evaluate", **arguments)
         assert "exceptionDetails" not in result, result
         return result["result"].get("value")
 

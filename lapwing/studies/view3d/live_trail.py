@@ -30,9 +30,9 @@ class LiveTrail:
         if len(step.reference):
             error = np.linalg.norm(path - step.reference[np.minimum(rows, len(step.reference) - 1), :3], axis=1)
         begins = not self._lines or len(self._points) > POINTS
-        kept = slice(-1, None) if begins else slice(None)  # a line begins where the one before ends
-        self._points = np.concatenate([self._points[kept], path])
-        self._errors = np.concatenate([self._errors[kept], error])
+        remaining = slice(-1, None) if begins else slice(None)  # a line begins where the one before ends
+        self._points = np.concatenate([self._points[remaining], path])
+        self._errors = np.concatenate([self._errors[remaining], error])
         if len(self._points) < 2:
             return
         known = None if np.isnan(self._errors).any() else self._errors

@@ -106,5 +106,5 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
             and of a recording "span", the times of the first and the last point of the trails [s].
     """
     code = (Path(__file__).parent / "bridge.js").read_text(encoding="utf-8")
-    given = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")
-    return html.replace("<head>", f"<head><script>window.lapwing={given};{code}</script>", 1)
+    text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")
+    return html.replace("<head>", f"<head><script>window.lapwing={text};{code}</script>", 1)

@@ -49,14 +49,14 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray) -> Samples:
         error = np.linalg.norm(path - desired, axis=1)
     estimate = std = None
     if flight.has("estimate"):
-        said = flight.topic("estimate")
-        own = nearest(said.times, times)
-        estimate, std = said.position[own], said.position_std[own]
+        view = flight.topic("estimate")
+        own = nearest(view.times, times)
+        estimate, std = view.position[own], view.position_std[own]
     contacts = forces = None
     if flight.has("contact_forces"):
-        said = flight.topic("contact_forces")
-        own = nearest(said.times, times)
-        contacts, forces = said.position[own], said.force[own]
+        view = flight.topic("contact_forces")
+        own = nearest(view.times, times)
+        contacts, forces = view.position[own], view.force[own]
     bodies = [_body(body, times, rows) for body in motion.bodies]
     return Samples(times, bodies, wind, desired, yaw, estimate, std, contacts, forces, error, beams(flight, times))
 

@@ -55,9 +55,9 @@ def step(p: Px4Controller, s: Px4State, tick: int, inputs: tuple[InputSample, ..
     charge = battery.value.charge if battery.due else s.charge
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     if landed.name == FLYING:
-        controlled, given = law.step(p.law.value, s.law, c.interval, e, setpoint, watched.failed)
+        controlled, command = law.step(p.law.value, s.law, c.interval, e, setpoint, watched.failed)
     else:
         off = at_rest(c.law.value.shares[0])
-        controlled, given = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
-    watched, outputs = block_outputs(c, watched, still_from, charge, order, e, setpoint, landed.name, given)
+        controlled, command = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
+    watched, outputs = block_outputs(c, watched, still_from, charge, order, e, setpoint, landed.name, command)
     return Px4State(landed, controlled, watched, still_from, charge), outputs, CONTINUE

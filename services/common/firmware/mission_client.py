@@ -229,10 +229,10 @@ class MissionClient:
         name = message.param_id
         if name not in self._parameters:
             return
-        value, wanted = message.param_value, self._parameters[name]
+        value, desired = message.param_value, self._parameters[name]
         if self._conventions.bytewise and message.param_type in INTEGERS:
             value = struct.unpack(INTEGERS[message.param_type], struct.pack("<f", value))[0]
-        if abs(value - wanted) <= 1e-6 * max(1.0, abs(wanted)):
+        if abs(value - desired) <= 1e-6 * max(1.0, abs(desired)):
             del self._parameters[name]
         self._types[name] = message.param_type
         self._sent = -1.0

@@ -90,14 +90,14 @@ def firmware_config(
         (),
         own,
     )
-    taken = [*inputs, ports.BATTERY, *([ports.TRAJECTORY] if follows else [])]
+    names = [*inputs, ports.BATTERY, *([ports.TRAJECTORY] if follows else [])]
     none = (0.0,) * len(setup.order)
     outputs = [
         Port(ports.ACTUATORS, MotorCommand(none, False, none, (0.0, 0.0, 0.0))),
         Port(ports.STATUS, AutopilotStatus(), setup.status_every),
         *([Port(ports.SETPOINT, Setpoint())] if follows else []),
     ]
-    return ServiceConfig(setup, tuple(InputPort(name) for name in dict.fromkeys(taken)), tuple(outputs))
+    return ServiceConfig(setup, tuple(InputPort(name) for name in dict.fromkeys(names)), tuple(outputs))
 
 
 def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:

@@ -101,7 +101,10 @@ def reposition(session: Session, c: Command) -> Outcome:
     yaw = swap_yaw(c.params[3])
     if estimate is None or all(map(math.isnan, there)):
         return Request("hold", (yaw,))  # a heading alone turns it on the spot
-    place = [here if math.isnan(asked) else asked for here, asked in zip(estimate.position_world, there, strict=True)]
+    place = [
+        here if math.isnan(requested) else requested
+        for here, requested in zip(estimate.position_world, there, strict=True)
+    ]
     speed = c.params[0] if c.params[0] > 0.0 else math.nan
     return Request("goto", (*place, yaw, speed))
 

@@ -20,8 +20,8 @@ DOWN = (mavlink.MAV_SENSOR_ROTATION_PITCH_270, NO_ROTATION)
 
 def good_distance(v: VehicleCache) -> bool:
     """Return True if every distance sensor has a reading."""
-    found = [v.get(topic) for topic in (SONAR, RANGEFINDER)]
-    return any(found) and not any(math.isnan(m.range) for m in found if m)
+    readings = [v.get(topic) for topic in (SONAR, RANGEFINDER)]
+    return any(readings) and not any(math.isnan(m.range) for m in readings if m)
 
 
 def good_flow(v: VehicleCache) -> bool:
@@ -99,8 +99,8 @@ def optical_flow(v: VehicleCache) -> Any:
     m = v.get(OPTICAL_FLOW)
     if m is None:
         return None
-    interval, seen = v.description.flow_interval, good_flow(v)
-    flow_x, flow_y = m.flow if seen else (0.0, 0.0)
+    interval, is_good = v.description.flow_interval, good_flow(v)
+    flow_x, flow_y = m.flow if is_good else (0.0, 0.0)
     turn_x, turn_y = m.rate
     return mavlink.MAVLink_optical_flow_rad_message(
         v.boot_us,
@@ -112,7 +112,7 @@ def optical_flow(v: VehicleCache) -> Any:
         -interval * turn_y,
         0.0,  # its gyroscopes are those of x and y
         0,
-        QUALITY if seen else 0,
+        QUALITY if is_good else 0,
         0,
-        m.distance if seen else -1.0,
+        m.distance if is_good else -1.0,
     )

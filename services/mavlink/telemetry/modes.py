@@ -22,10 +22,10 @@ def current_mode(v: VehicleCache) -> Any:
 def available_modes(v: VehicleCache, index: float) -> list[Any]:
     """Return the mode of an index from 1, or all modes for 0."""
     modes = v.firmware.MODES
-    wanted = 0 if math.isnan(index) else round(index)
+    desired = 0 if math.isnan(index) else round(index)
     messages = []
     for number, mode in enumerate(modes, start=1):
-        if wanted in (0, number):
+        if desired in (0, number):
             named = mode.standard == mavlink.MAV_STANDARD_MODE_NON_STANDARD  # the others bear their standard's name
             properties = mavlink.MAV_MODE_PROPERTY_ADVANCED if mode.advanced else 0
             name = mode.name.encode() if named else b""

@@ -30,9 +30,9 @@ def sector_distances(azimuth: np.ndarray, distance: np.ndarray, most: float) -> 
     np.minimum.at(nearest, sector, np.where(np.isnan(distance), np.inf, np.maximum(distance, 0.0)))
     limit = min(round(100.0 * most), FARTHEST)
     centimetres = np.where(np.isfinite(nearest), np.minimum(np.round(100.0 * nearest), limit), limit + 1)
-    seen = np.zeros(SECTORS, bool)
-    seen[sector] = True
-    return [int(value) for value in np.where(seen, centimetres, UNKNOWN)]
+    is_known = np.zeros(SECTORS, bool)
+    is_known[sector] = True
+    return [int(value) for value in np.where(is_known, centimetres, UNKNOWN)]
 
 
 @stream("OBSTACLE_DISTANCE", 1.0, 10.0)

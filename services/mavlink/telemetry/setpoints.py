@@ -25,8 +25,8 @@ def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:
     position = tuple(setpoint.position)
     velocity, acceleration = swap_world(tuple(setpoint.velocity)), swap_world(tuple(setpoint.acceleration))
     turn = swap_yaw(setpoint.yaw), -setpoint.yaw_rate
-    given = (position[1], position[0], position[2], *velocity, *acceleration)
-    mask = sum(1 << k for k, value in enumerate(given) if not math.isfinite(value))
+    values = (position[1], position[0], position[2], *velocity, *acceleration)
+    mask = sum(1 << k for k, value in enumerate(values) if not math.isfinite(value))
     mask |= sum(1 << _YAW_BIT + k for k, value in enumerate(turn) if not math.isfinite(value))
     return mask, position, (*velocity, *acceleration, *turn)
 

@@ -30,14 +30,14 @@ def measured(kind: str, seed: int) -> LandingErrors:
     """Fly a landing at every accuracy and compare its whole state, at every moment, with the reference."""
     case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)
-    got, worst, taken = [], [], []
+    got, worst, times = [], [], []
     for accuracy in cases.ACCURACIES:
         states, seconds = cases.flown(case, accuracy)
         errors = cases.errors(states, exact)
         got.append(float(errors.max()))
         worst.append(float(cases.times()[errors.argmax()]))
-        taken.append(seconds)
-    return LandingErrors(seed, events, tuple(got), tuple(worst), tuple(taken), cases.round_off(case))
+        times.append(seconds)
+    return LandingErrors(seed, events, tuple(got), tuple(worst), tuple(times), cases.round_off(case))
 
 
 def measure(seeds: Iterable[int], processes: int | None = None, kind: str = "random") -> Iterator[LandingErrors]:

@@ -258,10 +258,10 @@ def _first_crossing(
         values = at_end if point == solver.t else wrong(dense(point))  # type: ignore[misc]
         if (values > 0.0).any():
             dense = dense or solver.dense_output()
-            found = [(_root(wrong, dense, before, point, k), k) for k in zip(*np.nonzero(values > 0.0), strict=True)]
-            t = min(found)[0]
+            roots = [(_root(wrong, dense, before, point, k), k) for k in zip(*np.nonzero(values > 0.0), strict=True)]
+            t = min(roots)[0]
             flipped = np.zeros_like(cases)
-            for root, k in found:
+            for root, k in roots:
                 flipped[k] = root == t
             return t, flipped
         before = point

@@ -90,11 +90,11 @@ def problems() -> dict[str, Problem]:
     mean = plain._replace(body=body_of(frame.mass.total, tuple(np.diag(inertia(frame, None)).tolist())))
     ways = [_way("reduced, frame only", plain, start, volts), _way("reduced, mean", mean, start, volts)]
     for name, form in (("SE(3)", multirotor_multibody), ("Euler", multirotor_euler)):
-        for held in multirotor_multibody.STABILISATIONS:
-            p = form.parameters(frame, (), "speed", held)
+        for stabilisation in multirotor_multibody.STABILISATIONS:
+            p = form.parameters(frame, (), "speed", stabilisation)
             x = thrown(p, frame)
             state = MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
-            ways.append(_way(f"{name}, {held}", p, state, volts))
+            ways.append(_way(f"{name}, {stabilisation}", p, state, volts))
     problem = Problem(
         "delivery drone of one and of five bodies, tumbling",
         "s",
@@ -117,7 +117,7 @@ def thrown(p: Any, frame: Any) -> FiveBodies:
 
 
 def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
-    def flown(steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+    def flight_of(steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
         out = np.empty((rows, len(flatten(motion))))
         each = max(1, steps // SAMPLES)
@@ -132,7 +132,9 @@ def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
         return SolverRun(times, coordinates(motion, out)[:, :18], defect, round(DURATION / step) * METHOD.EVALUATIONS)
 
     settings = [DURATION / (COARSEST * 2**k) for k in range(HALVINGS)]
-    return SolverMethod(name, METHOD.ORDER, "s", settings, lambda h: flown(round(DURATION / h)), read, flown(1, rows=1))
+    return SolverMethod(
+        name, METHOD.ORDER, "s", settings, lambda h: flight_of(round(DURATION / h)), read, flight_of(1, rows=1)
+    )
 
 
 def inertia(frame: Any, angles: Any) -> np.ndarray:

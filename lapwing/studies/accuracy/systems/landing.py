@@ -52,7 +52,7 @@ def _way(name: str, case: Landing) -> SolverMethod:
     method = integrators.get(name)
     ticks = round(cases.DURATION / cases.INTERVAL)
 
-    def flown(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+    def flight_of(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         p, start = cases.plant(case)
         p, off = p._replace(tolerance=contact_tolerance(accuracy)), (0.0,) * len(p.layout.x_body)
         steps = round(cases.INTERVAL / STEP)
@@ -73,4 +73,4 @@ def _way(name: str, case: Landing) -> SolverMethod:
         motion = cases.plant(case)[1].motion
         return SolverRun(times, coordinates(motion, rows), defect(motion, rows[-1]), None)
 
-    return SolverMethod(name, method.ORDER, "tol", cases.ACCURACIES, flown, read, flown(1.0, rows=1))
+    return SolverMethod(name, method.ORDER, "tol", cases.ACCURACIES, flight_of, read, flight_of(1.0, rows=1))

@@ -11,7 +11,7 @@ NEEDS = ("ground_truth",)
 
 def draw(flight: FlightData) -> Plot:
     """Plot each angle in a row."""
-    said = "Attitude as roll, pitch and yaw."
+    caption = "Attitude as roll, pitch and yaw."
     if len(flight.reference):
-        said += " The reference of roll and pitch is what the inner loops follow; that of yaw is the setpoint."
-    return three_axes(flight, 3, DEGREES * flight.truth.attitude, "°", DEGREES, said)
+        caption += " The reference of roll and pitch is what the inner loops follow; that of yaw is the setpoint."
+    return three_axes(flight, 3, DEGREES * flight.truth.attitude, "°", DEGREES, caption)

@@ -35,10 +35,10 @@ def draw(flight: FlightData) -> Plot:
             marks = Band(t, -bound, bound, "3 sigma"), Line(t, off, "estimate minus truth", width=1.0)
             label = f"{quantity} {name} [{unit}]"
             panels.append(Panel(marks, label, title=beyond, row=row, column=column, y_range=(-half, half)))
-    said = f"{cut} samples lie beyond the scales of their panels (▲)" if cut else "Nothing lies beyond the scales"
+    note = f"{cut} samples lie beyond the scales of their panels (▲)" if cut else "Nothing lies beyond the scales"
     caption = (
         "Estimate minus truth at the estimate's own time, within three standard deviations as the estimator says "
-        f"(shaded); {100 * inside:.1f} % of the errors lie inside. {said}. "
+        f"(shaded); {100 * inside:.1f} % of the errors lie inside. {note}. "
         "Attitude as rotation vector in the body frame. " + refusals(flight)
     )
     return Plot(tuple(panels), caption, 6.6, (1.0,) * 3, (1.0,) * 3, **over(flight))
@@ -53,9 +53,9 @@ def errors(flight: FlightData) -> np.ndarray:
     """Estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
     from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
 
-    stamps, wanted = flight.truth.stamps, flight.estimate.stamps
-    later = np.searchsorted(stamps, wanted).clip(1, len(stamps) - 1)
-    nearer = stamps[later] - wanted > wanted - stamps[later - 1]
+    stamps, desired = flight.truth.stamps, flight.estimate.stamps
+    later = np.searchsorted(stamps, desired).clip(1, len(stamps) - 1)
+    nearer = stamps[later] - desired > desired - stamps[later - 1]
     at = later - nearer
     both = flight.truth, flight.estimate
     true, estimated = (np.hstack([view.position, view.velocity]) for view in both)
@@ -66,5 +66,5 @@ def errors(flight: FlightData) -> np.ndarray:
 def refusals(flight: FlightData) -> str:
     """Return the share of rejected measurements of each source as a sentence."""
     count = Counter(source for sources in flight.estimate.rejected_sources for source in sources)
-    said = ", ".join(f"{source} {times}" for source, times in count.most_common())
-    return f"Measurements rejected: {said or 'none'}."
+    note = ", ".join(f"{source} {times}" for source, times in count.most_common())
+    return f"Measurements rejected: {note or 'none'}."

@@ -21,10 +21,10 @@ def draw(flight: FlightData) -> Plot:
         marks.append(Line(x[:1], y[:1], colour=colour, marker="open", size=8.0, joined=False))
         marks.append(Line(x[-1:], y[-1:], colour=colour, marker="square", size=7.0, joined=False))
     plan = Panel(tuple(marks), "y north [m]", "x east [m]", timed=False, equal=True)
-    least, found = least_over_time(flight.fleet), nearest(flight.fleet)
-    over = (Line(flight.truth.times[: len(least)], least), Level(found.distance))
+    least, pair = least_over_time(flight.fleet), nearest(flight.fleet)
+    over = (Line(flight.truth.times[: len(least)], least), Level(pair.distance))
     apart = Panel(over, "least distance of two [m]", column=1)
-    said = (
-        f"All vehicles from above, north up (left; open: start, square: end), and the least distance of two. {found}."
+    caption = (
+        f"All vehicles from above, north up (left; open: start, square: end), and the least distance of two. {pair}."
     )
-    return Plot((plan, apart), said, 4.9, (1.0,), (1.0, 1.0))
+    return Plot((plan, apart), caption, 4.9, (1.0,), (1.0, 1.0))

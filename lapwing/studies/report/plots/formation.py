@@ -20,8 +20,8 @@ def draw(flight: FlightData) -> Plot:
     """Plot three panels over time on the left, the side view on the right."""
     t = flight.times("body_states")
     places = flight.topic("body_states").position
-    wanted = _wanted(flight, t)
-    error = np.linalg.norm(places[:, 0] - wanted, axis=1)
+    desired = _desired(flight, t)
+    error = np.linalg.norm(places[:, 0] - desired, axis=1)
     links = places[:, :1] - places[:, 1:]
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
     thrust = flight.topic("rotor_wrench").thrust
@@ -29,20 +29,20 @@ def draw(flight: FlightData) -> Plot:
         Panel((Line(t, np.where(error > 0.0, error, np.nan), colour=BOUND),), "load error [m]", log_y=True),
         Panel(_each(t, angle), "link from vertical [°]", row=1),
         Panel(_each(flight.times("rotor_wrench"), thrust), "thrust [N]", row=2),
-        side(places, wanted),
+        side(places, desired),
     )
-    said = (
+    caption = (
         "Distance of the load from its path, the links' angles in the x-z plane and the thrusts; on the right the "
         f"whole from the side at {INSTANTS} instants. At the end the load is {error[-1]:.2g} m from its path."
     )
-    return Plot(panels, said, 7.2, (1.0,) * 3, (1.2, 1.0), **over(flight))
+    return Plot(panels, caption, 7.2, (1.0,) * 3, (1.2, 1.0), **over(flight))
 
 
-def side(places: np.ndarray, wanted: np.ndarray) -> Panel:
+def side(places: np.ndarray, desired: np.ndarray) -> Panel:
     """Return the panel of the load's path and the links in the xz plane."""
     marks = [
         Line(places[:, 0, 0], places[:, 0, 2], "load", BOUND),
-        reference(wanted[:, 0], wanted[:, 2], name="wanted path"),
+        reference(desired[:, 0], desired[:, 2], name="wanted path"),
     ]
     some = places[np.linspace(0, len(places) - 1, INSTANTS).astype(int)]
     for i in range(places.shape[1] - 1):
@@ -61,7 +61,7 @@ def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
     return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
 
 
-def _wanted(flight: FlightData, t: np.ndarray) -> np.ndarray:
+def _desired(flight: FlightData, t: np.ndarray) -> np.ndarray:
     """Return the load's desired path [m] at times t, shape (n, 3)."""
     path = np.array(flight.origin.scene["formation"]["path"])
     return path[0] + t[:, None] * path[1] + t[:, None] ** 2 * path[2]

@@ -27,11 +27,11 @@ def draw(flight: FlightData) -> Plot:
         ("electrical power [W]", truth.motor_power),
     )
     panels = [Panel(motors(t, values), label) for label, values in quantities]
-    marks, said = limits(flight)
+    marks, note = limits(flight)
     panels[1] = panels[1]._replace(marks=panels[1].marks + marks)
     energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / WATT_HOUR
     caption = f"Speed of each propeller, voltage and power of its motor. All motors take {energy:.1f} W h. "
-    return Plot(caption=caption + said, **column(panels, 2.2, **over(flight)))
+    return Plot(caption=caption + note, **column(panels, 2.2, **over(flight)))
 
 
 def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
@@ -49,13 +49,13 @@ def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
     levels = Level(0.0, "limits", BOUND, "dot"), Level(highest, "limits", BOUND, "dot")
     if not len(flight.armed):
         return levels, f"Limits of the voltage: 0 and {highest:g} V."
-    t, found = flight.truth.times[: len(flight.armed)], saturation(flight.truth, flight.armed, highest)
-    if not found.lasted:
+    t, saturated = flight.truth.times[: len(flight.armed)], saturation(flight.truth, flight.armed, highest)
+    if not saturated.lasted:
         return levels, f"No motor is at a limit of its voltage (0 and {highest:g} V) in the air."
-    marks = (*_stretches(t, found.low, 0.0), *_stretches(t, found.high, highest))
+    marks = (*_stretches(t, saturated.low, 0.0), *_stretches(t, saturated.high, highest))
     return (*levels, *marks), (
         f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for "
-        f"{found.lasted:.2f} s, {100.0 * found.share(found.lasted):.2g} % of that time."
+        f"{saturated.lasted:.2f} s, {100.0 * saturated.share(saturated.lasted):.2g} % of that time."
     )
 
 

@@ -11,5 +11,5 @@ NEEDS = ("ground_truth",)
 
 def draw(flight: FlightData) -> Plot:
     """Plot each axis of the world frame in a row."""
-    said = "Position of the body frame in the world frame (ENU), from home."
-    return three_axes(flight, 0, flight.truth.position, "m", 1.0, said)
+    caption = "Position of the body frame in the world frame (ENU), from home."
+    return three_axes(flight, 0, flight.truth.position, "m", 1.0, caption)

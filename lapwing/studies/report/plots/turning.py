@@ -24,5 +24,5 @@ def draw(flight: FlightData) -> Plot:
         labels = f"ω{'xyz'[second]} [rad/s]", f"ω{'xyz'[first]} [rad/s]"
         panels.append(Panel((pair,), *labels, row=row, column=1, timed=False))
     largest = np.linalg.norm(omega, axis=1).max()
-    said = f"Angular velocity in the body frame over time, and in pairs. Largest magnitude: {largest:.3g} rad/s."
-    return Plot(tuple(panels), said, 7.6, (1.0,) * 3, (1.7, 1.0), **over(flight))
+    caption = f"Angular velocity in the body frame over time, and in pairs. Largest magnitude: {largest:.3g} rad/s."
+    return Plot(tuple(panels), caption, 7.6, (1.0,) * 3, (1.7, 1.0), **over(flight))

@@ -41,11 +41,11 @@ def draw(flight: FlightData) -> Plot:
         panels.append(picture(crate, place[k], turn[k])._replace(title=f"{t[k]:.2f} s", row=3 + i // 3, column=i % 3))
     shut = t[until.sum() :][np.abs(door[until.sum() :]) < 1.0]
     after = f"{shut[0] - crate['pickup']:.2f} s after it is taken the door is shut" if len(shut) else "it stays open"
-    said = (
+    caption = (
         "Displacements of the pack's middle until it is taken (longitudinal, vertical, angular as in the paper's "
         f"Figure 28), the door's angle from shut, the contact forces on the pack, and the crate from the side; {after}."
     )
-    return Plot(tuple(panels), said, 10.4, (1.0, 1.0, 1.0, 1.25, 1.25), (1.0,) * 3, **over(flight))
+    return Plot(tuple(panels), caption, 10.4, (1.0, 1.0, 1.0, 1.25, 1.25), (1.0,) * 3, **over(flight))
 
 
 def picture(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:

@@ -20,8 +20,8 @@ def draw(flight: FlightData) -> Plot:
     speeds = enumerate(zip((flight.truth.rotor_speed * RPM).T, COLOURS, DASHES, strict=False), 1)
     rotors = tuple(Line(t, speed, f"rotor {i}", colour, dash=dash) for i, (speed, colour, dash) in speeds)
     panels = Panel((Line(t, force),), "vertical force [N]"), Panel(rotors, "speed [rpm]")
-    said = (
+    caption = (
         f"Resultant of thrust, weight and drag along the vertical: from {force[0]:.3g} N to {force[-1]:.3g} N. "
         "Below, the speed of each rotor."
     )
-    return Plot(caption=said, **column(panels, 2.0, **over(flight)))
+    return Plot(caption=caption, **column(panels, 2.0, **over(flight)))

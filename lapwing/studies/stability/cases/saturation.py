@@ -141,7 +141,7 @@ def sweep() -> Sweep:
     losses = np.geomspace(0.1, 4.0, 25)
     result = {True: "integral held", False: "integral goes on"}
     curves = [
-        Curve(name, losses, np.array([np.abs(height(held, float(s))[1][-250:]).max() for s in losses]))
-        for held, name in result.items()
+        Curve(name, losses, np.array([np.abs(height(is_limited, float(s))[1][-250:]).max() for s in losses]))
+        for is_limited, name in result.items()
     ]
     return Sweep("seconds without thrust", "height error at the end [m]", 0.1, curves)
