@@ -39,6 +39,18 @@ def _widen(c: np.ndarray, start: int, deviation: float) -> None:
         c[i, i] += deviation * deviation
 
 
+@always_inline
+def doubt_imu(m: Memory) -> None:
+    """Inflate what follows from the IMU, and forget the trend of innovations."""
+    c = m.covariance
+    _widen(c, THETA, 0.02)
+    _widen(c, VELOCITY, 0.3)
+    _widen(c, POSITION, 0.1)
+    _widen(c, GYRO, 5e-3)
+    _widen(c, ACCELEROMETER, 0.1)
+    m.trend[:] = 0.0
+
+
 @kernel
 def inflate_covariance(p: Estimator, m: Memory, source: int) -> None:
     """Inflate the covariance after the gate rejected a reading of `source`."""
@@ -50,11 +62,7 @@ def inflate_covariance(p: Estimator, m: Memory, source: int) -> None:
         lone = m.since[GPS_VELOCITY] == NEVER and m.since[GPS] * p.interval > _LONE
         imu_doubted = source == GPS and lone
     if imu_doubted:
-        _widen(c, THETA, 0.02)
-        _widen(c, VELOCITY, 0.3)
-        _widen(c, POSITION, 0.1)
-        _widen(c, GYRO, 5e-3)
-        _widen(c, ACCELEROMETER, 0.1)
+        doubt_imu(m)
     elif source == GPS and for_long:
         _widen(c, POSITION, 3.0)
     elif source == BARO and for_long:

@@ -72,6 +72,7 @@ class Memory(NamedTuple):
     refused: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
     repeats: np.ndarray  # (WATCHED,) number of consecutive equal readings
     last: np.ndarray  # (WATCHED, 6) last reading of each source
+    trend: np.ndarray  # (2, 2) of horizontal innovations of GPS position and velocity (theory.md, eq. (3.64))
     nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
     packed: np.ndarray  # (1, PACKED) upper triangle of the covariance and `nis`, as they are sent
 
@@ -111,6 +112,7 @@ def new_memory() -> Memory:
         np.zeros(WATCHED, np.int64),
         np.zeros(WATCHED, np.int64),
         np.zeros((WATCHED, 6)),
+        np.zeros((2, 2)),
         np.zeros(WATCHED),
         np.zeros((1, PACKED)),
     )

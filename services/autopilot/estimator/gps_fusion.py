@@ -4,7 +4,7 @@ from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, scale, subtract
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
+from lapwing.services.autopilot.estimator.covariance_inflation import doubt_imu, inflate_covariance
 from lapwing.services.autopilot.estimator.delayed_measurements import (
     Noise,
     late_innovation_variances,
@@ -15,6 +15,9 @@ from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import GPS, GPS_VELOCITY, HISTORY, Memory, State, corrected
 from lapwing.services.autopilot.estimator.fuse import apply_update
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
+
+_TREND = 0.8  # weight of the former trend at each fix
+_REST = math.sqrt(1.0 - _TREND * _TREND)
 
 
 @always_inline
@@ -91,21 +94,28 @@ def _fuse(
         age: delay [ticks].
     """
     m, since, r = s.memory, _noise_since(p, s, age), rotation_matrix(s.nominal.attitude)
-    accepted, nis = True, 0.0
+    accepted, drifts, nis, row = True, False, 0.0, source - GPS
     for axis in range(3):
         _row(m, source, force, r, axis, delay)
         _, largest = late_innovation_variances(m, axis, since, variance[axis], force)
         ratio = innovation[axis] * innovation[axis] / largest
         nis += ratio
         accepted = accepted and ratio < p.gate * p.gate
-    if accepted:
+        if axis < 2:  # other sources of height may be wrong
+            m.trend[row, axis] = _TREND * m.trend[row, axis] + _REST * innovation[axis] / math.sqrt(largest)
+            drifts = drifts or math.fabs(m.trend[row, axis]) > p.gate
+    drifts = drifts and accepted  # beyond the gate the reading is wrong, not the estimate
+    if accepted and not drifts:
         nis = 0.0
         for axis in range(3):
             _row(m, source, force, r, axis, delay)
             s_gain, _ = late_innovation_variances(m, axis, since, variance[axis], force)
             nis += apply_update(m, innovation[axis], s_gain)
-    record_gate_result(m, source, accepted, nis)
-    if not accepted:
+    record_gate_result(m, source, accepted and not drifts, nis)
+    if drifts:
+        doubt_imu(m)
+    elif not accepted:
+        m.trend[row, :] = 0.0
         inflate_covariance(p, m, source)
     return corrected(s)
 

@@ -340,6 +340,28 @@ def test_position_alone_will_do():
     assert np.all(rms(ensemble(velocity=False).error[:, 50:, ef.P]) < (0.015, 0.015, 0.01))
 
 
+@pytest.mark.parametrize(("signs", "inflates"), [((1, 1), True), ((1, -1), False)])
+def test_small_innovations_of_one_sign_inflate_covariance(signs, inflates):
+    """theory.md, eq. (3.64): 2.5 deviations are no reason to reject a reading, but ten such readings are a drift."""
+    s, largest = at_rest(), 0.0
+    for k in range(20):
+        spread = math.sqrt(s.memory.covariance[filter_state.VELOCITY, filter_state.VELOCITY] + 0.05**2)
+        x, y, z = s.nominal.velocity_world
+        velocity = (x + 2.5 * signs[k % 2] * spread, y, z + 1e-6 * k)
+        s = estimator.update_gps_velocity(P, s, velocity, 0.05**2, 0, True)
+        largest = max(largest, math.sqrt(s.memory.covariance[filter_state.GYRO, filter_state.GYRO]))
+    assert (largest > 2.0 * P.gyro_bias_std) == inflates
+
+
+def test_rejected_reading_is_no_drift():
+    s = at_rest()
+    s = estimator.update_gps_velocity(P, s, (30.0, 0.0, 0.0), 0.05**2, 0, True)
+    assert s.memory.refused[filter_state.GPS_VELOCITY]
+    before = s.memory.covariance[filter_state.GYRO, filter_state.GYRO]
+    s = estimator.update_gps_velocity(P, s, (0.01, 0.0, 0.0), 0.05**2, 0, True)
+    assert s.memory.covariance[filter_state.GYRO, filter_state.GYRO] <= before
+
+
 def test_covariance_is_inflated_only_for_lasting_rejection():
     s = at_rest()
     before = s.memory.covariance.copy()
