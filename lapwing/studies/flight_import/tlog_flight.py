@@ -79,7 +79,7 @@ def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], set[str]]
     unknown: set[str] = set()
     system = None
     try:
-        log = mavutil.mavlink_connection(str(path))
+        log = mavutil.mavlogfile(str(path))  # mavlink_connection scans the file first, and fails on damaged ones
         while (message := log.recv_msg()) is not None:
             name = message.get_type()
             if name == "HEARTBEAT" and system is None and message.autopilot != NO_AUTOPILOT:

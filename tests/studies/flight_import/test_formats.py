@@ -167,6 +167,14 @@ def test_damaged_file_is_rejected_in_one_line(tmp_path, name, content):
     assert "\n" not in str(raised.value)
 
 
+def test_telemetry_log_may_end_within_a_message(tmp_path, flight):
+    WRITERS["f.tlog"](tmp_path / "f.tlog", flight)
+    whole = (tmp_path / "f.tlog").read_bytes()
+    vibration = b"\xfd\x20\x00\x00\x00\x01\x01\xf1\x00\x00"  # the header of a message that the log has nowhere else
+    (tmp_path / "f.tlog").write_bytes(whole + whole[:8] + vibration + bytes(8))
+    assert len(open_flight(tmp_path / "f.tlog")) >= SAMPLES - 2
+
+
 def test_log_without_motor_outputs_is_rejected(tmp_path, flight, monkeypatch):
     rows = [row for row in dataflash_rows(flight) if row[0] != "RCOU"]
     monkeypatch.setattr(flight_writers, "dataflash_rows", lambda flight: iter(rows))
