@@ -4,9 +4,12 @@
 # mypy: disable-error-code="attr-defined"
 
 import ctypes
+import select
+import struct
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import numpy as np
 from llvmlite import ir
 from numba.core import types
 from numba.extending import intrinsic
@@ -17,6 +20,11 @@ _INT32, _INT64, _DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
 def address_of(function: Any) -> int:
     """Return the address of a function of ctypes."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0
+
+
+def poll_entry(descriptor: int) -> np.ndarray:
+    """Return the eight bytes of a `struct pollfd` that waits for input of a file."""
+    return np.frombuffer(bytearray(struct.pack("=ihh", descriptor, select.POLLIN, 0)), np.int64)
 
 
 def _caller(result: ir.Type) -> Callable:

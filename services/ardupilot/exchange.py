@@ -12,7 +12,6 @@ from lapwing.services.ardupilot.state_message import write_state
 from lapwing.services.common.firmware.datagrams import Datagrams, is_from_peer, receive, send, unsigned16
 from lapwing.services.common.firmware.exchange import (
     INVALID,
-    POLL,
     SEND,
     WAIT,
     Shared,
@@ -75,8 +74,7 @@ def step(p: ArduPilotExchange, s: int, tick: int, inputs: tuple) -> tuple[int, t
             e.outputs[k] = throttle(unsigned16(d.received, _HEAD + 2 * k), PWM_MIN, PWM_MAX)
     elif not call_python(e, tick, WAIT, size):
         return s, (), NON_FINITE
-    end(e)
-    if tick >= e.next_poll[0] and not call_python(e, tick, POLL, 0):
+    if not end(e, tick):
         return s, (), NON_FINITE
     running = False
     for k in range(OUTPUTS):

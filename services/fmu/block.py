@@ -12,11 +12,11 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import math
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.native_calls import address_of
+from lapwing.kernels.native_calls import address_of, poll_entry
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.fmu.exchange import FmuExchange
 from lapwing.services.fmu.host_process import HostError, HostProcess
-from lapwing.services.fmu.pipe_polling import LOOKS, poll_entry
+from lapwing.services.fmu.pipe_polling import LOOKS
 from lapwing.services.fmu.service_config import Connection, FmuConfig
 
 _WAIT = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_int64, ctypes.c_int64)

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.native_calls import address_of
+from lapwing.kernels.native_calls import address_of, poll_entry
 from lapwing.services.fmu import stepping
 from lapwing.services.fmu.instance import DISCARD, FmuInstance
-from lapwing.services.fmu.pipe_polling import LOOKS, poll_entry
+from lapwing.services.fmu.pipe_polling import LOOKS
 from lapwing.services.fmu.stepping import UPDATES, Channel, FmuCalls
 from lapwing.services.fmu.variable_group import Group
 
@@ -97,12 +97,12 @@ class CoSimulation(FmuInstance):
 def channel(requests: int, replies: int, request: bytearray, reply: bytearray) -> Cell:
     """Return the channel of `CoSimulation.serve`: file descriptors, and the bytes of a request and a reply."""
     libc, received = ctypes.CDLL(None), np.zeros(1, np.int64)
-    question, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
-    places = question.ctypes.data, answer.ctypes.data
+    numbers, answer = (np.frombuffer(each, np.float64) for each in (request, reply))
+    places = numbers.ctypes.data, answer.ctypes.data
     functions = map(address_of, (libc.poll, libc.read, libc.write))
     entry = poll_entry(requests)
     return Cell(
-        Channel(requests, replies, question, answer, *places, received, entry, entry.ctypes.data, LOOKS, *functions)
+        Channel(requests, replies, numbers, answer, *places, received, entry, entry.ctypes.data, LOOKS, *functions)
     )
 
 

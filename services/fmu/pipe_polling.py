@@ -1,21 +1,12 @@
 """Wait for a pipe in compiled code without sleep: a process that sleeps takes 10 to 30 us to wake up."""
 
 import os
-import select
-import struct
-
-import numpy as np
 
 from lapwing.kernels import always_inline
 from lapwing.kernels.native_calls import call_int
 
 LOOKS = 200 if len(os.sched_getaffinity(0)) > 1 else 0
 """Looks at a pipe (0.2 us each) before a process sleeps; on one processor, the other end cannot write meanwhile."""
-
-
-def poll_entry(descriptor: int) -> np.ndarray:
-    """Return the eight bytes of a `struct pollfd` that waits for input."""
-    return np.frombuffer(bytearray(struct.pack("=ihh", descriptor, select.POLLIN, 0)), np.int64)
 
 
 @always_inline

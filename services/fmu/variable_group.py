@@ -47,7 +47,7 @@ class Group:
             elements: (index in `numbers`, `Element`).
             numbers: array of doubles, which the values of the variables come from or go to.
         """
-        kind_of_value = (_FMI3 if instance.is_3 else _FMI2)[kind]
+        spec = (_FMI3 if instance.is_3 else _FMI2)[kind]
         begins: dict[int, int] = {}
         names: dict[int, str] = {}
         total = 0
@@ -64,18 +64,18 @@ class Group:
         begin = self.indices[0]
         is_dense = self.places == [*range(total)] and self.indices == [*range(begin, begin + total)]
         self._slice = slice(begin, begin + total) if is_dense else None
-        self.in_place = is_dense and kind_of_value.c_type is ctypes.c_double
-        values = kind_of_value.c_type * total
+        self.in_place = is_dense and spec.c_type is ctypes.c_double
+        values = spec.c_type * total
         self.values = values.from_buffer(numbers, begin * ctypes.sizeof(ctypes.c_double)) if self.in_place else values()
         self._former: list[float] = []  # the numbers that `values` has
         self._is_real = kind in ("Real", "Float64", "Float32")
         self._is_boolean = kind == "Boolean"
-        self._limits = kind_of_value.lowest, kind_of_value.highest
+        self._limits = spec.lowest, spec.highest
         self.references = (ctypes.c_uint32 * len(begins))(*begins)
         sizes = (ctypes.c_size_t(total),) if instance.is_3 else ()
         self.arguments = (instance.component, self.references, ctypes.c_size_t(len(begins)), self.values, *sizes)
-        self.function = instance.function(verb + kind_of_value.suffix)
-        self._read = instance.function("Get" + kind_of_value.suffix)
+        self.function = instance.function(verb + spec.suffix)
+        self._read = instance.function("Get" + spec.suffix)
 
     def fill(self) -> int:
         """Read all elements, for arrays of which only some are set. Return the status."""

@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, NON_FINITE
 from lapwing.kernels import always_inline, math
 from lapwing.services.common.firmware.exchange import (
-    POLL,
     SEND,
     WAIT,
     Shared,
@@ -74,8 +73,7 @@ def step(p: Px4Exchange, s: int, tick: int, inputs: tuple) -> tuple[int, tuple, 
         size = receive(stream)
         if not _is_answer(p, size, time_us) and not call_python(e, tick, WAIT, size):
             return s, (), NON_FINITE
-    end(e)
-    if tick >= e.next_poll[0] and not call_python(e, tick, POLL, 0):
+    if not end(e, tick):
         return s, (), NON_FINITE
     publish(e, p.armed[0] != 0)
     return s, (), CONTINUE

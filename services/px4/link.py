@@ -23,7 +23,7 @@ from lapwing.services.px4.connection import Connection, claim
 from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange
 from lapwing.services.px4.messages import HIL_ACTUATOR_CONTROLS, ActuatorControls, actuator_controls
 from lapwing.services.px4.resolve import Px4Setup
-from lapwing.services.px4.sample import RARE, Readings, Sampler, at_rest
+from lapwing.services.px4.sample import RARE, Readings, at_rest, rare_messages
 from lapwing.services.px4.sensor_frame import payload
 from lapwing.services.px4.stream import stream
 from lapwing.services.px4.vehicle_link import VehicleLink
@@ -44,7 +44,7 @@ class Px4Link:
         self._setup = setup
         self._own: Px4Setup = setup.own
         self.report = LinkReport("px4")
-        self._sampler, self._stream = Sampler(setup.own), stream()
+        self._stream = stream()
         self._program: Program | None = None
         self._connection: Connection | None = None
         self._vehicle: VehicleLink | None = None
@@ -67,7 +67,7 @@ class Px4Link:
             ring(ports.BAROMETER),
             airspeed,
             np.array([periods.get(port, 0) for port in named]),
-            np.full(len(named), -1),
+            self._setup.period,
         )
         return Px4Exchange(
             shared, readings, self._stream, payload(), payload(), self._epoch, self._setup.interval_ns, self._armed,
@@ -129,7 +129,7 @@ class Px4Link:
         self._time = tick * setup.interval
         self._last_us = int(self._epoch[0]) + tick * setup.interval_ns // 1000
         if reason == MESSAGES:
-            link.append(self._sampler.messages(tick, self._last_us, read))
+            link.append(rare_messages(self._own, setup.period, tick, self._last_us, read))
         elif reason == SEND:  # also a full buffer: a firmware that has not read for a long time
             link.lose()
         elif reason == POLL:

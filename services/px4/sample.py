@@ -1,12 +1,12 @@
 """Readings of the ports as messages of PX4's simulator interface, each once.
 
-HIL_SENSOR, of every step, is written by compiled code (`sensors`); the rarer messages by Python (`Sampler`).
+HIL_SENSOR, of every step, is written by compiled code (`sensors`); the rarer messages by Python (`rare_messages`).
 """
 
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import InputRing
-from lapwing.kernels import always_inline, math
+from lapwing.kernels import always_inline, math, python_function
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.exchange import newest
 from lapwing.services.common.firmware.link import Read
@@ -21,36 +21,29 @@ _IMU, _MAGNETOMETER, _BAROMETER, _AIRSPEED = range(4)
 
 
 class Readings(NamedTuple):
-    """Ports of HIL_SENSOR and their stamps."""
+    """Ports of HIL_SENSOR, and when they have readings."""
 
     imu: InputRing
     magnetometer: InputRing
     barometer: InputRing
     airspeed: InputRing
     periods: Any  # (n,) int64 [ticks] of these ports, then of those in RARE; 0: none
-    stamps: Any  # (n,) int64 [ticks] of their last readings
+    step: int  # [ticks] between two exchanges
 
 
 @always_inline
-def is_new(p: Readings, k: int, tick: int) -> bool:
-    """Return True if port k has a reading that has not been sent."""
-    period = p.periods[k]
-    if period == 0:
-        return False
-    stamp = tick - tick % period
-    if stamp == p.stamps[k]:
-        return False
-    p.stamps[k] = stamp
-    return True
+def is_new(period: int, step: int, tick: int) -> bool:
+    """Return True if a port of this period [ticks] has a reading later than the exchange `step` ticks ago."""
+    return period > 0 and tick % period < step
 
 
 @always_inline
 def has_rare(p: Readings, tick: int) -> bool:
     """Return True if a port in RARE has a reading that has not been sent."""
-    found = False
+    result = False
     for k in range(_AIRSPEED + 1, len(p.periods)):
-        found = is_new(p, k, tick) or found
-    return found
+        result = result or is_new(p.periods[k], p.step, tick)
+    return result
 
 
 @always_inline
@@ -60,42 +53,29 @@ def sensors(p: Readings, tick: int) -> Sensors:
     barometer, airspeed = newest(p.barometer, tick), newest(p.airspeed, tick)
     omega = force = field = NONE
     pressure = dynamic = math.nan
-    if is_new(p, _IMU, tick) and imu.valid:
+    if is_new(p.periods[_IMU], p.step, tick) and imu.valid:
         omega, force = imu.omega_body, imu.specific_force_body
-    if is_new(p, _MAGNETOMETER, tick) and magnetometer.valid:
+    if is_new(p.periods[_MAGNETOMETER], p.step, tick) and magnetometer.valid:
         field = magnetometer.field_body
-    if is_new(p, _BAROMETER, tick) and barometer.valid:
+    if is_new(p.periods[_BAROMETER], p.step, tick) and barometer.valid:
         pressure = barometer.pressure
-    if is_new(p, _AIRSPEED, tick) and airspeed.valid:
+    if is_new(p.periods[_AIRSPEED], p.step, tick) and airspeed.valid:
         dynamic = airspeed.pressure
     return Sensors(omega, force, field, pressure, dynamic)
 
 
-class Sampler:
-    """Selects the rare readings that are new at a tick."""
-
-    def __init__(self, own: Px4Setup):
-        """Create a sampler before the first tick."""
-        self._periods = {port: own.periods[port] for port in RARE if port in own.periods}
-        self._stamps = dict.fromkeys(self._periods, -1)  # [ticks] of the last reading, by port
-
-    def messages(self, tick: int, time_us: int, read: Read) -> list[tuple[Layout, tuple]]:
-        """Return the messages at a tick."""
-        result = []
-        for port in [port for port in self._periods if self._is_new(port, tick)]:
-            reading = read(port)
-            if port == ports.GPS:
-                result.append((HIL_GPS, gps_values(time_us, reading)))
-            elif reading.valid and math.isfinite(reading.range):
-                result.append((DISTANCE_SENSOR, distance_values(time_us, reading)))
-        return result
-
-    def _is_new(self, port: str, tick: int) -> bool:
-        stamp = tick - tick % self._periods[port]
-        if stamp == self._stamps[port]:
-            return False
-        self._stamps[port] = stamp
-        return True
+def rare_messages(own: Px4Setup, step: int, tick: int, time_us: int, read: Read) -> list[tuple[Layout, tuple]]:
+    """Return the messages of the ports in RARE at a tick; `step` as in `Readings`."""
+    result = []
+    for port in RARE:
+        if not python_function(is_new)(own.periods.get(port, 0), step, tick):
+            continue
+        reading = read(port)
+        if port == ports.GPS:
+            result.append((HIL_GPS, gps_values(time_us, reading)))
+        elif reading.valid and math.isfinite(reading.range):
+            result.append((DISTANCE_SENSOR, distance_values(time_us, reading)))
+    return result
 
 
 def at_rest(own: Px4Setup, count: int) -> Sensors:

@@ -1,14 +1,13 @@
 """TCP connection whose bytes compiled code and Python send and receive in the same memory."""
 
 import ctypes
-import select
 import socket
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from lapwing.kernels import always_inline
-from lapwing.kernels.native_calls import address_of, call_int, call_long
+from lapwing.kernels.native_calls import address_of, call_int, call_long, poll_entry
 
 PIECE = 65536  # [bytes] received at once
 SENT = 2048  # [bytes] of the messages of a step, at most
@@ -48,8 +47,7 @@ def stream() -> Stream:
 def connect(c: Stream, descriptor: int) -> None:
     """Use another socket; -1: none."""
     c.descriptor[0], c.rest[0] = descriptor, 0
-    c.entry.view(np.int32)[0] = descriptor
-    c.entry.view(np.int16)[2] = select.POLLIN
+    c.entry[:] = poll_entry(descriptor)
 
 
 @always_inline

@@ -11,6 +11,7 @@ from typing import Any
 
 from numba import types
 
+from lapwing.dynamics.effects._hooks import initial_discrete_state
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import compile_source, generated_overload, map_tuple
 
@@ -30,7 +31,7 @@ def inputs_of(effects: tuple) -> list[Any]:
 
 def initial_state(e: Any) -> tuple:
     """Return the discrete state of an effect with named inputs before its first sample."""
-    return (e.own.initial_discrete_state() if hasattr(e.own, "initial_discrete_state") else (), e.inputs)
+    return initial_discrete_state(e.own), e.inputs
 
 
 @always_inline
@@ -51,17 +52,12 @@ def all_given_or(own, values):
 
 
 def _stored(effects: types.BaseTuple, memory: types.BaseTuple, samples: types.BaseTuple) -> Any:
-    members: list[str] = []
-    names = {"latest": _latest}
-    for i, e in enumerate(effects.types):
-        is_external = e.instance_class in _CLASSES
-        k = len([member for member in members if member.startswith("(")])
-        members.append(f"(memory[{i}][0], latest(samples[{k}], memory[{i}][1]))" if is_external else f"memory[{i}]")
-    result = "".join(f"{member}, " for member in members)
-    changed = any(member.startswith("(") for member in members)
-    return compile_source(
-        "with_inputs_stored(effects, memory, samples)", names, f"return ({result})" if changed else "return memory"
-    )
+    members = [f"memory[{i}]" for i in range(len(effects.types))]
+    places = [i for i, e in enumerate(effects.types) if e.instance_class in _CLASSES]
+    for k, i in enumerate(places):
+        members[i] = f"(memory[{i}][0], latest(samples[{k}], memory[{i}][1]))"
+    result = f"({''.join(f'{member}, ' for member in members)})" if places else "memory"
+    return compile_source("with_inputs_stored(effects, memory, samples)", {"latest": _latest}, f"return {result}")
 
 
 @always_inline

@@ -20,23 +20,23 @@ def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool
     Raises:
         ValueError: the report cannot be written, or the file's name has another ending.
     """
-    several = [flights] if isinstance(flights, FlightData) else list(flights)
+    flight_list = [flights] if isinstance(flights, FlightData) else list(flights)
     check_format(target)
     try:
         if target.suffix == ".html":
             from lapwing.studies.report.page import flight_page
             from lapwing.studies.view3d import available
 
-            target.write_text(flight_page(several, view3d and available()), encoding="utf-8")
+            target.write_text(flight_page(flight_list, view3d and available()), encoding="utf-8")
         else:
             from lapwing.studies.report.sections import sections
 
-            drawn = (section for section in sections(several) if section.plot)
+            drawn = (section for section in sections(flight_list) if section.plot)
             if target.suffix == ".pdf":
                 from lapwing.studies.report.flight_cover import cover
                 from lapwing.studies.report.paper import Titled, write_pdf
 
-                write_pdf(target, cover(several), [Titled(s.title, s.plot) for s in drawn if s.plot])
+                write_pdf(target, cover(flight_list), [Titled(s.title, s.plot) for s in drawn if s.plot])
             else:
                 from lapwing.studies.report.matplotlib_figure import write_png
 

@@ -30,25 +30,26 @@ def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
     )
 
 
-def gain_set(model: Hover, initial: Bandwidths) -> GainSet:
+def gain_set(model: Hover, bandwidths: Bandwidths) -> GainSet:
     """Return the gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
 
     def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
         d = w / effect
         return _rounded(p * w * d), _rounded(i * w * p * w * d), _rounded(d)
 
-    roll = loop(model.roll, initial.attitude, 0.12, 0.024)
-    outer = loop(model.tilt, initial.position, 0.39, 0.032)
+    roll = loop(model.roll, bandwidths.attitude, 0.12, 0.024)
+    outer = loop(model.tilt, bandwidths.position, 0.39, 0.032)
+    text = ", ".join(f"{name} {value:.3g}" for name, value in bandwidths._asdict().items())
     return GainSet(
-        description=f"lapwing tune: bandwidths {', '.join(f'{k} {v:.3g}' for k, v in initial._asdict().items())} rad/s",
-        altitude=loop(model.altitude, initial.altitude, 0.39, 0.06),
-        yaw=loop(model.yaw, initial.yaw, 0.21, 0.017),
+        description=f"lapwing tune: bandwidths {text} rad/s",
+        altitude=loop(model.altitude, bandwidths.altitude, 0.39, 0.06),
+        yaw=loop(model.yaw, bandwidths.yaw, 0.21, 0.017),
         roll_inner=(-roll[0], -roll[1], -roll[2]),
-        pitch_inner=loop(model.pitch, initial.attitude, 0.12, 0.024),
+        pitch_inner=loop(model.pitch, bandwidths.attitude, 0.12, 0.024),
         roll_outer=outer,
         pitch_outer=outer,
         tilt_limit=0.6,
-        reference_bandwidth=_rounded(4.1 * initial.position),
+        reference_bandwidth=_rounded(4.1 * bandwidths.position),
         reference_damping=0.55,
         feed_forward=True,
     )

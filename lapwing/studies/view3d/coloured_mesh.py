@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lapwing.studies.view3d.solids import Solid
+from lapwing.studies.view3d.solids import Solid, concatenated
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125  # component types of glTF 2.0, 3.6.2.2
 VERTICES, FACES = 34962, 34963  # targets of buffer views
@@ -13,9 +13,8 @@ VERTICES, FACES = 34962, 34963  # targets of buffer views
 
 def coloured_mesh(solids: Sequence[Solid]) -> bytes:
     """Return a binary glTF 2.0 of solids, with a colour at each vertex; the viewer shades it flat without normals."""
-    place = np.concatenate([solid.vertices for solid in solids]).astype("<f4")
-    starts = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])])
-    faces = np.concatenate([solid.faces + start for solid, start in zip(solids, starts, strict=True)])
+    vertices, faces = concatenated(solids)
+    place = vertices.astype("<f4")
     colours = np.concatenate([np.tile(linear(solid.colour), (len(solid.vertices), 1)) for solid in solids])
     chunks = [part.tobytes() for part in (place, colours.astype("<u2"), faces.astype("<u4"))]
     offsets = np.cumsum([0, *(len(chunk) for chunk in chunks)])

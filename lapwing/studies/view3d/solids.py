@@ -90,8 +90,12 @@ def merged(solids: Iterable[Solid]) -> list[Solid]:
             groups.setdefault((solid.colour, solid.opacity, solid.open), []).append(solid)
     joined = []
     for (colour, opacity, is_open), group in groups.items():
-        starts = np.cumsum([0, *(len(solid.vertices) for solid in group[:-1])])
-        vertices = np.concatenate([solid.vertices for solid in group])
-        faces = np.concatenate([solid.faces + start for solid, start in zip(group, starts, strict=True)])
-        joined.append(Solid(vertices, faces, colour, opacity, is_open))
+        joined.append(Solid(*concatenated(group), colour, opacity, is_open))
     return joined
+
+
+def concatenated(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the vertices and faces of solids as those of one."""
+    starts = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])])
+    faces = [solid.faces + start for solid, start in zip(solids, starts, strict=True)]
+    return np.concatenate([solid.vertices for solid in solids]), np.concatenate(faces)

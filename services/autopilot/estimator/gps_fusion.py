@@ -105,13 +105,14 @@ def _fuse(
             m.trend[row, axis] = _TREND * m.trend[row, axis] + _REST * innovation[axis] / math.sqrt(largest)
             drifts = drifts or math.fabs(m.trend[row, axis]) > p.gate
     drifts = drifts and accepted  # beyond the gate the reading is wrong, not the estimate
-    if accepted and not drifts:
+    accepted = accepted and not drifts
+    if accepted:
         nis = 0.0
         for axis in range(3):
             _row(m, source, force, r, axis, delay)
             s_gain, _ = late_innovation_variances(m, axis, since, variance[axis], force)
             nis += apply_update(m, innovation[axis], s_gain)
-    record_gate_result(m, source, accepted and not drifts, nis)
+    record_gate_result(m, source, accepted, nis)
     if drifts:
         doubt_imu(m)
     elif not accepted:

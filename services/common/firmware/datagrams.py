@@ -25,7 +25,7 @@ class Datagrams(NamedTuple):
     peer: Any  # (2,) int64: address of the other end; 0: none
     sender: Any  # (2,) int64: address of the sender of the last datagram
     sender_size: Any  # (1,) int64
-    addresses: tuple[int, int, int, int, int]  # of sent, received, peer, sender, sender_size
+    addresses: tuple[int, ...]  # of sent, received, peer, sender, sender_size
     sendto: int  # addresses of functions
     recvfrom: int
 
@@ -37,7 +37,7 @@ def datagrams() -> Datagrams:
     peer, sender, size = np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)
     places = [part.ctypes.data for part in (sent, received, peer, sender, size)]
     return Datagrams(
-        np.full(1, -1), sent, np.zeros(1, np.int64), received, peer, sender, size, tuple(places),  # type: ignore[arg-type]
+        np.full(1, -1), sent, np.zeros(1, np.int64), received, peer, sender, size, tuple(places),
         address_of(libc.sendto), address_of(libc.recvfrom),
     )  # fmt: skip
 

@@ -101,16 +101,21 @@ def begin(e: Shared, tick: int) -> bool:
 
 
 @always_inline
-def end(e: Shared) -> None:
-    """Add the wall time since `begin` to the waiting time."""
+def end(e: Shared, tick: int) -> bool:
+    """Add the wall time since `begin` to the waiting time, and poll the other link if it is due.
+
+    Return False if the run ends.
+    """
     time = now(e)
     e.seconds[WAITING] += time - e.seconds[LAST]
     e.seconds[ENDED] = time
+    return tick < e.next_poll[0] or call_python(e, tick, POLL, 0)
 
 
 @always_inline
-def _duty(given: tuple[Any, bool], output: int, _: float) -> float:
-    return min(max(given[0][output], 0.0), 1.0) if given[1] else 0.0
+def _duty(outputs_armed: tuple[Any, bool], output: int, _: float) -> float:
+    outputs, armed = outputs_armed
+    return min(max(outputs[output], 0.0), 1.0) if armed else 0.0
 
 
 @always_inline

@@ -24,10 +24,10 @@ def draw(flight: FlightData) -> Plot:
         panels.append(Panel(_wind(t, wind), "wind [m/s]"))
     if density.any():
         panels.append(Panel((Line(t, density),), "density [kg/m³]"))
-    caption = f" Wind: mean over {SECOND:g} s, and its range within that time (shaded)." if wind.any() else ""
-    caption = caption or " The log has no velocity of the wind."
+    note = f" Wind: mean over {SECOND:g} s, and its range within that time (shaded)." if wind.any() else ""
+    note = note or " The log has no velocity of the wind."
     return Plot(
-        caption=f"Velocity of the air in the world frame (ENU) and its density where the vehicle is.{caption}",
+        caption=f"Velocity of the air in the world frame (ENU) and its density where the vehicle is.{note}",
         **column(panels, 1.9, **over(flight)),
     )
 

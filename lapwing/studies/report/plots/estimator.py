@@ -53,9 +53,9 @@ def errors(flight: FlightData) -> np.ndarray:
     """Estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
     from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
 
-    stamps, desired = flight.truth.stamps, flight.estimate.stamps
-    later = np.searchsorted(stamps, desired).clip(1, len(stamps) - 1)
-    nearer = stamps[later] - desired > desired - stamps[later - 1]
+    stamps, own = flight.truth.stamps, flight.estimate.stamps
+    later = np.searchsorted(stamps, own).clip(1, len(stamps) - 1)
+    nearer = stamps[later] - own > own - stamps[later - 1]
     at = later - nearer
     both = flight.truth, flight.estimate
     true, estimated = (np.hstack([view.position, view.velocity]) for view in both)

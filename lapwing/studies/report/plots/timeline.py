@@ -31,16 +31,14 @@ def draw(flight: FlightData) -> Plot:
         "status text": (runs(t, status.text), COLOURS[3]),
         **{kind: (_instants(flight, kind), colour) for kind, colour in MARKED.items()},
     }
-    shown_lanes = {lane: ([run for run in stretches if run[0]], colour) for lane, (stretches, colour) in lanes.items()}
-    bars = tuple(
-        Stretch(lane, s, e, text, colour) for lane, (some, colour) in shown_lanes.items() for text, s, e in some
-    )
-    never = [lane for lane, (some, _) in shown_lanes.items() if not some]
-    caption = f" None in this flight: {', '.join(never)}." if never else ""
-    shown = max(len(shown_lanes) - len(never), 1)
+    all_lanes = {lane: ([run for run in stretches if run[0]], colour) for lane, (stretches, colour) in lanes.items()}
+    bars = tuple(Stretch(lane, s, e, text, colour) for lane, (some, colour) in all_lanes.items() for text, s, e in some)
+    never = [lane for lane, (some, _) in all_lanes.items() if not some]
+    note = f" None in this flight: {', '.join(never)}." if never else ""
+    shown = max(len(all_lanes) - len(never), 1)
     return Plot(
         (Panel(bars),),
-        f"State of the autopilot ({len(t)} messages) and events.{caption}",
+        f"State of the autopilot ({len(t)} messages) and events.{note}",
         1.1 + 0.32 * shown,
         span=over(flight)["span"],
     )
