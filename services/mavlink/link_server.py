@@ -1,10 +1,8 @@
-"""MAVLink adapter with its sockets: waits for endpoints and for the vehicle together, and serves both fairly."""
+"""MAVLink adapter with its sockets."""
 
-import os
 import selectors
 import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from typing import Any
 
 from lapwing.messages import OperatorInput, header
@@ -14,8 +12,6 @@ from lapwing.services.mavlink.link_options import Options
 from lapwing.services.mavlink.links import Link, open_link
 from lapwing.services.mavlink.telemetry_timing import Pacing
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
-
-WAIT = 0.05  # [s] longest wait
 
 
 class LinkServer:
@@ -54,9 +50,6 @@ class LinkServer:
         self._topics = {topic.key(description.name): topic for topic in TOPICS}
         self.selector: selectors.BaseSelector = first.selector if first else selectors.DefaultSelector()
         self._owns = first is None
-        self._wakeup = os.eventfd(0, os.EFD_NONBLOCK)
-        if self._owns:
-            self.selector.register(self._wakeup, selectors.EVENT_READ, self._drain)
         self._links: list[Link] = []
         try:
             for url in options.urls:
@@ -65,16 +58,8 @@ class LinkServer:
             self.close()
             raise
 
-    def wake(self) -> None:
-        """End the current wait; may be called from any thread."""
-        with suppress(OSError):  # the server is closed
-            os.eventfd_write(self._wakeup, 1)
-
-    def _drain(self) -> None:
-        os.eventfd_read(self._wakeup)
-
-    def wait(self, seconds: float = WAIT) -> None:
-        """Wait for data, for `wake`, or for `seconds`; then serve the endpoints once."""
+    def wait(self, seconds: float) -> None:
+        """Wait for data of endpoints, at most `seconds`; then serve the endpoints once."""
         ready = self.selector.select(seconds)
         self.adapter.tick(time.monotonic())
         for key, _ in ready:
@@ -111,7 +96,6 @@ class LinkServer:
             link.close()
         if self._owns:
             self.selector.close()
-        os.close(self._wakeup)
         self.adapter.close()
 
     def __enter__(self) -> "LinkServer":

@@ -2,7 +2,7 @@
 
 It is not part of the lock step: no service waits for it, and the flight continues when it dies. In a run with a
 real-time factor, a subscription to the estimate wakes it; it reads all other topics from the services' log packets,
-ten per second.
+ten per second, which wait for the next estimate.
 """
 
 import time
@@ -23,7 +23,9 @@ from lapwing.services.mavlink.link_options import Options
 from lapwing.services.mavlink.link_server import LinkServer
 from lapwing.services.mavlink.links import for_vehicle_index
 from lapwing.services.mavlink.signing import TIME_STAMPS, read_key, state_folder
+from lapwing.services.mavlink.socket_watch import SocketWatch
 
+WAIT = 0.05  # [s] longest wait
 ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics whose messages are all handled
 
 
@@ -60,24 +62,26 @@ def run(process: Participant, spec: Any) -> None:
         }
         first_server, *others = servers.values()
 
-        def wait() -> None:
-            first_server.wait()
+        def serve() -> None:
+            first_server.wait(0.0)
             for other in others:
                 other.adapter.tick(time.monotonic())
 
         senders = process.participants.senders(BATCH_KEY, setup.services)
         estimates = dict.fromkeys(by_estimate_key, process.participants.encoder_gid("autopilot"))
-        estimate_messages = process.bus.receive(estimates, notify=first_server.wake)
-        log_packets = process.bus.receive(senders, notify=None if estimates else first_server.wake)
-        process.join(wait)  # endpoints may connect while the others still load or compile
+        log_packets = process.bus.receive(senders, deferred=True)
+        first_source = process.bus.receive(estimates, deferred=True) if immediate else log_packets  # wakes this process
+        process.join(serve)  # endpoints may connect while the others still load or compile
+        sockets = stack.enter_context(SocketWatch(first_server.selector, first_source.wake))
         unfinished = set(setup.services)  # services whose last log packet has not arrived
         while unfinished and not process.stopping:
-            wait()
-            while (
-                unfinished
-                and (news := estimate_messages.get_with_key(0.0) or log_packets.get_with_key(0.0)) is not None
-            ):
+            news = first_source.get_with_key(0.0 if sockets.ready else WAIT)
+            if news is None or sockets.ready:
+                serve()
+                sockets.served()
+            while (news := news or log_packets.get_with_key(0.0)) is not None:
                 name, time_ns, payload = news
+                news = None
                 if name in by_estimate_key:
                     if payload:
                         by_estimate_key[name].take(ESTIMATE, time_ns, payload)

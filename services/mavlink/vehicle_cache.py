@@ -2,51 +2,58 @@
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cached_property
 from typing import Any
 
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
 from lapwing.messages import Status, nanoseconds
 from lapwing.messages.topics import ESTIMATE, STATUS, TRUTH, Topic
-from lapwing.services.common.mavlink.frames import Quaternion, saturated, swap_attitude, swap_body, swap_world
-from lapwing.services.common.mavlink.geo_coordinates import Datum, to_local
+from lapwing.services.common.mavlink.frames import Quaternion, saturated, swap_attitude
+from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink import firmware
 from lapwing.services.mavlink.event_log import EventLog
 from lapwing.services.mavlink.fast_conversions import angles, geodetic
 from lapwing.services.mavlink.flight_times import FlightTimes
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
+_MOTION_END = 18  # values of a header and a motion: encapsulation, time (2), frame (2), pose (7), velocities (6)
 ON_GROUND = Status(landed=True)  # before the vehicle has published a status
 
 
 class NedMotion:
-    """Position and motion of the vehicle in MAVLink's frames: NED, FRD, degrees."""
+    """Position and motion of the vehicle in MAVLink's frames: NED, FRD, degrees.
 
-    def __init__(self, message: Any, home: Home, standing_height: float):
-        """Convert a message with pose, velocity and angular velocity: the estimate or the truth."""
-        self._stamp, self._home = message.header.stamp, home
-        p, q, v, w = message.pose.position, message.pose.orientation, message.velocity, message.angular_velocity
-        self.position_world: Vec3 = (p.x, p.y, p.z)
-        self.position_ned = to_local(standing_height, self.position_world)
-        self.velocity_ned = swap_world(tuple(v))
-        self.omega_frd = swap_body(tuple(w))
-        self.attitude: Quaternion = swap_attitude((q.w, q.x, q.y, q.z))
+    Attributes:
+        time_ns: simulation time of the motion [ns].
+        position_world: position in the world frame [m].
+        position_ned: position from the local origin [m].
+        velocity_ned: velocity [m/s].
+        omega_frd: angular velocity [rad/s].
+        attitude: quaternion of FRD in NED.
+        angles: roll, pitch, yaw [rad] from NED to FRD.
+        geodetic: latitude [deg], longitude [deg], altitude [m].
+    """
 
-    @cached_property
-    def time_ns(self) -> int:
-        """Simulation time of the motion [ns]."""
-        return nanoseconds(self._stamp)
+    __slots__ = (
+        "angles", "attitude", "geodetic", "omega_frd", "position_ned", "position_world", "time_ns", "velocity_ned",
+    )  # fmt: skip
 
-    @cached_property
-    def angles(self) -> Vec3:
-        """Roll, pitch, yaw [rad] from NED to FRD."""
-        return angles(self.attitude)
+    def __init__(self, message: Any, payload: bytes, home: Home, standing_height: float):
+        """Convert an encoded message with header, pose, velocity and angular velocity: the estimate or the truth.
 
-    @cached_property
-    def geodetic(self) -> Vec3:
-        """Latitude [deg], longitude [deg], altitude [m]."""
-        return geodetic(self._home, self.position_world)
+        The values are read without the message: a link converts an estimate every 20 ms, each time from memory that
+        other processes have displaced from the caches, where each function and object that is used counts.
+        """
+        values = message.layouts.unpack(payload)
+        _, seconds, nanoseconds, _, _, x, y, z, q_x, q_y, q_z, q_w, u, v, w, p, q, r = values[:_MOTION_END]
+        self.time_ns = seconds * 1_000_000_000 + nanoseconds
+        self.position_world: Vec3 = (x, y, z)
+        self.position_ned: Vec3 = (y, x, standing_height - z)
+        self.velocity_ned: Vec3 = (v, u, -w)
+        self.omega_frd: Vec3 = (p, -q, -r)
+        self.attitude: Quaternion = swap_attitude((q_w, q_x, q_y, q_z))
+        self.angles: Vec3 = angles(self.attitude)
+        self.geodetic: Vec3 = geodetic(home, self.position_world)
 
 
 class VehicleCache:
@@ -91,10 +98,11 @@ class VehicleCache:
 
     def _motion(self, topic: Topic) -> NedMotion | None:
         if topic not in self._motions:
-            message = self.get(topic)
-            if message is None:
+            payload = self._payloads.get(topic)
+            if payload is None:
                 return None
-            self._motions[topic] = NedMotion(message, self.description.home, self.description.standing_height)
+            description = self.description
+            self._motions[topic] = NedMotion(topic.message, payload, description.home, description.standing_height)
         return self._motions[topic]
 
     @property

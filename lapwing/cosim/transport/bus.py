@@ -116,16 +116,18 @@ class ZenohBus:
         statuses = (self._publishers[key][0].matching_status for key in keys)
         return any(status.matching for status in statuses)  # type: ignore[attr-defined]  # the stub says bool
 
-    def subscribe(self, *key_expressions: str, notify: Callable[[], None] | None = None) -> Subscription:
-        """Subscribe to any sender on any of the keys, in order of arrival.
+    def subscribe(self, *key_expressions: str) -> Subscription:
+        """Subscribe to any sender on any of the keys, in order of arrival."""
+        return self._receive(key_expressions, Subscription(_message, None, self._count_rejected))
 
-        `notify` is called from another thread after each arrival, for callers that also wait for other events.
+    def receive(self, senders: Mapping[str, bytes | None], deferred: bool = False) -> Subscription:
+        """Subscribe to known senders.
+
+        Args:
+            senders: by key the GID of a message; None to accept that of the first message.
+            deferred: see `Subscription`.
         """
-        return self._receive(key_expressions, Subscription(_message, None, self._count_rejected, notify))
-
-    def receive(self, senders: Mapping[str, bytes | None], notify: Callable[[], None] | None = None) -> Subscription:
-        """Subscribe to known senders: by key the GID of a message, None to accept that of the first message."""
-        return self._receive(senders, Subscription(_message, dict(senders), self._count_rejected, notify))
+        return self._receive(senders, Subscription(_message, dict(senders), self._count_rejected, deferred))
 
     def inbox(self, key: str, sender: bytes | None) -> Inbox:
         """Subscribe to the sender with this GID on `key`, for messages that are read soon after they arrive: a message

@@ -2,6 +2,7 @@
 
 import re
 import sys
+import threading
 import time
 from pathlib import Path
 
@@ -43,3 +44,27 @@ def test_messages_that_wait_take_little_memory():
         taken = sum(1 for _ in iter(lambda: arrived.get(timeout=0.0), None))
     assert taken == MESSAGES
     assert grown < 2048 * MESSAGES
+
+
+def test_deferred_subscription_returns_messages_of_known_sender_in_order():
+    other = bytes(15) + b"x"
+    (endpoint,) = loopback_endpoints(["a"]).values()
+    with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], gid=MARK) as here:
+        arrived, put = there.receive({KEY: MARK}, deferred=True), here.publisher(KEY)
+        while arrived.get(timeout=0.1) is None:
+            put(b"first", 0)
+        for number in range(5):
+            put(b"%d" % number, number)
+        payloads = []
+        with ZenohBus(connect=[endpoint], gid=other) as stranger:
+            while not (there.rejected and len(payloads) == 5):  # a message is rejected when it is taken
+                stranger.publisher(KEY)(b"forged", 0)
+                payloads += [m[1] for m in iter(lambda: arrived.get(timeout=0.1), None) if m[1] != b"first"]
+    assert payloads == [b"%d" % number for number in range(5)]
+
+
+def test_wake_ends_wait_of_another_thread():
+    with ZenohBus() as bus:
+        arrived = bus.receive({KEY: MARK}, deferred=True)
+        threading.Timer(0.1, arrived.wake).start()
+        assert arrived.get_with_key(timeout=600.0) is None
