@@ -18,6 +18,7 @@ import numpy as np
 from numba.core import types
 from numba.core.registry import cpu_target
 from numba.core.runtime import _nrt_python as counted
+from numba.core.runtime import rtsys
 from numba.np.numpy_support import as_dtype
 
 from lapwing.kernels.tree_flatten import leaves
@@ -74,7 +75,7 @@ def layout(kind: types.Type) -> Layout:
 @cache
 def _make_ready() -> None:
     """Initialise numba's reference counting."""
-    cpu_target.target_context.refresh()
+    rtsys.initialize(cpu_target.target_context)
 
 
 class Memory:

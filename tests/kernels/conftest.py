@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[2]
 
 FILES = {
     "plant/__init__.py": "pass\n",
@@ -74,6 +74,13 @@ def times(n):
     def product(x):
         return n * inner(x)
     return product
+""",
+    "plant/texts.py": """
+from lapwing.kernels import kernel
+
+@kernel
+def text_hash(n):
+    return hash("abcdefgh"[:n])
 """,
     "plant/large.py": """
 from lapwing.kernels import kernel, noinline

@@ -32,6 +32,21 @@ def test_second_process_compiles_no_kernel(package):
     assert second["loaded"] > 0
 
 
+def test_loading_kernels_does_not_set_up_numba_for_compilation(package):
+    names = "('numba.np.arraymath', 'scipy.linalg')"
+    run = f"{OUTER}; import sys; values['imported'] = [name for name in {names} if name in sys.modules]"
+    assert "numba.np.arraymath" in package.run(run)["values"]["imported"]  # it compiles
+    assert package.run(run)["values"] == {"outer": 7.0, "imported": []}
+
+
+def test_loaded_kernel_hashes_texts_as_python_does(package):
+    run = "from plant.texts import text_hash; values['equal'] = text_hash(5) == hash('abcde')"
+    for compiled in (True, False):
+        result = package.run(run)
+        assert result["values"] == {"equal": True}
+        assert (result["compiled"] > 0) == compiled
+
+
 @pytest.mark.parametrize(
     ("statements", "file", "old", "new", "after"),
     [

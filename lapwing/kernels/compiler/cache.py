@@ -11,6 +11,7 @@ from numba.core.caching import _Cache
 from numba.core.compiler import CompileResult
 from numba.core.dispatcher import Dispatcher
 from numba.core.errors import NumbaWarning
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from lapwing.kernels.compiler import cache_files, file_locks, source_digest
@@ -24,6 +25,7 @@ class Statistics(NamedTuple):
     loaded: int  # from disk, with all kernels that they call
 
 
+_HASH_SECRET = b"_numba_hashsecret_"  # in the machine code of kernels that hash texts
 _counted = {"compiled": 0, "loaded": 0}
 _listeners: list[Callable[[str], None]] = []
 
@@ -70,8 +72,12 @@ class KernelCache(_Cache):
         cache_files.remove(self._folder, self._name)
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """Return the version for a signature, or None if it must be compiled."""
-        target_context.refresh()
+        """Return the version for a signature, or None if it must be compiled.
+
+        Numba's implementations of Python's functions are not set up: only a compilation needs them, and sets them up
+        itself. They take half of the processor time of loading the kernels of a run.
+        """
+        rtsys.initialize(target_context)
         current = self._key(sig, target_context.codegen()) if self._enabled else None
         result = self._loaded(current, sig, target_context)
         if result is None:
@@ -100,6 +106,8 @@ class KernelCache(_Cache):
         content = cache_files.read(self._folder, self._file(current, inner), current.sources) if current else None
         if content is None:
             return None
+        if _HASH_SECRET in content:  # numba defines these symbols with its implementations
+            target_context.refresh()
         with contextlib.suppress(Exception):  # any error here is repaired by compiling again
             stored, payload = pickle.loads(content)
             result = self._rebuild(target_context, payload)
