@@ -1,6 +1,6 @@
 """Download of the run's log, which may still grow (MAVLink guide, "Log protocol")."""
 
-from collections.abc import Iterator
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -45,17 +45,19 @@ class LogServer:
         self._next = self._end = 0
         self._due = False
 
-    def step(self) -> Iterator[Any]:
-        """Yield the next LOG_DATA messages."""
+    def step(self) -> Sequence[Any]:
+        """Return the next LOG_DATA messages."""
         if not self._due:
-            return
+            return ()
+        messages = []
         data = self._read(self._next, min(PER_STEP * PIECE, self._end - self._next))
         for start in range(0, max(1, len(data)), PIECE):
             piece = data[start : start + PIECE]
             padded = list(piece.ljust(PIECE, b"\0"))
-            yield mavlink.MAVLink_log_data_message(NUMBER, self._next + start, len(piece), padded)
+            messages.append(mavlink.MAVLink_log_data_message(NUMBER, self._next + start, len(piece), padded))
         self._next += len(data)
         self._due = bool(data) and self._next < self._end
+        return messages
 
     def _read(self, offset: int, count: int) -> bytes:
         if self._path is None or count <= 0:

@@ -73,7 +73,7 @@ class VehicleCache:
         self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
         self.mission: Callable[[], Sequence[Any]] = lambda: ()  # its mission items, as endpoints wrote them
         self.parameter: Callable[[str], float] = lambda name: math.nan  # value of a parameter; NaN if there is none
-        self._home_heading = 0.0
+        self._home_heading, self._armed = 0.0, False
         self._payloads: dict[Topic, bytes] = {}
         self._decoded: dict[Topic, Any] = {}
         self._motions: dict[Topic, NedMotion] = {}
@@ -84,8 +84,10 @@ class VehicleCache:
         self._decoded.pop(topic, None)
         self._motions.pop(topic, None)
         if topic is STATUS:
-            self.flight.update(self.status, nanoseconds(self.status.header.stamp))
-        elif topic is ESTIMATE and not self.status.armed and (estimate := self.estimate):
+            status = self.status
+            self._armed = status.armed
+            self.flight.update(status, nanoseconds(status.header.stamp))
+        elif topic is ESTIMATE and not self._armed and (estimate := self.estimate):
             self._home_heading = estimate.angles[2]
 
     def get(self, topic: Topic) -> Any:

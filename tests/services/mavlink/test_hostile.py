@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.mavlink.links.link import MAX_RATE
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.protocols.commands import RULES
 
@@ -209,17 +210,16 @@ def test_too_long_interval_is_clamped():
 def test_flood_is_bounded_and_vehicle_flies_on():
     port = free_port()
     frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
+    began = time.monotonic()
     with flying(f"udpin:127.0.0.1:{port}") as running, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as attacker:
         attacker.connect(("127.0.0.1", port))
         before, end = running.vehicle.time_ns, time.monotonic() + 1.5
-        sent = 0
         while time.monotonic() < end:
             for _ in range(50):
                 attacker.send(frame)
-            sent += 50
-        assert running.vehicle.time_ns > before + 2e8
-        assert until(lambda: running.counts["above the rate limit"] > 0 or sent < 5000)
-        assert running.counts["received"] < 8000
+        assert until(lambda: running.vehicle.time_ns > before + 2e8)
+        received = running.counts["received"]  # before the time: a busy machine reads fewer than the limit
+        assert received <= MAX_RATE * (1.0 + time.monotonic() - began)
 
 
 def test_many_strangers_get_no_room():
