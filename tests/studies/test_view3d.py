@@ -240,6 +240,10 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     vertices = node.arguments[0]
     assert vertices[np.argmax(vertices[:, 2])] == pytest.approx([0.0, 0.0, 0.0], abs=0.01)  # heights are from home's
     assert vertices[:, 2].min() == pytest.approx(-2.0)
+    lines = recorder.nodes["/surroundings/lines"].arguments[0]
+    rows = {tuple(row) for row in np.asarray(vertices, np.float32)[:, :2].tolist()}
+    assert {tuple(end) for end in lines[:, :, :2].reshape(-1, 2).tolist()} < rows  # between the points of the surface
+    assert lines[:, :, 2].max() == pytest.approx(0.02, abs=0.01)
 
 
 def test_node_is_sent_only_when_it_changes():

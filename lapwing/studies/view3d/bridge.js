@@ -24,7 +24,8 @@
   const client = () => window.__viserMutable; // the scene of viser's client, which it shows to its own tests
   const state = () => client()?.scene?.__r3f?.root.getState();
 
-  const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail" }, names = {};
+  const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail", reference: "reference/body", estimate: "estimate/body" };
+  const names = {};
   function nameOf(part, number) { // of a node of a vehicle, which begins with its number
     const nodes = client().nodeRefFromName, key = part + number;
     if (!nodes[names[key]]) {
@@ -49,6 +50,12 @@
       const pieces = geometry?.attributes.instanceStart?.count;
       if (pieces) geometry.instanceCount = Math.floor(Math.min(Math.max(share, 0), 1) * pieces + 1e-6);
     }));
+  }
+
+  function thinGhosts() { // a faint ghost does not hide the translucent parts of the vehicle behind it
+    facts.names.forEach((_, k) => ["reference", "estimate"].forEach((part) => node(part, k)?.traverse(({ material }) => {
+      if (material) material.depthWrite = false;
+    })));
   }
 
   function showNames({ camera, size }) { // those that no nearer one covers
@@ -104,6 +111,7 @@
       if (next !== seen) {
         changed = performance.now();
         showTrails();
+        thinGhosts();
         showNames(now);
         view.changed?.();
       }

@@ -8,7 +8,7 @@ from lapwing.studies.view3d.bodies import Body
 from lapwing.studies.view3d.solids import Solid, concatenated, lifted, rod
 from lapwing.studies.view3d.surroundings import add_solid
 
-OPACITY, STEP = 0.4, 0.05  # greatest, and by which it changes
+OPACITY, STEP = 0.4, 0.1  # greatest, and by which it changes
 HIDDEN, FULL = 0.05, 0.35  # distances from the body itself, in sizes of the body
 
 

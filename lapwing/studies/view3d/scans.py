@@ -19,7 +19,7 @@ from lapwing.studies.view3d.sampling import nearest, rotated
 BUDGET = 150_000  # points of all scans of an instrument in a recording, 6 bytes each
 MOST, FEWEST = 2500, 64  # points of one scan
 PERIOD = 0.2  # [s] between the scans of a long recording
-SIZE = 0.05  # [m] of a drawn point
+SIZE = 0.035  # [m] of a drawn point
 
 
 class Scans(NamedTuple):
