@@ -402,6 +402,13 @@ def test_legend_of_long_names_has_room_above_panels():
     assert np.diff([top(*(f"{name} {k}" for k in range(count))) for count in range(4)]).tolist() == [22, 28, 28]
 
 
+def test_names_of_short_phases_are_left_out_on_phone():
+    phases = (("climb", 0.0, 50.0), ("item 2 of 7", 50.0, 60.0), ("i", 60.0, 100.0))
+    panel = Panel((Line(np.arange(3.0), np.arange(3.0)),))
+    drawn = figure(Plot((panel,), "", 3.0, span=(0.0, 100.0), phases=phases))["layout"]["annotations"]
+    assert [(one["text"], one["name"]) for one in drawn] == [("climb", ""), ("item 2 of 7", "wide"), ("i", "")]
+
+
 def test_texts_at_both_ends_of_axis_have_room():
     panel = Panel(
         (Line(np.arange(3.0), np.arange(3.0)),), timed=False, x_ticks=("[0.0, 0.0, 0.0]", "b", "[9.0, 3.0, 0.0]")

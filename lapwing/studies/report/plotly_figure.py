@@ -16,6 +16,7 @@ _PAGE = 900.0  # [pixel] typical width of the panels together
 _NARROW = 300.0  # [pixel] of a phone
 _LETTER, _SYMBOL = 6.6, 48.0  # [pixel] wide in a legend
 _FIRST_LINE, _LINE = 22, 28  # [pixel] of a legend: the first line and each further one
+_WIDE = "wide"  # name of an annotation that a phone has no room for
 _MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; above see _top
 _FONT = {"family": "system-ui, sans-serif", "size": 12, "color": TEXT}
 _GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
@@ -143,6 +144,7 @@ def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
     """Shade every other phase, and name the phases above the panels of the first row if there is room."""
     span = plot.span or (0.0, 1.0)
     room = 130 * panel.columns / len(plot.widths) / (span[1] - span[0])  # letters a second
+    narrow_room = 45 / (span[1] - span[0])
     for index, (name, start, end) in enumerate(plot.phases):
         if index % 2:
             place = {"type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "layer": "below"}
@@ -151,7 +153,8 @@ def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
         if panel.row == 0 and not panel.title and len(name) <= room * (end - start):
             middle: dict[str, Any] = {"xref": f"x{number}", "yref": f"y{number} domain", "x": (start + end) / 2, "y": 1}
             looks: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#555555"}}
-            layout["annotations"].append({**middle, **looks, "text": text_of(name)})
+            too_long = len(name) > narrow_room * (end - start)
+            layout["annotations"].append({**middle, **looks, "text": text_of(name), "name": _WIDE if too_long else ""})
 
 
 def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:

@@ -67,7 +67,7 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
         add_solid(scene, f"/surroundings/{k}", solid)
     if not isinstance(relief, Level):
         lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))
-        scene.add_line_segments("/surroundings/lines", lines, LINE, thickness=1.0, thickness_units="screen")
+        scene.add_line_segments("/surroundings/lines", lines, WIDE_LINE, thickness=1.0, thickness_units="screen")
 
 
 def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
