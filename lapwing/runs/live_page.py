@@ -22,6 +22,7 @@ from lapwing.studies.view3d.live_trail import LiveTrail
 from lapwing.studies.view3d.local_server import serving
 from lapwing.studies.view3d.recording import with_bridge
 from lapwing.studies.view3d.samples import Samples, sample
+from lapwing.studies.view3d.scans import BUDGET
 from lapwing.studies.view3d.stage import Vehicle, add_shaders
 from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
@@ -73,7 +74,7 @@ class LivePage:
         spread, self._before = float(np.clip(now - self._before, *LAG)), now
         first, last = (float(steps[0].truth.times[k]) for k in (0, -1))
         times = np.linspace(first, last, FRAMES + 1)[1:]
-        result = [sample(step, motion(step), times) for step in steps]
+        result = [sample(step, motion(step), times, BUDGET) for step in steps]
         with self._ready:
             self._frames.extend((now + spread * k / FRAMES, result, k) for k in range(FRAMES))
             self._ready.notify()

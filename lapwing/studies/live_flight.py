@@ -7,14 +7,14 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.messages.topic_columns import history
-from lapwing.messages.topics import ESTIMATE, STATUS, Topic, template_topic
+from lapwing.messages.topics import DEPTH_IMAGE, ESTIMATE, LASER_SCAN, POINT_CLOUD, STATUS, Topic, template_topic
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.flight_data import IN_SPACE, FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.topic_view import TopicView
 
-TAKEN = (*IN_SPACE, STATUS, ESTIMATE)
+TAKEN = (*IN_SPACE, STATUS, ESTIMATE, LASER_SCAN, POINT_CLOUD, DEPTH_IMAGE)
 
 
 class LiveFlight:

@@ -8,6 +8,7 @@ import sys
 import urllib.error
 import urllib.request
 
+import numpy as np
 import pytest
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
@@ -118,6 +119,22 @@ def test_events_of_fleet_are_published_and_listed_by_vehicle():
     assert len(lines) == len(run.published)
     assert {line.split()[1] for line in lines} == set(names)
     assert {key for key, _, message in run.published if message.name == "arming"} == {f"{n}/events" for n in names}
+
+
+def test_latest_scan_of_lidar_is_shown_live():
+    run = Run(overrides={"sensors.lidar.columns": 36, "success.require": []})
+    with LivePage(run.setup) as page:
+        follow = LiveFeed(run.setup, [page.show])
+        follow.observe(run)
+        for _ in range(3):
+            run.step()
+            follow.observe(run)
+        page._player.join(3.0)  # it shows the frames meanwhile
+        (vehicle,) = page._vehicles
+        cloud = vehicle._optional["lidar"]._cloud
+    assert cloud.visible
+    assert 10 < len(cloud.points) <= 36 * 16
+    assert np.abs(cloud.points[:, 2] + cloud.position[2]).max() < 0.3  # on the ground, within its noise
 
 
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")

@@ -37,7 +37,8 @@ from lapwing.studies.report.downsampling import thin
 from lapwing.studies.report.flight_header import MANY, differences
 from lapwing.studies.report.flight_phases import phases
 from lapwing.studies.report.overlay import overlay
-from lapwing.studies.report.plot import Plot
+from lapwing.studies.report.plot import Line, Panel, Plot
+from lapwing.studies.report.plotly_figure import figure
 from lapwing.studies.report.plots import air, estimator, motors, position, propulsion
 from lapwing.studies.report.style import POINTS
 
@@ -374,11 +375,47 @@ def test_differences_of_two_flights_have_names(log, tmp_path):
     one, two = (position.draw(FlightData.read(path)) for path in (log, other))
     both = overlay(one, two, ("a", "b"))
     assert [mark.name for mark in both.panels[0].marks] == ["flown, a", "reference", "flown, b"]
-    assert both.panels[1].title == "a: RMSE 0.1000 m; b: RMSE 0.9000 m"
+    assert both.panels[1].title == "RMSE 0.1000 m / 0.9000 m"
+    assert "Above the panels: a / b." in both.caption
     same = next(panel for panel in both.panels if panel.y_label == "y [m]").marks  # the legend has each name by flight
     assert [mark.name for mark in same] == ["flown, a", "reference", "flown, b"]
     names = {mark.name for panel in both.panels for mark in panel.marks}
     assert names == {"flown, a", "flown, b", "reference", "± RMSE, a", "± RMSE, b", ""}
+
+
+def test_caption_of_two_flights_has_shared_sentences_once():
+    panel = Panel((Line(np.arange(3.0), np.arange(3.0)),))
+    one, two = (
+        Plot((panel,), f"Power of each motor. All take {value} W h. Marked: a limit.", 3.0) for value in (1, 2.5)
+    )
+    expected = "Power of each motor. Marked: a limit. a: All take 1 W h. b: All take 2.5 W h."
+    assert overlay(one, two, ("a", "b")).caption == expected
+    assert overlay(one, one, ("a", "b")).caption == one.caption
+
+
+def test_legend_of_long_names_has_room_above_panels():
+    def top(*names):
+        marks = tuple(Line(np.arange(3.0), np.arange(3.0), name) for name in names)
+        return figure(Plot((Panel(marks),), "", 3.0))["layout"]["margin"]["t"]
+
+    name = "the reference of a flight whose name is longer than half of a line"  # one fits into a line
+    assert np.diff([top(*(f"{name} {k}" for k in range(count))) for count in range(4)]).tolist() == [22, 28, 28]
+
+
+def test_names_of_short_phases_are_left_out_on_phone():
+    phases = (("climb", 0.0, 50.0), ("item 2 of 7", 50.0, 60.0), ("i", 60.0, 100.0))
+    panel = Panel((Line(np.arange(3.0), np.arange(3.0)),))
+    drawn = figure(Plot((panel,), "", 3.0, span=(0.0, 100.0), phases=phases))["layout"]["annotations"]
+    assert [(one["text"], one["name"]) for one in drawn] == [("climb", ""), ("item 2 of 7", "wide"), ("i", "")]
+
+
+def test_texts_at_both_ends_of_axis_have_room():
+    panel = Panel(
+        (Line(np.arange(3.0), np.arange(3.0)),), timed=False, x_ticks=("[0.0, 0.0, 0.0]", "b", "[9.0, 3.0, 0.0]")
+    )
+    axis = figure(Plot((panel,), "", 3.0))["layout"]["xaxis"]
+    assert axis["range"] == [-0.5, 2.5]
+    assert axis["ticktext"] == list(panel.x_ticks)
 
 
 def test_keys_in_which_two_scenes_differ():

@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 import synthetic_flights
+from flights_in_space import AIRFRAME, HUBS, READY, TICKS, Recorder, T, flight
 
 from lapwing.services.common.mesh_file import Mesh
 from lapwing.services.common.mesh_schema import pack
@@ -29,43 +30,6 @@ from lapwing.studies.view3d.vehicle_bodies import motion
 from tests.golden.digests import sample_file
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
-
-TICKS, RATE = 400, 100
-T = np.arange(TICKS) / RATE
-HUBS = [[0.3, 0.3, 0.0], [-0.3, 0.3, 0.0], [-0.3, -0.3, 0.0], [0.3, -0.3, 0.0]]
-AIRFRAME = {
-    "rotors": {"position": HUBS, "spin_direction": ["cw", "ccw", "cw", "ccw"]},
-    "propeller": {"diameter": 0.5},
-    "contact": {"feet": [[0.2, 0.2, -0.3]]},
-    "mass": {"payload": 2.0},
-}
-READY = """
-    const until = async (holds) => {
-      for (let k = 0; k < 1200 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
-      if (!holds()) throw new Error(`never: ${holds}`);
-    };
-    await until(() => document.readyState === "complete" && window.lapwingView && lapwingView.ready);
-"""
-
-
-def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
-    """Up at 1 m/s, rotors at 1 rad/s, wind of 3 m/s along x."""
-    t = np.arange(ticks) / RATE
-    truth = {
-        "pose.position": np.column_stack([0.0 * t, 0.0 * t, t]),
-        "pose.orientation": synthetic_flights.LEVEL,
-        "rotor_speed": (1.0,) * 4,
-        **dict.fromkeys(("motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque"), (1.0,) * 4),
-        "velocity": (0.0, 0.0, 1.0),
-        "acceleration": (0.0,) * 3,
-        "air_density": 1.2,
-        "wind": (3.0, 0.0, 0.0),
-        "ground_contact": np.zeros(ticks, bool),
-    }
-    tables = {"vehicle": {"model": model}, **({"airframe": AIRFRAME} if scene is None else scene)}
-    result = synthetic_flights.flight(ticks, RATE, scene=tables, ground_truth=truth, **topics)
-    result.digest = "0" * 32
-    return result
 
 
 def volume(solid):
@@ -190,21 +154,6 @@ def slung():
     return flight("slung_load", scene={"airframe": OFF, "slung_load": SLING}, body_states=load_states)
 
 
-class Recorder:
-    """A viser scene that keeps what is added."""
-
-    def __init__(self):
-        self.nodes = {}
-
-    def __getattr__(self, kind):
-        def add(name, *arguments, **options):
-            handle = type("Node", (), {"name": name, "kind": kind, "arguments": arguments, **options})()
-            self.nodes[name if isinstance(name, str) else kind] = handle
-            return handle
-
-        return add
-
-
 def test_cable_is_straight_if_taut_and_keeps_length_if_slack():
     values, scene = slung(), Recorder()
     vehicle = Vehicle(scene, 0, values, "drone1", "#0072B2")
@@ -291,6 +240,10 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     vertices = node.arguments[0]
     assert vertices[np.argmax(vertices[:, 2])] == pytest.approx([0.0, 0.0, 0.0], abs=0.01)  # heights are from home's
     assert vertices[:, 2].min() == pytest.approx(-2.0)
+    lines = recorder.nodes["/surroundings/lines"].arguments[0]
+    rows = {tuple(row) for row in np.asarray(vertices, np.float32)[:, :2].tolist()}
+    assert {tuple(end) for end in lines[:, :, :2].reshape(-1, 2).tolist()} < rows  # between the points of the surface
+    assert lines[:, :, 2].max() == pytest.approx(0.02, abs=0.01)
 
 
 def test_node_is_sent_only_when_it_changes():

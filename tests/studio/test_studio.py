@@ -177,6 +177,7 @@ def test_cards_of_flights_have_picture_and_outcome(studio, folder, flown):
         assert f"flights/{name}/card" in home
         card = studio.page(f"flights/{name}/card")
         assert "<polyline" in card
+        assert f"· {name}<" in card
         assert "timed out" in card or "completed" in card
     assert logs(folder)[0] in studio.page("?q=hover+" + ("timed" if "timed out" in card else "completed"))
     assert logs(folder)[0] not in studio.page("?q=hover+crashed")

@@ -1,5 +1,8 @@
 """Two flights in one plot: the second in other colours, its names with the flight's own."""
 
+import re
+from itertools import takewhile
+
 import numpy as np
 
 from lapwing.studies.report.plot import Band, Line, Mark, Panel, Plot, Stretch
@@ -20,10 +23,9 @@ def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
         panels.append(panel if other is None else _both(panel, other, labels, named, apart))
     spans = [plot.span for plot in (first, second) if plot.span]
     span = (min(s for s, _ in spans), max(e for _, e in spans)) if spans else None
-    if first.caption == second.caption:
-        caption = first.caption
-    else:
-        caption = f"{labels[0]}: {first.caption} {labels[1]}: {second.caption}"
+    caption = _captions(first.caption, second.caption, labels)
+    if any(" / " in panel.title and " / " not in own.title for panel, own in zip(panels, first.panels, strict=True)):
+        caption += f" Above the panels: {labels[0]} / {labels[1]}."
     if first.phases:
         caption += f" Phases are those of {labels[0]}."
     if others:
@@ -63,11 +65,29 @@ def _both(
     theirs = [_of(m, labels[1], SECOND, "dot", named[1]) for m in other.marks if not any(m is s for s in shared)]
     ranges = [p.y_range for p in (panel, other) if p.y_range]
     y_range = (min(low for low, _ in ranges), max(high for _, high in ranges)) if len(ranges) == 2 else None
-    title, note = (
-        a if a == b else between.join(f"{label}: {text}" for label, text in zip(labels, (a, b), strict=True) if text)
-        for a, b, between in ((panel.title, other.title, "; "), (panel.note, other.note, "\n"))
-    )
+    title, note = _texts(panel.title, other.title, labels, "; "), _texts(panel.note, other.note, labels, "\n")
     return panel._replace(marks=(*mine, *theirs), y_range=y_range, title=title, note=note)
+
+
+def _texts(one: str, other: str, labels: tuple[str, str], between: str) -> str:
+    """Return two texts in one: what they begin with once, "RMSE 0.12 m / 0.15 m"; otherwise each with its flight."""
+    if one == other:
+        return one
+    first, second = one.split(" "), other.split(" ")
+    shared = len(list(takewhile(lambda pair: pair[0] == pair[1], zip(first, second, strict=False))))
+    if shared:
+        return " ".join([*first, "/", *second[shared:]])
+    return between.join(f"{label}: {text}" for label, text in zip(labels, (one, other), strict=True) if text)
+
+
+def _captions(one: str, other: str, labels: tuple[str, str]) -> str:
+    """Return two captions in one: sentences of both first, then those of each flight."""
+    first, second = (re.split(r"(?<=\.) ", text) for text in (one, other))
+    parts = [sentence for sentence in first if sentence in second]
+    for label, own, others in ((labels[0], first, second), (labels[1], second, first)):
+        if rest := [sentence for sentence in own if sentence not in others]:
+            parts.append(f"{label}: {' '.join(rest)}")
+    return " ".join(parts)
 
 
 def _same(one: Mark, other: Mark) -> bool:

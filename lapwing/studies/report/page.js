@@ -44,6 +44,7 @@
   // On a phone the columns of a plot are below each other.
   function stack(layout, { height, top, domains }) {
     Object.assign(layout, { height, margin: { ...layout.margin, l: 56, r: 6, t: top } });
+    layout.annotations = layout.annotations.filter(({ name }) => name !== "wide");
     for (const [number, domain] of Object.entries(domains)) {
       layout[`xaxis${number}`].domain = [0, 1];
       layout[`yaxis${number}`].domain = domain;

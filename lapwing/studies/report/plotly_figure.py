@@ -1,7 +1,6 @@
 """Plots in a browser: the figures of plotly.js as JSON."""
 
 import json
-import math
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,8 @@ _GAP_X_LABEL = 30.0  # [pixel] more below a panel that names its own x
 _PAGE = 900.0  # [pixel] typical width of the panels together
 _NARROW = 300.0  # [pixel] of a phone
 _LETTER, _SYMBOL = 6.6, 48.0  # [pixel] wide in a legend
+_FIRST_LINE, _LINE = 22, 28  # [pixel] of a legend: the first line and each further one
+_WIDE = "wide"  # name of an annotation that a phone has no room for
 _MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; above see _top
 _FONT = {"family": "system-ui, sans-serif", "size": 12, "color": TEXT}
 _GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
@@ -98,6 +99,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
     if panel.x_ticks:
         x |= {"tickvals": list(range(len(panel.x_ticks))), "ticktext": [text_of(text) for text in panel.x_ticks]}
         x["automargin"] = True  # a text may have several lines
+        x["range"] = [-0.5, len(panel.x_ticks) - 0.5]
     if panel.equal:
         y |= {"scaleanchor": f"x{number}", "scaleratio": 1}
         x["constrain"] = y["constrain"] = "range"
@@ -142,6 +144,7 @@ def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
     """Shade every other phase, and name the phases above the panels of the first row if there is room."""
     span = plot.span or (0.0, 1.0)
     room = 130 * panel.columns / len(plot.widths) / (span[1] - span[0])  # letters a second
+    narrow_room = 45 / (span[1] - span[0])
     for index, (name, start, end) in enumerate(plot.phases):
         if index % 2:
             place = {"type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "layer": "below"}
@@ -150,7 +153,8 @@ def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
         if panel.row == 0 and not panel.title and len(name) <= room * (end - start):
             middle: dict[str, Any] = {"xref": f"x{number}", "yref": f"y{number} domain", "x": (start + end) / 2, "y": 1}
             looks: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#555555"}}
-            layout["annotations"].append({**middle, **looks, "text": text_of(name)})
+            too_long = len(name) > narrow_room * (end - start)
+            layout["annotations"].append({**middle, **looks, "text": text_of(name), "name": _WIDE if too_long else ""})
 
 
 def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:
@@ -165,9 +169,13 @@ def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:
 
 def _top(plot: Plot, width: float = _PAGE) -> int:
     """Return the space [pixel] above the panels for legend, titles and names of phases."""
-    names = {getattr(mark, "name", "") for panel in plot.panels for mark in panel.marks} - {""}
-    lines = math.ceil(sum(_LETTER * len(name) + _SYMBOL for name in names) / width)
-    return 6 + 22 * lines + (18 if plot.phases or any(panel.title for panel in plot.panels) else 0)
+    names = dict.fromkeys(getattr(mark, "name", "") for panel in plot.panels for mark in panel.marks)
+    lines, used = 0, width
+    for name in filter(None, names):
+        needed = _LETTER * len(name) + _SYMBOL
+        lines, used = (lines + 1, needed) if used + needed > width else (lines, used + needed)
+    titles = 18 if plot.phases or any(panel.title for panel in plot.panels) else 0
+    return 6 + (_FIRST_LINE + _LINE * (lines - 1) if lines else 0) + titles
 
 
 def _share(parts: tuple[float, ...], gap: float, first: int, count: int) -> list[float]:

@@ -60,25 +60,21 @@ def show(console: Console, tuning: Tuned) -> None:
         console.print(f"new gains fail: {text}", style="bold red", soft_wrap=True)
 
 
-def cell(m: Margins) -> str:
-    """Return margins as a short text."""
+def cells(m: Margins) -> tuple[str, ...]:
+    """Return crossover [rad/s], phase margin [deg], gain margins [dB] upwards and downwards."""
     if not 0.0 < m.crossover < math.inf:
-        return f"no crossover: gain {'above' if m.crossover else 'below'} 1"
+        return f"none: gain {'above' if m.crossover else 'below'} 1", "", "", ""
     up, down = (20.0 * math.log10(k) if k > 0.0 else -math.inf for k in (m.gain, m.reduction))
-    return f"{m.crossover:.1f}, {math.degrees(m.phase):.1f}, {up:+.1f}/{down:+.1f}"
+    return f"{m.crossover:.1f}", f"{math.degrees(m.phase):.1f}", f"{up:+.1f}", f"{down:+.1f}"
 
 
 def _margins(tuning: Tuned) -> Rows:
-    rows = Rows(
-        "Crossover in rad/s, phase margin in degrees, upper/lower gain margin in dB", "loop", tuning.before.name, "new"
-    )
+    heads = ("loop", "gains", "crossover, rad/s", "phase margin, °", "gain margin, dB", "reduction, dB")
+    rows = Rows("Margins of the loops before and after", *heads)
     for name in tuning.after.margins:
-        rows.add(
-            name,
-            cell(tuning.before.margins[name]),
-            cell(tuning.after.margins[name]),
-            failed=name in tuning.after.shortfalls,
-        )
+        for judged in (tuning.before, tuning.after):
+            failed = judged is tuning.after and name in judged.shortfalls
+            rows.add(name, judged.name, *cells(judged.margins[name]), failed=failed)
     return rows
 
 

@@ -24,7 +24,8 @@
   const client = () => window.__viserMutable; // the scene of viser's client, which it shows to its own tests
   const state = () => client()?.scene?.__r3f?.root.getState();
 
-  const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail" }, names = {};
+  const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail", reference: "reference/body", estimate: "estimate/body" };
+  const names = {};
   function nameOf(part, number) { // of a node of a vehicle, which begins with its number
     const nodes = client().nodeRefFromName, key = part + number;
     if (!nodes[names[key]]) {
@@ -49,6 +50,12 @@
       const pieces = geometry?.attributes.instanceStart?.count;
       if (pieces) geometry.instanceCount = Math.floor(Math.min(Math.max(share, 0), 1) * pieces + 1e-6);
     }));
+  }
+
+  function thinGhosts() { // a faint ghost does not hide the translucent parts of the vehicle behind it
+    facts.names.forEach((_, k) => ["reference", "estimate"].forEach((part) => node(part, k)?.traverse(({ material }) => {
+      if (material) material.depthWrite = false;
+    })));
   }
 
   function showNames({ camera, size }) { // those that no nearer one covers
@@ -104,7 +111,9 @@
       if (next !== seen) {
         changed = performance.now();
         showTrails();
+        thinGhosts();
         showNames(now);
+        view.changed?.();
       }
       seen = next;
       if (slow) simplify(now, at);
@@ -147,7 +156,7 @@
   }
 
   view.seek = (time) => { // by the number field of the player, as a user would
-    const field = document.querySelector("input");
+    const field = document.querySelector("input:not([type=checkbox])");
     if (!field) return;
     Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(field, String(Math.max(0, time - facts.start)));
     field.dispatchEvent(new Event("input", { bubbles: true }));
@@ -160,6 +169,7 @@
     const { camera, controls } = state(), { x, y, z } = controls.getTarget(camera.position.clone());
     return { place: camera.position.toArray(), target: [x, y, z] };
   };
+  view.redraw = () => state().invalidate();
   view.frames = () => state().gl.info.render.frame; // that have been drawn
   view.look = (mode, vehicle = view.vehicle, place = null) => Object.assign(view, { mode, vehicle, place, fresh: true });
   const { port1: asked, port2: answered } = new MessageChannel(), waiting = [];
@@ -202,49 +212,5 @@
     return pictures;
   };
 
-  function select(name, options, chosen) {
-    const box = document.createElement("select");
-    box.name = name;
-    box.title = name;
-    options.forEach((text, k) => box.add(new Option(text, k)));
-    box.onchange = () => chosen(Number(box.value));
-    return box;
-  }
-  addEventListener("DOMContentLoaded", () => {
-    const style = document.createElement("style");
-    style.textContent = `.mantine-Notifications-root { display: none }
-      .mantine-Input-input:disabled { opacity: 1 !important; color: inherit !important; background: none !important; border: 0; cursor: auto }
-      textarea.mantine-Textarea-input:disabled { min-height: 55vh; max-height: none; font-variant-numeric: tabular-nums }
-      #lapwing { position: fixed; top: 10px; left: 10px; max-width: calc(100% - 20px); box-sizing: border-box; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
-        font: 13px system-ui, sans-serif; color: #1f2328; background: #ffffffd9; border-radius: 6px; padding: 6px 10px }
-      #lapwing span { display: flex; gap: 6px; align-items: center }
-      #lapwing select { font: inherit; border: 1px solid #d0d7de; border-radius: 4px; background: #fff; color: inherit; padding: 2px 4px }
-      #lapwing i { display: inline-block; width: 90px; height: 8px; border-radius: 4px;
-        background: linear-gradient(90deg, #004c8c, #008eaa, #56b46e, #deba28, #e06e14) }
-      #lapwing u { text-decoration: none; display: inline-block; width: 10px; height: 10px; border-radius: 5px }
-      @media (prefers-color-scheme: dark) {
-        #lapwing { color: #e6eaee; background: #14181dd9 }
-        #lapwing select { background: #1d232a; border-color: #39424c }
-      }`;
-    document.head.append(style);
-    const bar = document.createElement("div");
-    bar.id = "lapwing";
-    const label = (...parts) => bar.appendChild(document.createElement("span")).append(...parts);
-    const modes = ["follow", "orbit", "top", "onboard"];
-    bar.append(select("camera", modes, (k) => view.look(modes[k])));
-    if (facts.names.length > 1) {
-      bar.append(select("vehicle", facts.names, (k) => view.look(view.mode, k)));
-      facts.names.forEach((name, k) => {
-        const dot = document.createElement("u");
-        dot.style.background = facts.colours[k];
-        label(dot, name);
-      });
-    }
-    if (facts.error > 0) {
-      const unit = facts.error < 0.1 ? [1000, "mm"] : [1, "m"];
-      label("error 0", document.createElement("i"), `${Number((facts.error * unit[0]).toPrecision(2))} ${unit[1]}`);
-    }
-    document.body.append(bar);
-  });
   requestAnimationFrame(steer);
 })();

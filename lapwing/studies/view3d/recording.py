@@ -12,6 +12,7 @@ from lapwing.studies.report.style import COLOURS
 from lapwing.studies.view3d import require
 from lapwing.studies.view3d.local_server import serving
 from lapwing.studies.view3d.samples import sample
+from lapwing.studies.view3d.scans import BUDGET
 from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
 from lapwing.studies.view3d.surroundings import add_surroundings
 
@@ -85,7 +86,8 @@ def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle
         if path.desired is not None:
             vehicle.desired_path(path.desired)
         vehicle.trail(path.bodies[0].position, path.error, most)
-    samples = [sample(flight, vehicle.motion, times) for flight, vehicle in zip(shown, vehicles, strict=True)]
+    points = BUDGET // len(shown)
+    samples = [sample(flight, vehicle.motion, times, points) for flight, vehicle in zip(shown, vehicles, strict=True)]
     for vehicle, result in zip(vehicles, samples, strict=True):
         vehicle.show(result, 0)
     recording = server.get_scene_serializer()
@@ -105,6 +107,6 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
         facts: names and colours of the vehicles, the size of the largest [m], start [s], largest error [m], "live",
             and of a recording "span", the times of the first and the last point of the trails [s].
     """
-    code = (Path(__file__).parent / "bridge.js").read_text(encoding="utf-8")
+    code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in ("bridge.js", "toolbar.js"))
     text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")
     return html.replace("<head>", f"<head><script>window.lapwing={text};{code}</script>", 1)

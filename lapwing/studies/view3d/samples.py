@@ -7,7 +7,8 @@ import numpy as np
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d.beams import BeamSamples, beams
 from lapwing.studies.view3d.bodies import Body, Motion
-from lapwing.studies.view3d.sampling import about_z, nearest, rounded, rounded_angle
+from lapwing.studies.view3d.sampling import from_angles, nearest, rounded, rounded_angle
+from lapwing.studies.view3d.scans import Scans, scans
 
 
 class BodySamples(NamedTuple):
@@ -27,38 +28,47 @@ class Samples(NamedTuple):
     bodies: list[BodySamples]
     wind: np.ndarray | None  # (k, 3) [m/s] world
     desired: np.ndarray | None  # (k, 3) [m]
-    desired_yaw: np.ndarray | None  # (k, 4) w, x, y, z
+    desired_attitude: np.ndarray | None  # (k, 4) w, x, y, z
     estimate: np.ndarray | None  # (k, 3) [m]
+    estimate_attitude: np.ndarray | None  # (k, 4) w, x, y, z
     estimate_std: np.ndarray | None  # (k, 3) [m]
     contacts: np.ndarray | None  # (k, points, 3) [m] world
     contact_forces: np.ndarray | None  # (k, points, 3) [N] world
     error: np.ndarray | None  # (k,) [m] distance from the reference
     beams: list[BeamSamples]
+    scans: list[Scans]
 
 
-def sample(flight: FlightData, motion: Motion, times: np.ndarray) -> Samples:
-    """Return all that is drawn of a flight at `times` [s], shape (k,)."""
+def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 0) -> Samples:
+    """Return all that is drawn of a flight at `times` [s], shape (k,), rising.
+
+    `points` is the count of all points of a scanning instrument; 0 leaves scans out.
+    """
     truth = flight.truth
     rows = nearest(truth.times, times)
     path = truth.position[rows]
     wind = truth.wind[rows] if "wind" in truth.fields and np.any(truth.wind) else None
-    desired = yaw = error = None
+    desired = attitude = error = None
     if len(flight.reference):
         last = np.minimum(rows, len(flight.reference) - 1)
-        desired, yaw = flight.reference[last, :3], about_z(flight.reference[last, 5])
+        desired, attitude = flight.reference[last, :3], from_angles(flight.reference[last, 3:])
         error = np.linalg.norm(path - desired, axis=1)
-    estimate = std = None
+    estimate = believed = std = None
     if flight.has("estimate"):
         view = flight.topic("estimate")
         own = nearest(view.times, times)
         estimate, std = view.position[own], view.position_std[own]
+        believed = rounded(view.orientation[own][:, [3, 0, 1, 2]])
     contacts = forces = None
     if flight.has("contact_forces"):
         view = flight.topic("contact_forces")
         own = nearest(view.times, times)
         contacts, forces = view.position[own], view.force[own]
     bodies = [_body(body, times, rows) for body in motion.bodies]
-    return Samples(times, bodies, wind, desired, yaw, estimate, std, contacts, forces, error, beams(flight, times))
+    distances, clouds = beams(flight, times), scans(flight, times, points) if points else []
+    return Samples(
+        times, bodies, wind, desired, attitude, estimate, believed, std, contacts, forces, error, distances, clouds
+    )
 
 
 def _body(body: Body, times: np.ndarray, rows: np.ndarray) -> BodySamples:

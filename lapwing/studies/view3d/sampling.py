@@ -14,10 +14,11 @@ def nearest(known: np.ndarray, times: np.ndarray) -> np.ndarray:
     return (np.searchsorted(known, np.asarray(times) + 1e-9, side="right") - 1).clip(0, len(known) - 1)
 
 
-def about_z(angle: np.ndarray) -> np.ndarray:
-    """Return quaternions w, x, y, z of turns about z [rad], shape (k, 4)."""
-    zero = np.zeros_like(angle)
-    return rounded(np.column_stack([np.cos(angle / 2.0), zero, zero, np.sin(angle / 2.0)]))
+def from_angles(angles: np.ndarray) -> np.ndarray:
+    """Return quaternions w, x, y, z of roll, pitch, yaw [rad], shape (k, 3); shape (k, 4)."""
+    (a, b, c), (d, e, f) = np.cos(0.5 * angles.T), np.sin(0.5 * angles.T)
+    parts = (a * b * c + d * e * f, d * b * c - a * e * f, a * e * c + d * b * f, a * b * f - d * e * c)
+    return rounded(np.column_stack(parts))
 
 
 def along(direction: np.ndarray) -> np.ndarray:
@@ -39,3 +40,10 @@ def rounded_angle(angle: np.ndarray) -> np.ndarray:
 def rounded(values: Any) -> np.ndarray:
     """Return values rounded to 1 / GRID."""
     return np.round(np.asarray(values, float) * GRID) / GRID
+
+
+def rotated(wxyz: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Return vectors, shape (3,) or (k, 3), rotated by a quaternion w, x, y, z."""
+    w, axis = wxyz[0], wxyz[1:]
+    twice = 2.0 * np.cross(axis, vectors)
+    return np.asarray(vectors + w * twice + np.cross(axis, twice))

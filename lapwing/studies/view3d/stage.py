@@ -1,29 +1,34 @@
 """Nodes of the vehicles of a flight in a viser scene, and their motion."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.report.style import BOUND, FLOWN, QUIET
+from lapwing.studies.report.style import BOUND, FLOWN
 from lapwing.studies.view3d.beams import Beam
 from lapwing.studies.view3d.bodies import Body, Link, Motion
+from lapwing.studies.view3d.cables import cable
 from lapwing.studies.view3d.coloured_mesh import coloured_mesh
+from lapwing.studies.view3d.ghosts import Ghost
 from lapwing.studies.view3d.rotors import BLADE, SHORTEST, Rotors
 from lapwing.studies.view3d.samples import Samples
-from lapwing.studies.view3d.sampling import along
-from lapwing.studies.view3d.solids import arrow, ball, box, lifted, merged, rod
+from lapwing.studies.view3d.sampling import along, rotated
+from lapwing.studies.view3d.scans import ScanPoints
+from lapwing.studies.view3d.solids import arrow, ball, box, lifted, merged
 from lapwing.studies.view3d.surroundings import add_solid, rgb
 from lapwing.studies.view3d.vehicle_bodies import motion
 
-WIND, FORCE, REFERENCE, ESTIMATE = "#56B4E9", BOUND, QUIET, "#CC79A7"
-DESIRED = "#4A5560"
+WIND, FORCE, DESIRED, ESTIMATE = "#56B4E9", BOUND, "#4A5560", "#CC79A7"
+GHOSTS = {"reference": DESIRED, "estimate": ESTIMATE}
+SCAN_COLOURS = {"lidar": BOUND, "depth_camera": "#882255"}
 FLOWN_WIDTH, DESIRED_WIDTH, CABLE_WIDTH = 4.0, 2.0, 2.5  # [pixel]
 WIND_SCALE = 0.12  # [m] of arrow for 1 m/s
 SIGMAS = 3.0  # of the drawn ellipsoid
-SAG = 12  # parts of a drawn cable
 EVERY = 3  # frames between two changes of an arrow
+_ELLIPSOID = ball((0.0, 0.0, 0.0), 1.0, ESTIMATE, 0.3)
 # Ends of the colour scale of a trail, from no error to the largest: dark blue to yellow, told apart by lightness too.
 SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (224, 110, 20)], float)
 
@@ -43,6 +48,7 @@ class Vehicle:
     ):
         """Add the nodes; `number` makes their paths unique, `named` writes the name above the vehicle."""
         self.name, self.colour, self.motion = name, colour, motion(flight)
+        self._is_ghost = ghost
         self._scene, self._root = scene, f"/{number} {name.replace('/', '_')}"
         self._sent: dict[tuple[str, str], Any] = {}
         self._size = reach(self.motion)
@@ -98,25 +104,37 @@ class Vehicle:
         if samples.wind is not None:
             node = self._node("wind", lambda name: self._arrow(name, WIND, 0.035 * self._size))
             self._point(node, lifted(place, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
-        if samples.desired is not None:
-            ghost = self._node("reference", self._reference_ghost)
-            self._set(ghost, "position", np.round(samples.desired[k], 3))
-            if samples.desired_yaw is not None:
-                self._set(ghost, "wxyz", samples.desired_yaw[k])
-        if samples.estimate is not None and samples.estimate_std is not None:
-            node = self._node("estimate", lambda name: add_solid(self._scene, name, ball((0,) * 3, 1.0, ESTIMATE, 0.3)))
-            self._set(node, "position", np.round(samples.estimate[k], 3))
-            if not k % EVERY:
-                sizes = (SIGMAS * samples.estimate_std[k]).clip(0.01, 50.0)
-                self._set(node, "scale", np.round(sizes, 2))
+        self._show_ghosts(samples, k)
         self._show_forces(samples, k)
         for beam in samples.beams:
             if beam.name not in self._beams:
                 self._beams[beam.name] = Beam(self._scene, self._frames[0].name, beam, self._size)
             if not k % EVERY:
                 self._beams[beam.name].show(beam, k)
+        for scan in samples.scans:
+            colour = rgb(SCAN_COLOURS[scan.name])
+            self._node(scan.name, partial(ScanPoints, self._scene, colour)).show(scan, k)
         for link in self.motion.links:
             self._show_link(link, samples, k)
+
+    def _show_ghosts(self, samples: Samples, k: int) -> None:
+        """Show bodies where the vehicle should be and where it is believed to be, and the ellipsoid of its position."""
+        body = samples.bodies[0]
+        own = (body.position[k], body.orientation[k])
+        for name, places, attitudes in (
+            ("reference", samples.desired, samples.desired_attitude),
+            ("estimate", samples.estimate, samples.estimate_attitude),
+        ):
+            if places is not None and attitudes is not None and not self._is_ghost:
+                ghost = self._node(name, partial(Ghost, self._scene, self.motion.bodies[0], GHOSTS[name]))
+                ghost.show(np.round(places[k], 3), attitudes[k], *own)
+        if samples.estimate is None or samples.estimate_std is None or self._is_ghost:
+            return
+        ellipsoid = self._node("estimate/ellipsoid", lambda name: add_solid(self._scene, name, _ELLIPSOID))
+        self._set(ellipsoid, "position", np.round(samples.estimate[k], 3))
+        if not k % EVERY:
+            sizes = (SIGMAS * samples.estimate_std[k]).clip(0.01, 50.0)
+            self._set(ellipsoid, "scale", np.round(sizes, 2))
 
     def _show_forces(self, samples: Samples, k: int) -> None:
         pushes = []
@@ -126,24 +144,12 @@ class Vehicle:
             node = self._node(f"force {i + 1}", lambda name: self._arrow(name, FORCE, 0.03 * self._size))
             self._point(node, place, force, self._per_newton, k)
 
-    def _reference_ghost(self, name: str) -> Any:
-        """Add a small cross where the vehicle should be, pointing along the desired heading."""
-        size = 0.5 * self._size
-        node = self._scene.add_frame(name, show_axes=False)
-        lines = [rod((-size, 0, 0), (1.4 * size, 0, 0), 0.02 * self._size, REFERENCE, 0.5)]
-        lines.append(rod((0, -size, 0), (0, size, 0), 0.02 * self._size, REFERENCE, 0.5))
-        for solid in merged(lines):
-            add_solid(self._scene, f"{name}/cross", solid)
-        return node
-
     def _show_link(self, link: Link, samples: Samples, k: int) -> None:
         first, second = samples.bodies[link.first], samples.bodies[link.second]
-        start = first.position[k] + _turned(first.orientation[k], np.array(link.hook))
+        start = first.position[k] + rotated(first.orientation[k], np.array(link.hook))
         stop = second.position[k]
-        points = np.linspace(start, stop, SAG + 1)
-        apart = float(np.linalg.norm(stop - start))
-        if link.length > apart and (second.force is None or not np.any(second.force[k])):
-            points += _sag(start, stop, link.length)
+        is_slack = second.force is None or not np.any(second.force[k])
+        points = cable(start, stop, link.length if is_slack else 0.0)
         pairs = np.stack([points[:-1], points[1:]], axis=1).astype(np.float32)
         handle = self._node(f"link {link.second}", lambda name: _lines(self._scene, name, pairs, BLADE, CABLE_WIDTH))
         handle.points = pairs
@@ -221,23 +227,3 @@ def vehicle_colours(count: int, compared: bool) -> Sequence[str]:
 def _lines(scene: Any, name: str, points: np.ndarray, colour: Any, width: float) -> Any:
     colours = rgb(colour) if isinstance(colour, str) else colour
     return scene.add_line_segments(name, points, colours, thickness=width, thickness_units="screen")
-
-
-def _sag(start: np.ndarray, stop: np.ndarray, length: float) -> np.ndarray:
-    """Return offsets from the chord of a slack cable, a parabola of about its length, shape (SAG + 1, 3) [m]."""
-    chord = stop - start
-    apart = float(np.linalg.norm(chord))
-    depth = np.sqrt(3.0 * apart * (length - apart) / 8.0) if apart > 0.0 else length / 2.0
-    down = np.array([0.0, 0.0, -1.0])
-    across = down - chord * float(down @ chord) / max(apart * apart, 1e-9)
-    size = float(np.linalg.norm(across))
-    across = across / size if size > 1e-3 else np.array([1.0, 0.0, 0.0])  # a vertical chord bows to one side
-    share = np.linspace(0.0, 1.0, SAG + 1)
-    return (depth * 4.0 * share * (1.0 - share))[:, None] * across
-
-
-def _turned(wxyz: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Return a vector turned by a quaternion w, x, y, z."""
-    w, axis = wxyz[0], wxyz[1:]
-    twice = 2.0 * np.cross(axis, vector)
-    return vector + w * twice + np.cross(axis, twice)

@@ -15,10 +15,11 @@ from lapwing.studies.view3d.solids import Solid, ball, box, merged, rod
 
 SKY = ((126, 170, 205), (226, 236, 242))  # red, green, blue at the top and at the horizon
 SOIL, LINE, WIDE_LINE = (214, 219, 215), (190, 197, 193), (160, 168, 164)
-OBSTACLE, EARTH = "#8C9BA5", "#B9C2B4"
+OBSTACLE, EARTH = "#AEB9C2", "#B9C2B4"
 DAYLIGHT = 2.4  # from the sky, beside the sun
 POINTS = 81  # of the terrain along each side
-MARGIN = 15.0  # [m] of terrain around the flight
+EVERY, LIFT = 8, 0.02  # points of the terrain between two lines on it, and their height above it [m]
+MARGIN = 30.0  # [m] of terrain around the flight
 FENCE_HEIGHT = 12.0  # [m] of the drawn walls
 
 
@@ -57,12 +58,16 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
     solids = list(_obstacles(terrain))
     low = -0.002
     if not isinstance(relief, Level):
-        solids.append(_relief(relief, flight.truth.position))
-        low = float(solids[-1].vertices[:, 2].min()) - 0.05
+        relief_solid = _relief(relief, flight.truth.position)
+        solids.append(relief_solid)
+        low = float(relief_solid.vertices[:, 2].min()) - 0.05
     add_ground(scene, low)
     solids += [*_fence(flight), *_plan(flight)]
     for k, solid in enumerate(merged(solids)):
         add_solid(scene, f"/surroundings/{k}", solid)
+    if not isinstance(relief, Level):
+        lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))
+        scene.add_line_segments("/surroundings/lines", lines, WIDE_LINE, thickness=1.0, thickness_units="screen")
 
 
 def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
@@ -107,6 +112,14 @@ def _relief(relief: Any, path: np.ndarray) -> Solid:
     one = np.column_stack([corner, corner + 1, corner + POINTS + 1])
     other = np.column_stack([corner, corner + POINTS + 1, corner + POINTS])
     return Solid(vertices, np.concatenate([one, other]), EARTH, open=True)
+
+
+def _relief_lines(points: np.ndarray) -> np.ndarray:
+    """Return the segments of a grid that lies on the surface at points (rows, columns, 3), shape (n, 2, 3)."""
+    raised = points + np.array([0.0, 0.0, LIFT])
+    lines = (raised[::EVERY], raised[:, ::EVERY].swapaxes(0, 1))
+    pairs = [np.stack([some[:, :-1], some[:, 1:]], axis=2).reshape(-1, 2, 3) for some in lines]
+    return np.concatenate(pairs).astype(np.float32)
 
 
 def _fence(flight: FlightData) -> Iterator[Solid]:

@@ -1,5 +1,6 @@
 from pathlib import Path
 
+import numpy as np
 import pytest
 from page_texts import page_text
 from rich.console import Console
@@ -64,7 +65,12 @@ def test_page_and_tables(found, tmp_path):
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
     console = Console(record=True, width=120)
     console_output.show(console, found)
-    assert "x_plant_input" in console.export_text()
+    rows = [line.split("│")[1:-1] for line in console.export_text().splitlines() if "x_plant_input" in line]
+    assert [row[1].strip() for row in rows] == [found.before.name, "new"]
+    for row, judged in zip(rows, (found.before, found.after), strict=True):
+        m = judged.margins["x_plant_input"]
+        expected = (m.crossover, np.degrees(m.phase), 20.0 * np.log10(m.gain), 20.0 * np.log10(m.reduction))
+        assert [float(text) for text in row[2:]] == pytest.approx(expected, abs=0.051)  # a number in each cell
 
 
 def test_failing_gains_are_named_and_need_force(found, tmp_path, monkeypatch):

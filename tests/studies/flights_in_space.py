@@ -1,0 +1,56 @@
+"""A flight to be drawn in space, and a scene that keeps what is drawn."""
+
+import numpy as np
+import synthetic_flights
+
+TICKS, RATE = 400, 100
+T = np.arange(TICKS) / RATE
+HUBS = [[0.3, 0.3, 0.0], [-0.3, 0.3, 0.0], [-0.3, -0.3, 0.0], [0.3, -0.3, 0.0]]
+AIRFRAME = {
+    "rotors": {"position": HUBS, "spin_direction": ["cw", "ccw", "cw", "ccw"]},
+    "propeller": {"diameter": 0.5},
+    "contact": {"feet": [[0.2, 0.2, -0.3]]},
+    "mass": {"payload": 2.0},
+}
+READY = """
+    const until = async (holds) => {
+      for (let k = 0; k < 1200 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+      if (!holds()) throw new Error(`never: ${holds}`);
+    };
+    await until(() => document.readyState === "complete" && window.lapwingView && lapwingView.ready);
+"""
+
+
+def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
+    """Up at 1 m/s, rotors at 1 rad/s, wind of 3 m/s along x."""
+    t = np.arange(ticks) / RATE
+    truth = {
+        "pose.position": np.column_stack([0.0 * t, 0.0 * t, t]),
+        "pose.orientation": synthetic_flights.LEVEL,
+        "rotor_speed": (1.0,) * 4,
+        **dict.fromkeys(("motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque"), (1.0,) * 4),
+        "velocity": (0.0, 0.0, 1.0),
+        "acceleration": (0.0,) * 3,
+        "air_density": 1.2,
+        "wind": (3.0, 0.0, 0.0),
+        "ground_contact": np.zeros(ticks, bool),
+    }
+    tables = {"vehicle": {"model": model}, **({"airframe": AIRFRAME} if scene is None else scene)}
+    result = synthetic_flights.flight(ticks, RATE, scene=tables, ground_truth=truth, **topics)
+    result.digest = "0" * 32
+    return result
+
+
+class Recorder:
+    """A viser scene that keeps what is added."""
+
+    def __init__(self):
+        self.nodes = {}
+
+    def __getattr__(self, kind):
+        def add(name, *arguments, **options):
+            handle = type("Node", (), {"name": name, "kind": kind, "arguments": arguments, **options})()
+            self.nodes[name if isinstance(name, str) else kind] = handle
+            return handle
+
+        return add
