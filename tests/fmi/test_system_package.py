@@ -80,6 +80,7 @@ def test_override_applies_to_package(folder: Path) -> None:
     assert len(truth(log)) == 251
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_fmu_in_package_takes_place_of_part(folder: Path, fmi: int) -> None:
     package = changed(folder / f"hover{fmi}.ssp", folder / f"foreign{fmi}.ssp", foreign("autopilot"))
@@ -123,6 +124,7 @@ def nested(package: Path, out: Path) -> Path:
     return out
 
 
+@pytest.mark.long
 def test_system_in_system_flies_like_flat_one(folder: Path, tmp_path: Path) -> None:
     flat = changed(folder / "hover3.ssp", tmp_path / "flat.ssp", foreign("autopilot"))
     package, log = nested(flat, tmp_path / "nested.ssp"), tmp_path / "nested.mcap"
@@ -151,6 +153,7 @@ def test_fmpy_flies_package(folder: Path) -> None:
     assert height[-1] == pytest.approx(1.35, abs=0.01)  # a Jacobi coupling: not the bits of the scene
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -187,6 +190,7 @@ def test_invalid_package_is_one_line(folder: Path, tmp_path: Path, changes: list
     assert not (tmp_path / "a.mcap").exists()
 
 
+@pytest.mark.long
 def test_damaged_package_is_one_line(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "bad.ssp"
     for content, message in ((b"no archive", "not a package"), (b"", "not a package")):
@@ -218,6 +222,7 @@ def test_scene_file_and_parameters_of_package_are_read(folder: Path, tmp_path: P
     assert "services.autopilot.start.parameters.autopilot.none: unknown variable" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

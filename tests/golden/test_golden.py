@@ -9,9 +9,10 @@ from tests.golden import digests, thinned_log
 from tests.golden.cases import CASES
 
 WHOLE = {"gyrostat_blocked", "os4_motors", "cooperative_load", "hover"}
+QUICK = {"gyrostat_blocked", "os4_motors", "hover"}
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in CASES])
 def test_scene_flies_to_its_digest(name):
     golden, setup = digests.read()[name], CASES[name].resolve()
     whole = name in WHOLE

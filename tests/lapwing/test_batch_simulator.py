@@ -46,6 +46,7 @@ def alone(k, volts, ticks, start=None):
     return pack_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
 
 
+@pytest.mark.long
 def test_members_are_stepped_side_by_side_in_vector_registers(batch):
     batch.reset()
     batch.step(motor_voltages=np.full((N, 4), 31.0))
@@ -81,6 +82,7 @@ def test_members_are_reset_alone(batch):
     assert np.array_equal(rows(batch.reset()), rows(first))
 
 
+@pytest.mark.long
 def test_body_rates_are_followed_and_thrust_holds_weight():
     batch = lapwing.BatchSimulator("hover", 4)
     batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=np.full(4, 330.0))
@@ -165,6 +167,7 @@ def test_member_that_turns_too_fast_is_marked():
     assert batch.reset([1]).valid.all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope", "bumps", "steps", "box and cylinder", "grid", "rotor table"])
 def test_members_over_any_terrain_have_bits_of_one_alone(ground):
     """Drops onto the terrain, each at its own place, so that some land on an edge or beside it."""

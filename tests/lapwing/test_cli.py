@@ -238,6 +238,7 @@ def test_output_to_full_device_is_one_line_and_no_traceback(arguments):
     assert result.stderr == "lapwing: standard output: cannot be written: no space left on device\n"
 
 
+@pytest.mark.long
 def test_full_output_device_leaves_log(tmp_path):
     lapwing.fly("hover", {"run.duration": 0.1})  # compiles: a notice of that would be the first that cannot be said
     log = tmp_path / "log.mcap"

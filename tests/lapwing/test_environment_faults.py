@@ -31,6 +31,7 @@ def test_log_that_is_device_is_rejected(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", ["fifo", "/dev/zero"])
 @pytest.mark.parametrize("command", ["check", "run"])
 def test_scene_that_is_device_is_rejected(tmp_path, command, device):
@@ -38,6 +39,7 @@ def test_scene_that_is_device_is_rejected(tmp_path, command, device):
     check_rejected(lapwing(tmp_path, command, device), f"{device}: is not a regular file")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("content", "message"),
     [('{"fileType": "Plan", "mission": {}}', "key 'items' is missing"), ("[1]", "wrong type"), ("{", "neither JSON")],
@@ -47,6 +49,7 @@ def test_broken_plan_is_rejected(tmp_path, content, message):
     check_rejected(lapwing(tmp_path, "run", HOVER, "--plan", "broken.plan"), message)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("preset", ['["0.1"]', "{a=1}", "3"])
 def test_sensor_preset_of_another_type_is_rejected(tmp_path, preset):
     result = lapwing(tmp_path, "check", "delivery_mission", "--set", f"sensors.imu.preset={preset}")
@@ -64,6 +67,7 @@ def test_deleted_working_directory_is_rejected(tmp_path):
     check_rejected(result, "working directory: does not exist")
 
 
+@pytest.mark.long
 def test_run_prints_in_ascii(tmp_path):
     result = lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "ä.mcap", PYTHONIOENCODING="ascii")
     assert result.returncode == 0, result.stderr
@@ -71,6 +75,7 @@ def test_run_prints_in_ascii(tmp_path):
     assert (tmp_path / "ä.mcap").exists()
 
 
+@pytest.mark.long
 @pytest.mark.skipif(os.geteuid() == 0 and not Path("/proc/self/fd").exists(), reason="needs /proc")
 def test_log_in_folder_without_write_access_is_rejected(tmp_path):
     check_rejected(lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "/proc/a.mcap"), "/proc/a.mcap: cannot be written")

@@ -91,6 +91,7 @@ def test_claimed_report_json_and_export_are_rejected_by_name(tmp_path):
     lock.close()
 
 
+@pytest.mark.long
 def test_campaign_rejects_folder_that_another_campaign_writes(tmp_path):
     arguments = ["campaign", SCENE, "--runs", "2", "--workers", "1", "--out", "c", "--set", "run.duration=1.0"]
     first = start(tmp_path, *arguments)

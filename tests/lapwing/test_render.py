@@ -27,6 +27,7 @@ def log(tmp_path_factory):
     return package.fly(scene).save(tmp_path_factory.mktemp("render") / "hover.mcap")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("words", "message"),
     [

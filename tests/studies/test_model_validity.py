@@ -85,6 +85,7 @@ def test_unlimited_motor_current_is_reported(peak, effects, count):
     assert all(warning.text.startswith(text) for warning in warnings)
 
 
+@pytest.mark.long
 def test_run_of_papers_mission_names_unlimited_current():
     """Mission of the paper as flown: 311 A, as found by hand from voltages and speeds."""
     flight = lapwing.fly("delivery_paper")

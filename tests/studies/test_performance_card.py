@@ -147,6 +147,7 @@ def test_four_rotors_cannot_lose_one():
     assert (row.computed, row.reason) == (None, "the 4 rotors cannot lose one")
 
 
+@pytest.mark.long
 def test_command_prints_loads_and_margins_in_hover(tmp_path):
     command = [sys.executable, "-m", "lapwing", "performance", "quad_x", "--json", str(tmp_path / "card.json")]
     result = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"})

@@ -282,6 +282,7 @@ def test_page_has_no_external_resources(page):
     assert not any("url(" in text or "@import" in text for text in page.texts)
 
 
+@pytest.mark.long
 def test_neither_matplotlib_nor_plotly_is_imported_for_page(log):
     code = (
         "import sys; from pathlib import Path; from lapwing.studies.flight_data import FlightData;"
@@ -430,6 +431,7 @@ def test_keys_in_which_two_scenes_differ():
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
+@pytest.mark.long
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
 def test_browser_draws_page_without_complaint(log, tmp_path):
     page = report(log)

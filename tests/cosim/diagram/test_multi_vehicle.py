@@ -54,6 +54,7 @@ def flown(setup):
     return fly(setup)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("vehicle", ["left", "right", "scout"])
 def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
     alone = fly(member(setup, vehicle))

@@ -54,6 +54,7 @@ def test_lands_on_bumps_on_three_feet_at_least(drone, place):
     assert np.sort(heights)[2] < 1e-5
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("x", "ground"), [(0.0, 0.0), (1.5, 0.1), (3.0, -0.3)])
 def test_lands_on_treads_of_stair(drone, x, ground):
     p = vehicle(drone, STAIR)

@@ -132,6 +132,7 @@ def ambient(x, p, t, y):
     return np.concatenate([tangent[0], turned, np.array(flatten(tangent))[6:]])
 
 
+@pytest.mark.long
 def test_ramp_and_pickup_between_ticks_are_exact():
     """0.1 s of a pack that has settled on the rollers, in ticks of 4 ms and steps of 1 ms."""
     x = settled = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)

@@ -109,6 +109,7 @@ def test_rotors_that_cannot_balance_vehicle_are_refused(B):
 ANY = st.floats(-30.0, 30.0)
 
 
+@pytest.mark.long
 @example(
     6.0, 1.0, 4.0, 1.0, ((1.0, 1.0, -1.0, 1.0), (1.0, 1.0, 1.0, -1.0), (1.0, -1.0, 1.0, 1.0), (1.0, -1.0, -1.0, -1.0))
 )  # possible with yaw only

@@ -97,6 +97,7 @@ def test_card_of_scene_and_its_autopilot_agree_on_hover(tmp_path):
     assert 0.85 * ideal < computed < ideal
 
 
+@pytest.mark.long
 def test_tuner_uses_nominal_airframe():
     scene = load("hover", X8)
     result, known = hover(scene), known_airframe(scene)

@@ -36,6 +36,7 @@ def velocity_fix(s, velocity, tick):
     return estimator.update_gps_velocity(P, s, (noise, noise, velocity + noise), 0.02**2, AGE, True)
 
 
+@pytest.mark.long
 def test_fix_before_impact_does_not_correct_impact():
     """The vehicle comes down at 1 m/s and stops; of that the accelerometer sees one reading."""
     s = velocity_fix(predicted(at_rest(), 100), 0.0, 0)

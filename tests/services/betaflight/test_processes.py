@@ -67,6 +67,7 @@ def lapwing(*arguments):
     return subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
 
 
+@pytest.mark.long
 def test_run_of_processes_reports_firmware_and_flies_again(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
     with Peer(first):
@@ -79,6 +80,7 @@ def test_run_of_processes_reports_firmware_and_flies_again(tmp_path):
     assert before == after
 
 
+@pytest.mark.long
 def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
     with Peer(first, lambda n, own: [own] if n < 900 else []):
@@ -89,6 +91,7 @@ def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
     assert len(Flight.read(log).truth) > 10
 
 
+@pytest.mark.long
 def test_firmware_ends_with_killed_run(tmp_path):
     """The kernel ends a firmware whose service was killed."""
     script = tmp_path / "firmware.py"
@@ -118,6 +121,7 @@ def _content(path):
     return path.read_text()
 
 
+@pytest.mark.long
 def test_each_vehicle_of_fleet_has_its_firmware(tmp_path):
     one, log = free_ports(), tmp_path / "flight.mcap"
     two = one + 4
@@ -133,6 +137,7 @@ def test_each_vehicle_of_fleet_has_its_firmware(tmp_path):
         assert {"left/firmware", "right/firmware"} <= set(read.metadata)
 
 
+@pytest.mark.long
 def test_two_firmwares_of_same_ports_are_rejected(tmp_path):
     scene = tmp_path / "fleet.toml"
     scene.write_text(FLEET.format(9002, 9002))

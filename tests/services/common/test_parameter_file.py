@@ -75,6 +75,7 @@ def test_final_parameters_of_run_are_saved(tmp_path):
     assert table(load(HOVER, [f"autopilot.parameters={saved}"]))["MPC_XY_CRUISE"].default == 3.5
 
 
+@pytest.mark.long
 def test_scene_without_autopilot_has_no_parameters(tmp_path):
     result = lapwing("parameters", "lapwing/scenes/os4_motors.toml")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)

@@ -122,6 +122,7 @@ def test_wind_of_fmu_acts_one_tick_after_its_sample(folder: Path) -> None:
     assert np.isnan(readings(log, "effect_wind_constant")[:, 2]).all()
 
 
+@pytest.mark.long
 def test_battery_of_fmu_supplies_motors_and_own_charge_is_counted(folder: Path) -> None:
     log = folder / "battery.mcap"
     fly(scene_with(folder, ALL, "open_circuit = 44.0, resistance = 0.004"), log)
@@ -203,6 +204,7 @@ def test_exported_plant_has_named_inputs(folder: Path) -> None:
     assert (voltage.causality, voltage.unit) == ("input", "V")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("outputs", "message"),
     [
@@ -232,6 +234,7 @@ def test_effect_input_cannot_be_read(folder: Path) -> None:
     assert "services.parts.inputs.current_0: unknown port 'effect.battery'" in done.stderr
 
 
+@pytest.mark.long
 def test_model_without_multirotor_effects_is_rejected(folder: Path) -> None:
     scene = folder / "gyrostat.toml"
     gyrostat = Path("lapwing/scenes/gyrostat_attitude.toml").resolve().read_text()

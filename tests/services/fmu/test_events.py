@@ -40,6 +40,7 @@ def height(t: float, e: float) -> tuple[float, float, int]:
         begin += 2.0 * v / G
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("step", [0.004, 0.3])
 def test_state_events_are_located_exactly(balls: dict, kind: tuple[int, str], step: float) -> None:
@@ -53,6 +54,7 @@ def test_state_events_are_located_exactly(balls: dict, kind: tuple[int, str], st
     assert bounces >= 2
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("step", [0.004, 0.03, 0.2])
 def test_time_events_occur_at_their_time(balls: dict, kind: tuple[int, str], step: float) -> None:
@@ -63,6 +65,7 @@ def test_time_events_occur_at_their_time(balls: dict, kind: tuple[int, str], ste
         assert count == math.floor(k * step / 0.05 + 1e-9)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", KINDS)
 def test_changed_inputs_act_from_begin_of_step(balls: dict, kind: tuple[int, str]) -> None:
     fmu = ball(balls[kind], kind[0])
@@ -72,6 +75,7 @@ def test_changed_inputs_act_from_begin_of_step(balls: dict, kind: tuple[int, str
     assert (h, v) == pytest.approx((1.015, 0.3), abs=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("integrator", ["euler", "rk4", "rkmk54", "rk8_renormalised"])
 def test_every_integrator_meets_accuracy(balls: dict, integrator: str) -> None:
     fmu = ball(balls[3, "ModelExchange"], 3, integrator=integrator, accuracy=1e-6)

@@ -76,6 +76,7 @@ def plain_log(folder: Path) -> Path:
     return log
 
 
+@pytest.mark.long
 def test_fmu_of_gain_one_does_not_change_flight(folder: Path, plain_log: Path) -> None:
     log = folder / "one.mcap"
     done = fly(scene_with(folder), log)
@@ -84,6 +85,7 @@ def test_fmu_of_gain_one_does_not_change_flight(folder: Path, plain_log: Path) -
     assert len(payloads(log, "/custom_sensor/actuators_motor")) == 251
 
 
+@pytest.mark.long
 def test_gain_changes_flight_and_resimulation_repeats_it(folder: Path, plain_log: Path) -> None:
     log = folder / "half.mcap"
     done = fly(scene_with(folder, start="gain = 0.5"), log)
@@ -97,6 +99,7 @@ def test_gain_changes_flight_and_resimulation_repeats_it(folder: Path, plain_log
     assert "is identical" in done.stdout
 
 
+@pytest.mark.long
 def test_changed_fmu_is_rejected_by_resimulation(folder: Path, tmp_path: Path) -> None:
     write_small_fmu(tmp_path / "small.fmu")
     log = tmp_path / "a.mcap"
@@ -107,6 +110,7 @@ def test_changed_fmu_is_rejected_by_resimulation(folder: Path, tmp_path: Path) -
     assert "the file differs from the one that was resolved" in done.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("fault", "message"),
     [
@@ -125,12 +129,14 @@ def test_fault_is_named_with_its_time_and_log_is_complete(folder: Path, fault: i
     assert len(payloads(log, "/ground_truth")) >= 124
 
 
+@pytest.mark.long
 def test_hanging_fmu_is_ended_after_its_timeout(folder: Path) -> None:
     done = fly(scene_with(folder, start=f"fault = {HANG}", timeout=1.0), folder / "hang.mcap")
     assert done.returncode == 1
     assert "services.motor: small.fmu: no answer for 1 s at t = 0.500 s" in done.stderr
 
 
+@pytest.mark.long
 def test_step_longer_than_stall_is_awaited_in_multi_process_mode(folder: Path, plain_log: Path) -> None:
     """A step of 4 s; a service that reports no wait counts as stalled after 2.5 s."""
     log = folder / "slow.mcap"
@@ -139,6 +145,7 @@ def test_step_longer_than_stall_is_awaited_in_multi_process_mode(folder: Path, p
     assert payloads(log, "/ground_truth") == payloads(plain_log, "/ground_truth")
 
 
+@pytest.mark.long
 def test_timeout_longer_than_stall_is_named_in_multi_process_mode(folder: Path) -> None:
     log = folder / "hang_processes.mcap"
     done = fly(scene_with(folder, start=f"fault = {HANG}", timeout=4.0), log, "--mode", "multi-process")
@@ -155,6 +162,7 @@ def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -238,6 +246,7 @@ start = { e = 0.8 }
 """
 
 
+@pytest.mark.long
 def test_model_exchange_flies_and_is_resimulated_from_log_alone(tmp_path: Path) -> None:
     write_event_fmu(tmp_path / "ball.fmu")
     scene = tmp_path / "ball.toml"
@@ -252,6 +261,7 @@ def test_model_exchange_flies_and_is_resimulated_from_log_alone(tmp_path: Path) 
     assert "is identical" in done.stdout
 
 
+@pytest.mark.long
 def test_port_of_longer_period_is_replaced(folder: Path) -> None:
     log = folder / "battery.mcap"
     battery = 'u = "battery.voltage"', '"battery.voltage" = "y"'
@@ -277,6 +287,7 @@ u = "{source}"
 """
 
 
+@pytest.mark.long
 def test_fmu_reads_output_of_other_fmu(folder: Path, plain_log: Path) -> None:
     scene, log = folder / "chain.toml", folder / "chain.mcap"
     chain = CHAIN.format(delay=0, source=COLUMN, outputs=f'"{COLUMN}" = "y"')
@@ -287,6 +298,7 @@ def test_fmu_reads_output_of_other_fmu(folder: Path, plain_log: Path) -> None:
     assert len(payloads(log, "/custom_sensor/fmu_first")) == 251
 
 
+@pytest.mark.long
 def test_crash_of_one_of_two_fmus_is_named_in_multi_process_mode(folder: Path) -> None:
     scene, log = folder / "two.toml", folder / "two.mcap"
     chain = CHAIN.format(delay=0, source=COLUMN, outputs=f'"{COLUMN}" = "y"')
@@ -299,6 +311,7 @@ def test_crash_of_one_of_two_fmus_is_named_in_multi_process_mode(folder: Path) -
     assert len(payloads(log, "/ground_truth")) >= 124
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("delay", [0, 1])
 def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> None:
     scene = folder / f"loop{delay}.toml"
@@ -362,6 +375,7 @@ def test_integrator_that_does_not_fit_is_rejected(tmp_path: Path, line: str, mes
     assert message in str(error.value)
 
 
+@pytest.mark.long
 def test_fmu_for_scheduled_execution_is_rejected(tmp_path: Path) -> None:
     write_event_fmu(tmp_path / "ball.fmu", kind="ScheduledExecution")
     done = fly(scene_with(tmp_path, "ball.fmu", "", '"trajectory.position_world.2" = "h"'), tmp_path / "a.mcap")

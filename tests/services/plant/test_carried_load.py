@@ -83,6 +83,7 @@ def hook(truth):
     return truth.position[-1] + rotate((w, x, y, z), (0.1, 0.0, -0.1))
 
 
+@pytest.mark.long
 def test_static_cables_carry_weight(flown):
     reported, left, right = (
         flown.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth")

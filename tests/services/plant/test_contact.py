@@ -36,6 +36,7 @@ def missing(flight):
     return mass * truth.acceleration - thrust - weight - reported.force.sum(axis=1)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
 def test_forces_sum_to_mass_times_acceleration(friction):
     """Bounces of the landing included, in which the ground does more than carry the weight."""
@@ -59,6 +60,7 @@ def test_each_foot_carries_quarter_at_rest():
     assert reported.position[100, :feet, 2] == pytest.approx(0.0, abs=1e-4)
 
 
+@pytest.mark.long
 def test_on_slope_friction_and_normal_forces_make_weight():
     flight = lapwing.fly("hover", {**STANDING, "environment.terrain.slope": [0.2, 0.0]})
     reported, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]

@@ -58,6 +58,7 @@ def flown(setup):
     return fly(setup)
 
 
+@pytest.mark.long
 def test_downwash_acts_only_below(flown):
     above, below = (flown.view(f"{name}/ground_truth").wind for name in ("above", "below"))
     assert -0.2 < above[-1, 2] < 0.0  # what the one below draws down

@@ -53,6 +53,7 @@ def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
     assert times[-1] > 2_000_000_000
 
 
+@pytest.mark.long
 def test_program_that_does_not_exist_is_named(tmp_path):
     log = tmp_path / "flight.mcap"
     flown = run(["/nowhere/px4"], "--log", str(log))
@@ -62,6 +63,7 @@ def test_program_that_does_not_exist_is_named(tmp_path):
     assert not log.exists()
 
 
+@pytest.mark.long
 def test_working_directory_that_does_not_exist_is_named(tmp_path):
     flown = run([sys.executable], "--set", f"autopilot.directory={tmp_path}/nowhere", "--log", str(tmp_path / "a.mcap"))
     assert flown.returncode == 2

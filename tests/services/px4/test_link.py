@@ -70,6 +70,7 @@ def at_start(peer):
             return message
 
 
+@pytest.mark.long
 def test_every_step_is_answered_with_its_time(link):
     def script(peer):
         first = at_start(peer)

@@ -188,6 +188,7 @@ def lapwing(*arguments, timeout=900):
     return subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("address", ["4560", "host:", "host:70000", ":4560"])
 def test_bad_address_is_named(address, tmp_path):
     done = lapwing("autopilot", "quad_x", "--px4-sim", address, "--log", str(tmp_path / "a.mcap"))

@@ -91,6 +91,7 @@ def test_sonar():
     assert white("sonar", p, p.noise_m_per_sqrt_hz, slice(1)) == pytest.approx(1.0, rel=0.05)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", GPSS)
 def test_gps(name):
     p = GPSS[name]

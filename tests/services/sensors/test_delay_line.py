@@ -74,6 +74,7 @@ def test_spikes_come_at_stated_rate():
     assert np.std((error[10:] - np.arange(10.0, 2000.0))[hit]) == pytest.approx(50.0, rel=0.15)
 
 
+@pytest.mark.long
 def test_fault_affects_only_its_channel():
     readings = fly({"kind": "bias", "channel": "gyro", "size": 1.0}, sensor="imu")
     assert readings[15].omega_body == (16.0, 1.0, 1.0)

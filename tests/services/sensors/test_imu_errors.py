@@ -77,12 +77,14 @@ def test_filter_response_equals_transfer_function():
         assert gain * np.exp(1j * phase) == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.long
 def test_filter_delays_slow_motion_by_its_group_delay():
     p = imu.Imu(rate=250.0, gyro_filter=LowPass(98.0, 2.8e-3))
     ramp = 3.0 * np.arange(400) / p.rate
     np.testing.assert_allclose(readings(p, spin=ramp)[200:, 2], ramp[200:] - 3.0 * 2.8e-3, atol=1e-12)
 
 
+@pytest.mark.long
 def test_matrix_and_response_to_g():
     rows = (1.01, 0.002, 0.0, -0.003, 1.0, 0.0, 0.0, 0.004, 0.99)
     p = imu.Imu(cross_coupling=CrossCoupling(gyro_matrix=rows))
@@ -122,6 +124,7 @@ def test_jitter_is_noise_in_proportion_to_slope():
     assert error.std() == pytest.approx(40.0 * 1e-4, rel=0.05)
 
 
+@pytest.mark.long
 def test_imbalance_aliases_and_filter_weakens_it():
     """500 rad/s is 79.6 Hz; blade passage at 159.2 Hz appears at 250 - 159.2 Hz."""
     v = RotorVibration(rotor_speed=500.0, damage_mg=100.0, blade_pass_mg=50.0, damage=Damage(0, 0, 1.0))
@@ -135,6 +138,7 @@ def test_imbalance_aliases_and_filter_weakens_it():
     assert spectrum(soft[:, 3], 250.0, frequency) == pytest.approx(expected, rel=2e-3)
 
 
+@pytest.mark.long
 def test_vibration_is_rectified():
     v = RotorVibration(rotor_speed=250.0, damage_mg=100.0, damage=Damage(0, 0, 1.0))
     c = CrossCoupling(rectification_mg_per_g2=20.0, gyro_rectification_dps_per_g2=0.5)

@@ -87,6 +87,7 @@ def test_constellation_repeats_after_stated_17_revolutions_in_10_days():
     assert np.degrees(np.arccos(np.clip((first * again).sum(axis=1), -1.0, 1.0))).max() < 1.0
 
 
+@pytest.mark.long
 def test_dilution_over_a_day_is_that_of_full_constellation():
     """At least 6 satellites, PDOP below 6: the bound that the GPS and Galileo performance standards use."""
     p = gps.Gps(constellation=GALILEO._replace(mask_deg=5.0), rate=1.0 / 600.0)
@@ -138,6 +139,7 @@ def test_position_jumps_when_a_satellite_leaves():
     assert steps[~changes].max() < 0.05
 
 
+@pytest.mark.long
 def test_building_hides_satellites_behind_it():
     """North of a wide, high box only satellites above its edge or in the northern half are left."""
     block = relief(boxes=[(0.0, -60.0, 400.0, 100.0, 0.0, 60.0)])
@@ -205,6 +207,7 @@ def test_long_range_of_satellite_overhead_lowers_fix():
         assert np.dot(fix.error, d[k]) < 0.0
 
 
+@pytest.mark.long
 def test_multipath_moves_fix_near_walls_only():
     street = relief(boxes=[(0.0, 14.0, 80.0, 8.0, 0.0, 20.0)])
     clean = gps.Gps(constellation=GALILEO)
@@ -221,6 +224,7 @@ def test_first_fix_comes_at_stated_time():
     assert [r.valid for r in result] == [k >= 26 for k in range(40)]
 
 
+@pytest.mark.long
 def test_rtk_solution_converges_and_falls_back():
     """Fixed; single once corrections are older than 2 s; then float for 3 s, then fixed; errors by their ratios."""
     rtk = Rtk(20.0, 100.0, 3.0, 5, 2.0, (Gap(1.0, 5.0),))
@@ -238,6 +242,7 @@ def test_rtk_solution_converges_and_falls_back():
     assert all(r.valid for r in result)
 
 
+@pytest.mark.long
 def test_rtk_is_float_with_few_satellites():
     p = gps.Gps(constellation=GALILEO, rtk=Rtk(satellites_min=24), fix_status=2)
     assert {r.fix for r in readings(p, 5)[1:]} == {GPS_FLOAT}

@@ -11,6 +11,7 @@ def height(to):
     return {"kind": "minimum_jerk", "to": to, "duration": 3.0}
 
 
+@pytest.mark.long
 def test_payload_is_released_only_on_ground():
     phases = [
         {"name": "climb", "z": height(1.0)},

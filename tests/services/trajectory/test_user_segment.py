@@ -64,6 +64,7 @@ def test_invalid_user_segment_is_named(tmp_path, keys, module, message):
         scene(tmp_path, module, **keys)
 
 
+@pytest.mark.long
 def test_command_resimulates_user_segment_from_log_alone(tmp_path):
     scene(tmp_path)
     keys = '{ kind = "line", module = "line", to = 1.0, rate = 0.5 }'

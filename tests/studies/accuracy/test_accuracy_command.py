@@ -95,6 +95,7 @@ def test_json_and_picture(tmp_path):
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.long
 def test_command_prints_choice(capsys, tmp_path, monkeypatch):
     problem = find("os4_experiment_1")
     few = [way for way in problem.ways if way.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled

@@ -42,6 +42,7 @@ def test_flight_in_memory_is_plants_own():
     assert abs(flown.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t
 
 
+@pytest.mark.long
 def test_errors_decrease_with_their_causes():
     scene = load(ROOT / "lapwing/scenes/cooperative_load.toml", ["run.duration=1.0", "solver.integrator=rkmk2"])
     parts = errors(scene)

@@ -24,6 +24,7 @@ def check(folder, *options, scene="hover"):
 SHORT = ("--set", "run.duration=1", "--set", "solver.step=0.004", "--set", "solver.integrator=rk4_renormalised")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("accuracy", "code", "verdict"), [(1e-4, 0, "met"), (1e-9, 1, "missed")])
 def test_command_compares_asked_and_got(tmp_path, accuracy, code, verdict):
     result = check(tmp_path, "--accuracy", "--json", "a.json", "--set", f"solver.accuracy={accuracy}", *SHORT)
@@ -41,12 +42,14 @@ def test_command_compares_asked_and_got(tmp_path, accuracy, code, verdict):
     assert (found["got"] > accuracy) == (code == 1)
 
 
+@pytest.mark.long
 def test_unloading_crate_meets_accuracy(tmp_path):
     """Bounces of the pack on rollers, door and ground: with a tenth of the accuracy for a substep it was 2.2e-3 off."""
     result = check(tmp_path, "--accuracy", "--set", "solver.accuracy=1e-4", scene="unload")
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "message"),
     [

@@ -119,6 +119,7 @@ def test_unreachable_accuracy_and_default_are_reported(measured, tmp_path):
         load(path, ["solver.accuracy=0"])
 
 
+@pytest.mark.long
 def test_measured_in_earnest_on_scene(monkeypatch, tmp_path):
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path)
     few = ["lie_euler", "erk4m", "rkmk4"]  # each is compiled

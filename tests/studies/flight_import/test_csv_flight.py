@@ -37,6 +37,7 @@ def read(path):
     return open_flight(path, "nanobench")
 
 
+@pytest.mark.long
 def test_columns_become_si_quantities(flight, path):
     result = read(path)
     assert result.position == pytest.approx(flight.position, abs=1e-8)

@@ -99,6 +99,7 @@ def test_setpoints_of_single_fields_are_read(tmp_path, flight, monkeypatch):
     assert np.array_equal(new, old)
 
 
+@pytest.mark.long
 def test_imported_setpoints_are_in_the_log(tmp_path, flight):
     write_ulog(tmp_path / "f.ulg", flight)
     done = run("import", tmp_path / "f.ulg", "--out", tmp_path / "f.mcap")
@@ -148,6 +149,7 @@ def run(*arguments):
     return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["f.bin", "f.tlog", "log07", "bag"])
 def test_command_imports_format(tmp_path, flight, name):
     WRITERS[name](tmp_path / name, flight)

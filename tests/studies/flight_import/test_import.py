@@ -23,6 +23,7 @@ def run(*arguments):
     return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
 
 
+@pytest.mark.long
 def test_imported_log_reads_back_as_same_recording(flight, tmp_path):
     write_log(tmp_path / "flight.mcap", flight, "flight.csv")
     result = open_flight(tmp_path / "flight.mcap")
@@ -34,6 +35,7 @@ def test_imported_log_reads_back_as_same_recording(flight, tmp_path):
     assert result.motor_voltage == pytest.approx(flight.motor_voltage[:n], abs=1e-9)
 
 
+@pytest.mark.long
 def test_command_writes_log_that_other_commands_read(flight, tmp_path):
     source, out = write_csv(tmp_path / "flight.csv", flight), tmp_path / "flight.mcap"
     done = run("import", source, "--mapping", "nanobench", "--out", out)
@@ -50,6 +52,7 @@ def broken(path, text):
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -76,6 +79,7 @@ def test_ulog_of_real_vehicle_has_consistent_axes(tmp_path):
     assert np.median(result.specific_force[:, 2]) == pytest.approx(9.8, abs=0.5)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("height", "share", "reason"), [(0.05, 1.0, "height changes by"), (2.0, 0.0, "motors do not run")]
 )

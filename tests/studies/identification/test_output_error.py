@@ -60,6 +60,7 @@ def test_parameter_without_influence_is_reported(plant):
     assert problem.solve(most=4).undetermined == ("airframe.motor.no_load_current",)
 
 
+@pytest.mark.long
 def test_grounded_flights_are_rejected(plant, tmp_path):
     (flight,) = simulated(plant, 2.0, [1])
     flight.position[:, 2] = 0.05
@@ -108,6 +109,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     assert not out.with_name("mine.toml.progress").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("free", "message"),
     [("airframe.motor.colour", "no number of this name"), ("a,a", "expected different keys")],

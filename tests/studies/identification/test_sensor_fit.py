@@ -63,6 +63,7 @@ def test_white_noise_has_no_bias_instability(flight):
     assert result["imu"]["gyro"]["bias_instability_deg_per_h"] == 0.0
 
 
+@pytest.mark.long
 def test_command_writes_tables_that_scene_takes(tmp_path):
     def run(*arguments):
         return subprocess.run(

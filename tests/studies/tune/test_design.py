@@ -41,6 +41,7 @@ def test_linear_model_is_one_derived_by_hand(model, airframe):
     assert model.thrust_slope == pytest.approx(2.0 * weight / model.rotor_speed, rel=1e-6)
 
 
+@pytest.mark.long
 def test_reaction_to_speeding_rotors_up_leads_yaw():
     """Theory, after eq. (4.31): the effect of a steady speed is the same, its rate adds I_r / (b_T dF/dOmega)."""
     scene = load_scene(SCENE.path.parent / "delivery_mission.toml")
@@ -99,6 +100,7 @@ def test_unstable_and_weak_gains_are_named(airframe):
 RACER = {"vehicle.airframe": str(Path(__file__).parent / "racer.toml"), "effects.gyroscopic_torque": {}}
 
 
+@pytest.mark.long
 def test_design_ignores_gains_of_other_vehicle():
     """Its yaw under the delivery drone's gains has a gain above 1 throughout, which once was an IndexError."""
     scene, output = load_scene("hover", RACER), []

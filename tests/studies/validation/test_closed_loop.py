@@ -27,6 +27,7 @@ def log(tmp_path_factory):
     return path
 
 
+@pytest.mark.long
 def test_own_setpoints_give_own_flight(log):
     flown = fly_setpoints(SCENE, open_flight(log))
     assert flown.time[-1] > 3.0
@@ -65,6 +66,7 @@ def test_recording_without_power_has_no_power_error():
     assert np.isnan(constant_velocity(flight, np.arange(20, 40), (1, 10)).power).all()
 
 
+@pytest.mark.long
 def test_command_overlays_closed_loop(log, tmp_path):
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
     done = lapwing("validate", SCENE, log, "--closed-loop", "--horizons", "50", "--json", out, "--report", page)

@@ -104,6 +104,7 @@ def run(*arguments):
     return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
 
 
+@pytest.mark.long
 def test_command_writes_errors_and_baselines(plant, tmp_path):
     paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 4.0, [1, 2, 3])]
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
@@ -120,6 +121,7 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     assert "Errors over the envelope" in page_text(page)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
