@@ -47,6 +47,38 @@ def test_unloading_crate_meets_accuracy(tmp_path):
     assert result.returncode == 0, result.stdout + result.stderr
 
 
+CLOSED_LOOP = ("--accuracy", "--set", "run.duration=8")
+NO_DIGITS = tuple(
+    word
+    for key in ("imu.gyro.resolution_dps", "imu.accelerometer.resolution_mg", "magnetometer.resolution_nt")
+    for word in ("--set", f"sensors.{key}=0")
+)
+
+
+@pytest.mark.parametrize(("accuracy", "code", "verdict"), [(1e-4, 0, "met"), (1e-9, 1, "missed")])
+def test_error_of_solver_is_told_from_digits_of_sensors(tmp_path, accuracy, code, verdict):
+    """A digit of a gyroscope is 2.7e-4 rad/s, whatever the step: only the error of the solver counts."""
+    options = (*CLOSED_LOOP, "--set", f"solver.accuracy={accuracy}", "--json", "a.json")
+    result = check(tmp_path, *options, scene="delivery_mission")
+    assert result.returncode == code, result.stdout + result.stderr
+    assert f"accuracy of the solver {verdict}: asked {accuracy:g}" in result.stdout
+    assert "closed loop" in result.stdout
+    found = json.loads((tmp_path / "a.json").read_text())
+    loop = found["closed_loop"]
+    assert max(quantity["error"] for quantity in loop["quantities"]) > 1e-4 > 1e-6 > found["got"]
+    assert loop["apart"]["error"] > 1e-4
+    if accuracy == 1e-4:
+        assert loop["signal"]["name"].startswith("imu.")
+        assert loop["true_difference"] < 0.1 * loop["signal"]["difference"]
+
+
+def test_closed_loop_meets_accuracy_without_digits(tmp_path):
+    options = (*CLOSED_LOOP, *NO_DIGITS, "--set", "solver.accuracy=1e-6")
+    result = check(tmp_path, *options, scene="delivery_mission")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "accuracy met: asked 1e-06" in result.stdout
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
