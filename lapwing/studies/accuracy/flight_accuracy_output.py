@@ -1,11 +1,13 @@
 """Accuracy of a scene's own flight as a table and as JSON."""
 
+import math
 from pathlib import Path
 
 from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.dynamics import integrators
 from lapwing.studies import json_file
 from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy, worst_of
 
@@ -26,9 +28,9 @@ def show(console: Console, result: FlightAccuracy) -> None:
 
 
 def _table(result: FlightAccuracy) -> Table:
-    fleet = len({quantity.vehicle for quantity in result.quantities}) > 1
+    fleet = _is_fleet(result)
     closed = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
-    table = Table(box=SIMPLE, pad_edge=False)
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if fleet and closed else (0, 1))  # within 80 columns
     names = ["quantity", "solver error" if closed else "largest error", "got / asked", "at (s)"]
     for name in [*names, *(["closed loop", "at (s)"] if closed else [])]:
         table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
@@ -79,10 +81,20 @@ def _closed_loop(result: FlightAccuracy) -> list[str]:
 
 
 def _remedy(result: FlightAccuracy) -> list[str]:
-    if result.met or result.step_selected:
+    """Return what to do about a missed accuracy."""
+    if result.met:
         return []
-    cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
-    return [f"{cause}; remove it, and a step is selected"]
+    cause = "solver.step: selected for gentle flight, and this one is not"
+    if not result.step_selected:
+        cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
+        if not _is_fleet(result):
+            return [f"{cause}; remove it, and a step is selected"]
+    count = math.ceil((result.worst.error / result.asked) ** (1.0 / integrators.get(result.integrator).ORDER))
+    return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:g}"]
+
+
+def _is_fleet(result: FlightAccuracy) -> bool:
+    return len({quantity.vehicle for quantity in result.quantities}) > 1
 
 
 def write_json(path: Path, result: FlightAccuracy) -> None:

@@ -66,7 +66,7 @@ def fly_parts(
     for number, start in enumerate(range(0, flown.tick, half)):
         stop = min(start + half, flown.tick)
         observe(start)
-        _restart(replicas[number % 2], recorded)
+        _restart(replicas[number % 2], recorded, start)
         for plant in (recorded, *replicas):
             plant.graph.advance(stop)
         spans[1 - number % 2].append(((start - 0.5) * interval, (stop - 0.5) * interval))
@@ -88,8 +88,15 @@ def _plant(flown: BlockDiagram, setup: RunConfig) -> _Plant:
     return _Plant(graph, service)
 
 
-def _restart(plant: _Plant, recorded: _Plant) -> None:
-    """Set the state of a plant to that of another one with the same blocks."""
+def _restart(plant: _Plant, recorded: _Plant, tick: int) -> None:
+    """Set the state of a plant before `tick` to that of another one with the same blocks.
+
+    Vehicles of a fleet act on each other by outputs of the tick before, which are part of the state.
+    """
     for own, other in zip(plant.service.parts, recorded.service.parts, strict=True):
         if isinstance(own, Block):
             write(own.state, read(other.state))
+    outputs = {port.name for part in plant.service.parts for port in part.outputs}
+    for late in {i for part in plant.service.parts for i in getattr(part, "inputs", ()) if i.port in outputs}:
+        for stamp in range(max(0, tick - late.delay), tick):
+            plant.graph.put_row(late.port, stamp, recorded.graph.row(late.port, stamp))

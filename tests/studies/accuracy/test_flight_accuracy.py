@@ -9,8 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from lapwing.studies.accuracy.flight_accuracy import differences
+from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy, Quantity, differences
+from lapwing.studies.accuracy.flight_accuracy_output import show
 
 ROOT = Path(__file__).parents[3]
 
@@ -77,6 +79,13 @@ def test_closed_loop_meets_accuracy_without_digits(tmp_path):
     result = check(tmp_path, *options, scene="delivery_mission")
     assert result.returncode == 0, result.stdout + result.stderr
     assert "accuracy met: asked 1e-06" in result.stdout
+
+
+@pytest.mark.parametrize(("error", "step"), [(4.1e-4, "0.002"), (1.5e-3, "0.002"), (1.7e-3, "0.00133333")])
+def test_missed_selection_names_step_of_fourth_order(capsys, error, step):
+    quantity = Quantity("a", "velocity", error, 1.0)
+    show(Console(), FlightAccuracy(1e-4, "rk4_renormalised", 0.004, 0.0005, True, 2.0, [quantity]))
+    assert f"--set solver.integrator=rk4_renormalised --set solver.step={step}\n" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

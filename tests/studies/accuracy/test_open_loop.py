@@ -5,9 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.services.common.ports import ImuReading, TrueState
 from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.accuracy import open_loop
 from lapwing.studies.accuracy.flight_accuracy import TOPICS, differences
 from lapwing.studies.accuracy.open_loop import fly_parts, inputs_of_plant
 from lapwing.studies.accuracy.sensitivity import first_signal, with_start_shifted
@@ -69,6 +72,25 @@ def test_shifted_start_differs_in_every_number(scene):
     for own, shifted in zip(motions(setup), motions(with_start_shifted(setup, 1e-8)), strict=True):
         a, b = (np.concatenate([np.ravel(part) for part in motion]) for motion in (own, shifted))
         np.testing.assert_allclose(b - a, 1e-8 * (1.0 + np.abs(a)), rtol=1e-6)
+
+
+def test_restart_includes_outputs_read_a_tick_later(monkeypatch):
+    """Vehicles of a fleet pull at each other with their states of the tick before, as in `carried_load`."""
+    port = Port("load", 0.0)
+
+    def plant(value):
+        part = Block("plant", None, value, (InputPort("load", 1), InputPort("actuators", 1)), (port,))
+        graph = BlockDiagram.__new__(BlockDiagram)
+        graph.ports, graph._rows = {"load": port}, {"load": np.full((8, 1), value)}
+        return open_loop._Plant(graph, Service("plant", [part], []))
+
+    states = []
+    monkeypatch.setattr(open_loop, "write", lambda cell, value: states.append((cell, value)))
+    monkeypatch.setattr(open_loop, "read", lambda cell: cell)
+    own, recorded = plant(1.0), plant(2.0)
+    open_loop._restart(own, recorded, 5)
+    assert states == [(1.0, 2.0)]
+    assert own.graph.ring("load")[:, 0].tolist() == [1.0, 1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0]
 
 
 def test_first_signal_is_earliest_beyond_limit():
