@@ -59,8 +59,8 @@ def fly_with_ports(
 
     See `fly` for arguments.
     """
-    graph, *rest = _flown(setup, only, no_operator, None, observe, every_port=True)
-    return FlightData.of_each(graph, *rest), graph
+    graph, _, failure, diverged = _flown(setup, only, no_operator, None, observe, every_port=True)
+    return FlightData.of_each(graph, only, failure, diverged), graph
 
 
 def _flown(
