@@ -1,7 +1,8 @@
 """Scenes listed, checked and precompiled; autopilot parameters."""
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import typer
 
@@ -14,7 +15,8 @@ from lapwing.cli.preflight import warn_of_gains, with_solver_selected
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
     from lapwing.cosim.scene import Scene
-    from lapwing.studies.flight_data import FlightData
+
+T = TypeVar("T")
 
 
 @app.command()
@@ -52,7 +54,7 @@ def check(
 ) -> None:
     """Validate a scene and show what it contains.
 
-    With --accuracy the exit code is 1 if the error is larger than solver.accuracy.
+    With --accuracy the exit code is 1 if the error of the solver is larger than solver.accuracy.
     """
     from lapwing.services.common.communication_schema import Communication
     from lapwing.services.common.run_schema import Run
@@ -84,22 +86,20 @@ def check(
 
 def _accuracy_met(scene: "Scene", step_selected: bool, json: Path | None) -> bool:
     """Print and write the error of the scene's flight. Return True if it is at most what the scene asks for."""
-    from lapwing.studies.accuracy import flight_accuracy
+    from lapwing.studies.accuracy import flight_accuracy, flight_accuracy_output
     from lapwing.studies.terminal import console
 
-    result = flight_accuracy.measure(scene, _fly_with_bar, step_selected)
-    flight_accuracy.show(console(), result)
+    result = flight_accuracy.measure(scene, _with_bar, step_selected)
+    flight_accuracy_output.show(console(), result)
     if json:
-        flight_accuracy.write_json(json, result)
-    return result.worst.error <= result.asked
+        flight_accuracy_output.write_json(json, result)
+    return result.met
 
 
-def _fly_with_bar(setup: "RunConfig", description: str) -> "list[FlightData]":
-    """Fly in this process, with a line of what is flown and a progress bar."""
+def _with_bar(setup: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
+    """Do work on a run in this process, with a line of what is flown and a progress bar."""
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.runs.work_progress import WorkProgress
-    from lapwing.studies.accuracy.flight_accuracy import TOPICS
-    from lapwing.studies.simulate import fly_each
 
     duration = setup.last_tick * setup.interval
     typer.echo(f"flying up to {duration:g} s: {description}")
@@ -109,7 +109,7 @@ def _fly_with_bar(setup: "RunConfig", description: str) -> "list[FlightData]":
             watch.stop()
             bar.show(tick * setup.interval)
 
-        return fly_each(setup, TOPICS, observe=observe)
+        return work(observe)
 
 
 @app.command()

@@ -52,12 +52,24 @@ def fly_each(
     return FlightData.of_each(*_flown(setup, only, no_operator, rows, observe))
 
 
+def fly_with_ports(
+    setup: RunConfig, only: Collection[Topic] | None = None, observe: Callable[[int], None] | None = None
+) -> tuple[list[FlightData], BlockDiagram]:
+    """Return the flights of all vehicles, and the block diagram at the end with the full history of all ports.
+
+    See `fly` for arguments.
+    """
+    graph, _, failure, diverged = _flown(setup, only, no_operator, None, observe, every_port=True)
+    return FlightData.of_each(graph, only, failure, diverged), graph
+
+
 def _flown(
     run: RunConfig | Scene,
     only: Collection[Topic] | None,
     operator: Operator,
     rows: dict[str, np.ndarray] | None,
     observe: Callable[[int], None] | None = None,
+    every_port: bool = False,
 ) -> tuple[BlockDiagram, Collection[Topic] | None, str, bool]:
     """Return (block diagram at the end, `only`, reason of an early end, True for a non-finite state)."""
     setup = run if isinstance(run, RunConfig) else resolve(run)
@@ -66,6 +78,8 @@ def _flown(
     selected = {
         wire.port for wire in wires if (wire.topic.recorded if only is None else template_topic(wire.topic) in only)
     }
+    if every_port:
+        selected = {port.name for service in services for part in service.parts for port in part.outputs}
     graph, failure, diverged = BlockDiagram(setup, services, PAGE, selected, rows), "", False
     try:
         look = setup.last_tick + 1 if observe is None else LOOK

@@ -63,6 +63,11 @@ class MultirotorState(NamedTuple):
     memory: tuple  # one tuple for each effect
 
 
+@always_inline
+def _never(layout, x, h):
+    return False
+
+
 class StateForm(NamedTuple):
     """The compiled functions of a class that stands for the motion in the state."""
 
@@ -70,6 +75,7 @@ class StateForm(NamedTuple):
     rate: Callable  # (drive, t, x) -> tangent of x
     held: Callable  # (drive, x) -> x after a step, brought back onto its constraints
     accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
+    switches: Callable = _never  # (layout, x, h) -> True if a force of the form can begin or end within h [s]
 
 
 FORMS = DispatchTable()

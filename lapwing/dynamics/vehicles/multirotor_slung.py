@@ -1,8 +1,9 @@
 """A multirotor that carries a point mass on a massless cable, under the effects of its scene (theory.md, section 1.5).
 
-A form of `multirotor`'s state. The cable is a spring with a damper that can pull and not push: it goes slack and taut
-again without an event to be found, and what it pulls with when it comes taut is bounded by its stiffness, where a rigid
-cable would need an impulse. A cable of steel or aramid is elastic, too; the price is a step that its frequency allows.
+A form of `multirotor`'s state. The cable is a spring with a damper that can pull and not push. What it pulls with when
+it comes taut is bounded by its stiffness, where a rigid cable would need an impulse. A cable of steel or aramid is
+elastic, too; the price is a step that its frequency allows. While the cable can come taut or slack, or the load touches
+the ground, steps are under error control as in ground contact.
 """
 
 import math
@@ -28,6 +29,7 @@ if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 GROUND_FREQUENCY, GROUND_DAMPING = 100.0, 0.7  # [rad/s], ratio of the load on the ground
+CLEARANCE = 1e-3  # [m] over the ground of a load that does not touch it within a step
 SLIDING, FRICTION = 0.05, 0.6  # [m/s] from which on the load slides with the whole coefficient of friction
 
 
@@ -133,7 +135,21 @@ def accelerations(drive, t, x):
     return tangent.vehicle.velocity_world, tangent.vehicle.omega_body
 
 
-FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations)
+@always_inline
+def switches(layout, x, h):
+    """Return True unless the cable stays taut and the load off the ground for h [s]."""
+    sling, v, load = layout.bodies, x.vehicle, x.load_velocity
+    R_world_body = rotation_matrix(v.attitude)
+    away = subtract(x.load_position, add(v.position_world, apply(R_world_body, sling.hook_body)))
+    hook_velocity = add(v.velocity_world, apply(R_world_body, cross(v.omega_body, sling.hook_body)))
+    distance = norm(away)
+    reach = 2.0 * abs(dot(away, subtract(load, hook_velocity))) / max(distance, sling.length)
+    height, _ = surface(sling.terrain, x.load_position[0], x.load_position[1])
+    slackens = distance - sling.length <= reach * (h + sling.damping / sling.stiffness)
+    return slackens or x.load_position[2] - height <= 2.0 * norm(load) * h + CLEARANCE
+
+
+FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations, switches)
 
 
 @always_inline

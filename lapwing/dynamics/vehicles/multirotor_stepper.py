@@ -37,6 +37,15 @@ def _step_inlined(method, drive, t, x, h):
     return lambda method, drive, t, x, h: held(drive, one_step(its_rate, drive, t, x, h))
 
 
+def _switches(layout, x, h):
+    raise NotImplementedError("compiled code only")
+
+
+@overload_for(_switches, inline=True)
+def _switches_of_form(layout, x, h):
+    return FORMS[x.instance_class].switches
+
+
 @always_inline
 def within(limit, voltage, _):
     """Clamp a voltage [V] to the controllers' range."""
@@ -211,10 +220,11 @@ def steps(method, drive, x, start, end, h, first, n):
         until = min(stop, end)
         layout, airborne = p.layout, _airborne(p, body, memory, voltage)
         for i in range(first, n):
-            if hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
+            switches = _switches(layout, x, h)
+            if not switches and hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
                 x = _step(method, airborne, start + i * h, x, h)
                 continue
-            if not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
+            if switches or not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
                 drive = MultirotorDrive(p, body, memory, voltage)
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break

@@ -18,7 +18,7 @@ from lapwing.kernels.codegen import map_tuple
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.common.vehicle_schema import Vehicle, gravity
 from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.integrate import SAMPLES
@@ -66,7 +66,12 @@ def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
     """Return (parameters, initial state) of a scene with a multirotor of one or more bodies, airborne and rotating."""
     form, p = model(scene).described(scene)
     start = ((0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p), (3.0, 1.0, -0.5), (0.4, -0.6, 0.3))
-    return p, form.initial_state(p, *start)
+    state = form.initial_state(p, *start)
+    if form is multirotor_slung:  # stretched by the load: the cable stays taut, and no step is split
+        sling, (x, y, z) = p.layout.bodies, state.motion.load_position
+        load = (x, y, z - sling.load_mass * gravity(scene) / sling.stiffness)
+        state = state._replace(motion=state.motion._replace(load_position=load))
+    return p, state
 
 
 def model(scene: Scene) -> Any:

@@ -9,8 +9,10 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
-from lapwing.studies.accuracy.flight_accuracy import differences
+from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy, Quantity, differences
+from lapwing.studies.accuracy.flight_accuracy_output import show
 
 ROOT = Path(__file__).parents[3]
 
@@ -24,6 +26,7 @@ def check(folder, *options, scene="hover"):
 SHORT = ("--set", "run.duration=1", "--set", "solver.step=0.004", "--set", "solver.integrator=rk4_renormalised")
 
 
+@pytest.mark.long
 @pytest.mark.long
 @pytest.mark.parametrize(("accuracy", "code", "verdict"), [(1e-4, 0, "met"), (1e-9, 1, "missed")])
 def test_command_compares_asked_and_got(tmp_path, accuracy, code, verdict):
@@ -47,6 +50,47 @@ def test_unloading_crate_meets_accuracy(tmp_path):
     """Bounces of the pack on rollers, door and ground: with a tenth of the accuracy for a substep it was 2.2e-3 off."""
     result = check(tmp_path, "--accuracy", "--set", "solver.accuracy=1e-4", scene="unload")
     assert result.returncode == 0, result.stdout + result.stderr
+
+
+CLOSED_LOOP = ("--accuracy", "--set", "run.duration=8")
+NO_DIGITS = tuple(
+    word
+    for key in ("imu.gyro.resolution_dps", "imu.accelerometer.resolution_mg", "magnetometer.resolution_nt")
+    for word in ("--set", f"sensors.{key}=0")
+)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("accuracy", "code", "verdict"), [(1e-4, 0, "met"), (1e-9, 1, "missed")])
+def test_error_of_solver_is_told_from_digits_of_sensors(tmp_path, accuracy, code, verdict):
+    """A digit of a gyroscope is 2.7e-4 rad/s, whatever the step: only the error of the solver counts."""
+    options = (*CLOSED_LOOP, "--set", f"solver.accuracy={accuracy}", "--json", "a.json")
+    result = check(tmp_path, *options, scene="delivery_mission")
+    assert result.returncode == code, result.stdout + result.stderr
+    assert f"accuracy of the solver {verdict}: asked {accuracy:g}" in result.stdout
+    assert "closed loop" in result.stdout
+    found = json.loads((tmp_path / "a.json").read_text())
+    loop = found["closed_loop"]
+    assert max(quantity["error"] for quantity in loop["quantities"]) > 1e-4 > 1e-6 > found["got"]
+    assert loop["apart"]["error"] > 1e-4
+    if accuracy == 1e-4:
+        assert loop["signal"]["name"].startswith("imu.")
+        assert loop["true_difference"] < 0.1 * loop["signal"]["difference"]
+
+
+@pytest.mark.long
+def test_closed_loop_meets_accuracy_without_digits(tmp_path):
+    options = (*CLOSED_LOOP, *NO_DIGITS, "--set", "solver.accuracy=1e-6")
+    result = check(tmp_path, *options, scene="delivery_mission")
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "accuracy met: asked 1e-06" in result.stdout
+
+
+@pytest.mark.parametrize(("error", "step"), [(4.1e-4, "0.002"), (1.5e-3, "0.002"), (1.7e-3, "0.00133333")])
+def test_missed_selection_names_step_of_fourth_order(capsys, error, step):
+    quantity = Quantity("a", "velocity", error, 1.0)
+    show(Console(), FlightAccuracy(1e-4, "rk4_renormalised", 0.004, 0.0005, True, 2.0, [quantity]))
+    assert f"--set solver.integrator=rk4_renormalised --set solver.step={step}\n" in capsys.readouterr().out
 
 
 @pytest.mark.long

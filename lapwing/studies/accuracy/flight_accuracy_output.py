@@ -1,0 +1,102 @@
+"""Accuracy of a scene's own flight as a table and as JSON."""
+
+import math
+from pathlib import Path
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Table
+
+from lapwing.dynamics import integrators
+from lapwing.studies import json_file
+from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy, worst_of
+
+
+def show(console: Console, result: FlightAccuracy) -> None:
+    """Print the errors as one table, and what they mean."""
+    lines = [
+        f"{result.integrator}, step {1e3 * result.step:g} ms, against steps of {1e3 * result.reference_step:g} ms; "
+        f"{result.duration:g} s, errors relative to 1 + size",
+        _table(result),
+        *_meaning(result),
+        _verdict(result),
+        *_closed_loop(result),
+        *_remedy(result),
+    ]
+    for line in lines:
+        console.print(line, highlight=False, soft_wrap=True)
+
+
+def _table(result: FlightAccuracy) -> Table:
+    fleet = _is_fleet(result)
+    closed = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if fleet and closed else (0, 1))  # within 80 columns
+    names = ["quantity", "solver error" if closed else "largest error", "got / asked", "at (s)"]
+    for name in [*names, *(["closed loop", "at (s)"] if closed else [])]:
+        table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
+    for q in result.quantities:
+        label = f"{q.vehicle}: {q.name}" if fleet else q.name
+        cells = [label, f"{q.error:.1e}", f"{q.error / result.asked:.2g}", f"{q.time:.3f}"]
+        if closed:
+            other = closed[q.vehicle, q.name]
+            cells += [f"{other.error:.1e}", f"{other.time:.3f}"]
+        table.add_row(*cells)
+    return table
+
+
+def _meaning(result: FlightAccuracy) -> list[str]:
+    """Return the meaning of the columns, in a table that has both errors."""
+    if result.closed_loop is None:
+        return []
+    return [
+        f"solver error: each {result.part:g} s of the flight again with finer steps, from its own states and under its "
+        "own motor commands",
+        "closed loop: the whole flight again with finer steps, with sensors and autopilot",
+    ]
+
+
+def _verdict(result: FlightAccuracy) -> str:
+    what = "accuracy of the solver" if result.closed_loop else "accuracy"
+    verdict, worst = "met" if result.met else "missed", result.worst
+    return f"{what} {verdict}: asked {result.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)"
+
+
+def _closed_loop(result: FlightAccuracy) -> list[str]:
+    """Return why the closed loop differs by more than the accuracy."""
+    if result.closed_loop is None:
+        return []
+    loop = result.closed_loop
+    worst, apart = worst_of(loop.quantities), loop.apart
+    lines = [
+        f"closed loop: {worst.error:.1e} ({worst.name}, {worst.time:.3f} s), made by sensors and autopilot: starts "
+        f"{loop.start_apart:g} apart differ by {apart.error:.1e} ({apart.name}, {apart.time:.3f} s) with the same steps"
+    ]
+    if loop.signal:
+        name, difference, time = loop.signal
+        lines.append(
+            f"first signal that differs by more than {result.asked:g}: {name}, by {difference:.1e} at {time:.3f} s, "
+            f"where the true state differs by {loop.true_difference:.1e}"
+        )
+    return lines
+
+
+def _remedy(result: FlightAccuracy) -> list[str]:
+    """Return what to do about a missed accuracy."""
+    if result.met:
+        return []
+    cause = "solver.step: selected for gentle flight, and this one is not"
+    if not result.step_selected:
+        cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
+        if not _is_fleet(result):
+            return [f"{cause}; remove it, and a step is selected"]
+    count = math.ceil((result.worst.error / result.asked) ** (1.0 / integrators.get(result.integrator).ORDER))
+    return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:g}"]
+
+
+def _is_fleet(result: FlightAccuracy) -> bool:
+    return len({quantity.vehicle for quantity in result.quantities}) > 1
+
+
+def write_json(path: Path, result: FlightAccuracy) -> None:
+    """Write the errors."""
+    json_file.write_json(path, {**result._asdict(), "got": result.worst.error, "worst": result.worst})

@@ -1,0 +1,105 @@
+"""Sensitivity of a closed loop: what its sensors and its autopilot make of a difference, however small.
+
+A digit of a sensor, a threshold or a change of mode turns any difference into one of a digit or a tick. Two flights
+with the same solver whose starts differ by a small share of the accuracy show it without any error of a solver.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import PerVehicle, RunConfig, ServiceConfig
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.tick_schedule import LATCHED
+from lapwing.kernels.row_packing import columns
+from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
+from lapwing.services.process_table import CLOCK_OWNER
+
+SHARE = 1e-4  # of the accuracy, that the starts differ by
+LEAST = 1e-12  # [1] of that difference, above round-off
+
+
+class Signal(NamedTuple):
+    """A number that a service outputs, at the moment at which it first differs between two flights."""
+
+    name: str
+    difference: float  # relative to 1 + size
+    time: float  # [s]
+
+
+def start_difference(accuracy: float) -> float:
+    """Return the difference between two starts, relative to 1 + size, for an accuracy."""
+    return max(SHARE * accuracy, LEAST)
+
+
+def with_start_shifted(setup: RunConfig, apart: float) -> RunConfig:
+    """Return a run configuration in which each number x of the vehicles' initial motions is apart (1 + |x|) larger."""
+    plant = setup.services[CLOCK_OWNER]
+    if isinstance(plant.parameters, PerVehicle):
+        vehicles, configs = plant.parameters
+        plant = plant._replace(
+            parameters=PerVehicle(vehicles, tuple(_shifted_service(each, apart) for each in configs))
+        )
+    else:
+        plant = _shifted_service(plant, apart)
+    return setup._replace(services={**setup.services, CLOCK_OWNER: plant})
+
+
+def _shifted_service(service: ServiceConfig, apart: float) -> ServiceConfig:
+    start = service.parameters.start
+    if isinstance(start, MultirotorPlantState):
+        shifted = start._replace(vehicle=start.vehicle._replace(motion=_shifted(start.vehicle.motion, apart)))
+    else:
+        shifted = _shifted(start, apart)
+    return service._replace(parameters=service.parameters._replace(start=shifted))
+
+
+def _shifted(tree: Any, apart: float) -> Any:
+    if isinstance(tree, tuple):
+        items = [_shifted(item, apart) for item in tree]
+        return type(tree)(*items) if hasattr(tree, "_fields") else tuple(items)
+    return tree + apart * (1.0 + abs(tree)) if isinstance(tree, float) else tree
+
+
+def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | None:
+    """Return the first output of a service other than the plant that differs by more than `limit`.
+
+    Args:
+        a: finished run with the full history of all ports.
+        b: a similar run.
+        limit: relative to 1 + size.
+    """
+    first: Signal | None = None
+    for service in a.services:
+        for port in (port for part in service.parts for port in part.outputs):
+            if service.name == CLOCK_OWNER or port.period == LATCHED:
+                continue
+            pair = [columns(port.like, graph.history(port.name, port.period)) for graph in (a, b)]
+            for name, one, other in _paired(port.name, *pair):
+                signal = _first(name, one, other, limit, port.period * a.setup.interval)
+                if signal and (first is None or signal.time < first.time):
+                    first = signal
+    return first
+
+
+def _paired(name: str, a: Any, b: Any) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """Yield the name and the columns of each number in two trees."""
+    if isinstance(a, tuple):
+        names = [f".{field}" for field in a._fields] if hasattr(a, "_fields") else [f"[{i}]" for i in range(len(a))]
+        for suffix, one, other in zip(names, a, b, strict=True):
+            yield from _paired(name + suffix, one, other)
+    else:
+        n = min(len(a), len(b))
+        yield name, a[:n].reshape(n, -1), b[:n].reshape(n, -1)
+
+
+def _first(name: str, a: np.ndarray, b: np.ndarray, limit: float, period: float) -> Signal | None:
+    same = (a == b) | (np.isnan(a) & np.isnan(b))
+    with np.errstate(invalid="ignore"):
+        difference = np.where(same, 0.0, np.abs(a - b) / (1.0 + np.abs(b)))
+    difference = np.nan_to_num(difference, nan=np.inf)
+    if not (difference > limit).any():
+        return None
+    row = int((difference > limit).any(axis=1).argmax())
+    return Signal(name, float(difference[row].max()), row * period)
