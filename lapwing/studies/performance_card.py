@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vehicles import hover_loads, performance
 from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
 from lapwing.services.autopilot.allocation import (
@@ -107,7 +108,7 @@ def card(subject: Path) -> list[Row]:
 
 def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
     try:
-        tables = tomllib.loads(subject.read_text(encoding="utf-8"))
+        tables = tomllib.loads(read_text(subject))
     except (OSError, ValueError):
         tables = {}
     if "rotors" in tables:  # what no scene has
