@@ -43,6 +43,19 @@ def _check_working_directory() -> None:
         raise ValueError("working directory: does not exist; change to another folder") from None
 
 
+def _check_encoding() -> None:
+    """Raise ValueError for a name that no log or page could contain, before a flight is lost with it."""
+    for what, text in (("working directory", os.getcwd()), *(("argument", each) for each in sys.argv[1:])):
+        try:
+            text.encode()
+        except UnicodeEncodeError:
+            encoding = sys.getfilesystemencoding()
+            shown = text.encode("ascii", "backslashreplace").decode()
+            raise ValueError(
+                f"{what} {shown}: not valid {encoding}; use another name, or a UTF-8 locale (LC_ALL=C.UTF-8)"
+            ) from None
+
+
 def _check_open_files() -> None:
     """Raise ValueError if so few files may be open that libraries end the process."""
     limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
@@ -71,6 +84,7 @@ def main() -> None:
     """Run the command of the command line."""
     with user_errors(), checked_output():
         _check_working_directory()
+        _check_encoding()
         _check_open_files()
         from lapwing.cosim.processes.gc_tuning import relax_gc
         from lapwing.services.common import foreign_code

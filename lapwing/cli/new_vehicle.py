@@ -88,11 +88,14 @@ def write_vehicle(
             known.add(figure.name)
         values[figure.name] = guess if value is None else value
         figure.check(values[figure.name])
-    thrust_to_weight = thrust_over_weight(airframe_of(values))
-    if thrust_to_weight <= 1.0:
-        raise ValueError(
-            f"{name} cannot hover: its thrust is {thrust_to_weight:.2f} times its weight; expected more than 1"
-        )
+    try:
+        thrust_to_weight = thrust_over_weight(airframe_of(values))
+        if thrust_to_weight <= 1.0:
+            raise ValueError(
+                f"{name} cannot hover: its thrust is {thrust_to_weight:.2f} times its weight; expected more than 1"
+            )
+    except ValueError as error:  # a remark about a unit may name the cause
+        raise ValueError("; ".join([str(error), *remarks])) from None
     path.parent.mkdir(exist_ok=True)
     path.write_text(written(name, values, known), encoding="utf-8")
     warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vehicles import hover_loads, performance
 from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
 from lapwing.services.autopilot.allocation import (
@@ -71,6 +72,16 @@ _SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
     "maximum tilt": (performance.maximum_tilt, "deg", math.pi / 180.0),
     "maximum speed": (performance.maximum_speed, "m/s", 1.0),
 }
+# figures that are false if the rotors take too little power
+_OF_POWER = {
+    "hover power",
+    "hover current",
+    "motor current in hover",
+    "ESC margin in hover",
+    "battery margin in hover",
+    "hover time",
+    "maximum range",
+}
 
 
 def card(subject: Path) -> list[Row]:
@@ -83,11 +94,13 @@ def card(subject: Path) -> list[Row]:
         ValueError: the file is neither, or the rotor thrust is undefined.
     """
     vehicle, rotor = _vehicle(subject)
-    rows = []
+    rows, fault = [], hover_loads.power_fault(vehicle, rotor)
     for name, (figure, unit, size) in _SHOWN.items():
         stated = getattr(vehicle.published, name.replace(" ", "_"), None)
         computed, reason = None, stated.reason if stated else ""
         try:
+            if fault and name in _OF_POWER:
+                raise ValueError(fault)
             value = figure(vehicle, rotor=rotor)
             computed = (value[0] if isinstance(value, tuple) else value) / size
         except ValueError as lacking:
@@ -107,7 +120,7 @@ def card(subject: Path) -> list[Row]:
 
 def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
     try:
-        tables = tomllib.loads(subject.read_text(encoding="utf-8"))
+        tables = tomllib.loads(read_text(subject))
     except (OSError, ValueError):
         tables = {}
     if "rotors" in tables:  # what no scene has

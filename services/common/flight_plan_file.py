@@ -6,12 +6,14 @@ the scene's home. Altitudes of frame 3 are above the resting vehicle, those of f
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
+from lapwing.dynamics.input_file import read_text
 from lapwing.messages import MissionItem, OperatorCommand, Vector3
 
 OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false"]  # scene overrides for flying a plan
@@ -58,7 +60,7 @@ def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -
         ValueError: (one line) the file is missing, has another format, or contains an unsupported item.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_text(path)
     except OSError as error:
         raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:
@@ -105,12 +107,13 @@ def _waypoints(text: str, datum: _Datum) -> tuple[list[Any], list[Any], list[Any
     rows = [line.split() for line in text.splitlines()[1:] if line.strip()]
     items = []
     for number, row in enumerate(rows):
-        if len(row) != 12:
-            raise ValueError(f"item {number}: expected 12 columns, got {len(row)}")
-        place = [float(v) for v in row[8:11]]
-        if number == 0 and row[3] == "16" and row[2] == "0":
-            continue  # the first row is home by convention
-        items.append(_item(number, int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place, datum))
+        with _entry(f"item {number}"):
+            if len(row) != 12:
+                raise ValueError(f"expected 12 columns, got {len(row)}")
+            place = [float(v) for v in row[8:11]]
+            if number == 0 and row[3] == "16" and row[2] == "0":
+                continue  # the first row is home by convention
+            items.append(_item(int(row[3]), int(row[2]), [float(v) for v in row[4:8]], place, datum))
     return [_jump_back(item, len(rows) - len(items)) for item in items], [], []
 
 
@@ -124,36 +127,59 @@ def _plan(data: dict, datum: _Datum) -> tuple[list[Any], list[Any], list[Any]]:
         raise ValueError('expected "fileType": "Plan"')
     items, numbers = [], {}
     for number, raw in enumerate(data["mission"]["items"]):
-        if raw.get("type") != "SimpleItem":
-            raise ValueError(f"item {number}: expected a SimpleItem, got {raw.get('type')}")
-        params = [math.nan if v is None else float(v) for v in raw["params"]]
-        numbers[raw.get("doJumpId", number + 1)] = number
-        items.append(_item(number, raw["command"], raw["frame"], params[:4], params[4:7], datum))
-    items = [
-        i._replace(values=(float(numbers[int(i.values[0])]), i.values[1])) if i.action == "jump" else i for i in items
-    ]
-    fence = data.get("geoFence", {})
+        with _entry(f"item {number}"):
+            if raw.get("type") != "SimpleItem":
+                raise ValueError(f"expected a SimpleItem, got {raw.get('type')}")
+            params = [math.nan if v is None else float(v) for v in raw["params"]]
+            numbers[raw.get("doJumpId", number + 1)] = number
+            items.append(_item(raw["command"], raw["frame"], params[:4], params[4:7], datum))
+    for number, item in enumerate(items):
+        if item.action == "jump":
+            target, times = item.values
+            if target not in numbers:
+                raise ValueError(f"item {number}: jumps to {target:g}, which no item has as doJumpId")
+            items[number] = item._replace(values=(float(numbers[target]), times))
+    with _entry("geoFence"):
+        shapes = _fence(data.get("geoFence", {}), datum)
+    with _entry("rallyPoints"):
+        points = data.get("rallyPoints", {}).get("points", ())
+        rally = [_item_of(datum, "rally", x, y, datum.ground + z) for x, y, z in points]
+    return items, shapes, rally
+
+
+@contextmanager
+def _entry(where: str) -> Iterator[None]:
+    """Name the entry of a plan in the ValueError about its content."""
+    try:
+        yield
+    except KeyError as error:
+        raise ValueError(f"{where}: key {error} is missing; {EXPECTED}") from None
+    except (TypeError, IndexError, AttributeError, OverflowError):
+        raise ValueError(f"{where}: wrong type or length; {EXPECTED}") from None
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from None
+
+
+def _fence(fence: dict, datum: _Datum) -> list[Any]:
+    """Return the items of a geofence's circles and polygons."""
     shapes = [_item_of(datum, "fence_circle_in" if c["inclusion"] else "fence_circle_out", *c["circle"]["center"],
                        radius=float(c["circle"]["radius"])) for c in fence.get("circles", ())]  # fmt: skip
     for polygon in fence.get("polygons", ()):
         action = "fence_inclusion" if polygon["inclusion"] else "fence_exclusion"
         count = (float(len(polygon["polygon"])),)
         shapes += [_item_of(datum, action, *corner, values=count) for corner in polygon["polygon"]]
-    rally = [
-        _item_of(datum, "rally", x, y, datum.ground + z) for x, y, z in data.get("rallyPoints", {}).get("points", ())
-    ]
-    return items, shapes, rally
+    return shapes
 
 
-def _item(number: int, command: int, frame: int, params: list[float], place: list[float], datum: _Datum) -> Any:
+def _item(command: int, frame: int, params: list[float], place: list[float], datum: _Datum) -> Any:
     if command not in _ACTIONS:
-        raise ValueError(f"item {number}: unknown command {command}; known: {', '.join(map(str, _ACTIONS))}")
+        raise ValueError(f"unknown command {command}; known: {', '.join(map(str, _ACTIONS))}")
     if frame not in (*_ABOVE_SEA, *_ABOVE_HOME, _NO_PLACE):
-        raise ValueError(f"item {number}: unknown frame {frame}; expected 0, 2 or 3")
+        raise ValueError(f"unknown frame {frame}; expected 0, 2 or 3")
     action, fields = _ACTIONS[command]
     latitude, longitude, height = place
     if not (abs(latitude) <= 90.0 and abs(longitude) <= 180.0) and action == "waypoint":
-        raise ValueError(f"item {number}: expected a latitude and a longitude, got {latitude:g}, {longitude:g}")
+        raise ValueError(f"expected a latitude and a longitude, got {latitude:g}, {longitude:g}")
     if frame in _ABOVE_SEA:
         height -= datum.home.height
     else:

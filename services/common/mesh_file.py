@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lapwing.dynamics.input_file import read_bytes
 from lapwing.services.common import gltf_file
 
 SUFFIXES = (".stl", ".obj", *gltf_file.SUFFIXES)
@@ -31,7 +32,7 @@ def read(path: Path) -> Mesh:
     """
     if path.stat().st_size > LARGEST:
         raise ValueError(f"{path.stat().st_size / 1e6:.0f} MB; expected at most {LARGEST / 1e6:.0f} MB")
-    data = path.read_bytes()
+    data = read_bytes(path)
     suffix = path.suffix.lower()
     corners = (
         gltf_file.corners_of(data) if suffix in gltf_file.SUFFIXES else _obj(data) if suffix == ".obj" else _stl(data)

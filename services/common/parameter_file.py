@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from lapwing.cosim.scene import KeyOrigin, SceneError
+from lapwing.dynamics.input_file import read_text
 from lapwing.services.common.autopilot_parameters import Parameter
 
 _INT32, _REAL32 = 6, 9  # MAV_PARAM_TYPE
@@ -21,7 +22,7 @@ def read(path: Path) -> dict[str, float]:
         ValueError: (one line) the file cannot be read or a line is invalid.
     """
     try:
-        return parse(path.read_text(encoding="utf-8"), path)
+        return parse(read_text(path), path)
     except OSError as error:
         raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:

@@ -10,6 +10,7 @@ import sqlite3
 import time
 from pathlib import Path
 
+from lapwing.dynamics.input_file import read_text
 from lapwing.services.common.mavlink.dialect import mavlink
 
 TIME_STAMPS = "mavlink_time_stamps.sqlite"
@@ -28,7 +29,7 @@ def read_key(path: Path) -> bytes:
         ValueError: the file cannot be read, or holds no passphrase.
     """
     try:
-        text = path.read_text(encoding="utf-8").strip()
+        text = read_text(path).strip()
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", "not a text")
         raise ValueError(f"--mavlink-key {path}: cannot be read: {reason}; expected a text file") from None

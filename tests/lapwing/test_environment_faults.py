@@ -39,7 +39,25 @@ def test_scene_that_is_device_is_rejected(tmp_path, command, device):
     check_rejected(lapwing(tmp_path, command, device), f"{device}: is not a regular file")
 
 
-@pytest.mark.long
+@pytest.mark.parametrize("device", ["fifo", "/dev/zero"])
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["info"],
+        ["report"],
+        ["performance"],
+        ["run", HOVER, "--plan"],
+        ["campaign", HOVER, "--sweep"],
+        ["run", HOVER, "--mavlink", "udpout:127.0.0.1:9", "--mavlink-key"],
+        ["import", "--out", "a.mcap"],
+    ],
+)
+def test_input_file_that_is_device_is_rejected(tmp_path, command, device):
+    os.mkfifo(tmp_path / "fifo")
+    check_rejected(lapwing(tmp_path, *command, device), f"{device}: ")
+    assert [path.name for path in tmp_path.iterdir()] == ["fifo"]
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [('{"fileType": "Plan", "mission": {}}', "key 'items' is missing"), ("[1]", "wrong type"), ("{", "neither JSON")],
@@ -67,7 +85,27 @@ def test_deleted_working_directory_is_rejected(tmp_path):
     check_rejected(result, "working directory: does not exist")
 
 
-@pytest.mark.long
+@pytest.mark.parametrize("arguments", [["--log", b"\xff.mcap"], ["--report", b"\xff.html"], ["--json", b"\xff.json"]])
+def test_name_that_is_not_utf8_is_rejected_before_flight(tmp_path, arguments):
+    arguments = [os.fsdecode(argument) if isinstance(argument, bytes) else argument for argument in arguments]
+    check_rejected(lapwing(tmp_path, "run", HOVER, *SHORT, *arguments), "not valid utf-8; use another name")
+    assert not list(tmp_path.iterdir())
+
+
+def test_working_directory_that_is_not_utf8_is_rejected(tmp_path):
+    folder = tmp_path / os.fsdecode(b"\xff")
+    folder.mkdir()
+    check_rejected(lapwing(folder, "run", HOVER, *SHORT), "working directory")
+    assert not list(folder.iterdir())
+
+
+def test_name_that_locale_cannot_express_is_rejected_before_flight(tmp_path):
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+    result = lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "ä.mcap", **ascii_only)
+    check_rejected(result, "not valid ascii; use another name, or a UTF-8 locale")
+    assert not list(tmp_path.iterdir())
+
+
 def test_run_prints_in_ascii(tmp_path):
     result = lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "ä.mcap", PYTHONIOENCODING="ascii")
     assert result.returncode == 0, result.stderr

@@ -124,6 +124,10 @@ def test_figure_far_from_its_guess_is_warned_of(tmp_path):
         ({"payload": 3.0}, "mass.payload: expected less than total"),
         ({"inertia_z": 9.0}, "triangle inequality"),
         ({"speed_constant": 100.0}, r"mine cannot hover: its thrust is 0\.\d\d times its weight; expected more than 1"),
+        (
+            {"resistance": 60.0},
+            r"0\.6 A without load, with 36 V .* A and 14\.8 V; resistance = 60 ohm",
+        ),
         ({"stand_thrust": 50.0, "stand_torque": 1.0}, r"50 N at .* rad/s is more than the .* N that a propeller"),
         ({"stand_torque": 1e-4}, r"0.0001 N m at .* rad/s is less than the .* N m that this thrust costs"),
     ],

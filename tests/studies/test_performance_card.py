@@ -91,7 +91,7 @@ def test_card_without_drag_or_battery_is_partial(tmp_path, capsys):
     assert "the vehicle has no [drag]" in capsys.readouterr().out
 
 
-QUADRATIC = "\n[effects.rotor_quadratic]\nthrust_constant = 4.0e-4\ntorque_constant = 1.0e-5\n"
+QUADRATIC = "\n[effects.rotor_quadratic]\nthrust_constant = 4.0e-4\ntorque_constant = 2.0e-5\n"
 
 
 def scene_with_constants(tmp_path, vehicle):
@@ -107,13 +107,13 @@ def test_card_and_autopilot_go_by_rotors_that_are_in_force(tmp_path, tables):
     scene = scene_with_constants(tmp_path, airframe_without(tmp_path, *tables))
     known = known_airframe(load(scene))
     assert known.motor.thrust_coefficient == 4.0e-4
-    assert known.torque_per_thrust == pytest.approx(1.0e-5 / 4.0e-4)
+    assert known.torque_per_thrust == pytest.approx(2.0e-5 / 4.0e-4)
     assert resolve(load(scene)).vehicle == "drone1"
     rows = {row.name: row for row in card(scene)}
     weight = load_airframe(VEHICLE).mass.total * performance.GRAVITY
     speed = math.sqrt(0.25 * weight / 4.0e-4)
     motor = load_airframe(VEHICLE).motor
-    current = 1.0e-5 * speed**2 / motor.rotor_constant + motor.no_load_current
+    current = 2.0e-5 * speed**2 / motor.rotor_constant + motor.no_load_current
     power = 4.0 * current * (motor.rotor_constant * speed + motor.resistance * current)
     energy = performance.battery_energy(load_airframe(VEHICLE))
     assert rows["hover time"].computed == pytest.approx(energy / power / 60.0)
@@ -147,7 +147,23 @@ def test_four_rotors_cannot_lose_one():
     assert (row.computed, row.reason) == (None, "the 4 rotors cannot lose one")
 
 
-@pytest.mark.long
+def test_torque_below_that_of_ideal_rotors_gives_no_power():
+    """The flights of the Crazyflie do not determine its torque constant, which predicts them best at a tenth."""
+    rows = {row.name: row for row in card(Path("crazyflie_21"))}
+    thrust = 0.25 * 0.034 * 9.80665
+    shaft = 9.0e-12 * (thrust / 1.75e-8) ** 1.5
+    ideal = thrust**1.5 / math.sqrt(2.0 * 1.225 * math.pi * 0.065**2)
+    reason = f"the torque constant is too small: a rotor takes {shaft:.2g} W in hover, an ideal one {ideal:.2g} W"
+    for name in ("hover power", "hover current", "ESC margin in hover", "hover time"):
+        assert (rows[name].computed, rows[name].reason) == (None, reason)
+    assert rows["thrust over weight"].computed == pytest.approx(2.07, abs=0.01)
+
+
+@pytest.mark.parametrize("scene", ["delivery_mission", "quad_x", "racer_250", "hexacopter"])
+def test_shipped_vehicles_take_more_power_than_ideal_rotors(scene):
+    assert all(row.computed is not None for row in card(Path(scene)) if row.name.startswith("hover"))
+
+
 def test_command_prints_loads_and_margins_in_hover(tmp_path):
     command = [sys.executable, "-m", "lapwing", "performance", "quad_x", "--json", str(tmp_path / "card.json")]
     result = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"})

@@ -12,6 +12,7 @@ from lapwing.cosim.config.former_names import present_metadata
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.log.mcap_contents import Contents
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC
+from lapwing.dynamics.input_file import check_regular
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
 from lapwing.messages.topic_columns import ColumnBuilder, TopicColumns
@@ -38,6 +39,7 @@ class LogReader:
     def __init__(self, path: str | Path, skip_damaged: bool = False) -> None:
         self.path = Path(path)
         try:
+            check_regular(self.path)
             self._file = open(self.path, "rb")  # noqa: SIM115 (closed in close)
         except OSError as error:
             raise ValueError(f"{self.path}: cannot read the log: {error.strerror}") from None

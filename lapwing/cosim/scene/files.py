@@ -8,6 +8,7 @@ from typing import Any
 
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.input_file import read_bytes
 
 
 class Files:
@@ -57,10 +58,8 @@ class Files:
         Raises:
             ConfigError: it cannot be read.
         """
-        if path.exists() and not path.is_file() and not path.is_dir():
-            raise ConfigError(named_by, f"{path}: is not a regular file")
         try:
-            content = path.read_bytes()
+            content = read_bytes(path)
             text = content.decode("utf-8")
         except OSError as error:
             raise ConfigError(named_by, f"{path}: {(error.strerror or 'cannot be read').lower()}") from None

@@ -16,6 +16,7 @@ from lapwing.cosim.scene.overrides import Override, Overrides, apply, is_below_f
 from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.input_file import check_regular
 from lapwing.dynamics.validation import fault
 
 SCENE_FILE = "scene.toml"  # the scene's own text among its sources
@@ -149,8 +150,7 @@ def _find(scene: str | Path, shipped: Path) -> Path:
 
 def _read(path: Path) -> str:
     try:
-        if path.exists() and not path.is_file() and not path.is_dir():
-            raise SceneError("", "is not a regular file", "a scene file (TOML)", KeyOrigin(path))
+        check_regular(path)
         return path.read_text(encoding="utf-8")
     except IsADirectoryError:
         raise SceneError("", "is a folder", "a scene file (TOML)", KeyOrigin(path)) from None

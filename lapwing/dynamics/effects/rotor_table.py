@@ -14,6 +14,7 @@ from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._propeller_data import parsed
 from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vector import pair
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
@@ -89,7 +90,7 @@ def embed(table: dict[str, Any], folder: Path) -> None:
         raise ConfigError(min(settings), "stands beside file", "one of them")
     path = folder / file
     try:
-        table.update(parsed("file", path.read_text(encoding="utf-8")))
+        table.update(parsed("file", read_text(path)))
     except OSError as error:
         raise ConfigError("file", f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:

@@ -9,6 +9,7 @@ from pydantic import ValidationError, model_validator
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import steiner
+from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.validation import fault
 from lapwing.dynamics.vehicles.airframe_tables import (
     Battery,
@@ -113,7 +114,7 @@ def load_airframe(path: str | Path) -> Airframe:
     """
     path = Path(path)
     try:
-        return Airframe.model_validate(tomllib.loads(path.read_text(encoding="utf-8")))
+        return Airframe.model_validate(tomllib.loads(read_text(path)))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
     except ValidationError as error:

@@ -1,6 +1,7 @@
 """Loads in hover: power, currents, throttle, and the margins of speed controllers and battery."""
 
 import math
+from itertools import combinations
 
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.performance import CELL_VOLTAGE, DENSITY, Rotor, trim
@@ -9,6 +10,23 @@ from lapwing.dynamics.vehicles.performance import CELL_VOLTAGE, DENSITY, Rotor, 
 def power(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """Return the power [W] that the motors draw from the battery in hover."""
     return trim(airframe, 0.0, density, rotor=rotor).power
+
+
+def power_fault(airframe: Airframe, rotor: Rotor, density: float = DENSITY) -> str:
+    """Return a description if the rotors take less shaft power in hover than ideal ones; "" otherwise.
+
+    An ideal rotor takes the power T^(3/2) / sqrt(2 rho A) of momentum theory. Without a propeller, the largest disk is
+    assumed that leaves the nearest other hub free, so the true limit is higher.
+    """
+    hover, (_, k_torque) = trim(airframe, 0.0, density, rotor=rotor), rotor.constants(density)
+    hubs = [place[:2] for place in airframe.rotors.position]
+    apart = [distance for a, b in combinations(hubs, 2) if (distance := math.dist(a, b)) > 0.0]
+    radius = 0.5 * airframe.propeller.diameter if airframe.propeller else min(apart, default=math.inf)
+    ideal = hover.thrust**1.5 / (radius * math.sqrt(2.0 * math.pi * density))
+    shaft = k_torque * hover.rotor_speed**3
+    if shaft >= ideal:
+        return ""
+    return f"the torque constant is too small: a rotor takes {shaft:.2g} W in hover, an ideal one {ideal:.2g} W"
 
 
 def current(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:

@@ -148,7 +148,11 @@ def _electrics(motor: Motor, speed: float, torque: float) -> tuple[float, float]
 
 
 def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """Return the maximum thrust of all rotors in still air [N], limited by voltage, current or power."""
+    """Return the maximum thrust of all rotors in still air [N], limited by voltage, current or power.
+
+    Raises:
+        ValueError: the current without load alone exceeds a limit.
+    """
     rotor, motor, count = rotor or rotor_of(airframe), airframe.motor, len(airframe.rotors.position)
     gains = rotor.gains(count, density, 1.0)  # in proportion to the square of the speed
     k_thrust, k_torque = rotor.constants(density)
@@ -165,6 +169,13 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
         )
         return max(used) - 1.0
 
+    if excess(0.0) > 0.0:
+        voltage, current = _electrics(motor, 0.0, 0.0)
+        limits = {airframe.motor_current_limit: "A", motor.max_voltage: "V", motor.power_limit: "W"}
+        raise ValueError(
+            f"a motor draws {current:.3g} A without load, with {voltage:.3g} V over its resistance; expected less than "
+            + " and ".join(f"{limit:.3g} {unit}" for limit, unit in limits.items() if math.isfinite(limit))
+        )
     highest = brentq(excess, 0.0, motor.max_voltage / motor.rotor_constant)
     return _lift(airframe) * k_thrust * highest**2
 

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.scene.overrides import value_of
+from lapwing.dynamics.input_file import read_text
 from lapwing.studies.campaign.distributions import Distribution
 
 APART = 2**32  # seeds of two campaigns
@@ -172,7 +173,7 @@ def _read(path: Path) -> tuple[dict[str, Any], ...]:
         ValueError: it cannot be read, has no lines, or lines of different length.
     """
     try:
-        lines = list(csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")), skipinitialspace=True))
+        lines = list(csv.reader(io.StringIO(read_text(path, "utf-8-sig")), skipinitialspace=True))
     except (OSError, UnicodeDecodeError) as fault:
         raise ValueError(f"--sweep {path}: cannot be read: {getattr(fault, 'strerror', None) or fault}") from None
     keys, *rows = [[cell.strip() for cell in line] for line in lines if line] or [[]]

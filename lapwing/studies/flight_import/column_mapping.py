@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.validation import fault
 
 GRAVITY = 9.80665  # [m/s^2]
@@ -113,7 +114,7 @@ def load_mapping(name: str) -> Mapping:
         if path.suffix != ".toml":
             raise ValueError(f"--mapping {name}: unknown; use one of {', '.join(shipped)}, or a .toml file")
         try:
-            text = path.read_text(encoding="utf-8")
+            text = read_text(path)
         except (OSError, UnicodeDecodeError) as error:
             raise ValueError(f"--mapping {name}: cannot be read: {getattr(error, 'strerror', error)}") from None
     try:

@@ -35,7 +35,8 @@ def _read(path: Path, mapping: str | None) -> Recording:
 
         return read_rosbag_flight(path)
     if not path.is_file():
-        raise ValueError(f"{path}: no such file; use the path of a recorded flight")
+        message = "is not a regular file" if path.exists() else "no such file"
+        raise ValueError(f"{path}: {message}; use the path of a recorded flight")
     if path.name.endswith((".csv", ".csv.gz")):
         if mapping is None:
             raise ValueError(f"{path}: a CSV file needs --mapping; use a name that ships, or a .toml file")

@@ -112,6 +112,13 @@ class Recording:
         """Number of rotors."""
         return int(self.motor_voltage.shape[1])
 
+    def repeats(self, other: Self) -> bool:
+        """Return True if the measurements are those of another recording, also of the same flight in another format."""
+        return len(self) == len(other) and all(
+            np.allclose(mine, its, rtol=0.0, atol=1e-9, equal_nan=True)
+            for mine, its in ((self.omega, other.omega), (self.position, other.position))
+        )
+
     @property
     def grounded(self) -> str:
         """Return the reason why the vehicle cannot have left the ground, or ""."""

@@ -23,6 +23,8 @@ def show(console: Console, identification: Identification) -> None:
     for key, before, value, error in zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True):
         table.add_row(key, f"{before:.5g}", f"{value:.5g}", f"{error:.2g}")
     console.print(table)
+    for line in identification.skipped:
+        console.print(f"left out: {line}", soft_wrap=True)
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
         if abs(fit.correlations[i, j]) > RELATED:
             text = f"correlated: {fit.keys[i]} and {fit.keys[j]}: {fit.correlations[i, j]:+.2f}"
@@ -51,6 +53,7 @@ def write_json(path: Path, identification: Identification) -> None:
         "loss": fit.cost,
         "flights": identification.used,
         "held_out": identification.held_out,
+        "left_out": identification.skipped,
         "held_out_errors": {name: {"before": a, "after": b} for name, a, b in errors},
     }
     json_file.write_json(path, content)

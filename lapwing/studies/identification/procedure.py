@@ -5,6 +5,7 @@ import json
 import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ class Identification:
     fit: Fit
     used: tuple[str, ...]  # names of the flights
     held_out: tuple[str, ...]
+    skipped: tuple[str, ...]  # a line for each flight that is left out
     before: np.ndarray  # mean absolute errors on held-out flights after 50 samples, in the order of the metrics
     after: np.ndarray
 
@@ -74,7 +76,10 @@ def identify(
     """
     base = load_one(scene, overrides)
     start = [start_value(base, key) for key in keys]
-    recordings = [r for r in read_flights(paths, mapping, say) if len(window_starts(r, HORIZON[-1], 1))]
+    flights, skipped = read_flights(paths, mapping, say)
+    flown = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
+    recordings = list(compress(flights, flown))
+    skipped += [f"{r.name}: no valid window in the air" for r, up in zip(flights, flown, strict=True) if not up]
     if not recordings:
         raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
     chosen = _held_out(len(recordings), seed)
@@ -97,7 +102,8 @@ def identify(
     if progress:
         progress.unlink(missing_ok=True)
     name = str(getattr(base, "name", scene))
-    return Identification(name, fit, tuple(r.name for r in used), tuple(r.name for r in held_out), before, after)
+    names, judges = tuple(r.name for r in used), tuple(r.name for r in held_out)
+    return Identification(name, fit, names, judges, tuple(skipped), before, after)
 
 
 def write_airframe(

@@ -23,6 +23,8 @@ SHORTEST_REST = 2.0  # [s] without motor commands that count as rest
 LONG_REST = 100.0  # [s] of rest from which slow errors of the IMU are estimated
 FEWEST = 20  # samples of a sensor
 RESTING = 0.02  # share of the highest motor voltage below which the vehicle rests
+MOST_BIAS_G = 0.3  # [g] departure of the specific force from gravity that a bias can explain
+MOST_BIAS_RAD_S = 0.5  # [rad/s] of the gyroscope, the same
 CLEAR = 0.8  # correlation from which a latency is believed
 LONGEST_LATENCY = 0.5  # [s]
 SIGNIFICANT = 3.3  # standard errors of an Allan variance
@@ -41,7 +43,7 @@ def fit_all(flights: Sequence[Recording]) -> tuple[dict[str, dict[str, Any]], li
         fits.append(result)
         notes += [f"{flight.name}: {remark}" for remark in remarks]
     if not any(fits):
-        raise ValueError("no flight has raw sensors (imu, mag, baro, gps); import a log of an autopilot")
+        raise ValueError("no flight has sensors (imu, mag, baro, gps); use a log with gyroscope and accelerometer")
     return _median(fits), notes
 
 
@@ -61,14 +63,15 @@ def fit_sensors(flight: Recording) -> tuple[dict[str, dict[str, Any]], list[str]
     """Return the parameters of each sensor that the flight has, and remarks on what it leaves open.
 
     Args:
-        flight: with raw sensors in its `readings`.
+        flight: with raw sensors in its `readings`, or an IMU in its samples.
     """
     out: dict[str, dict[str, Any]] = {}
     notes: list[str] = []
     rest = _rest(flight)
     if rest is None:
-        notes.append(f"no {SHORTEST_REST:g} s without motor commands: noise is measured in flight, with vibration")
-    series = {name: s for name, s in flight.readings.items() if len(s.time) >= FEWEST}
+        notes.append(f"no {SHORTEST_REST:g} s at rest with motors off: noise is measured in flight, with vibration")
+    readings = {"imu": _sampled_imu(flight), **flight.readings}
+    series = {name: s for name, s in readings.items() if len(s.time) >= FEWEST}
     located = bool(np.isfinite(flight.position).all(axis=1).any())
     if "imu" in series:
         out["imu"] = _imu(flight, series["imu"], rest, notes)
@@ -83,6 +86,13 @@ def fit_sensors(flight: Recording) -> tuple[dict[str, dict[str, Any]], list[str]
     if "gps" in series and located:
         out["gps"] = _gps(flight, series["gps"], notes)
     return out, notes
+
+
+def _sampled_imu(flight: Recording) -> Series:
+    """Return rate and specific force of the flight's samples: files of columns have the IMU at no rate of its own."""
+    values = np.column_stack([flight.omega, flight.specific_force])
+    sound = flight.valid & np.isfinite(values).all(axis=1)
+    return Series(_grid(flight)[sound], values[sound])
 
 
 def _imu(flight: Recording, s: Series, rest: tuple[float, float] | None, notes: list[str]) -> dict[str, Any]:
@@ -156,9 +166,12 @@ def _pressure_error(flight: Recording, s: Series) -> Series:
 
 
 def _rest(flight: Recording) -> tuple[float, float] | None:
-    """First and last instant [s] of the longest rest, or None."""
+    """First and last instant [s] of the longest rest, or None. A vehicle that falls or turns over does not rest."""
     volts = np.nan_to_num(flight.motor_voltage).max(axis=1)
-    still = np.r_[False, volts < RESTING * max(volts.max(initial=0.0), 1e-9), False]
+    off = volts < RESTING * max(volts.max(initial=0.0), 1e-9)
+    weight = np.abs(np.linalg.norm(flight.specific_force, axis=1) / STANDARD_GRAVITY - 1.0)
+    moves = (weight > MOST_BIAS_G) | (np.abs(flight.omega) > MOST_BIAS_RAD_S).any(axis=1)  # False for NaN
+    still = np.r_[False, off & ~moves, False]
     edges = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2) * flight.interval
     if not len(edges):
         return None

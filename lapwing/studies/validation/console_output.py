@@ -36,7 +36,7 @@ def show(console: Console, validation: Validation) -> None:
         f"{memory.torque:g} s (torque); 95 % intervals over flights",
     )
     for line in validation.skipped:
-        console.print(f"left out: {line}")
+        console.print(f"left out: {line}", soft_wrap=True)
     faulty = [(f.recording.name, f.recording.faults) for f in validation.flights if f.recording.faults]
     for name, faults in faulty:
         text = ", ".join(f"{cause}: {count}" for cause, count in faults.items())

@@ -39,7 +39,7 @@ class Validation:
     horizons: tuple[int, ...]  # [steps]
     memory: TrimMemory
     flights: tuple[FlightErrors, ...]
-    skipped: tuple[str, ...]  # a line for each flight without a window
+    skipped: tuple[str, ...]  # a line for each flight that is left out, or not flown in closed loop
     plant: list[list[Metric]]  # by horizon and field
     baselines: dict[str, list[list[Metric]]]
     closed_loop: tuple[ClosedLoop, ...] = ()
@@ -77,9 +77,9 @@ def validate(
     Raises:
         ValueError: a flight cannot be read, none has a window in the air, or rates or rotors differ.
     """
-    recordings = read_flights(paths, mapping, say)
+    recordings, skipped = read_flights(paths, mapping, say)
     interval = recordings[0].interval
-    used, starts, skipped = [], [], []
+    used, starts = [], []
     for recording in recordings:
         result = window_starts(recording, horizons[-1], stride)
         if len(result):
@@ -120,20 +120,29 @@ def validate(
     )  # fmt: skip
 
 
-def read_flights(paths: Sequence[Path], mapping: str | None, say: Callable[[str, int, int], None]) -> list[Recording]:
-    """Read flights of one rate.
+def read_flights(
+    paths: Sequence[Path], mapping: str | None, say: Callable[[str, int, int], None]
+) -> tuple[list[Recording], list[str]]:
+    """Read flights of one rate. Return them, and a line for each file that repeats the flight of an earlier one.
+
+    A repeated flight would narrow the confidence intervals, and be used both to estimate and to check an estimate.
 
     Raises:
         ValueError: a flight cannot be read, or its rate differs from the first one's.
     """
-    recordings = []
+    recordings: list[Recording] = []
+    repeated = []
     for k, path in enumerate(paths):
         say(f"reading {path.name}", k, len(paths))
-        recordings.append(open_flight(path, mapping))
-        if abs(recordings[-1].interval - recordings[0].interval) > 1e-6:
-            rates = f"{1.0 / recordings[-1].interval:g} Hz, others {1.0 / recordings[0].interval:g} Hz"
+        recording = open_flight(path, mapping)
+        if original := next((other.name for other in recordings if recording.repeats(other)), None):
+            repeated.append(f"{recording.name}: the same flight as {original}")
+            continue
+        recordings.append(recording)
+        if abs(recording.interval - recordings[0].interval) > 1e-6:
+            rates = f"{1.0 / recording.interval:g} Hz, others {1.0 / recordings[0].interval:g} Hz"
             raise ValueError(f"{path}: sampled at {rates}; validate them apart")
-    return recordings
+    return recordings, repeated
 
 
 def write_json(path: Path, validation: Validation) -> None:

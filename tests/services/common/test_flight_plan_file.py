@@ -1,5 +1,6 @@
 """Import of flight plans."""
 
+import json
 import math
 from pathlib import Path
 
@@ -52,7 +53,8 @@ def test_waypoints_skip_home_and_renumber_jumps(tmp_path):
         ("{}", "fileType"),
         ('{"fileType": "Plan"}', "not a plan"),
         ("QGC WPL 110\n0 1 3 16 0 0", "expected 12 columns, got 6"),
-        ("QGC WPL 110\n0 1 3 999 0 0 0 0 1 1 1 1", "unknown command 999"),
+        ("QGC WPL 110\n0 1 3 999 0 0 0 0 1 1 1 1", "item 0: unknown command 999"),
+        ("QGC WPL 110\n0 1 3 16 a 0 0 0 1 1 1 1", "item 0: could not convert string to float: 'a'"),
     ],
 )
 def test_invalid_plan_is_rejected_in_one_line(tmp_path, text, message):
@@ -60,4 +62,29 @@ def test_invalid_plan_is_rejected_in_one_line(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(ValueError, match=message) as caught:
         read(path)
+    assert "\n" not in str(caught.value)
+
+
+SIMPLE = {"type": "SimpleItem", "command": 16, "frame": 3, "params": [0, 0, 0, None, 40.7686, 14.7907, 5.0]}
+JUMP = SIMPLE | {"command": 177, "frame": 2, "params": [7, 1, 0, 0, 0, 0, 0]}
+
+
+@pytest.mark.parametrize(
+    ("mission", "others", "message"),
+    [
+        ([SIMPLE, {k: v for k, v in SIMPLE.items() if k != "params"}], {}, "item 1: key 'params' is missing"),
+        ([SIMPLE, SIMPLE | {"params": ["a"] * 7}], {}, "item 1: could not convert string to float: 'a'"),
+        ([SIMPLE, SIMPLE | {"params": [0, 0]}], {}, "item 1: not enough values"),
+        ([SIMPLE, 3], {}, "item 1: wrong type or length"),
+        ([SIMPLE, JUMP], {}, "item 1: jumps to 7"),
+        ([SIMPLE], {"geoFence": 3}, "geoFence: wrong type or length"),
+        ([SIMPLE], {"rallyPoints": {"points": [1]}}, "rallyPoints: wrong type or length"),
+    ],
+)
+def test_error_names_entry_of_plan(tmp_path, mission, others, message):
+    path = tmp_path / "bad.plan"
+    path.write_text(json.dumps({"fileType": "Plan", "mission": {"items": mission}, **others}))
+    with pytest.raises(ValueError, match=message) as caught:
+        read(path)
+    assert str(caught.value).startswith(f"{path}: ")
     assert "\n" not in str(caught.value)

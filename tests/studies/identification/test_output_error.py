@@ -2,6 +2,7 @@ import json
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -72,7 +73,7 @@ def test_grounded_flights_are_rejected(plant, tmp_path):
 def test_parameters_of_recordings_are_not_for_the_scene(tmp_path):
     keys = ("flight.command_delay", "effects.h_force.coefficient")
     fit = Fit(keys, np.zeros(2), np.array([0.01, 1e-6]), np.ones(2), np.eye(2), 1.0, 1, ())
-    result = Identification(SCENE, fit, ("a",), (), np.zeros(6), np.zeros(6))
+    result = Identification(SCENE, fit, ("a",), (), (), np.zeros(6), np.zeros(6))
     write_airframe(tmp_path / "mine.toml", SCENE, result)
     lines = (tmp_path / "mine.toml").read_text().splitlines()
     assert "#   effects.h_force.coefficient = 1e-06" in lines
@@ -90,7 +91,11 @@ def run(*arguments):
 
 @pytest.mark.long
 def test_command_writes_airframe_with_provenance(plant, tmp_path):
-    paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 4.0, [1, 2, 3])]
+    recordings = simulated(plant, 4.0, [1, 2, 3])
+    paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in recordings]
+    paths.append(write_csv(tmp_path / "copy.csv", recordings[0]))
+    grounded = replace(recordings[0], position=recordings[0].position * [1.0, 1.0, 0.0])
+    paths.append(write_csv(tmp_path / "grounded.csv", grounded))
     out, figures = tmp_path / "mine.toml", tmp_path / "mine.json"
     done = run(
         "identify", SCENE, *paths, "--mapping", "nanobench", "--free",
@@ -106,6 +111,8 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(true, rel=0.1)
     assert "Identified by output error from 2 flights" in out.read_text()
     assert len(json.loads(figures.read_text())["held_out"]) == 1
+    assert f"left out: copy: the same flight as {recordings[0].name}" in done.stdout
+    assert "left out: grounded: no valid window in the air" in done.stdout
     assert not out.with_name("mine.toml.progress").exists()
 
 

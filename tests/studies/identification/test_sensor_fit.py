@@ -3,13 +3,17 @@
 import subprocess
 import sys
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from flight_recordings import INTERVAL as FLIGHT_INTERVAL
+from flight_recordings import simulated, write_csv
 
 from lapwing.dynamics.geodesy import Home, enu_to_geodetic
 from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.identification.sensor_fit import fit_sensors
+from lapwing.studies.validation.plant_rows import PlantRows
 
 INTERVAL, SECONDS = 0.01, 300.0
 
@@ -38,7 +42,8 @@ def flight():
     volts = np.where(t < 150.0, 0.0, 3.0)[:, None] * np.ones(4)
     n = len(t)
     return Recording(
-        "flight", INTERVAL, position, attitude, np.gradient(position, t, axis=0), np.zeros((n, 3)), np.zeros((n, 3)),
+        "flight", INTERVAL, position, attitude, np.gradient(position, t, axis=0), np.zeros((n, 3)),
+        np.full((n, 3), [0.0, 0.0, 9.80665]),
         volts, np.full(n, 4.0), np.ones(n, bool),
         readings={"imu": Series(fine, imu), "gps": Series(slow, gps), "baro": Series(mid, baro[:, None])},
     )  # fmt: skip
@@ -56,6 +61,33 @@ def test_noise_bias_and_latency_return(flight):
     assert result["gps"]["latency_samples"] == 2
     assert result["gps"]["correlated_error_horizontal"] < 0.02
     assert result["barometer"]["noise_pa_per_sqrt_hz"] * 5.0 == pytest.approx(1.5, rel=0.05)
+
+
+@pytest.mark.parametrize("moving", [{"specific_force": 0.0}, {"omega": 3.0}], ids=["falls", "turns over"])
+def test_fall_without_motors_is_no_rest(flight, moving):
+    columns = {name: np.full((len(flight), 3), value) for name, value in moving.items()}
+    result, notes = fit_sensors(replace(flight, **columns))
+    assert "turn_on_bias_dps" not in result["imu"]["gyro"]
+    assert "turn_on_bias_mg" not in result["imu"]["accelerometer"]
+    assert "no 2 s at rest" in notes[0]
+
+
+def test_command_fits_imu_of_columns_as_of_imported_log(tmp_path):
+    path = write_csv(tmp_path / "flight.csv", *simulated(PlantRows("crazyflie_21", FLIGHT_INTERVAL), 4.0, [1]))
+    mapping = ("--mapping", "nanobench")
+    commands = (
+        ("identify", "crazyflie_21", path, *mapping, "--sensors", "--out", "columns.toml"),
+        ("import", path, *mapping, "--out", "flight.mcap"),
+        ("identify", "crazyflie_21", "flight.mcap", "--sensors", "--out", "log.toml"),
+    )
+    for command in commands:
+        result = subprocess.run(
+            [sys.executable, "-m", "lapwing", *map(str, command)], capture_output=True, text=True, cwd=tmp_path
+        )
+        assert result.returncode == 0, result.stderr
+    imus = [tomllib.loads((tmp_path / name).read_text())["sensors"]["imu"] for name in ("columns.toml", "log.toml")]
+    assert imus[0]["gyro"] == pytest.approx(imus[1]["gyro"], rel=0.01)
+    assert imus[0]["accelerometer"] == pytest.approx(imus[1]["accelerometer"], rel=0.01)
 
 
 def test_white_noise_has_no_bias_instability(flight):

@@ -121,7 +121,20 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     assert "Errors over the envelope" in page_text(page)
 
 
-@pytest.mark.long
+def test_repeated_flight_counts_once(plant, tmp_path):
+    """The copy is an imported log of the same file: errors and intervals are those of the first flights alone."""
+    paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 2.0, [1, 2])]
+    copy, options = tmp_path / "copy.mcap", ("--mapping", "nanobench", "--horizons", "1,50")
+    assert run("import", paths[0], "--mapping", "nanobench", "--out", copy).returncode == 0
+    results = []
+    for files in (paths, [*paths, copy]):
+        done = run("validate", SCENE, *files, *options, "--json", tmp_path / "errors.json")
+        assert done.returncode == 0, done.stderr
+        results.append(json.loads((tmp_path / "errors.json").read_text())["horizons"])
+    assert results[0] == results[1]
+    assert f"left out: copy: the same flight as {paths[0].stem}" in done.stdout
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
