@@ -58,6 +58,7 @@ def test_input_file_that_is_device_is_rejected(tmp_path, command, device):
     assert [path.name for path in tmp_path.iterdir()] == ["fifo"]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("content", "message"),
     [('{"fileType": "Plan", "mission": {}}', "key 'items' is missing"), ("[1]", "wrong type"), ("{", "neither JSON")],
@@ -106,6 +107,7 @@ def test_name_that_locale_cannot_express_is_rejected_before_flight(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.long
 def test_run_prints_in_ascii(tmp_path):
     result = lapwing(tmp_path, "run", HOVER, *SHORT, "--log", "ä.mcap", PYTHONIOENCODING="ascii")
     assert result.returncode == 0, result.stderr

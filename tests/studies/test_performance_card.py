@@ -164,6 +164,7 @@ def test_shipped_vehicles_take_more_power_than_ideal_rotors(scene):
     assert all(row.computed is not None for row in card(Path(scene)) if row.name.startswith("hover"))
 
 
+@pytest.mark.long
 def test_command_prints_loads_and_margins_in_hover(tmp_path):
     command = [sys.executable, "-m", "lapwing", "performance", "quad_x", "--json", str(tmp_path / "card.json")]
     result = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"})

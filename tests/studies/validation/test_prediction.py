@@ -135,6 +135,7 @@ def test_repeated_flight_counts_once(plant, tmp_path):
     assert f"left out: copy: the same flight as {paths[0].stem}" in done.stdout
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
