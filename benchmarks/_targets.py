@@ -61,13 +61,6 @@ def wall(command: list[str], repeats: int = 1, **options) -> float:
     return median(times[1:] or times)
 
 
-def said_within(command: list[str], **options) -> tuple[float, str]:
-    """The seconds that a command takes, once, and what it says."""
-    began = time.perf_counter()
-    ended = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, **options)
-    return time.perf_counter() - began, ended.stdout
-
-
 def size_mb(path: Path) -> float:
     """Return the size of a file [MB]."""
     return path.stat().st_size / 1e6
