@@ -78,8 +78,7 @@ def campaign(
     from lapwing.studies.campaign.results import Results
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        foreign_code.allow(allow_code)
+    with user_errors(), foreign_code.permission(allow_code):
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
         if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:

@@ -169,8 +169,7 @@ def resimulate(
     from lapwing.services.common import foreign_code
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        foreign_code.allow(allow_code)
+    with user_errors(), foreign_code.permission(allow_code):
         with Display(console(), 0.0) as display:
             recorded, computed = runs.resimulate(log, display, allow_code)
         if recorded != computed:

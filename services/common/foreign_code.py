@@ -1,23 +1,30 @@
 """Permission to run machine code that is not Lapwing's own, such as that of FMUs.
 
-Python programs have it. The command line takes it away, and returns it for `--allow-code`.
+Python programs have it. The command line withdraws it, and grants it for `--allow-code`.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
 
-_allowed = [True]
+_allowed = [True]  # the last one counts
 
 
-def allow(permitted: bool) -> None:
-    """Grant or withdraw the permission in this process."""
-    _allowed[0] = permitted
+@contextmanager
+def permission(granted: bool) -> Iterator[None]:
+    """Grant or withdraw the permission in this process and in those that it forks, until the end of the context."""
+    _allowed.append(granted)
+    try:
+        yield
+    finally:
+        _allowed.pop()
 
 
 def check(setup: "RunConfig") -> None:
     """Raise ValueError if a run has FMUs and foreign code is not allowed."""
-    if "fmu" in setup.services and not _allowed[0]:
+    if "fmu" in setup.services and not _allowed[-1]:
         names = ", ".join(f"services.{name}" for name in setup.resolved.get("services", {}))
         raise ValueError(f"{names}: an FMU is machine code of its author; if you trust it, use --allow-code to run it")
