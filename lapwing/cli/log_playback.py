@@ -164,13 +164,13 @@ def resimulate(
 
     Exit codes: 1 the digests differ, 2 invalid input.
     """
-    from lapwing.cli.progress import Display
+    from lapwing.cli.progress import RunProgress
     from lapwing.runs import resimulate as runs
     from lapwing.services.common import foreign_code
     from lapwing.studies.terminal import console
 
     with user_errors(), foreign_code.permission(allow_code):
-        with Display(console(), 0.0) as display:
+        with RunProgress(console(), 0.0) as display:
             recorded, computed = runs.resimulate(log, display, allow_code)
         if recorded != computed:
             fail(f"{log}: digests differ: recorded {recorded}, resimulated {computed}", 1)

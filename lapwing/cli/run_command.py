@@ -193,12 +193,12 @@ def _advise_recovery(log: Path) -> None:
 
 
 def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, Child]) -> "Elapsed":
-    from lapwing.cli.progress import Display
+    from lapwing.cli.progress import RunProgress
     from lapwing.services.process_table import FOXGLOVE, MAVLINK, ROS2
     from lapwing.studies.terminal import console
 
     setup = spec.setup
-    with remove_on_failure(log), Display(console(), setup.duration) as display, ExitStack() as stack:
+    with remove_on_failure(log), RunProgress(console(), setup.duration) as display, ExitStack() as stack:
         if spec.mode == SINGLE_PROCESS:
             from lapwing.runs.single_process_run import fly_single
 

@@ -95,7 +95,7 @@ def effects(
 
     Names the effects that the scene does not need tolerance --tolerance.
     """
-    from lapwing.cli.study_progress import Countdown
+    from lapwing.cli.progress import StudyProgress
     from lapwing.services.scene_resolver import load
     from lapwing.studies.effects import console_output
     from lapwing.studies.effects.procedure import Study, study
@@ -107,8 +107,8 @@ def effects(
         screen = console()
 
         def find() -> Study:
-            with Countdown(screen) as countdown:
-                return study(load(scene, set_ or []), tolerance, countdown.say)
+            with StudyProgress(screen) as progress:
+                return study(load(scene, set_ or []), tolerance, progress.say)
 
         _study("SCENE", scene, json, plot, screen, find, console_output)
 
