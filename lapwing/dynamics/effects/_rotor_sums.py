@@ -1,8 +1,9 @@
 """Sums over every rotor of a vehicle, whatever their number, as straight-line code."""
 
-from lapwing.dynamics.effects._types import PerRotor
-from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.dynamics.effects._types import Loads, PerRotor
+from lapwing.dynamics.vector import Vec3, add, pair
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import compile_source, map_tuple, overload_for
 
 
 def total(a: PerRotor) -> float:
@@ -46,3 +47,24 @@ def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
 def _total_wrench(a):
     lines = [f"force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
     return compile_source("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")
+
+
+@always_inline
+def _more_thrust(density, before, both):
+    factor, change = both
+    return before + density * factor * change[0]
+
+
+@always_inline
+def _more_torque(density, before, both):
+    factor, change = both
+    return before + density * factor * change[1]
+
+
+@always_inline
+def with_changes(s, factors, loads, change):
+    """Return the loads with the change (thrust [N], torque [N m]) of each rotor at a density of 1 added."""
+    return Loads(
+        map_tuple(_more_thrust, s.air.density, loads.thrust, map_tuple(pair, 0.0, factors.thrust, change)),
+        map_tuple(_more_torque, s.air.density, loads.torque, map_tuple(pair, 0.0, factors.torque, change)),
+    )

@@ -22,7 +22,7 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import over_plane, summit, surface
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, scale, subtract
 from lapwing.kernels import always_inline, kernel
-from lapwing.kernels.codegen import map_tuple, overload_for, reduce_tuple
+from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
 from lapwing.kernels.simd import any_above, deinterleave, interleave, select, select_vector, sqrt
 from lapwing.kernels.simd_chunks import chunk4, unchunk4
 from lapwing.kernels.state_tree import largest
@@ -54,12 +54,8 @@ def _element(e, deflection, foot):
     return scale(-1.0, limited), scale(1.0 / e.tangential_damping, subtract(limited, pull))
 
 
+@generic(inline=True)
 def _friction(e, memory, foot):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_friction, inline=True)
-def _friction_by_law(e, memory, foot):
     if e.instance_class is GroundContact:
         return lambda e, memory, foot: _element(e, memory, foot)[0]
 

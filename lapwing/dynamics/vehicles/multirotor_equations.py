@@ -25,7 +25,7 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import map_tuple, overload_for
+from lapwing.kernels.codegen import generic, map_tuple
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
@@ -66,9 +66,9 @@ class MultirotorState(NamedTuple):
 class StateForm(NamedTuple):
     """The compiled functions of a class that stands for the motion in the state."""
 
-    seen: Callable  # (layout, x) -> Motion that effects look at
+    motion: Callable  # (layout, x) -> Motion that effects read
     rate: Callable  # (drive, t, x) -> tangent of x
-    held: Callable  # (drive, x) -> x after a step, brought back onto its constraints
+    project: Callable  # (drive, x) -> x after a step, brought back onto its constraints
     accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
 
 
@@ -155,21 +155,13 @@ def accelerations(drive, t, motion):
 FORMS[Motion] = StateForm(_itself, rate, _itself, accelerations)
 
 
-def seen(layout: RotorLayout, x: Any) -> Motion:
-    """Return the vehicle's Motion from any state form; compiled code only."""
-    raise NotImplementedError("compiled code only")
+@generic(inline=True)
+def motion_of(layout, x):
+    """Return the vehicle's Motion from any state form."""
+    return FORMS[x.instance_class].motion
 
 
-@overload_for(seen, inline=True)
-def _seen(layout, x):
-    return FORMS[x.instance_class].seen
-
-
+@generic(inline=True)
 def accelerations_of_form(drive, t, x):
-    """Return `accelerations` from any state form; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(accelerations_of_form, inline=True)
-def _accelerations_of_form(drive, t, x):
+    """Return `accelerations` from any state form."""
     return FORMS[x.instance_class].accelerations

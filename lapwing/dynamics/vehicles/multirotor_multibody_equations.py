@@ -52,7 +52,7 @@ def _product(_, a, b):
 
 
 @always_inline
-def seen(layout, x):
+def motion_of(layout, x):
     """Return the Motion of the chassis with the rotor speeds; 0 for a detached one."""
     c = x.chassis
     speed = map_tuple(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
@@ -133,23 +133,23 @@ def unloaded(drive, motion):
 @kernel
 def rate(drive, t, x):
     """Return the tangent of the five bodies."""
-    return five_bodies.rate(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+    return five_bodies.rate(machine(drive, t, motion_of(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel
-def held(drive, x):
+def project(drive, x):
     """Return the bodies with stabilised constraints."""
     how = drive.parameters.layout.bodies.hold
     if how == hold.NONE:
         return x
-    p = unloaded(drive, seen(drive.parameters.layout, x))
+    p = unloaded(drive, motion_of(drive.parameters.layout, x))
     return hold.project(p, 0.0, x) if how == hold.PROJECTION else hold.partition(p, 0.0, x)
 
 
 @kernel
 def apply_constraint_impulse(drive, x):
     """Return the bodies after hinge impulses that satisfy all constraints and conserve momentum."""
-    return hold.project(unloaded(drive, seen(drive.parameters.layout, x)), 0.0, x)
+    return hold.project(unloaded(drive, motion_of(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel
@@ -159,7 +159,7 @@ def accelerations(drive, t, x):
     return tangent.chassis.velocity_world, tangent.chassis.omega_body
 
 
-FORMS[FiveBodies] = StateForm(seen, rate, held, accelerations)
+FORMS[FiveBodies] = StateForm(motion_of, rate, project, accelerations)
 
 
 @always_inline
@@ -181,7 +181,7 @@ def joints(drive, t, x):
 
     The z component of a propeller's torque is that of its drive.
     """
-    on = five_bodies.reactions(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+    on = five_bodies.reactions(machine(drive, t, motion_of(drive.parameters.layout, x)), 0.0, x)
     b, c = x.propellers, x.chassis
     chassis = total_wrench(
         (

@@ -52,7 +52,7 @@ class SlungMotion(NamedTuple):
 
 
 @always_inline
-def seen(layout, x):
+def motion_of(layout, x):
     """Return the Motion of the vehicle."""
     return x.vehicle
 
@@ -133,7 +133,7 @@ def accelerations(drive, t, x):
     return tangent.vehicle.velocity_world, tangent.vehicle.omega_body
 
 
-FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations)
+FORMS[SlungMotion] = StateForm(motion_of, rate, _itself, accelerations)
 
 
 @always_inline

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.vector import Vec3
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, seen
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, motion_of
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.common.ports import ContactForces
@@ -31,5 +31,5 @@ def _force(_: float, push: tuple[Vec3, Vec3], other: Any) -> Vec3:
 def step(p: ContactView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[ContactForces], int]:
     """Output position and ground force of each contact point at `tick`."""
     vehicle, state = p.vehicle, s.vehicle
-    pushes = hooks.all_contact_forces(vehicle.effects, state.memory, seen(vehicle.layout, state.motion))
+    pushes = hooks.all_contact_forces(vehicle.effects, state.memory, motion_of(vehicle.layout, state.motion))
     return s, (ContactForces(map_tuple(_place, 0.0, pushes, pushes), map_tuple(_force, 0.0, pushes, pushes)),), CONTINUE
