@@ -39,7 +39,7 @@ class ReplayOptions(LinkOptions):
 
     def validate(self) -> None:
         """Raise ValueError for options that are malformed, unsafe, or do not go together."""
-        from lapwing.cosim.transport.key_prefix import check_key_prefix
+        from lapwing.cosim.transport.bus_keys import check_key_prefix
 
         check_key_prefix(self.key_prefix)
         if self.record and self.loop:

@@ -1,6 +1,8 @@
 """Progress of a run and of a study: a bar in a terminal, otherwise occasional lines."""
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Self
 
 from rich.console import Console
@@ -138,3 +140,11 @@ class StudyProgress(_TerminalBar):
             return
         self._printed = now
         self._console.print(f"{done} of {total} flights{f', {remaining}' if remaining else ''}: {text}", soft_wrap=True)
+
+
+@contextmanager
+def step_progress(console: Console) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a function that shows (text, done, total) of some work in a bar; without a terminal it shows nothing."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("starting", total=1)
+        yield lambda text, done, total: progress.update(task, description=text, completed=done, total=max(total, 1))
