@@ -57,14 +57,15 @@ HOOKS: dict[str, DispatchTable] = {}
 def _hook(name: str) -> Callable:
     registered = HOOKS.setdefault(name, DispatchTable())
 
-    def for_type(parameters: type) -> Callable:
+    def for_types(*parameters: type) -> Callable:
         def register(function: Callable) -> Callable:
-            registered[parameters] = always_inline(function)
-            return registered[parameters]
+            compiled = always_inline(function)
+            registered.update(dict.fromkeys(parameters, compiled))
+            return compiled
 
         return register
 
-    return for_type
+    return for_types
 
 
 mass_properties = _hook("mass_properties")

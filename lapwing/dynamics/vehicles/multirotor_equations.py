@@ -22,7 +22,7 @@ from lapwing.dynamics.effects._types import (
     Rotors,
 )
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vector import ZERO, Vec3, product
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import generic, map_tuple
@@ -96,11 +96,6 @@ def _static_current(s, torque, voltage):
 
 
 @always_inline
-def _product(c, a, b):
-    return a * b
-
-
-@always_inline
 def _constant(c, a, b):
     return c
 
@@ -122,7 +117,7 @@ def evaluate(drive, t, motion):
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
     voltage = hooks.all_supply_voltage(p.effects, memory, drive.voltage)
     current = map_tuple(_static_current, s, loads.torque, voltage)
-    lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(_product, 0.0, voltage, current))
+    lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(product, 0.0, voltage, current))
     acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
     rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
     thrust, torque = thrust_wrench(layout, loads)
