@@ -11,7 +11,7 @@ from lapwing.services.autopilot.allocation import tables_for_failures
 from lapwing.services.autopilot.control import Command, sign
 from lapwing.services.autopilot.controller_parameters import Airframe, hover_thrust, moments, shares
 from lapwing.services.autopilot.mixer import Shares, VirtualControls, active_allocation, clamp_to_range, mix, saturate
-from lapwing.services.autopilot.motor import Motor, thrusts_at
+from lapwing.services.autopilot.motor import Motor, thrust_at, thrusts_at
 from lapwing.services.autopilot.px4 import attitude, position, rates
 from lapwing.services.common.ports import Setpoint, StateEstimate
 
