@@ -39,7 +39,7 @@ def fly(
         rows: memory of the flight, for many that are looked at one after the other: the next one writes over it.
         observe: called with the tick that is reached: when everything is compiled, and then every LOOK ticks.
     """
-    return kind.of(*_fly(run, only, operator, rows, observe))
+    return kind.of(*_flown(run, only, operator, rows, observe))
 
 
 def fly_each(
@@ -49,10 +49,10 @@ def fly_each(
     observe: Callable[[int], None] | None = None,
 ) -> list[FlightData]:
     """Return the flights of all vehicles of a run. See `fly` for arguments."""
-    return FlightData.of_each(*_fly(setup, only, no_operator, rows, observe))
+    return FlightData.of_each(*_flown(setup, only, no_operator, rows, observe))
 
 
-def _fly(
+def _flown(
     run: RunConfig | Scene,
     only: Collection[Topic] | None,
     operator: Operator,
