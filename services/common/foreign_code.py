@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
 
-_allowed = [True]  # the last one counts
+_allowed = [True]
 
 
 @contextmanager
 def permission(granted: bool) -> Iterator[None]:
     """Grant or withdraw the permission in this process and in those that it forks, until the end of the context."""
-    _allowed.append(granted)
+    before, _allowed[0] = _allowed[0], granted
     try:
         yield
     finally:
-        _allowed.pop()
+        _allowed[0] = before
 
 
 def check(setup: "RunConfig") -> None:
     """Raise ValueError if a run has FMUs and foreign code is not allowed."""
-    if "fmu" in setup.services and not _allowed[-1]:
+    if "fmu" in setup.services and not _allowed[0]:
         names = ", ".join(f"services.{name}" for name in setup.resolved.get("services", {}))
         raise ValueError(f"{names}: an FMU is machine code of its author; if you trust it, use --allow-code to run it")
