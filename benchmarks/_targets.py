@@ -30,8 +30,8 @@ class Row(NamedTuple):
         return self.measured < self.bar if self.more else self.measured > self.bar
 
 
-def show(rows: Iterable[Row]) -> None:
-    """Print a table, and what falls short."""
+def show(rows: Iterable[Row]) -> list[Row]:
+    """Print a table and what falls short; return the rows."""
     rows = list(rows)
     print(f"{'':58}{'measured':>10}{'bar':>11}")
     for row in rows:
@@ -39,6 +39,13 @@ def show(rows: Iterable[Row]) -> None:
         note = "  falls short" if row.short else ""
         print(f"{f'{row.what} [{row.unit}]':58}{row.measured:10.3g}{least:>4}{row.bar:7g}{note}", flush=True)
     print(f"{sum(row.short for row in rows)} of {len(rows)} fall short")
+    return rows
+
+
+def percentile(values: Iterable[float], share: float) -> float:
+    """Return the value below which this share of the values lies."""
+    ordered = sorted(values)
+    return ordered[int(share * (len(ordered) - 1))]
 
 
 @contextmanager
@@ -59,13 +66,6 @@ def wall(command: list[str], repeats: int = 1, **options) -> float:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, **options)
         times.append(time.perf_counter() - began)
     return median(times[1:] or times)
-
-
-def said_within(command: list[str], **options) -> tuple[float, str]:
-    """The seconds that a command takes, once, and what it says."""
-    began = time.perf_counter()
-    ended = subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True, **options)
-    return time.perf_counter() - began, ended.stdout
 
 
 def size_mb(path: Path) -> float:

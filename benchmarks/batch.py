@@ -63,8 +63,7 @@ def main(*scenes: str) -> list[Row]:
         together, single, alone = rates(scene)
         print(f"{scene}: one core {single:.1f}, one vehicle after the other {alone:.1f} million steps/s")
         result.append(Row(f"batch, all cores, {scene}, million steps/s", together, "", bar, True))
-    show(result)
-    return result
+    return show(result)
 
 
 if __name__ == "__main__":

@@ -122,8 +122,7 @@ def main():
     result = [
         Row(f"batch to {name}, steps a core", rates["lapwing"] / rates[name], "", 3.0, True) for name in there[1:]
     ]
-    show(result)
-    return result
+    return show(result)
 
 
 def alone(name):

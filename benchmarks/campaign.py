@@ -41,8 +41,7 @@ def main(runs=20):
         Row("campaign: a run besides its flight, seed only", 100.0 * besides, "%", 5.0),
         Row("campaign: a run besides its flight, mass and wind drawn", 100.0 * besides_varied, "%", 5.0),
     ]
-    show(result)
-    return result
+    return show(result)
 
 
 def flown(options):

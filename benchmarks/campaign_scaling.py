@@ -30,8 +30,7 @@ def main(most=10000):
         Row(f"campaign: a further run up to {most} runs to one up to 1000", each[-1] / each[0], "", 1.1),
         Row(f"campaign: peak memory, {most} runs to 1000", cost[most][1] / cost[1000][1], "", 1.1),
     ]
-    show(result)
-    return result
+    return show(result)
 
 
 def taken(command):

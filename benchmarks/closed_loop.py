@@ -117,8 +117,7 @@ def main():
         rows.append(Row(f"closed-loop flights to {name}, one core", ratio, "", 3.0, True))
     if len(result) < 4:
         print("not all are installed: pip install 'lapwing[bench]'")
-    show(rows)
-    return rows
+    return show(rows)
 
 
 if __name__ == "__main__":

@@ -37,9 +37,7 @@ def rows():
 
 
 def main():
-    result = list(rows())
-    show(result)
-    return result
+    return show(rows())
 
 
 if __name__ == "__main__":

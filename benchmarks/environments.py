@@ -93,8 +93,7 @@ def main(*vehicles: int) -> list[Row]:
     for n in many:
         share = found[f"gymnasium.make_vec, {n}"] / found[f"BatchSimulator, {n}"]
         rows.append(Row(f"gymnasium.make_vec to BatchSimulator, {n} vehicles", share, "1", SHARE, True))
-    show(rows)
-    return rows
+    return show(rows)
 
 
 if __name__ == "__main__":

@@ -62,8 +62,7 @@ def main(most=32):
         Row(f"fleet of {most}, one process: a vehicle to one alone", single[most] / most / single[1], "", 1.1),
         Row(f"fleet of {most}, processes: a vehicle to one alone", apart[most] / most / apart[1], "", 1.1),
     ]
-    show(result)
-    return result
+    return show(result)
 
 
 def scene(n, path):

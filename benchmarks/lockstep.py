@@ -15,7 +15,7 @@ import time
 from itertools import pairwise
 from statistics import median
 
-from benchmarks._targets import Row, show
+from benchmarks._targets import Row, percentile, show
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
@@ -132,10 +132,6 @@ def measure(kind, cycles, core):
     return cycles_s[len(cycles_s) // 10 :]  # without the start
 
 
-def percentile(values, share):
-    return sorted(values)[int(share * (len(values) - 1))]
-
-
 def compare(cycles, repeats, core):
     """Medians over interleaved repeats."""
     figures = {kind: [] for kind in KINDS}
@@ -163,8 +159,7 @@ def main(cycles=5000, repeats=5):
                 f"{f['cycles_per_s']:6.0f} cycles/s  {HOPS} hops"
             )
         result.append(Row(f"cycle of the lock step to the bare ping, {placing}", figures["ratio_of_medians"], "", 1.5))
-    show(result)
-    return result
+    return show(result)
 
 
 if __name__ == "__main__":

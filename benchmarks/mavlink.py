@@ -21,7 +21,7 @@ from statistics import median
 
 from pymavlink import mavutil
 
-from benchmarks._targets import Row, show
+from benchmarks._targets import Row, percentile, show
 from tests.participants import participants
 
 MISSION, GROUND = "lapwing/scenes/delivery_mission.toml", "lapwing/scenes/groundstation.toml"
@@ -64,10 +64,6 @@ def first_news(folder):
         run.communicate(timeout=120)
     station.close()
     return result
-
-
-def percentile(values, share):
-    return sorted(values)[int(share * (len(values) - 1))]
 
 
 def real_time(folder):
@@ -170,8 +166,7 @@ def main():
         for name, result in factors.items():
             change = 100.0 * (max(result) / best - 1.0)
             print(f"lock step at top speed, {name}: {max(result):.2f} x real time, {change:+.1f} %")
-        show(rows)
-        return rows
+        return show(rows)
 
 
 if __name__ == "__main__":

@@ -38,8 +38,7 @@ def main(repeats=3):
         Row("mission, a process for each service, to real time", factor["multi-process"], "", 18.6, True),
         Row("log of the mission", size, "MB", 5.0),
     ]
-    show(result)
-    return result
+    return show(result)
 
 
 if __name__ == "__main__":

@@ -143,9 +143,7 @@ def fleet(flight, count):
 
 
 def main(log=None):
-    result = list(rows(log))
-    show(result)
-    return result
+    return show(rows(log))
 
 
 if __name__ == "__main__":

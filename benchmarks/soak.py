@@ -147,8 +147,7 @@ def main(minutes: float = 2.0, hours: float = 0.0) -> list[Row]:
             last = max(time_ns for _, _, time_ns, _ in read.messages(start_ns=int(1e9 * (simulated - 10.0)))) * 1e-9
         print(f"the log opens, complete: {read.complete}, to {last:.1f} s")
     result = rows(samples, "soak, one process" if hours else "soak, processes")
-    show(result)
-    return result
+    return show(result)
 
 
 if __name__ == "__main__":

@@ -22,9 +22,7 @@ def rows(repeats=5):
 
 
 def main(repeats=5):
-    result = list(rows(repeats))
-    show(result)
-    return result
+    return show(rows(repeats))
 
 
 if __name__ == "__main__":

@@ -84,7 +84,7 @@ class BatchSimulator:
             raise ValueError(f"n: expected at least 1 member, got {n}")
         base = with_solver(load_one(scene, overrides))
         batch_plan = plan(base.name, (), n, seed, vary)
-        first = batch_members.plant_of(load(base, batch_plan.given(0)))
+        first = batch_members.plant_of(load(base, batch_plan.overrides_of(0)))
         self._core, self.n, self.interval = first.core, n, first.core.interval
         self._like = simd_batch.member(first.core.vehicle, first.start.vehicle)
         self._motion = row_width(self._like.motion)
@@ -101,7 +101,7 @@ class BatchSimulator:
         self._commands = np.zeros((members, len(self._like.voltage)))  # [V]
         self.setpoints = np.zeros((members, 4))  # thrust [N], body rates [rad/s]
         for k in range(1, n) if batch_plan.keys else ():
-            plant = batch_members.plant_of(load(base, batch_plan.given(k)))
+            plant = batch_members.plant_of(load(base, batch_plan.overrides_of(k)))
             batch_members.check_alike(k, plant.core, first.core)
             self._terrains[k] = batch_members.terrain_of(plant.core)
             self._initial_rows[k] = pack_row(simd_batch.member(plant.core.vehicle, plant.start.vehicle))

@@ -158,12 +158,12 @@ def main(name: str) -> None:
     from lapwing.services.common import foreign_code
 
     relax_gc()
-    foreign_code.allow(True)  # the command that starts this process has checked it
     with suppress(OSError):  # name in `ps` and `top`, on systems that support it
         Path("/proc/self/comm").write_text(name[:LONGEST])
     import_ahead([name])
     try:
-        code = run_participant(read_spec())
+        with foreign_code.permission(True):  # the command that starts this process has checked it
+            code = run_participant(read_spec())
     except (ValueError, BusError, LockStepError) as error:
         code = error.EXIT_CODE if isinstance(error, LockStepError) else ExitCode.REJECTED
         print(f"lapwing: {' '.join(str(error).split())}", file=sys.stderr)

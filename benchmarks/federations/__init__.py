@@ -39,8 +39,7 @@ def main(cycles=1000, repeats=1):
         for name in others:
             ratio = median(b / a for a, b in zip(times["lock step"], times[name], strict=True))
             result.append(Row(f"cycle of {name} to one of the lock step, {placing}", ratio, "", 3.0, True))
-    show(result)
-    return result
+    return show(result)
 
 
 def measure(package, cycles, core):

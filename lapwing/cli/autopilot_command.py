@@ -24,7 +24,7 @@ def autopilot(
 
     Exit codes: 1 the run failed, 2 invalid input.
     """
-    from lapwing.cli.progress import Display
+    from lapwing.cli.progress import RunProgress
     from lapwing.cosim.log import LogReader
     from lapwing.runs.foreign_simulator_run import on_simulator, services
     from lapwing.runs.single_process_run import fly_single
@@ -39,7 +39,7 @@ def autopilot(
         path = log or reserve_log(loaded.name)
         check_log(path)
         sources = {name: content.decode() for name, content in loaded.sources.items()}
-        with remove_on_failure(path), Display(console(), setup.duration) as display:
+        with remove_on_failure(path), RunProgress(console(), setup.duration) as display:
             elapsed = fly_single(setup, path, sources, observer=display, services=services(setup))
         typer.echo(f"{elapsed.simulated:.1f} s flown in {elapsed.wall:.1f} s")
         with LogReader(path) as read:

@@ -78,8 +78,7 @@ def campaign(
     from lapwing.studies.campaign.results import Results
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        foreign_code.allow(allow_code)
+    with user_errors(), foreign_code.permission(allow_code):
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
         if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:
@@ -168,14 +167,14 @@ def _part(shard: str | None, shards: int) -> range | None:
 
 
 def _workers(screen: "Console", cluster: str | None, count: int | None, folder: "Folder") -> "Workers":
-    from lapwing.studies.campaign import local
+    from lapwing.studies import workers
 
     if cluster is not None:
         from lapwing.studies.campaign.cluster import dask
 
         return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
-    number = min(count or local.cores(), len(folder.missing()))
-    return local.here if number <= 1 else local.processes(number)
+    number = min(count or workers.cores(), len(folder.missing()))
+    return workers.here if number <= 1 else workers.processes(number)
 
 
 def _fly(
@@ -188,13 +187,13 @@ def _fly(
 ) -> None:
     import time
 
-    from lapwing.cli.study_progress import Countdown
+    from lapwing.cli.progress import StudyProgress
     from lapwing.studies.campaign.shard_loop import Count
     from lapwing.studies.campaign.shard_loop import campaign as study
 
     start, previous = time.monotonic(), -1
     own_runs = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
-    with Countdown(screen, LINES) as countdown:
+    with StudyProgress(screen, LINES) as progress:
 
         def say(count: Count) -> None:
             nonlocal previous
@@ -202,6 +201,6 @@ def _fly(
             finished, rate = count.runs - previous, (count.runs - previous) / max(time.monotonic() - start, 1e-9)
             p = count.failure
             text = f"{rate:.1f} runs/s, {count.failures} failures, {p.low:.1%} to {p.high:.1%}"
-            countdown.say(text, finished, own_runs)
+            progress.say(text, finished, own_runs)
 
         study(folder, first, workers, say, until, part)

@@ -1,7 +1,5 @@
 """Commands on real flights: validate, identify, import."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_distinct, check_log, claim
+from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named
 
 Flights = Annotated[
     list[Path],
@@ -45,6 +43,7 @@ def validate(
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="write errors over the envelope (HTML)")] = None,
 ) -> None:
     """Measure how well a scene's plant predicts recorded flights."""
+    from lapwing.cli.progress import step_progress
     from lapwing.studies.terminal import console
     from lapwing.studies.validation import console_output, procedure, report_page
     from lapwing.studies.validation.start_states import TrimMemory
@@ -53,11 +52,9 @@ def validate(
         steps = _horizons(horizons)
         _check_flights(flights)
         check_distinct({"--json": json, "--report": report})
-        if report and report.suffix != ".html":
-            raise ValueError(f"--report {report}: expected a name that ends in .html")
         claim(json)
-        claim(report)
-        with _bar() as say:
+        claim_named("--report", report, ".html")
+        with step_progress(console()) as say:
             memory = TrimMemory(trim_force, trim_torque)
             result = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
         console_output.show(console(), result)
@@ -90,6 +87,7 @@ def identify(
 
     An interrupted estimation continues where it was, from FILE.progress beside the airframe file.
     """
+    from lapwing.cli.progress import step_progress
     from lapwing.studies.identification import console_output, procedure
     from lapwing.studies.terminal import console
     from lapwing.studies.validation.start_states import TrimMemory
@@ -111,7 +109,7 @@ def identify(
         claim(out)
         claim(json)
         memory, progress = TrimMemory(trim_force, trim_torque), out.with_name(f"{out.name}.progress")
-        with _bar() as say:
+        with step_progress(console()) as say:
             result = procedure.identify(
                 scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
             )
@@ -187,16 +185,3 @@ def _check_flights(flights: list[Path]) -> None:
     for path in flights:
         if not path.exists():
             raise ValueError(f"{path}: no such file; use the path of a recorded flight")
-
-
-@contextmanager
-def _bar() -> Iterator[Callable[[str, int, int], None]]:
-    """Return a progress bar on a terminal, else a silent one."""
-    from rich.progress import Progress
-
-    from lapwing.studies.terminal import console
-
-    screen = console()
-    with Progress(console=screen, transient=True, disable=not screen.is_terminal) as progress:
-        task = progress.add_task("starting", total=1)
-        yield lambda text, done, total: progress.update(task, description=text, completed=done, total=max(total, 1))

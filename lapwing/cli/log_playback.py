@@ -39,7 +39,7 @@ class ReplayOptions(LinkOptions):
 
     def validate(self) -> None:
         """Raise ValueError for options that are malformed, unsafe, or do not go together."""
-        from lapwing.cosim.transport.key_prefix import check_key_prefix
+        from lapwing.cosim.transport.bus_keys import check_key_prefix
 
         check_key_prefix(self.key_prefix)
         if self.record and self.loop:
@@ -164,14 +164,13 @@ def resimulate(
 
     Exit codes: 1 the digests differ, 2 invalid input.
     """
-    from lapwing.cli.progress import Display
+    from lapwing.cli.progress import RunProgress
     from lapwing.runs import resimulate as runs
     from lapwing.services.common import foreign_code
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        foreign_code.allow(allow_code)
-        with Display(console(), 0.0) as display:
+    with user_errors(), foreign_code.permission(allow_code):
+        with RunProgress(console(), 0.0) as display:
             recorded, computed = runs.resimulate(log, display, allow_code)
         if recorded != computed:
             fail(f"{log}: digests differ: recorded {recorded}, resimulated {computed}", 1)

@@ -90,9 +90,9 @@ def main() -> None:
         from lapwing.services.common import foreign_code
 
         relax_gc()
-        foreign_code.allow(False)
         try:
-            app(sys.argv[1:] or ["--help"], standalone_mode=False)
+            with foreign_code.permission(False):
+                app(sys.argv[1:] or ["--help"], standalone_mode=False)
         except UsageError as error:
             fail(f"{error.format_message()} (see lapwing --help)", USER_ERROR)
 

@@ -30,6 +30,13 @@ def claim(path: Path | None) -> None:
         _claims.callback(OutputLock(path).close)
 
 
+def claim_named(option: str, path: Path | None, ending: str) -> None:
+    """Claim a file of an option; raise ValueError unless its name has this ending and it can be written."""
+    if path is not None and path.suffix != ending:
+        raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
+    claim(path)
+
+
 def claim_folder(path: Path, shared: bool = False) -> None:
     """Lock an existing folder until the command ends.
 

@@ -1,6 +1,9 @@
-"""Progress display of a run: a progress bar in a terminal, otherwise occasional lines."""
+"""Progress of a run and of a study: a bar in a terminal, otherwise occasional lines."""
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
@@ -9,8 +12,8 @@ from rich.text import Text
 
 from lapwing.messages import PoseStamped, Status
 from lapwing.runs.compile_notice import Compilation
+from lapwing.runs.work_progress import NEARLY, TimeLeft
 
-NEARLY = 0.97  # share of an estimate that was too low at which the bar waits
 LINE_PERIOD = 2.0  # [s] of wall time between two lines if the output is not a terminal
 
 
@@ -40,7 +43,22 @@ class _Bar(BarColumn):
         return super().render(task)
 
 
-class Display:
+class _TerminalBar:
+    """Context in which the bar is shown, if the output is a terminal."""
+
+    _bar: Progress | None
+
+    def __enter__(self) -> Self:
+        if self._bar:
+            self._bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar:
+            self._bar.stop()
+
+
+class RunProgress(_TerminalBar):
     """Shows simulation time, real-time factor, position and phase."""
 
     def __init__(self, console: Console, duration: float):
@@ -49,7 +67,7 @@ class Display:
         self._duration = duration
         self._started = time.monotonic()
         self._next_line = self._started + LINE_PERIOD
-        self._bar: Progress | None = None
+        self._bar = None
         if console.is_terminal:
             self._bar = Progress(
                 _Bar(bar_width=24),
@@ -60,15 +78,6 @@ class Display:
                 transient=True,
             )
             self._task = self._bar.add_task("starting", total=duration)
-
-    def __enter__(self) -> "Display":
-        if self._bar:
-            self._bar.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._bar:
-            self._bar.stop()
 
     def begin(self) -> None:
         """Start the bar of the flight, at the first message."""
@@ -105,3 +114,37 @@ class Display:
             self._next_line = time.monotonic() + LINE_PERIOD
             factor = seconds / max(1e-9, time.monotonic() - self._started)
             self._console.print(f"t = {seconds:6.1f} s  {factor:5.1f}x  {line}")
+
+
+class StudyProgress(_TerminalBar):
+    """Shows how many flights of a study are finished, and its remaining time."""
+
+    def __init__(self, console: Console, every: float = 0.0):
+        """Create the display; outside a terminal it prints at most one line per `every` [s]."""
+        self._console, self._left, self._every, self._printed = console, TimeLeft(), every, -every
+        columns = (BarColumn(bar_width=24), TextColumn("{task.completed} of {task.total} flights  {task.fields[left]}"))
+        description_column = TextColumn("{task.description}", markup=False)
+        self._bar = (
+            Progress(*columns, description_column, console=console, transient=True) if console.is_terminal else None
+        )
+        self._task = self._bar.add_task("", total=1, left="") if self._bar else None
+
+    def say(self, text: str, done: int, total: int) -> None:
+        """Show that `done` of `total` flights are finished, and the current work."""
+        self._left.done(done)
+        remaining = self._left.text(total)
+        if self._bar and self._task is not None:
+            self._bar.update(self._task, description=text, completed=done, total=total, left=remaining)
+            return
+        if (now := time.monotonic()) - self._printed < self._every and done < total:
+            return
+        self._printed = now
+        self._console.print(f"{done} of {total} flights{f', {remaining}' if remaining else ''}: {text}", soft_wrap=True)
+
+
+@contextmanager
+def step_progress(console: Console) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield a function that shows (text, done, total) of some work in a bar; without a terminal it shows nothing."""
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        task = progress.add_task("starting", total=1)
+        yield lambda text, done, total: progress.update(task, description=text, completed=done, total=max(total, 1))

@@ -1,5 +1,6 @@
 """Reports, views and films of logs."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -86,6 +87,7 @@ def render(
     Needs chromium, and pip install lapwing[view3d].
     """
     from lapwing.cli.output_paths import check_distinct, claim
+    from lapwing.cli.progress import step_progress
     from lapwing.flight import Flight
     from lapwing.studies.flight_data import SHOWN
     from lapwing.studies.report.sections import labels
@@ -99,12 +101,8 @@ def render(
         check_distinct({"FILE": log, "--with": other, "--out": out})
         flights = [Flight.read(path, only=SHOWN) for path in (log, other) if path]
         claim(out)
-        from rich.progress import Progress
-
-        screen = console()
-        with Progress(console=screen, transient=True, disable=not screen.is_terminal) as bar:
-            task = bar.add_task("pictures", total=1)
-            draw(flights, labels(flights), out, shot, lambda done, all_: bar.update(task, completed=done, total=all_))
+        with step_progress(console()) as say:
+            draw(flights, labels(flights), out, shot, partial(say, "pictures"))
         typer.echo(out)
 
 

@@ -40,7 +40,9 @@ def run(options: RunOptions) -> None:
 
     Exit codes: 1 the run failed, 2 invalid input, 4 the flight does not meet success.require of the scene.
     """
-    with user_errors(), _started_early(options) as early:
+    from lapwing.services.common import foreign_code
+
+    with user_errors(), foreign_code.permission(options.allow_code), _started_early(options) as early:
         options.validate()
         scene = _load(options)
         options = _with_ros2_of_scene(options, scene)
@@ -116,7 +118,6 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     if options.mavlink and (firmware := foreign_firmware(setup)):
         message = f"--mavlink: {firmware} flies the vehicle and has its own MAVLink or MSP links"
         raise ValueError(f"{message}; connect the ground station to the firmware")
-    foreign_code.allow(options.allow_code)
     foreign_code.check(setup)
     speed, table, realtime = options.speed, options.table, options.realtime
     if speed is None:
@@ -192,12 +193,12 @@ def _advise_recovery(log: Path) -> None:
 
 
 def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, Child]) -> "Elapsed":
-    from lapwing.cli.progress import Display
+    from lapwing.cli.progress import RunProgress
     from lapwing.services.process_table import FOXGLOVE, MAVLINK, ROS2
     from lapwing.studies.terminal import console
 
     setup = spec.setup
-    with remove_on_failure(log), Display(console(), setup.duration) as display, ExitStack() as stack:
+    with remove_on_failure(log), RunProgress(console(), setup.duration) as display, ExitStack() as stack:
         if spec.mode == SINGLE_PROCESS:
             from lapwing.runs.single_process_run import fly_single
 

@@ -51,7 +51,7 @@ def service(options: ServiceOptions) -> None:
 
     Exit codes: 1 the run failed, 2 invalid input.
     """
-    from lapwing.cosim.transport.key_prefix import check_key_prefix
+    from lapwing.cosim.transport.bus_keys import check_key_prefix
     from lapwing.runs.distributed_run import external_services, parse_endpoints
     from lapwing.services import process_table
     from lapwing.services.process_main import ProcessSpec, run_participant

@@ -12,7 +12,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import fail, user_errors
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_distinct, claim, claim_plot
+from lapwing.cli.output_paths import check_distinct, claim, claim_named, claim_plot
 from lapwing.studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ def effects(
 
     Names the effects that the scene does not need tolerance --tolerance.
     """
-    from lapwing.cli.study_progress import Countdown
+    from lapwing.cli.progress import StudyProgress
     from lapwing.services.scene_resolver import load
     from lapwing.studies.effects import console_output
     from lapwing.studies.effects.procedure import Study, study
@@ -107,8 +107,8 @@ def effects(
         screen = console()
 
         def find() -> Study:
-            with Countdown(screen) as countdown:
-                return study(load(scene, set_ or []), tolerance, countdown.say)
+            with StudyProgress(screen) as progress:
+                return study(load(scene, set_ or []), tolerance, progress.say)
 
         _study("SCENE", scene, json, plot, screen, find, console_output)
 
@@ -157,10 +157,8 @@ def stability(
         from lapwing.studies.stability import stability_command
 
         check_distinct({"--json": json, "--report": report})
-        if report and report.suffix != ".html":
-            raise ValueError(f"--report {report}: expected a name that ends in .html")
         claim(json)
-        claim(report)
+        claim_named("--report", report, ".html")
         passed = stability_command.run(case, slow, sweep, json, report)
     if not passed:
         raise SystemExit(1)
@@ -206,10 +204,8 @@ def tune(
 
     with user_errors():
         check_distinct({"SCENE": scene, "--from": log, "--out": out, "--report": report})
-        for option, path, ending in (("--out", out, ".toml"), ("--report", report, ".html")):
-            if path and path.suffix != ending:
-                raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
-            claim(path)
+        claim_named("--out", out, ".toml")
+        claim_named("--report", report, ".html")
         target, screen = Bandwidths(altitude, yaw, attitude, position), console()
         with Progress(console=screen, transient=True) as progress:
             task = progress.add_task("linearising, then flying gain sets", total=gain_refinement.CANDIDATES)

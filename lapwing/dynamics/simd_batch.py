@@ -21,9 +21,14 @@ from lapwing.dynamics import rate_control, vector
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import AnyMassProperties, PerRotor
 from lapwing.dynamics.vehicles import multirotor_stepper
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState, seen
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    MultirotorDrive,
+    MultirotorParameters,
+    MultirotorState,
+    motion_of,
+)
 from lapwing.kernels import always_inline, kernel, math, vectorise_loops
-from lapwing.kernels.codegen import compile_source, map_index, overload_for
+from lapwing.kernels.codegen import compile_source, generic, map_index
 from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
 
 WIDTH = 16  # members in a block
@@ -180,7 +185,7 @@ def _all_asleep(like, memory, base, h):
     awake = 0
     for lane in range(WIDTH):
         m = take(like, memory, base + lane)
-        if not hooks.all_sleeping(m.parameters.effects, m.memory, seen(m.parameters.layout, m.motion), h):
+        if not hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h):
             awake += 1
     return awake == 0
 
@@ -222,23 +227,15 @@ def _poke(context, array, index, value):
     return signature(types.none, array, types.intp, value), stored
 
 
-def take(like: Any, memory: np.ndarray, at: int) -> Any:
+@generic(inline=True)
+def take(like: types.Type, memory: types.Type, at: types.Type) -> Callable:
     """Return a tree with the type and the arrays of `like` from numbers `WIDTH` apart, starting at `at`."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(take, inline=True)
-def _take(like: types.Type, memory: types.Type, at: types.Type) -> Callable:
     result, names = construction(like, lambda column: f"peek(memory, at + {column * WIDTH})", "like")
     return compile_source("take(like, memory, at)", {"peek": _peek, **names}, f"return {result}")
 
 
-def give(tree: Any, memory: np.ndarray, at: int) -> None:
+@generic(inline=True)
+def give(tree: types.Type, memory: types.Type, at: types.Type) -> Callable:
     """Put a tree where `take` would take it from."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(give, inline=True)
-def _give(tree: types.Type, memory: types.Type, at: types.Type) -> Callable:
     lines = [f"poke(memory, at + {k * WIDTH}, {path})" for k, path in enumerate(leaves(tree, "tree"))]
     return compile_source("give(tree, memory, at)", {"poke": _poke}, *lines, "return None")

@@ -109,3 +109,21 @@ def transpose(m):
 def pair(_, a, b):
     """Return (a, b), for `map_tuple` of two tuples."""
     return a, b
+
+
+@always_inline
+def product(_, a, b):
+    """Return a b, for `map_tuple` of two tuples."""
+    return a * b
+
+
+@always_inline
+def first(_, members, same):
+    """Return the first member, for `map_tuple` of a tuple of tuples."""
+    return members[0]
+
+
+@always_inline
+def second(_, members, same):
+    """Return the second member, for `map_tuple` of a tuple of tuples."""
+    return members[1]

@@ -6,6 +6,7 @@ calls is generated at compile time and has no cost at run time. All generated so
 
 import inspect
 from collections.abc import Callable, Mapping
+from functools import wraps
 from typing import Any
 
 import numba
@@ -32,40 +33,31 @@ def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Cal
     return scope[signature.partition("(")[0]]
 
 
-def generated_overload(
-    signature: str, generate: Callable[..., Callable], doc: str, *, inline: bool = False
-) -> Callable:
-    """Return a function for compiled code that `generate` creates for every combination of argument types.
+def generic(*, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable[..., Any]]:
+    """Return a decorator for the generator of a function whose implementation depends on the types of its arguments.
 
-    Called from Python, the generated code runs uncompiled, which is slow: use it in tests and configuration only.
+    The generator has the name, the arguments and the docstring of that function. It gets the numba types of the
+    arguments and returns the implementation: a function of the same arguments, or an existing kernel, which needs no
+    further compilation. Called from Python, the implementation runs uncompiled, which is slow: do this in tests and
+    configuration only.
 
     Args:
-        signature: "name(arguments)".
-        generate: maps the numba types of the arguments to a function of that signature.
-        doc: docstring of the function.
-        inline: True to inline the function into every caller.
+        inline: True to inline the implementation into every caller, unless a kernel declares this itself.
     """
-    name = signature.partition("(")[0]
 
-    def function(*values: Any) -> Any:
-        return generate(*map(numba.typeof, values))(*values)
+    def decorate(generate: Callable[..., Callable]) -> Callable[..., Any]:
+        @wraps(generate)
+        def function(*values: Any) -> Any:
+            return generate(*map(numba.typeof, values))(*values)
 
-    function.__name__, function.__qualname__, function.__doc__ = name, name, doc
-    function.__module__ = generate.__module__
-    _implement(function, generate, inline)
-    return function
+        _implement(function, generate, inline)
+        return function
+
+    return decorate
 
 
 def overload_for(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:
-    """Return a decorator that registers a generator as the implementation of `function` in compiled code.
-
-    The generator maps the numba types of the arguments to a function of the same arguments. Return an existing kernel
-    where there is one: it needs no further compilation.
-
-    Args:
-        function: placeholder that kernels name in their source; compiled code never calls it.
-        inline: True to inline the implementation into every caller, unless a kernel declares this itself.
-    """
+    """Return a decorator like `generic` for a function that has an implementation in Python, too."""
 
     def decorate(choose: Callable[..., Callable]) -> Callable:
         _implement(function, choose, inline)

@@ -18,7 +18,7 @@ from numba.core.typing.templates import ConcreteTemplate, infer_global, signatur
 from numba.extending import intrinsic, lower_builtin, models, register_model
 
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import compile_source, generated_overload
+from lapwing.kernels.codegen import compile_source, generic
 from lapwing.kernels.state_tree import NUMBERS, unroll
 
 FLOAT, INDEX = ir.DoubleType(), ir.IntType(32)
@@ -185,7 +185,9 @@ def horizontal_sum(x):
     return (a + b) + (c + d)
 
 
-def _interleave(four: Any) -> Callable:
+@generic(inline=True)
+def interleave(four: Any) -> Callable:
+    """Return the tree of vectors whose lane k holds the numbers of the k-th of four trees of equal shape."""
     paths, names = tuple(f"four[{k}]" for k in range(4)), {"pack4": pack4}
     expression = unroll(
         four.types[0], paths, lambda matched, p, _: None if matched else f"pack4({', '.join(p)})", names
@@ -193,26 +195,12 @@ def _interleave(four: Any) -> Callable:
     return compile_source("interleave(four)", names, f"return {expression}")
 
 
-interleave = generated_overload(
-    "interleave(four)",
-    _interleave,
-    "Return the tree of vectors whose lane k holds the numbers of the k-th of four trees of equal shape.",
-    inline=True,
-)
-
-
-def _deinterleave(tree: Any) -> Callable:
+@generic(inline=True)
+def deinterleave(tree: Any) -> Callable:
+    """Return the four trees of the lanes of a tree of vectors, as a tuple; the inverse of `interleave`."""
     names: dict[str, Any] = {"unpack4": unpack4}
     parts = [
         unroll(tree, ("tree",), lambda matched, p, _, k=k: None if matched else f"unpack4({p[0]})[{k}]", names)
         for k in range(4)
     ]
     return compile_source("deinterleave(tree)", names, f"return ({', '.join(parts)})")
-
-
-deinterleave = generated_overload(
-    "deinterleave(tree)",
-    _deinterleave,
-    "Return the four trees of the lanes of a tree of vectors, as a tuple; the inverse of `interleave`.",
-    inline=True,
-)

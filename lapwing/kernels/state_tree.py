@@ -17,7 +17,7 @@ from numba.core import types
 from numba.core.errors import TypingError
 
 from lapwing.kernels import DispatchTable
-from lapwing.kernels.codegen import compile_source, generated_overload
+from lapwing.kernels.codegen import compile_source, generic
 
 
 class Manifold(NamedTuple):
@@ -76,7 +76,9 @@ def _operation(signature: str, shape: str, body: Callable, doc: str) -> Callable
         expression = body(argument_types[position], names)
         return compile_source(signature, names, f"return {expression}")
 
-    return generated_overload(signature, generate, doc)
+    generate.__name__ = generate.__qualname__ = signature.partition("(")[0]
+    generate.__doc__ = doc
+    return generic()(generate)
 
 
 def _of_manifold(operation: str, paths: tuple[str, ...], takes: slice, on_float: str) -> Callable:

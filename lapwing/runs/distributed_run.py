@@ -10,8 +10,7 @@ from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.run_monitor import MONITOR, RunMonitor
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.cosim.transport.bus import ZenohBus, mesh
-from lapwing.cosim.transport.bus_keys import ALIVE_KEY, ENCODER
-from lapwing.cosim.transport.key_prefix import check_key_prefix
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, ENCODER, check_key_prefix
 from lapwing.runs.multi_process_run import Clock
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table

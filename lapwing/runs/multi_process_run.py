@@ -11,7 +11,7 @@ from lapwing.cosim.processes.child_process import Child
 from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.launcher import launch
 from lapwing.cosim.processes.run_monitor import RunMonitor
-from lapwing.cosim.transport.key_prefix import check_key_prefix
+from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import Stopwatch
 from lapwing.runs.observer import Elapsed, Observer

@@ -42,3 +42,14 @@ def thrust_at(motor: Motor, volts: float) -> float:
     """Return the steady thrust [N] at a voltage [V], the inverse of `voltage`."""
     propeller = motor.speed_constant * volts * motor.gear_ratio / RPM
     return motor.thrust_coefficient * propeller * propeller
+
+
+@always_inline
+def _thrust_at(motor: Motor, volts: float, _: float) -> float:
+    return thrust_at(motor, volts)
+
+
+@always_inline
+def thrusts_at(motor: Motor, volts: PerRotor) -> PerRotor:
+    """Return the steady thrusts [N] at voltages [V]."""
+    return map_tuple(_thrust_at, motor, volts, volts)

@@ -186,18 +186,18 @@ def _item(command: int, frame: int, params: list[float], place: list[float], dat
         height += datum.ground
     if action in ("waypoint", "land", "takeoff", "loiter_time"):
         return _item_of(datum, action, latitude, longitude, height, **fields(params))
-    return _made(action, (math.nan,) * 3, **fields(params))
+    return _mission_item(action, (math.nan,) * 3, **fields(params))
 
 
 def _item_of(datum: _Datum, action: str, latitude: float, longitude: float, height: float = 0.0, **more: Any) -> Any:
     """Return an item at a geodetic position and a world z of `height` [m]; NaN without a position."""
     if math.isnan(latitude) or (latitude, longitude) == (0.0, 0.0):
-        return _made(action, (math.nan, math.nan, height), **more)
+        return _mission_item(action, (math.nan, math.nan, height), **more)
     x, y, _ = geodetic_to_enu(datum.home, float(latitude), float(longitude), datum.home.height + height)
-    return _made(action, (x, y, height), **more)
+    return _mission_item(action, (x, y, height), **more)
 
 
-def _made(action: str, place: tuple[float, float, float], **more: Any) -> Any:
+def _mission_item(action: str, place: tuple[float, float, float], **more: Any) -> Any:
     item = MissionItem(action, Vector3(*place), math.nan, math.nan, 0.0, ())
     return item._replace(**more)
 

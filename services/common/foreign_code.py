@@ -1,8 +1,10 @@
 """Permission to run machine code that is not Lapwing's own, such as that of FMUs.
 
-Python programs have it. The command line takes it away, and returns it for `--allow-code`.
+Python programs have it. The command line withdraws it, and grants it for `--allow-code`.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -11,9 +13,14 @@ if TYPE_CHECKING:
 _allowed = [True]
 
 
-def allow(permitted: bool) -> None:
-    """Grant or withdraw the permission in this process."""
-    _allowed[0] = permitted
+@contextmanager
+def permission(granted: bool) -> Iterator[None]:
+    """Grant or withdraw the permission in this process and in those that it forks, until the end of the context."""
+    before, _allowed[0] = _allowed[0], granted
+    try:
+        yield
+    finally:
+        _allowed[0] = before
 
 
 def check(setup: "RunConfig") -> None:

@@ -27,7 +27,7 @@ def registered(thing: Any, folder: Path) -> Iterator[str]:
         thing: object to name; a text is a name already.
         folder: folder of the scene.
     """
-    if name := thing if isinstance(thing, str) else _carried(thing, folder):
+    if name := thing if isinstance(thing, str) else _module_of_log(thing, folder):
         yield name
         return
     base = re.sub(r"\W", "", getattr(thing, "__name__", type(thing).__name__)) or "object"
@@ -42,7 +42,7 @@ def registered(thing: Any, folder: Path) -> Iterator[str]:
         del _lent[name]
 
 
-def _carried(thing: Any, folder: Path) -> str:
+def _module_of_log(thing: Any, folder: Path) -> str:
     """Return "module:Name" of a class or function whose unchanged module can be stored. Return "" otherwise."""
     if not (inspect.isclass(thing) or inspect.isfunction(thing)) or thing.__module__ == "__main__":
         return ""

@@ -54,30 +54,18 @@ def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
         TopicEncoder(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
     ]
     if wiring.odometry:
-        sample = Odometry(header(0, WORLD), setup.vehicle)
-        result.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: sample))
-    if ports.BATTERY in declared_ports:
-        battery = _battery_sample(setup.vehicle, wiring)
-        result.append(
-            TopicEncoder(
-                topic.BATTERY, ports.BATTERY, declared_ports[ports.BATTERY].period, _battery(wiring), lambda: battery
-            )
-        )
-    if ports.BODIES in declared_ports:
-        sample_bodies = _bodies_sample(wiring.bodies)
-        result.append(
-            TopicEncoder(
-                topic.BODIES, ports.BODIES, declared_ports[ports.BODIES].period, _bodies, lambda: sample_bodies
-            )
-        )
-    if ports.CONTACT in declared_ports:
-        n = len(declared_ports[ports.CONTACT].like.force_world)
-        sample_contact = lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
-        result.append(
-            TopicEncoder(
-                topic.CONTACT, ports.CONTACT, declared_ports[ports.CONTACT].period, _contact, lambda: sample_contact
-            )
-        )
+        odometry = Odometry(header(0, WORLD), setup.vehicle)
+        result.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: odometry))
+    optional = {
+        ports.BATTERY: (topic.BATTERY, _battery(wiring), lambda _: _battery_sample(setup.vehicle, wiring)),
+        ports.BODIES: (topic.BODIES, _bodies, lambda _: _bodies_sample(wiring.bodies)),
+        ports.CONTACT: (topic.CONTACT, _contact, _contact_sample),
+    }
+    for name, (its_topic, fields, sample_of) in optional.items():
+        if name in declared_ports:
+            port = declared_ports[name]
+            sample = sample_of(port.like)
+            result.append(TopicEncoder(its_topic, name, port.period, fields, lambda sample=sample: sample))
     return result
 
 
@@ -186,6 +174,11 @@ def _bodies_sample(names: tuple[str, ...]) -> Any:
     return BodyStates(
         header(0, WORLD), names, (Pose(),) * n, *[(Vector3(),) * n for _ in ("velocity", "rate", "force", "torque")]
     )
+
+
+def _contact_sample(like: ContactForces) -> Any:
+    n = len(like.force_world)
+    return lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
 
 
 def _bodies(x: BodyMotions, time_ns: np.ndarray) -> Fields:

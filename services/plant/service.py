@@ -19,10 +19,10 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, Mult
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import apply_constraint_impulse
 from lapwing.kernels import kernel
 from lapwing.kernels.cell import Cell, read, write
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.services.common import ports
 from lapwing.services.common.ports import PerRotor
-from lapwing.services.plant.blocks import gyrostat, os4, unloading  # noqa: F401 (their output functions)
+from lapwing.services.plant.blocks import system_outputs  # noqa: F401 (registers output functions)
 from lapwing.services.plant.blocks.interaction import Interaction
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 from lapwing.services.plant.blocks.neighbour_state import PresenceView
@@ -151,14 +151,10 @@ def lock(p: MultirotorParameters, s: MultirotorState, command: PerRotor) -> Mult
     """Return the state s after an impulse that satisfies the constraints of p, under a command [V]."""
     memory = s.memory
     drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, command)
-    return MultirotorState(_struck(drive, s.motion), memory)
+    return MultirotorState(_after_impulses(drive, s.motion), memory)
 
 
-def _struck(drive: MultirotorDrive, x: Any) -> Any:
+@generic()
+def _after_impulses(drive: types.Type, x: types.Type) -> Any:
     """Return the bodies after impulses in their hinges, in any coordinates."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_struck)
-def _struck_of(drive: types.Type, x: types.Type) -> Any:
     return apply_constraint_impulse if x.instance_class is FiveBodies else multirotor_euler.apply_constraint_impulse

@@ -65,10 +65,10 @@ class Trajectory(Phases, SceneTable):
 
 def compiled(scene: Scene) -> CompiledTrajectory:
     """Return the scene's trajectory about the origin. See `compile` for errors."""
-    return scene.cached(_compiled)
+    return scene.cached(_compile)
 
 
-def _compiled(scene: Scene) -> CompiledTrajectory:
+def _compile(scene: Scene) -> CompiledTrajectory:
     trajectory = scene[Trajectory]
     user_segment.load(scene, _keyed_segments(trajectory))
     return compile(trajectory)

@@ -3,7 +3,7 @@
 from numba.core import types
 
 from lapwing.kernels import always_inline, kernel
-from lapwing.kernels.codegen import any_in_tuple, compile_source, generated_overload, map_index, map_tuple, reduce_tuple
+from lapwing.kernels.codegen import any_in_tuple, compile_source, generic, map_index, map_tuple, reduce_tuple
 
 
 @always_inline
@@ -16,11 +16,10 @@ def taken(x, y, i):
     return x[i] - y[i]
 
 
-def _first(x):
+@generic()
+def first(x):
+    """Return the first number."""
     return compile_source("first(x)", {}, "return x[0]" if isinstance(x, types.BaseTuple) else "return x")
-
-
-first = generated_overload("first(x)", _first, "The first number.")
 
 
 @kernel
@@ -35,7 +34,7 @@ def test_defines_function_of_several_lines():
 def test_compiled_and_uncompiled_are_same():
     x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
-    assert (first.__name__, first.__doc__) == ("first", "The first number.")
+    assert (first.__name__, first.__doc__) == ("first", "Return the first number.")
 
 
 @kernel

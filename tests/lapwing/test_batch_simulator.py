@@ -38,7 +38,7 @@ def alone(k, volts, ticks, start=None):
     """The numbers of the motion of member k after so many ticks, stepped by itself."""
     from lapwing.studies.campaign.plan import plan
 
-    values = plan(MISSION, (), N, 5, VARY).given(k)
+    values = plan(MISSION, (), N, 5, VARY).overrides_of(k)
     plant = resolve(load(MISSION, values)).services["plant"].parameters
     core, state = plant.core, plant.start.vehicle
     if start is not None:

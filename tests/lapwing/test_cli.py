@@ -10,7 +10,7 @@ import pytest
 
 import lapwing
 from lapwing.cli.app import GROUPS
-from lapwing.cosim.transport.key_prefix import check_key_prefix
+from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.runs import single_process_run
 
 ROOT = Path.cwd()

@@ -10,7 +10,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from lapwing.cli.main import app
-from lapwing.cli.progress import Display
+from lapwing.cli.progress import RunProgress
 from lapwing.kernels import kernel
 from lapwing.runs import compile_notice, precompile
 from lapwing.runs.compile_notice import EACH, FILE, Compilation, notify_on_compile
@@ -109,7 +109,7 @@ def test_terminal_has_bar_and_anything_else_line():
         (False, "hover: compiling kernels of plant, sensors, about 40 s"),
     ):
         console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
-        with Display(console, 20.0) as display:
+        with RunProgress(console, 20.0) as display:
             display.compiling(Compilation("hover", ("plant", "sensors"), 40.0))
             if display._bar:
                 display._bar.refresh()

@@ -52,11 +52,8 @@ def attachments(setup: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes
 
 
 def package_version() -> str:
-    """Version of the installed package, "unknown" where it is not installed."""
-    try:
-        return version("lapwing")
-    except PackageNotFoundError:
-        return "unknown"
+    """Return the version of the installed package, "unknown" where it is not installed."""
+    return _installed("lapwing")
 
 
 def machine() -> dict[str, str]:

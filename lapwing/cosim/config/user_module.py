@@ -47,7 +47,7 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
         raise ConfigError(key, f"got module {name!r}", "a name that Python can import")
     file, installed = (folder / f"{name}.py").resolve(), installed_module(name)
     if file.is_file():
-        if _taken(name, file):
+        if _is_taken(name, file):
             raise ConfigError(key, f"{file}: another module has this name", "a unique name")
     elif installed is None:
         raise ConfigError(key, f"no module {name}", f"{file}, or a module on Python's path")
@@ -60,13 +60,13 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
     while ahead:
         for imported in _imports(ahead.pop()):
             beside = file.parent / f"{imported}.py"
-            if imported not in result and beside.is_file() and not _taken(imported, beside):
+            if imported not in result and beside.is_file() and not _is_taken(imported, beside):
                 result[imported] = beside
                 ahead.append(beside)
     return result
 
 
-def _taken(name: str, file: Path) -> bool:
+def _is_taken(name: str, file: Path) -> bool:
     """Return True if Python would import another file of that name."""
     installed = installed_module(name)
     other = installed is not None and Path(str(installed.origin)).resolve() != file

@@ -24,7 +24,7 @@ from numba.extending import intrinsic
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port, due
 from lapwing.kernels import always_inline, kernel, no_refcount
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.kernels.codegen import compile_source, generic
 from lapwing.kernels.row_packing import load, store
 
 CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE = range(4)
@@ -115,13 +115,9 @@ def _address(cell: types.Type, trusted: bool) -> int:
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
 
-def step(parameters: Any, state: Any, tick: int, inputs: tuple) -> tuple:
+@generic(inline=True)
+def step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Any:
     """Call `step` of the module that declares the class of the parameters."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(step, inline=True)
-def _step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Any:
     return sys.modules[parameters.instance_class.__module__].step
 
 
@@ -145,22 +141,14 @@ def _put(value: Any, ring: OutputRing, tick: int) -> None:
         store(value, ring.rows, ring_index(tick, ring.period, ring.rows))
 
 
-def _take_all(inputs: tuple[InputRing, ...], tick: int) -> tuple[InputSample, ...]:
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_take_all, inline=True)
-def _take_each(inputs: types.Type, tick: types.Type) -> Callable:
+@generic(inline=True)
+def _take_all(inputs: types.Type, tick: types.Type) -> Callable:
     calls = "".join(f"take(inputs[{i}], tick), " for i in range(len(inputs)))
     return compile_source("take_all(inputs, tick)", {"take": _take}, f"return ({calls})")
 
 
-def _put_all(values: tuple, outputs: tuple[OutputRing, ...], tick: int) -> None:
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_put_all, inline=True)
-def _put_each(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
+@generic(inline=True)
+def _put_all(values: types.Type, outputs: types.Type, tick: types.Type) -> Callable:
     calls = [f"put(values[{i}], outputs[{i}], tick)" for i in range(len(outputs))]
     return compile_source("put_all(values, outputs, tick)", {"put": _put}, *calls, "return None")
 

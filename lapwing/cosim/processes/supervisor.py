@@ -100,7 +100,7 @@ class RunSupervisor:
         else:
             self._check_shutdown(now)
         if self._stopped_since and now - min(self._stopped_since.values()) > STALL:
-            raise self._stopped()
+            raise self._stop_error()
 
     def _check_exit_codes(self, codes: Mapping[str, int | None]) -> None:
         for name, code in codes.items():
@@ -144,7 +144,7 @@ class RunSupervisor:
     def _check_progress(self, now: float) -> None:
         message = self._monitor.stall_message(self._required, self._starvation.of)
         if message and self._stopped_since:
-            raise self._stopped()
+            raise self._stop_error()
         if message and not self._kill_optional():
             raise RunFailed(message)
         if message:
@@ -187,7 +187,7 @@ class RunSupervisor:
             process.wait()
         return bool(running)
 
-    def _stopped(self) -> RunFailed:
+    def _stop_error(self) -> RunFailed:
         return RunFailed(f"{', '.join(sorted(self._stopped_since))}: stopped for {STALL:g} s, {self._at()}")
 
     def _unexpected_end(self, name: str, code: int) -> RunFailed:

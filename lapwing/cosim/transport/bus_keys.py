@@ -1,4 +1,9 @@
-"""Keys of the lock step on the bus: the part between the key prefix of a run and the name of a participant."""
+"""Keys of the lock step on the bus: the part between the key prefix of a run and the name of a participant.
+
+The key prefix is the first part of every Zenoh key of a run, and separates runs on one network.
+"""
+
+import re
 
 STEP_KEY = "_step"  # step packets
 BATCH_KEY = "_batch"  # log packets
@@ -17,3 +22,9 @@ HEARD_KEY = "_heard"  # token: the participant has received the last message of 
 LOGGED_KEY = "_logged"  # token: the participant has received the last message of the recorder
 
 ENCODER = "_messages"  # suffix of the name of the process that encodes an external service's messages
+
+
+def check_key_prefix(key_prefix: str) -> None:
+    """Raise ValueError if the text cannot be the first part of a Zenoh key."""
+    if not re.fullmatch(r"[\w.-]+(/[\w.-]+)*", key_prefix, re.ASCII):
+        raise ValueError(f"--key-prefix {key_prefix}: expected letters, digits, _, - and . (parts joined by /)")

@@ -11,7 +11,7 @@ from typing import Any
 from numba import types
 
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
-from lapwing.dynamics.vector import add, apply, apply_transposed, cross, dot, norm, pair, scale, subtract
+from lapwing.dynamics.vector import add, apply, apply_transposed, cross, dot, norm, pair, product, scale, subtract
 from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.codegen import map_tuple, overload_for
 
@@ -41,17 +41,12 @@ def places(layout):
 
 
 @always_inline
-def _product(_, a, b):
-    return a * b
-
-
-@always_inline
 def _thrust_along_z(arguments):
     layout, loads = arguments
     return total(loads.thrust), (
-        total(map_tuple(_product, 0.0, layout.y_body, loads.thrust)),
-        -total(map_tuple(_product, 0.0, layout.x_body, loads.thrust)),
-        total(map_tuple(_product, 0.0, layout.reaction_sign, loads.torque)),
+        total(map_tuple(product, 0.0, layout.y_body, loads.thrust)),
+        -total(map_tuple(product, 0.0, layout.x_body, loads.thrust)),
+        total(map_tuple(product, 0.0, layout.reaction_sign, loads.torque)),
     )
 
 
@@ -71,7 +66,7 @@ def _load(_, place, both):
 @always_inline
 def _thrust_tilted(arguments):
     layout, loads = arguments
-    reaction = map_tuple(_product, 0.0, layout.reaction_sign, loads.torque)
+    reaction = map_tuple(product, 0.0, layout.reaction_sign, loads.torque)
     pushes = map_tuple(_load, 0.0, places(layout), map_tuple(pair, 0.0, loads.thrust, reaction))
     return total_wrench(map_tuple(_push, 0.0, layout.axis, pushes))
 

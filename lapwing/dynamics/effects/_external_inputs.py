@@ -9,11 +9,9 @@ The discrete state of such an effect is (its own, inputs). The plant stores new 
 
 from typing import Any
 
-from numba import types
-
 from lapwing.dynamics.effects._hooks import initial_discrete_state
 from lapwing.kernels import always_inline, math
-from lapwing.kernels.codegen import compile_source, generated_overload, map_tuple
+from lapwing.kernels.codegen import compile_source, generic, map_tuple
 
 _CLASSES: set[type] = set()
 
@@ -51,7 +49,9 @@ def all_given_or(own, values):
     return map_tuple(_given_or, 0.0, own, values)
 
 
-def _stored(effects: types.BaseTuple, memory: types.BaseTuple, samples: types.BaseTuple) -> Any:
+@generic(inline=True)
+def with_inputs_stored(effects: Any, memory: Any, samples: Any) -> Any:
+    """Return the discrete states with the samples of named inputs, one for each effect that has them."""
     members = [f"memory[{i}]" for i in range(len(effects.types))]
     places = [i for i, e in enumerate(effects.types) if e.instance_class in _CLASSES]
     for k, i in enumerate(places):
@@ -63,11 +63,3 @@ def _stored(effects: types.BaseTuple, memory: types.BaseTuple, samples: types.Ba
 @always_inline
 def _latest(sample, former):
     return sample.value if sample.due else former
-
-
-with_inputs_stored = generated_overload(
-    "with_inputs_stored(effects, memory, samples)",
-    _stored,
-    "Return the discrete states with the samples of named inputs, one for each effect that has them.",
-    inline=True,
-)

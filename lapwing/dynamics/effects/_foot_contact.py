@@ -1,12 +1,12 @@
 """Position, slip and normal force of each foot; four feet in SIMD lanes (lapwing/kernels/simd.py)."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from lapwing.dynamics.terrain import Level, over_plane, summit, touch, upright
 from lapwing.dynamics.vector import Mat3, Vec3, add, apply, apply_transposed, cross, dot, scale
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import map_tuple, overload_for
+from lapwing.kernels.codegen import generic, map_tuple
 from lapwing.kernels.simd import deinterleave, interleave, select, splat
 
 NO_FOOT = (math.nan, math.nan, math.nan)  # fills a group of four up: what is nowhere is under nothing
@@ -60,13 +60,9 @@ def _touch(terrain, place_world, _):
     return touch(terrain, place_world)
 
 
-def _touch_four(terrain: Any, places_world: Vec3) -> tuple[float, Vec3]:
+@generic(inline=True)
+def _touch_four(terrain, places_world):
     """Evaluate `touch` at four positions in SIMD lanes."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_touch_four, inline=True)
-def _touch_four_on(terrain, places_world):
     if terrain.instance_class is Level:
 
         def level(terrain, places_world):

@@ -1,6 +1,6 @@
 """From a scene's table to an effect's parameters."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -47,3 +47,12 @@ def _tuples(value: Any) -> Any:
 def reject(reason: str) -> NoReturn:
     """Reject an effect that the vehicle cannot have."""
     raise ConfigError("", reason)
+
+
+def check_beside(tables: Mapping[str, Any], needed: str, excluded: Iterable[str]) -> None:
+    """Reject an effect without the effect that it needs, or beside one that it excludes."""
+    if needed not in tables:
+        reject(f"goes with effects.{needed}, which the scene does not name")
+    for name in excluded:
+        if name in tables:
+            reject(f"is not made to stand beside effects.{name}: keep one of them")

@@ -49,7 +49,7 @@ from numba.core.errors import TypingError
 from lapwing.dynamics.effects._axes import beside, in_world
 from lapwing.dynamics.vector import Vec3, add, apply
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import compile_source, generated_overload
+from lapwing.kernels.codegen import compile_source, generic
 
 HOOKS: dict[str, DispatchTable] = {}
 
@@ -57,14 +57,15 @@ HOOKS: dict[str, DispatchTable] = {}
 def _hook(name: str) -> Callable:
     registered = HOOKS.setdefault(name, DispatchTable())
 
-    def for_type(parameters: type) -> Callable:
+    def for_types(*parameters: type) -> Callable:
         def register(function: Callable) -> Callable:
-            registered[parameters] = always_inline(function)
-            return registered[parameters]
+            compiled = always_inline(function)
+            registered.update(dict.fromkeys(parameters, compiled))
+            return compiled
 
         return register
 
-    return for_type
+    return for_types
 
 
 mass_properties = _hook("mass_properties")
@@ -126,7 +127,9 @@ def _written_out(
             end = f"({', '.join(members)}{',' if len(members) == 1 else ''})"
         return compile_source(signature, names, *lines, f"return {end}")
 
-    return generated_overload(signature, generate, f"The effects' `{hook}`, one after the other.", inline=True)
+    generate.__name__ = generate.__qualname__ = fold
+    generate.__doc__ = f"Return the result of the effects' `{hook}`, one after the other."
+    return generic(inline=True)(generate)
 
 
 def _chain(hook: str, before: str = "") -> Callable:
@@ -238,7 +241,9 @@ all_sleeping = _written_out(
 )
 
 
-def _all_stiff_sleeping(effects: Any, *_rest: Any) -> Callable:
+@generic(inline=True)
+def all_stiff_sleeping(effects: Any, memory: Any, motion: Any, h: Any) -> Callable:
+    """Return True if every stiff effect is sleeping."""
     both = HOOKS["substeps"], HOOKS["is_sleeping"]
     stiff = [i for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)]
     names = {f"f{i}": HOOKS["is_sleeping"][effects.types[i].instance_class] for i in stiff}
@@ -246,27 +251,13 @@ def _all_stiff_sleeping(effects: Any, *_rest: Any) -> Callable:
     return compile_source("all_stiff_sleeping(effects, memory, motion, h)", names, f"return {calm or 'True'}")
 
 
-all_stiff_sleeping = generated_overload(
-    "all_stiff_sleeping(effects, memory, motion, h)",
-    _all_stiff_sleeping,
-    "Whether every effect that is stiff is asleep.",
-    inline=True,
-)
-
-
-def _without_sleepers(effects: Any, _: Any) -> Callable:
+@generic(inline=True)
+def without_sleepers(effects: Any, values: Any) -> Callable:
+    """Return the members of `values`, one for each effect, that belong to effects that never sleep."""
     items = "".join(
         f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["is_sleeping"]
     )
     return compile_source("without_sleepers(effects, values)", {}, f"return ({items})")
-
-
-without_sleepers = generated_overload(
-    "without_sleepers(effects, values)",
-    _without_sleepers,
-    "The members of `values`, one for each effect, that belong to effects that never sleep.",
-    inline=True,
-)
 
 
 class KnownWrench(NamedTuple):
@@ -288,7 +279,9 @@ def _integrated(effects: Any) -> list[tuple[int, Callable]]:
     return [(i, rates[e.instance_class]) for i, e in enumerate(effects.types) if e.instance_class in rates]
 
 
-def _with_rates(effects: Any, *_rest: Any) -> Callable:
+@generic(inline=True)
+def with_rates(effects: Any, memory: Any, motion: Any) -> Callable:
+    """Return (effects, with the wrenches of those that have one in their place; rates of their memories)."""
     active = dict(_integrated(effects))
     names = {"known": KnownWrench, **{f"f{i}": hook for i, hook in active.items()}}
     lines = [f"force{i}, torque{i}, rate{i} = f{i}(effects[{i}], memory[{i}], motion)" for i in active]
@@ -298,36 +291,19 @@ def _with_rates(effects: Any, *_rest: Any) -> Callable:
     return compile_source("with_rates(effects, memory, motion)", names, *lines, f"return ({items}), ({rates})")
 
 
-with_rates = generated_overload(
-    "with_rates(effects, memory, motion)",
-    _with_rates,
-    "Return (effects, with the wrenches of those that have one in their place; rates of their memories).",
-    inline=True,
-)
-
-
-def _all_integrated(effects: Any, *_rest: Any) -> Callable:
+@generic(inline=True)
+def all_integrated(effects: Any, memory: Any) -> Callable:
+    """Return the memories that have a rate."""
     members = "".join(f"memory[{i}], " for i, _ in _integrated(effects))
     return compile_source("all_integrated(effects, memory)", {}, f"return ({members})")
 
 
-all_integrated = generated_overload(
-    "all_integrated(effects, memory)", _all_integrated, "Memories that have a rate.", inline=True
-)
-
-
-def _with_integrated(effects: Any, *_rest: Any) -> Callable:
+@generic(inline=True)
+def with_integrated(effects: Any, memory: Any, integrated: Any) -> Callable:
+    """Return the memories of all effects, with those that have a rate from `integrated`."""
     integrated = [i for i, _ in _integrated(effects)]
     members = [
         f"integrated[{integrated.index(i)}]" if i in integrated else f"memory[{i}]" for i in range(len(effects.types))
     ]
     result = "".join(f"{member}, " for member in members)
     return compile_source("with_integrated(effects, memory, integrated)", {}, f"return ({result})")
-
-
-with_integrated = generated_overload(
-    "with_integrated(effects, memory, integrated)",
-    _with_integrated,
-    "The memories of all effects, with those that have a rate from `integrated`.",
-    inline=True,
-)

@@ -1,8 +1,9 @@
 """Sums over every rotor of a vehicle, whatever their number, as straight-line code."""
 
-from lapwing.dynamics.effects._types import PerRotor
-from lapwing.dynamics.vector import Vec3, add
-from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.dynamics.effects._types import Loads, PerRotor
+from lapwing.dynamics.vector import add, pair
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import compile_source, map_tuple, overload_for, reduce_tuple
 
 
 def total(a: PerRotor) -> float:
@@ -20,29 +21,44 @@ def _total(a):
     return compile_source("total(a)", {}, f"return {pairs([f'a[{i}]' for i in range(len(a))])}")
 
 
-def total_vector(a: tuple[Vec3, ...]) -> Vec3:
+@always_inline
+def _add_vector(_, total, a, same):
+    return add(total, a)
+
+
+@always_inline
+def total_vector(a):
     """Return the sum of a tuple of vectors."""
-    total = a[0]
-    for more in a[1:]:
-        total = add(total, more)
-    return total
+    return reduce_tuple(_add_vector, 0.0, a[0], a[1:], a[1:])
 
 
-@overload_for(total_vector, inline=True)
-def _total_vector(a):
-    lines = [f"total = add(total, a[{i}])" for i in range(1, len(a))]
-    return compile_source("total_vector(a)", {"add": add}, "total = a[0]", *lines, "return total")
+@always_inline
+def _add_wrench(_, total, a, same):
+    return add(total[0], a[0]), add(total[1], a[1])
 
 
-def total_wrench(a: tuple[tuple[Vec3, Vec3], ...]) -> tuple[Vec3, Vec3]:
+@always_inline
+def total_wrench(a):
     """Return the sum of a tuple of (force [N], torque [N m])."""
-    force, torque = a[0]
-    for more_force, more_torque in a[1:]:
-        force, torque = add(force, more_force), add(torque, more_torque)
-    return force, torque
+    return reduce_tuple(_add_wrench, 0.0, a[0], a[1:], a[1:])
 
 
-@overload_for(total_wrench, inline=True)
-def _total_wrench(a):
-    lines = [f"force, torque = add(force, a[{i}][0]), add(torque, a[{i}][1])" for i in range(1, len(a))]
-    return compile_source("total_wrench(a)", {"add": add}, "force, torque = a[0]", *lines, "return force, torque")
+@always_inline
+def _more_thrust(density, before, both):
+    factor, change = both
+    return before + density * factor * change[0]
+
+
+@always_inline
+def _more_torque(density, before, both):
+    factor, change = both
+    return before + density * factor * change[1]
+
+
+@always_inline
+def with_changes(s, factors, loads, change):
+    """Return the loads with the change (thrust [N], torque [N m]) of each rotor at a density of 1 added."""
+    return Loads(
+        map_tuple(_more_thrust, s.air.density, loads.thrust, map_tuple(pair, 0.0, factors.thrust, change)),
+        map_tuple(_more_torque, s.air.density, loads.torque, map_tuple(pair, 0.0, factors.torque, change)),
+    )

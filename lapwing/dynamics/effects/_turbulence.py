@@ -9,7 +9,7 @@ from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.terrain import LEVEL, surface
-from lapwing.dynamics.vector import ZERO, Vec3, add, multiply, norm, scale, subtract
+from lapwing.dynamics.vector import ZERO, Vec3, add, first, multiply, norm, scale, subtract
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
@@ -158,11 +158,6 @@ def _advanced(c, part, state):
 
 
 @always_inline
-def _states(_, part, __):
-    return part[0]
-
-
-@always_inline
 def _gust(axis, part, _):
     return part[1][axis]
 
@@ -179,7 +174,7 @@ def drawn(e, memory, s, key, tick, interval):
         total(map_tuple(_gust, 2, parts, parts)),
     )
     u, v, w = multiply(sigma, gust)
-    return map_tuple(_states, 0, parts, parts), in_world(e.conditions, u, v, w), 1.0
+    return map_tuple(first, 0, parts, parts), in_world(e.conditions, u, v, w), 1.0
 
 
 @always_inline

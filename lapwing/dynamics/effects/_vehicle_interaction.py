@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from lapwing.dynamics.effects._hooks import HOOKS
 from lapwing.dynamics.vector import ZERO, Mat3, Vec3
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import compile_source, generated_overload
+from lapwing.kernels.codegen import compile_source, generic
 
 
 class NeighbourState(NamedTuple):
@@ -64,7 +64,9 @@ def presence(effects: tuple) -> NeighbourState:
     return NeighbourState(**{key: value for table in tables for key, value in table.items()})
 
 
-def _all_interactions(effects: Any, *_rest: Any) -> Any:
+@generic(inline=True)
+def all_interactions(effects: Any, memory: Any, own: Any, others: Any, interval: Any) -> Any:
+    """Return the effects' memory after the hooks of interacting effects."""
     names, members = {}, []
     for i, effect in enumerate(effects.types):
         known = effect.instance_class in INTERACTION
@@ -73,11 +75,3 @@ def _all_interactions(effects: Any, *_rest: Any) -> Any:
         members.append(f"f{i}(effects[{i}], memory[{i}], own, others, interval)" if known else f"memory[{i}]")
     values = "".join(f"{member}, " for member in members)
     return compile_source("all_interactions(effects, memory, own, others, interval)", names, f"return ({values})")
-
-
-all_interactions = generated_overload(
-    "all_interactions(effects, memory, own, others, interval)",
-    _all_interactions,
-    "The effects' memory after each that knows of other vehicles has looked at them.",
-    inline=True,
-)

@@ -6,7 +6,7 @@ from lapwing.dynamics.effects._axes import axial_speeds
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
-from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vector import pair, product
 from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
@@ -66,17 +66,12 @@ def _less(constant, before, both):
     return before - (constant * both[1]) * both[0]
 
 
-@always_inline
-def _product(_, a, b):
-    return a * b
-
-
 @loads(AxialInflow)
 def axial_inflow(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
     speed, density = s.motion.rotor_speed, s.air.density
     w = map_tuple(_advance, e.turn_per_metre, axial_speeds(s), speed)
-    linear, square = map_tuple(_product, 0.0, speed, w), map_tuple(_square_change, 0.0, speed, w)
+    linear, square = map_tuple(product, 0.0, speed, w), map_tuple(_square_change, 0.0, speed, w)
     return Loads(
         map_tuple(_less, e.thrust_constant * density, before.thrust, map_tuple(pair, 0.0, linear, factors.thrust)),
         map_tuple(

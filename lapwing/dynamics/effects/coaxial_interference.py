@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics import small_matrices
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import check_beside, checked, reject
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
 from lapwing.dynamics.vector import pair
@@ -96,11 +96,7 @@ class CoaxialInterference(NamedTuple):
 
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     """Check that the scene has `rotor_thrust`, whose loads this effect changes."""
-    if "rotor_thrust" not in tables:
-        reject("goes with effects.rotor_thrust, which the scene does not name")
-    for name in NOT_BESIDE:
-        if name in tables:
-            reject(f"is not made to stand beside effects.{name}: keep one of them")
+    check_beside(tables, "rotor_thrust", NOT_BESIDE)
 
 
 def stacked(airframe: "Airframe") -> bool:

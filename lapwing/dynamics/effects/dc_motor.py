@@ -10,7 +10,7 @@ from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._external_motor import DcMotorInputs, ExternalDcMotor, idle_current
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import discrete_update, motor
-from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
 from lapwing.kernels import math as exact
 from lapwing.kernels.codegen import map_tuple
@@ -205,16 +205,6 @@ def continue_current(e, memory, s, rotors, key, tick, interval):
 
 
 @always_inline
-def _first(_, driven, __):
-    return driven[0]
-
-
-@always_inline
-def _second(_, driven, __):
-    return driven[1]
-
-
-@always_inline
 def _third(_, driven, __):
     return driven[2]
 
@@ -225,7 +215,7 @@ def dc_motor(e, memory, s, loads, voltage):
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, loads.torque)
     driven = by_axis(_all_without_lag, _all_lagging, e.winding, (e, memory, s.t, both, voltage))
     return (
-        map_tuple(_first, 0.0, driven, driven),
-        map_tuple(_second, 0.0, driven, driven),
+        map_tuple(first, 0.0, driven, driven),
+        map_tuple(second, 0.0, driven, driven),
         map_tuple(_third, 0.0, driven, driven),
     )

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from lapwing.dynamics.effects._axes import hub_speeds
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import discrete_update, loads
-from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects.axial_inflow import KIND
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
@@ -106,23 +106,8 @@ def _change(e, both, hub):
     return speed * e.slope * (e.hover * speed - through), torque
 
 
-@always_inline
-def _more_thrust(density, before, both):
-    factor, change = both
-    return before + density * factor * change[0]
-
-
-@always_inline
-def _more_torque(density, before, both):
-    factor, change = both
-    return before + density * factor * change[1]
-
-
 @loads(DynamicInflow)
 def dynamic_inflow(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
     change = map_tuple(_change, e, map_tuple(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
-    return Loads(
-        map_tuple(_more_thrust, s.air.density, before.thrust, map_tuple(pair, 0.0, factors.thrust, change)),
-        map_tuple(_more_torque, s.air.density, before.torque, map_tuple(pair, 0.0, factors.torque, change)),
-    )
+    return with_changes(s, factors, before, change)

@@ -22,7 +22,7 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import over_plane, summit, surface
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, scale, subtract
 from lapwing.kernels import always_inline, kernel
-from lapwing.kernels.codegen import map_tuple, overload_for, reduce_tuple
+from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
 from lapwing.kernels.simd import any_above, deinterleave, interleave, select, select_vector, sqrt
 from lapwing.kernels.simd_chunks import chunk4, unchunk4
 from lapwing.kernels.state_tree import largest
@@ -54,12 +54,8 @@ def _element(e, deflection, foot):
     return scale(-1.0, limited), scale(1.0 / e.tangential_damping, subtract(limited, pull))
 
 
+@generic(inline=True)
 def _friction(e, memory, foot):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_friction, inline=True)
-def _friction_by_law(e, memory, foot):
     if e.instance_class is GroundContact:
         return lambda e, memory, foot: _element(e, memory, foot)[0]
 
@@ -109,15 +105,9 @@ def _feet_wrench(e, memory, motion, R_world_body):
     return force, apply_transposed(R_world_body, torque_world)
 
 
-@wrench(GroundContact)
+@wrench(GroundContact, GroundContactSmooth)
 def ground_contact(e, memory, s, rotors):
-    """Force [N] in world, torque [N m] in body coordinates."""
-    return _feet_wrench(e, memory, s.motion, s.R_world_body)
-
-
-@wrench(GroundContactSmooth)
-def ground_contact_smooth(e, memory, s, rotors):
-    """Force [N] in world, torque [N m] in body coordinates."""
+    """Return the force [N] in world, torque [N m] in body coordinates."""
     return _feet_wrench(e, memory, s.motion, s.R_world_body)
 
 
@@ -129,34 +119,23 @@ def _on_points(c, feet, memory):
     return deinterleave((place, _push(e, stance, feet_body, interleave(memory))[0]))
 
 
-@always_inline
-def _forces(e, memory, motion):
+@contact_forces(GroundContact, GroundContactSmooth)
+def forces(e, memory, motion):
+    """Return ((place [m], force [N]) of every foot and point of the hull), world."""
     stance = stance_of(e, motion, rotation_matrix(motion.attitude))
     feet, fours = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
     return unchunk4(map_tuple(_on_points, (e, stance), feet, fours), e.feet)
 
 
-@contact_forces(GroundContact)
-def forces(e, memory, motion):
-    """((place [m], force [N]) of every foot and point of the hull), world."""
-    return _forces(e, memory, motion)
-
-
-@contact_forces(GroundContactSmooth)
-def forces_smooth(e, memory, motion):
-    """((place [m], force [N]) of every foot and point of the hull), world."""
-    return _forces(e, memory, motion)
-
-
 @is_sleeping(GroundContact)
 def far(e, memory, motion, h):
-    """Well above the ground, with friction elements that have relaxed?"""
+    """Return True well above the ground, if the friction elements have relaxed."""
     return _far(e, motion, h) and largest(memory) < RELAXED
 
 
 @is_sleeping(GroundContactSmooth)
 def far_smooth(e, memory, motion, h):
-    """Well above the ground?"""
+    """Return True well above the ground."""
     return _far(e, motion, h)
 
 
@@ -236,13 +215,7 @@ def _touches(e, motion, R_world_body):
     return reduce_tuple(_press, (e, stance_of(e, motion, R_world_body)), False, feet, feet)
 
 
-@contact(GroundContact)
+@contact(GroundContact, GroundContactSmooth)
 def touches(e, memory, s):
-    """Does any foot press on the ground?"""
-    return _touches(e, s.motion, s.R_world_body)
-
-
-@contact(GroundContactSmooth)
-def touches_smooth(e, memory, s):
-    """Does any foot press on the ground?"""
+    """Return True if any foot presses on the ground."""
     return _touches(e, s.motion, s.R_world_body)

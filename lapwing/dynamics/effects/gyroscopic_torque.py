@@ -6,7 +6,7 @@ from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.effects._rotor_sums import total, total_vector
-from lapwing.dynamics.vector import cross, scale, subtract
+from lapwing.dynamics.vector import cross, product, scale, subtract
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 
@@ -35,17 +35,12 @@ class GyroscopicTorque(NamedTuple):
 
 
 @always_inline
-def _signed(_, sign, value):
-    return sign * value
-
-
-@always_inline
 def _along_z(arguments):
     e, s, rotors = arguments
     sign, omega = s.layout.reaction_sign, s.motion.omega_body
     # a rotor that pushes the body to +z turns about -z itself
-    momentum = -e.inertia * total(map_tuple(_signed, 0.0, sign, s.motion.rotor_speed))  # along body z
-    spin_up = e.inertia * total(map_tuple(_signed, 0.0, sign, rotors.acceleration))
+    momentum = -e.inertia * total(map_tuple(product, 0.0, sign, s.motion.rotor_speed))  # along body z
+    spin_up = e.inertia * total(map_tuple(product, 0.0, sign, rotors.acceleration))
     return (-omega[1] * momentum, omega[0] * momentum, spin_up)
 
 
@@ -57,7 +52,7 @@ def _scaled(_, value, axis):
 @always_inline
 def _sum_along(axis, sign, values):
     """Return the sum of a value of each rotor along its axis, with the sign of its reaction."""
-    return total_vector(map_tuple(_scaled, 0.0, map_tuple(_signed, 0.0, sign, values), axis))
+    return total_vector(map_tuple(_scaled, 0.0, map_tuple(product, 0.0, sign, values), axis))
 
 
 @always_inline

@@ -8,7 +8,7 @@ from lapwing.dynamics.effects._axes import air_body, by_axis, places
 from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
-from lapwing.dynamics.vector import add, cross, dot, pair, scale, subtract
+from lapwing.dynamics.vector import add, cross, dot, pair, product, scale, subtract
 from lapwing.dynamics.vehicles.propeller import h_force_coefficient
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
@@ -51,11 +51,6 @@ class HForce(NamedTuple):
 
 
 @always_inline
-def _product(_, a, b):
-    return a * b
-
-
-@always_inline
 def _along_z(arguments):
     e, s = arguments
     layout, speed = s.layout, s.motion.rotor_speed
@@ -63,9 +58,9 @@ def _along_z(arguments):
     # sums over the rotors of speed times 1, x, y and x^2 + y^2 give the force and torque of all of them
     k, h = e.coefficient * s.air.density, e.height
     w = k * total(speed)
-    wx = k * total(map_tuple(_product, 0.0, speed, layout.x_body))
-    wy = k * total(map_tuple(_product, 0.0, speed, layout.y_body))
-    w_square = k * total(map_tuple(_product, 0.0, speed, e.square_arm))
+    wx = k * total(map_tuple(product, 0.0, speed, layout.x_body))
+    wy = k * total(map_tuple(product, 0.0, speed, layout.y_body))
+    w_square = k * total(map_tuple(product, 0.0, speed, e.square_arm))
     x = -(w * (v[0] + h * omega[1]) - wy * omega[2])
     y = -(w * (v[1] - h * omega[0]) + wx * omega[2])
     yaw = wy * (v[0] + h * omega[1]) - wx * (v[1] - h * omega[0]) - w_square * omega[2]

@@ -8,7 +8,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import checked
 from lapwing.dynamics.effects._hooks import break_time, load_factors, timed_update
 from lapwing.dynamics.effects._types import Factors, PerRotor
-from lapwing.kernels import always_inline
+from lapwing.dynamics.vector import product
 from lapwing.kernels.codegen import map_tuple
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
@@ -53,11 +53,6 @@ class RotorDamage(NamedTuple):
         return (1.0,) * len(self.remaining_thrust), (1.0,) * len(self.remaining_torque)
 
 
-@always_inline
-def _product(_, a, b):
-    return a * b
-
-
 @break_time(RotorDamage)
 def moment(e, memory, t, h, value):
     """Return the moment of the damage if it is to come."""
@@ -73,6 +68,4 @@ def strike(e, memory, t):
 @load_factors(RotorDamage)
 def rotor_damage(e, memory, s, before):
     """Multiply the damaged rotor's load factors."""
-    return Factors(
-        map_tuple(_product, 0.0, before.thrust, memory[0]), map_tuple(_product, 0.0, before.torque, memory[1])
-    )
+    return Factors(map_tuple(product, 0.0, before.thrust, memory[0]), map_tuple(product, 0.0, before.torque, memory[1]))

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from lapwing.dynamics.effects._axes import air_body, hub_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import check_beside, checked, reject
 from lapwing.dynamics.effects._hooks import loads
-from lapwing.dynamics.effects._types import Loads
+from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects._vortex_wake import OFFSETS, SKEWS, mean_wash
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
@@ -79,11 +79,7 @@ class RotorInterference(NamedTuple):
 
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     """Check that the scene has `rotor_thrust`, whose loads this effect changes."""
-    if "rotor_thrust" not in tables:
-        reject("goes with effects.rotor_thrust, which the scene does not name")
-    for name in NOT_BESIDE:
-        if name in tables:
-            reject(f"is not made to stand beside effects.{name}: keep one of them")
+    check_beside(tables, "rotor_thrust", NOT_BESIDE)
 
 
 @always_inline
@@ -138,18 +134,6 @@ def _change(c, row, both):
     return thrust, (thrust * through + static * (flow + own)) / speed
 
 
-@always_inline
-def _more_thrust(density, before, both):
-    factor, change = both
-    return before + density * factor * change[0]
-
-
-@always_inline
-def _more_torque(density, before, both):
-    factor, change = both
-    return before + density * factor * change[1]
-
-
 @loads(RotorInterference)
 def rotor_interference(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
@@ -157,7 +141,4 @@ def rotor_interference(e, memory, s, factors, before):
     air, _ = air_body(s)
     flows = map_tuple(_induced, e, speed, hub_speeds(s))
     change = map_tuple(_change, (e, flows, (air[0], air[1])), e.pairs, map_tuple(pair, 0.0, e.numbers, speed))
-    return Loads(
-        map_tuple(_more_thrust, s.air.density, before.thrust, map_tuple(pair, 0.0, factors.thrust, change)),
-        map_tuple(_more_torque, s.air.density, before.torque, map_tuple(pair, 0.0, factors.torque, change)),
-    )
+    return with_changes(s, factors, before, change)

@@ -10,7 +10,7 @@ from lapwing.dynamics.effects._from_scene import checked, reject
 from lapwing.dynamics.effects._hooks import discrete_update, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.noise import normal3
-from lapwing.dynamics.vector import pair
+from lapwing.dynamics.vector import pair, product
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
@@ -107,13 +107,8 @@ def _factor(e, hub, both):
     return 1.0 - strength(-hub[0] / hover, hub[1] / hover) * (e.loss + e.unsteadiness * state[0])
 
 
-@always_inline
-def _product(_, a, b):
-    return a * b
-
-
 @load_factors(VortexRing)
 def vortex_ring(e, memory, s, before):
     """Multiply the thrust factors; torque is unchanged."""
     factor = map_tuple(_factor, e, hub_speeds(s), map_tuple(pair, 0.0, s.motion.rotor_speed, memory))
-    return Factors(map_tuple(_product, 0.0, before.thrust, factor), before.torque)
+    return Factors(map_tuple(product, 0.0, before.thrust, factor), before.torque)

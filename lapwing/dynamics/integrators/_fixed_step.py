@@ -9,7 +9,7 @@ from collections import namedtuple
 from typing import Any
 
 from lapwing.kernels import DispatchTable, always_inline, kernel
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic, overload_for
 from lapwing.kernels.state_tree import finite, flatten
 
 RATES = DispatchTable()
@@ -27,12 +27,9 @@ def method_token(module: str) -> type:
     return result
 
 
+@generic()
 def _rate(p, t, x):
     """Dispatch by the class of p."""
-
-
-@overload_for(_rate)
-def _rate_of(p, t, x):
     return RATES[p.instance_class]
 
 

@@ -10,7 +10,7 @@ from numba import types
 
 from lapwing.dynamics.integrators._fixed_step import RATES, _rate
 from lapwing.kernels import DispatchTable, always_inline, kernel
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 
 BREAKPOINTS = DispatchTable()
 """The compiled `next_breakpoint(p, t)` of a system, by the NamedTuple class of its parameters; others have none."""
@@ -35,13 +35,9 @@ def _rate_of_piece(p, t, x):
 RATES[Piece] = _rate_of_piece
 
 
-def next_breakpoint(p: Any, t: float) -> float:
+@generic(inline=True)
+def next_breakpoint(p: types.Type, t: types.Type) -> Any:
     """Return the first time [s] after t at which the forces of the system p change; infinity if there is none."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(next_breakpoint, inline=True)
-def _next_breakpoint(p: types.Type, t: types.Type) -> Any:
     return BREAKPOINTS.get(p.instance_class, lambda p, t: math.inf)
 
 

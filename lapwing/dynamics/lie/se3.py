@@ -7,8 +7,14 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie import quaternion, so3
 from lapwing.dynamics.lie.quaternion import Quaternion, rotate
-from lapwing.dynamics.lie.ratio_slopes import cosine_slope, cotangent_slope, cubic_slope
-from lapwing.dynamics.lie.ratios import cosine_ratio, cotangent_ratio, cubic_ratio
+from lapwing.dynamics.lie.ratios import (
+    cosine_ratio,
+    cosine_slope,
+    cotangent_ratio,
+    cotangent_slope,
+    cubic_ratio,
+    cubic_slope,
+)
 from lapwing.dynamics.vector import Vec3, add, cross, dot, scale
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold

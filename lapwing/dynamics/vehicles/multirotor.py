@@ -21,7 +21,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     RotorLayout,
     accelerations_of_form,
     evaluate,
-    seen,
+    motion_of,
 )
 from lapwing.dynamics.vehicles.multirotor_stepper import begin, parts, steps, within
 from lapwing.kernels import kernel
@@ -82,7 +82,7 @@ def observe(p, tick, interval, state, command):
     voltage = map_tuple(within, layout.max_voltage, command, command)
     body = hooks.all_mass_properties(p.effects, state.memory, p.body)
     drive = MultirotorDrive(p, body, state.memory, voltage)
-    s, rotors, _, _ = evaluate(drive, tick * interval, seen(layout, state.motion))
+    s, rotors, _, _ = evaluate(drive, tick * interval, motion_of(layout, state.motion))
     linear, angular = accelerations_of_form(drive, tick * interval, state.motion)
     unknown = (math.nan, layout.max_voltage, total(rotors.current), math.nan)
     return MultirotorObservation(

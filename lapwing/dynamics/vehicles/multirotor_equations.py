@@ -22,10 +22,10 @@ from lapwing.dynamics.effects._types import (
     Rotors,
 )
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vector import ZERO, Vec3, product
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import map_tuple, overload_for
+from lapwing.kernels.codegen import generic, map_tuple
 
 STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
 
@@ -71,9 +71,9 @@ def _never(layout, x, h):
 class StateForm(NamedTuple):
     """The compiled functions of a class that stands for the motion in the state."""
 
-    seen: Callable  # (layout, x) -> Motion that effects look at
+    motion: Callable  # (layout, x) -> Motion that effects read
     rate: Callable  # (drive, t, x) -> tangent of x
-    held: Callable  # (drive, x) -> x after a step, brought back onto its constraints
+    project: Callable  # (drive, x) -> x after a step, brought back onto its constraints
     accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
     switches: Callable = _never  # (layout, x, h) -> True if a force of the form can begin or end within h [s]
 
@@ -102,11 +102,6 @@ def _static_current(s, torque, voltage):
 
 
 @always_inline
-def _product(c, a, b):
-    return a * b
-
-
-@always_inline
 def _constant(c, a, b):
     return c
 
@@ -128,7 +123,7 @@ def evaluate(drive, t, motion):
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
     voltage = hooks.all_supply_voltage(p.effects, memory, drive.voltage)
     current = map_tuple(_static_current, s, loads.torque, voltage)
-    lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(_product, 0.0, voltage, current))
+    lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(product, 0.0, voltage, current))
     acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
     rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
     thrust, torque = thrust_wrench(layout, loads)
@@ -161,21 +156,13 @@ def accelerations(drive, t, motion):
 FORMS[Motion] = StateForm(_itself, rate, _itself, accelerations)
 
 
-def seen(layout: RotorLayout, x: Any) -> Motion:
-    """Return the vehicle's Motion from any state form; compiled code only."""
-    raise NotImplementedError("compiled code only")
+@generic(inline=True)
+def motion_of(layout, x):
+    """Return the vehicle's Motion from any state form."""
+    return FORMS[x.instance_class].motion
 
 
-@overload_for(seen, inline=True)
-def _seen(layout, x):
-    return FORMS[x.instance_class].seen
-
-
+@generic(inline=True)
 def accelerations_of_form(drive, t, x):
-    """Return `accelerations` from any state form; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(accelerations_of_form, inline=True)
-def _accelerations_of_form(drive, t, x):
+    """Return `accelerations` from any state form."""
     return FORMS[x.instance_class].accelerations

@@ -156,9 +156,9 @@ def _stopped(b):
 
 
 @noinline
-def seen(layout, x):
+def motion_of(layout, x):
     """Return the Motion of the chassis with the speeds of the rotors."""
-    return on_se3.seen(layout, five(x))
+    return on_se3.motion_of(layout, five(x))
 
 
 @noinline
@@ -167,7 +167,7 @@ def rate(drive, t, x):
     if not _all_upright(x):
         b = x.body
         return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
-    p = on_se3.machine(drive, t, seen(drive.parameters.layout, x))
+    p = on_se3.machine(drive, t, motion_of(drive.parameters.layout, x))
     bodies = drive.parameters.layout.bodies
     a = _system(bodies.arrays, p)
     q, v = _arrays(x)
@@ -179,7 +179,7 @@ def rate(drive, t, x):
 @noinline
 def apply_constraint_impulse(drive, x):
     """See `multirotor_multibody_equations.apply_constraint_impulse`."""
-    p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
+    p = on_se3.unloaded(drive, motion_of(drive.parameters.layout, x))
     a = _system(drive.parameters.layout.bodies.arrays, p)
     q, v = _arrays(x)
     q, v = stabilisation.project(a, q, v, _imposed(a, p), _ranks(a))
@@ -187,14 +187,14 @@ def apply_constraint_impulse(drive, x):
 
 
 @noinline
-def held(drive, x):
+def project(drive, x):
     """Return the bodies with stabilised constraints."""
     bodies = drive.parameters.layout.bodies
     if bodies.hold == five_body_stabilisation.NONE or not _all_upright(x):
         return x
     if bodies.hold == five_body_stabilisation.PROJECTION:
         return apply_constraint_impulse(drive, x)
-    p = on_se3.unloaded(drive, seen(drive.parameters.layout, x))
+    p = on_se3.unloaded(drive, motion_of(drive.parameters.layout, x))
     a = _system(bodies.arrays, p)
     q, v = _arrays(x)
     q, v = stabilisation.partition(a, q, v, _imposed(a, p), _ranks(a))
@@ -211,7 +211,7 @@ def accelerations(drive, t, x):
     return tangent.velocity_world, angular
 
 
-FORMS[FiveEulerBodies] = StateForm(seen, rate, held, accelerations)
+FORMS[FiveEulerBodies] = StateForm(motion_of, rate, project, accelerations)
 
 
 def singular(x: FiveEulerBodies) -> int:

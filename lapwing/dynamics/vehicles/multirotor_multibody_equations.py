@@ -15,7 +15,7 @@ from lapwing.dynamics.multibody import five_bodies
 from lapwing.dynamics.multibody import five_body_stabilisation as hold
 from lapwing.dynamics.multibody.delivery_drone import Drone
 from lapwing.dynamics.multibody.five_bodies import NO_WRENCH, FiveBodies, Machine, Rotor, Wrench
-from lapwing.dynamics.vector import ZERO, Vec3, add, cross, pair, scale, subtract
+from lapwing.dynamics.vector import ZERO, Vec3, add, cross, pair, product, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_equations import FORMS, StateForm, evaluate
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.codegen import map_tuple
@@ -47,16 +47,11 @@ def _rotor_speed(chassis_rate, sign, propeller):
 
 
 @always_inline
-def _product(_, a, b):
-    return a * b
-
-
-@always_inline
-def seen(layout, x):
+def motion_of(layout, x):
     """Return the Motion of the chassis with the rotor speeds; 0 for a detached one."""
     c = x.chassis
     speed = map_tuple(_rotor_speed, c.omega_body[2], layout.reaction_sign, x.propellers)
-    speed = map_tuple(_product, 0.0, layout.bodies.drone.held, speed)
+    speed = map_tuple(product, 0.0, layout.bodies.drone.held, speed)
     return Motion(c.position_world, c.attitude, c.velocity_world, c.omega_body, speed)
 
 
@@ -73,9 +68,9 @@ def acting(drive, t, motion):
     field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
     known = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
     arms = (
-        total(map_tuple(_product, 0.0, layout.y_body, rotors.thrust)),
-        -total(map_tuple(_product, 0.0, layout.x_body, rotors.thrust)),
-        total(map_tuple(_product, 0.0, layout.reaction_sign, rotors.torque)),
+        total(map_tuple(product, 0.0, layout.y_body, rotors.thrust)),
+        -total(map_tuple(product, 0.0, layout.x_body, rotors.thrust)),
+        total(map_tuple(product, 0.0, layout.reaction_sign, rotors.torque)),
     )
     loads = map_tuple(pair, 0.0, rotors.thrust, rotors.torque)
     parts = map_tuple(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
@@ -133,23 +128,23 @@ def unloaded(drive, motion):
 @kernel
 def rate(drive, t, x):
     """Return the tangent of the five bodies."""
-    return five_bodies.rate(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+    return five_bodies.rate(machine(drive, t, motion_of(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel
-def held(drive, x):
+def project(drive, x):
     """Return the bodies with stabilised constraints."""
     how = drive.parameters.layout.bodies.hold
     if how == hold.NONE:
         return x
-    p = unloaded(drive, seen(drive.parameters.layout, x))
+    p = unloaded(drive, motion_of(drive.parameters.layout, x))
     return hold.project(p, 0.0, x) if how == hold.PROJECTION else hold.partition(p, 0.0, x)
 
 
 @kernel
 def apply_constraint_impulse(drive, x):
     """Return the bodies after hinge impulses that satisfy all constraints and conserve momentum."""
-    return hold.project(unloaded(drive, seen(drive.parameters.layout, x)), 0.0, x)
+    return hold.project(unloaded(drive, motion_of(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel
@@ -159,7 +154,7 @@ def accelerations(drive, t, x):
     return tangent.chassis.velocity_world, tangent.chassis.omega_body
 
 
-FORMS[FiveBodies] = StateForm(seen, rate, held, accelerations)
+FORMS[FiveBodies] = StateForm(motion_of, rate, project, accelerations)
 
 
 @always_inline
@@ -181,7 +176,7 @@ def joints(drive, t, x):
 
     The z component of a propeller's torque is that of its drive.
     """
-    on = five_bodies.reactions(machine(drive, t, seen(drive.parameters.layout, x)), 0.0, x)
+    on = five_bodies.reactions(machine(drive, t, motion_of(drive.parameters.layout, x)), 0.0, x)
     b, c = x.propellers, x.chassis
     chassis = total_wrench(
         (

@@ -54,7 +54,7 @@ class SlungMotion(NamedTuple):
 
 
 @always_inline
-def seen(layout, x):
+def motion_of(layout, x):
     """Return the Motion of the vehicle."""
     return x.vehicle
 
@@ -149,7 +149,7 @@ def switches(layout, x, h):
     return slackens or x.load_position[2] - height <= 2.0 * norm(load) * h + CLEARANCE
 
 
-FORMS[SlungMotion] = StateForm(seen, rate, _itself, accelerations, switches)
+FORMS[SlungMotion] = StateForm(motion_of, rate, _itself, accelerations, switches)
 
 
 @always_inline

@@ -13,36 +13,28 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     StateForm,
     accelerations_of_form,
     evaluate,
-    seen,
+    motion_of,
 )
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels import noinline as never_inlined
-from lapwing.kernels.codegen import map_tuple, overload_for
+from lapwing.kernels.codegen import generic, map_tuple
 from lapwing.kernels.state_tree import axpy, finite, normalise, relative_difference
 
 BREAK_ROUNDING = 1e-6  # of a communication step: breakpoints so close to its ends are there
 FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
 
 
+@generic(inline=True)
 def _step(method, drive, t, x, h):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_step, inline=True)
-def _step_inlined(method, drive, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
     form = FORMS[x.instance_class]
-    its_rate, held = form.rate, form.held
+    its_rate, project = form.rate, form.project
     # inlined into `advance`, so that what a whole interval has in common is computed once
-    return lambda method, drive, t, x, h: held(drive, one_step(its_rate, drive, t, x, h))
+    return lambda method, drive, t, x, h: project(drive, one_step(its_rate, drive, t, x, h))
 
 
+@generic(inline=True)
 def _switches(layout, x, h):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_switches, inline=True)
-def _switches_of_form(layout, x, h):
     return FORMS[x.instance_class].switches
 
 
@@ -69,25 +61,17 @@ class AwakeState(NamedTuple):
 
 @always_inline
 def _seen_awake(layout, x):
-    return seen(layout, x.motion)
+    return motion_of(layout, x.motion)
 
 
+@generic(inline=True)
 def _rate_of_form(drive, t, x):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_rate_of_form, inline=True)
-def _rate_of_form_inlined(drive, t, x):
     return FORMS[x.instance_class].rate
 
 
-def _held_form(drive, x):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_held_form, inline=True)
-def _held_form_inlined(drive, x):
-    return FORMS[x.instance_class].held
+@generic(inline=True)
+def _project_form(drive, x):
+    return FORMS[x.instance_class].project
 
 
 @always_inline
@@ -100,14 +84,14 @@ def _remembering(drive, x):
 @kernel
 def _awake_rate(drive, t, x):
     p, body, memory, voltage = _remembering(drive, x)
-    effects, rates = hooks.with_rates(p.effects, memory, seen(p.layout, x.motion))
+    effects, rates = hooks.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
     known = MultirotorParameters(p.body, p.layout, effects, p.tolerance)
     return AwakeState(_rate_of_form(MultirotorDrive(known, body, memory, voltage), t, x.motion), rates)
 
 
 @always_inline
-def _held_awake(drive, x):
-    return AwakeState(_held_form(drive, x.motion), x.memory)
+def _project_awake(drive, x):
+    return AwakeState(_project_form(drive, x.motion), x.memory)
 
 
 @always_inline
@@ -115,15 +99,11 @@ def _awake_accelerations(drive, t, x):
     return accelerations_of_form(_remembering(drive, x), t, x.motion)
 
 
-FORMS[AwakeState] = StateForm(_seen_awake, _awake_rate, _held_awake, _awake_accelerations)
+FORMS[AwakeState] = StateForm(_seen_awake, _awake_rate, _project_awake, _awake_accelerations)
 
 
+@generic(inline=True)
 def _extrapolated(method, halves, whole):
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_extrapolated, inline=True)
-def _extrapolated_by_order(method, halves, whole):
     share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
     return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))
 
@@ -147,7 +127,7 @@ def _stiff_steps(method, drive, t, x, h, end):
     x = AwakeState(x, hooks.all_integrated(p.effects, memory))
     while True:
         left = end - t
-        part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, seen(p.layout, x), h))
+        part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, motion_of(p.layout, x), h))
         last = part > (1.0 - 1e-9) * left
         size = left if last else part
         half = 0.5 * size
@@ -175,7 +155,7 @@ def begin(p, key, tick, state, command, interval):
     layout, memory = p.layout, state.memory
     voltage = map_tuple(within, layout.max_voltage, command, command)
     before = _airborne(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
-    s, rotors, _, _ = evaluate(before, tick * interval, seen(layout, state.motion))
+    s, rotors, _, _ = evaluate(before, tick * interval, motion_of(layout, state.motion))
     memory = hooks.all_discrete_updates(p.effects, memory, s, rotors, key, tick, interval)
     memory = hooks.all_timed_updates(p.effects, memory, (tick + BREAK_ROUNDING) * interval)
     return MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
@@ -221,10 +201,10 @@ def steps(method, drive, x, start, end, h, first, n):
         layout, airborne = p.layout, _airborne(p, body, memory, voltage)
         for i in range(first, n):
             switches = _switches(layout, x, h)
-            if not switches and hooks.all_sleeping(p.effects, memory, seen(layout, x), h):
+            if not switches and hooks.all_sleeping(p.effects, memory, motion_of(layout, x), h):
                 x = _step(method, airborne, start + i * h, x, h)
                 continue
-            if switches or not hooks.all_stiff_sleeping(p.effects, memory, seen(layout, x), h):
+            if switches or not hooks.all_stiff_sleeping(p.effects, memory, motion_of(layout, x), h):
                 drive = MultirotorDrive(p, body, memory, voltage)
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break

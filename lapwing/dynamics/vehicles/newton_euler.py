@@ -4,16 +4,12 @@ from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import FullMassProperties, OffsetMassProperties
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, scale, subtract
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 
 
+@generic(inline=True)
 def angular_acceleration(body, omega, torque):
     """Return the angular acceleration by Euler's equations (eqs. (1.6), (1.6a)), by mass properties class."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(angular_acceleration, inline=True)
-def _angular_acceleration_of_class(body, omega, torque):
     return _with_products if body.instance_class is FullMassProperties else _about_principal_axes
 
 
@@ -32,16 +28,12 @@ def _about_principal_axes(body, omega, torque):
     )
 
 
+@generic(inline=True)
 def newton_euler(body, drive, s, force, torque):
     """Return (linear [m/s^2], world; angular [rad/s^2], body) acceleration, by mass properties class.
 
     The force [N] is in the world, the torque [N m] in the body about the motion's position.
     """
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(newton_euler, inline=True)
-def _newton_euler_of_class(body, drive, s, force, torque):
     return _about_offset_centre if body.instance_class is OffsetMassProperties else _about_centre
 
 

@@ -1,5 +1,6 @@
 """Digest of the sources of modules and, transitively, of all modules that they import."""
 
+import ast
 import hashlib
 import importlib.util
 import os
@@ -10,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from lapwing.kernels.compiler.import_scan import imports
+from lapwing.kernels.compiler import cache_files
 from lapwing.kernels.compiler.start_time import BEGAN
 
 OURS = {"lapwing"}
@@ -161,3 +162,38 @@ def unchanged(modules: Iterable[str]) -> bool:
         return False
     # a moved file keeps its modification time (mtime), but gets a new ctime
     return all(max(state.st_mtime, state.st_ctime) < BEGAN for state in states)
+
+
+def imports(module: str, is_package: bool, source: bytes, version: str) -> list[str]:
+    """Return the dotted names that a source imports anywhere: modules, and names that may be modules.
+
+    Parsing the few hundred sources of a run would take half a second, so the result is stored on disk.
+
+    Args:
+        module: dotted name of the module, the origin of relative imports.
+        is_package: True if the source is an `__init__.py`.
+        source: text of the module.
+        version: hexadecimal digest of the source.
+
+    Raises:
+        SyntaxError: the source is not Python.
+    """
+    text = cache_files.read("imports", module, version)
+    if text is None:
+        text = "\n".join(sorted(_parsed(source, module if is_package else module.rpartition(".")[0]))).encode()
+        cache_files.write("imports", module, version, text)
+    return text.decode().split()
+
+
+def _parsed(source: bytes, package: str) -> set[str]:
+    imports: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                parts = alias.name.split(".")
+                imports.update(".".join(parts[: n + 1]) for n in range(len(parts)))
+        elif isinstance(node, ast.ImportFrom):
+            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            base = ".".join([*above, *([node.module] if node.module else [])])
+            imports.update([base, *(f"{base}.{alias.name}" for alias in node.names if alias.name != "*")])
+    return imports

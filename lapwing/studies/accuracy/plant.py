@@ -12,7 +12,7 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vehicles import multirotor, multirotor_slung
 from lapwing.dynamics.vehicles.multirotor import advance, observe
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, motion_of
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
 from lapwing.kernels.state_tree import flatten
@@ -57,7 +57,7 @@ def flight(
             for _ in range(every):
                 state = advance(method, p, key, tick, state, map_tuple(_wave, tick * n * h, volts, phase), h, n)
                 tick += 1
-        numbers = flatten(seen(p.layout, state.motion))
+        numbers = flatten(motion_of(p.layout, state.motion))
         for i in range(len(numbers)):
             out[row, i] = numbers[i]
 
@@ -120,7 +120,7 @@ def problem(scene: Scene) -> Problem:
             for tick in range(TICK, TICK + SAMPLES * every):
                 voltage = map_tuple(_wave, tick * count * float(h), volts, phase)
                 x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)
-            return extended_coordinates(motion, extended(seen)(numbers.layout, x.motion))
+            return extended_coordinates(motion, extended(motion_of)(numbers.layout, x.motion))
 
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return SolverMethod(

@@ -10,7 +10,7 @@ from rich.table import Table
 from lapwing.studies.campaign.campaign_plots import shown
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.campaign.statistics import Interval, interval, paired
+from lapwing.studies.campaign.statistics import Interval, interval, paired_difference
 from lapwing.studies.metrics import METRICS
 
 COMPARED = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a campaign's manifest
@@ -56,14 +56,14 @@ def compare(one: Path, other: Path) -> Comparison:
         raise ValueError(f"{one} and {other}: have no run of the same seed; expected two campaigns of one --seed")
     at, of = np.array(pairs).T
     good, better = a["success"][at].astype(float), b["success"][of].astype(float)
-    differences = [Difference("success", float(good.mean()), float(better.mean()), paired(good, better))]
+    differences = [Difference("success", float(good.mean()), float(better.mean()), paired_difference(good, better))]
     for name in METRICS:
         if a.folder.kinds[name] is float:
             x, y = a[name][at], b[name][of]
             there = np.isfinite(x) & np.isfinite(y)
             if there.any():
                 means = float(x[there].mean()), float(y[there].mean())
-                differences.append(Difference(name, *means, paired(x[there], y[there])))
+                differences.append(Difference(name, *means, paired_difference(x[there], y[there])))
     count = len(pairs)
     failures = interval(int(count - good.sum()), count), interval(int(count - better.sum()), count)
     worse, mended = int(((good == 1) & (better == 0)).sum()), int(((good == 0) & (better == 1)).sum())

@@ -198,7 +198,7 @@ def parallel(results: Results) -> Plot:
         columns.append((values - low) / (high - low if high > low else 1.0))
         texts = _texts(results, name)
         ends = (texts[0], texts[-1]) if texts else (f"{scale * low:.3g}", f"{scale * high:.3g}")
-        ticks.append(f"{_broken(label)}\n{ends[0]}\nto {ends[1]}")
+        ticks.append(f"{_break_key(label)}\n{ends[0]}\nto {ends[1]}")
     rows, good = np.column_stack(columns), results["success"].astype(bool)
     marks = []
     for name, chosen, colour in (("success", good, QUIET), ("failure", ~good, BOUND)):
@@ -267,7 +267,7 @@ def _texts(results: Results, name: str) -> tuple[str, ...]:
     return tuple(np.unique(results[name])) if results[name].dtype == object else ()
 
 
-def _broken(key: str) -> str:
+def _break_key(key: str) -> str:
     """Break a dotted key into several lines."""
     lines = [""]
     for part in re.findall(r"\[[^\]]*\]|[^.\[]+\.?", key):

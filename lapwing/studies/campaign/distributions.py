@@ -20,7 +20,7 @@ class Distribution(NamedTuple):
     arguments: tuple[Any, ...]
 
     def __str__(self) -> str:
-        return f"{self.name}({', '.join(map(_shown, self.arguments))})"
+        return f"{self.name}({', '.join(map(_text, self.arguments))})"
 
     @property
     def values(self) -> tuple[Any, ...]:
@@ -40,7 +40,7 @@ def normal(mean: float, deviation: float) -> Distribution:
     Raises:
         ValueError: the deviation is below 0.
     """
-    return _made("normal", mean, deviation, sound=deviation >= 0.0, expected="a deviation of at least 0")
+    return _checked("normal", mean, deviation, sound=deviation >= 0.0, expected="a deviation of at least 0")
 
 
 def uniform(low: float, high: float) -> Distribution:
@@ -49,7 +49,7 @@ def uniform(low: float, high: float) -> Distribution:
     Raises:
         ValueError: high is below low.
     """
-    return _made("uniform", low, high, sound=high >= low, expected="low <= high")
+    return _checked("uniform", low, high, sound=high >= low, expected="low <= high")
 
 
 def loguniform(low: float, high: float) -> Distribution:
@@ -58,7 +58,7 @@ def loguniform(low: float, high: float) -> Distribution:
     Raises:
         ValueError: high is below low, or low is not above 0.
     """
-    return _made("loguniform", low, high, sound=high >= low > 0.0, expected="0 < low <= high")
+    return _checked("loguniform", low, high, sound=high >= low > 0.0, expected="0 < low <= high")
 
 
 def linspace(low: float, high: float, count: int) -> Distribution:
@@ -69,7 +69,7 @@ def linspace(low: float, high: float, count: int) -> Distribution:
     """
     sound = isinstance(count, int) and 0 < count <= MOST
     expected = f"a whole number of values, up to {MOST}, as third argument"
-    return _made("linspace", low, high, count, sound=sound, expected=expected)
+    return _checked("linspace", low, high, count, sound=sound, expected=expected)
 
 
 def choice(*values: Any) -> Distribution:
@@ -123,11 +123,11 @@ def _arguments(text: str) -> list[Any]:
         return [value_of(part.strip()) for part in _SPLIT.findall(text)]
 
 
-def _made(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
+def _checked(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
     if not sound or not all(abs(number) <= sys.float_info.max for number in numbers):
         raise ValueError(f"{name}: expected {expected}, got {', '.join(map(str, numbers))}")
     return Distribution(name, numbers)
 
 
-def _shown(value: Any) -> str:
+def _text(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)

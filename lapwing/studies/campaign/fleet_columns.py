@@ -27,7 +27,7 @@ def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
     return {NEAREST: float, **each, **figures} if vehicles else {}
 
 
-def joined(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
+def joint_row(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
     """Return the columns of a run without its drawn parameters.
 
     Args:

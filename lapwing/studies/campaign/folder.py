@@ -156,7 +156,7 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
 
 def _make(path: Path, about: dict[str, Any]) -> None:
     """Make the folder of a campaign."""
-    if path.exists() and (not path.is_dir() or any(not _begun(file) for file in path.iterdir())):
+    if path.exists() and (not path.is_dir() or any(not _may_be_new(file) for file in path.iterdir())):
         raise ValueError(f"{path}: holds something else; expected a new folder, or one of a campaign")
     try:
         (path / "shards").mkdir(parents=True, exist_ok=True)
@@ -166,7 +166,7 @@ def _make(path: Path, about: dict[str, Any]) -> None:
         raise ValueError(f"{path}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
 
 
-def _begun(file: Path) -> bool:
+def _may_be_new(file: Path) -> bool:
     """Return True if a file may belong to a campaign that another machine is starting."""
     return file.name in ("shards", MANIFEST) or file.name.startswith(f".{MANIFEST}.")
 

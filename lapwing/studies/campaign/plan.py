@@ -62,7 +62,7 @@ class Plan(NamedTuple):
         drawn = {key: distribution.at(u) for (key, distribution), u in zip(self.vary, places, strict=True)}
         return drawn | (self.sweep[run % len(self.sweep)] if self.sweep else {})
 
-    def given(self, run: int) -> dict[str, Any]:
+    def overrides_of(self, run: int) -> dict[str, Any]:
         """Return all overrides of a run, including its seed."""
         return {**self.values(run), SEED: self.seed_of(run)}
 

@@ -124,7 +124,7 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     if scene.vehicles:
         by_name = {flight.vehicle: flight for flight in flights}
         required = {vehicle[Vehicle].name: vehicle[Success] for vehicle in scene.vehicles}
-        return row | fleet_columns.joined(
+        return row | fleet_columns.joint_row(
             by_name, {name: metrics(flight) for name, flight in by_name.items()}, required
         )
     result = metrics(flights[0])
@@ -157,7 +157,7 @@ def setup_of(plan: Plan, run: int) -> RunConfig:
     if not plan.keys:
         return reseed(_resolved(plan.path, plan.overrides), plan.seed_of(run))
     with located(plan):
-        return campaign_setup(load(scene_of(plan), plan.given(run)))
+        return campaign_setup(load(scene_of(plan), plan.overrides_of(run)))
 
 
 @contextlib.contextmanager

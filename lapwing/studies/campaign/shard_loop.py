@@ -21,19 +21,19 @@ class Count(NamedTuple):
     kinds: tuple[tuple[str, int], ...] = ()  # how many ended how
 
     @property
-    def flown(self) -> int:
+    def accepted(self) -> int:
         """Runs that the scene took."""
         return self.runs - dict(self.kinds).get(REFUSED, 0)
 
     @property
     def failures(self) -> int:
         """Runs that were flown without success."""
-        return self.flown - self.successes
+        return self.accepted - self.successes
 
     @property
     def failure(self) -> Interval:
         """Probability of a failure."""
-        return interval(self.failures, self.flown)
+        return interval(self.failures, self.accepted)
 
     def __add__(self, other: "Count") -> "Count":  # type: ignore[override]
         kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REFUSED)}
@@ -117,6 +117,6 @@ class Ending:
         """Return True if these shards suffice."""
         while self._until is not None and not self._reached and self.shard in done:
             self.total += done[self.shard]
-            self._reached = self.total.flown > 0 and self.total.failure.half_width <= self._until
+            self._reached = self.total.accepted > 0 and self.total.failure.half_width <= self._until
             self.shard += not self._reached
         return self._reached

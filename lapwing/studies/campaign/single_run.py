@@ -28,7 +28,7 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
         if there.get(name) != here.get(name):
             raise ValueError(f"{scene}: {name} is not what {folder} has flown; expected the scene as it was then")
     with located(plan):
-        return load(scene_of(plan), plan.given(run))
+        return load(scene_of(plan), plan.overrides_of(run))
 
 
 def end_state_of(run: int, folder: Path) -> str:

@@ -51,7 +51,7 @@ def spread(values: np.ndarray, runs: np.ndarray, least: bool = False) -> Spread 
     return Spread(float(median), float(low), float(high), float(numbers[worst]), int(runs[worst]))
 
 
-def paired(a: np.ndarray, b: np.ndarray) -> Interval:
+def paired_difference(a: np.ndarray, b: np.ndarray) -> Interval:
     """Return the mean of b - a over pairs, with Student's interval; NaN with fewer than two pairs."""
     difference = (b - a)[np.isfinite(a) & np.isfinite(b)]
     if len(difference) < 2:

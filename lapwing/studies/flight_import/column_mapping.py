@@ -78,15 +78,15 @@ class Mapping(_Table):
     @property
     def columns(self) -> list[str]:
         """Every column named."""
-        return [column for columns in self._named().values() for column in columns]
+        return [column for columns in self._columns().values() for column in columns]
 
     def within(self, names: Collection[str]) -> "Mapping":
         """Return the mapping without quantities whose columns are missing and that it can do without."""
-        missing = [key for key, columns in self._named().items() if not set(columns) <= set(names)]
+        missing = [key for key, columns in self._columns().items() if not set(columns) <= set(names)]
         optional = set(missing) - {"time", "omega", "motors"} if self.partial else set(missing) & {"setpoint"}
         return self.model_copy(update=dict.fromkeys(optional))
 
-    def _named(self) -> dict[str, tuple[str, ...]]:
+    def _columns(self) -> dict[str, tuple[str, ...]]:
         tables = {name: getattr(self, name) for name in type(self).model_fields}
         return {
             name: (table.column,) if isinstance(table, Scalar) else table.columns

@@ -17,7 +17,7 @@ def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]
         ValueError: the file cannot be read, has no header or no rows, or a field is not a number.
     """
     try:
-        with warnings.catch_warnings(), _opened(path) as file:
+        with warnings.catch_warnings(), _open(path) as file:
             names = [name.strip().strip('"') for name in file.readline().split(",")]
             result = [name for name in dict.fromkeys(selected) if name in names]
             if not result:
@@ -39,7 +39,7 @@ def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]
     return dict(zip(result, table.T, strict=True))
 
 
-def _opened(path: Path) -> TextIO:
+def _open(path: Path) -> TextIO:
     if path.suffix == ".gz":
         return cast(TextIO, gzip.open(path, "rt", encoding="utf-8"))
     return path.open(encoding="utf-8")
@@ -54,7 +54,7 @@ def _tolerant(path: Path, places: list[int]) -> np.ndarray:
             raise ValueError(f"{path}:{line}: {text[:20]!r} is not a number; expected numbers in every row") from None
 
     rows = []
-    with _opened(path) as file:
+    with _open(path) as file:
         next(file)
         for line, row in enumerate(file, start=2):
             fields = row.rstrip("\n").split(",")

@@ -35,13 +35,13 @@ def read_log_flight(path: Path) -> Recording:
         raise ValueError(f"{path}: shorter than {50 * interval:g} s; expected a flight")
     grid = np.arange(times[0], times[-1], interval)
     volts = _latest(grid, flight.times("actuators"), flight.actuators.motor_voltage)
-    omega, force = _sampled(grid, times, truth.angular_velocity), np.full((len(grid), 3), np.nan)
+    omega, force = _sample(grid, times, truth.angular_velocity), np.full((len(grid), 3), np.nan)
     if flight.has("imu") and len(flight.topic("imu")) > 1:
         imu, at = flight.topic("imu"), flight.times("imu")
-        omega, force = _sampled(grid, at, imu.angular_velocity), _sampled(grid, at, imu.linear_acceleration)
-    quaternion = unit(_sampled(grid, times, continuous(truth.orientation[:, [3, 0, 1, 2]])))
+        omega, force = _sample(grid, at, imu.angular_velocity), _sample(grid, at, imu.linear_acceleration)
+    quaternion = unit(_sample(grid, times, continuous(truth.orientation[:, [3, 0, 1, 2]])))
     battery = np.full(len(grid), np.nan)
-    position, velocity = _sampled(grid, times, truth.position), _sampled(grid, times, truth.velocity)
+    position, velocity = _sample(grid, times, truth.position), _sample(grid, times, truth.velocity)
     valid = np.isfinite(np.column_stack([position, velocity, quaternion, omega, volts])).all(axis=1)
     return Recording(
         path.stem, interval, position, quaternion, velocity, omega, force, volts, battery, valid,
@@ -77,7 +77,7 @@ def _readings(flight: FlightData, begin: float) -> dict[str, Series]:
     return out
 
 
-def _sampled(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
+def _sample(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(grid, times, column) for column in np.asarray(values).T])
 
 

@@ -103,11 +103,11 @@ def _difference(
 
 def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -> tuple[Growth, ...]:
     """Return the distance of the vector that holds the field, at times that both logs have."""
-    times, apart = _apart(a, b, topic, (field.rpartition(".")[0], field))
+    times, apart = _distances(a, b, topic, (field.rpartition(".")[0], field))
     if not len(times):
         return ()
     truth = next((name for name in a.topics() if name.endswith("/ground_truth") and name in b.topics()), None)
-    instants, moved = _apart(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
+    instants, moved = _distances(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
     position = dict(zip(instants.tolist(), moved.tolist(), strict=True))
     after = (times - first_ns) * 1e-9
     moments = [seconds for seconds in AFTER if seconds < after[-1]] + [float(after[-1])]
@@ -115,7 +115,7 @@ def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -
     return tuple(Growth(float(after[k]), float(apart[k]), position.get(int(times[k]))) for k in rows)
 
 
-def _apart(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+def _distances(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Return times [ns] and distances (n,) of the first of these fields with numbers in both logs; or empty."""
     (times_a, one), (times_b, other) = a.history(topic), b.history(topic)
     name = next((name for name in names if name in one and name in other), "")

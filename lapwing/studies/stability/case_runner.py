@@ -18,17 +18,17 @@ class Result(NamedTuple):
 
     case: str
     hard: str
-    found: CaseResult
+    figures: CaseResult
     sweep: Sweep | None
     seconds: float  # of wall time
 
     @property
     def is_conclusive(self) -> bool:
         """True if every row is conclusive."""
-        return all(row.is_conclusive for row in self.found.rows)
+        return all(row.is_conclusive for row in self.figures.rows)
 
 
-def chosen(case: str | None, long: bool, sweep: bool) -> list[str]:
+def select(case: str | None, long: bool, sweep: bool) -> list[str]:
     """Return the names of the cases to run: one, or all; slow ones only with `long`.
 
     Raises:

@@ -47,7 +47,7 @@ def table(console: Console, results: Sequence[Result]) -> None:
             width = FIGURES.get(name)
             right = name in FIGURES and name != "verdict"
             shown.add_column(name, justify="right" if right else "left", ratio=ratio, width=width, no_wrap=bool(width))
-        for row in result.found.rows:
+        for row in result.figures.rows:
             shown.add_row(
                 row.name, escape(row.invariant), escape(row.method), figure(row.bound), figure(row.measured),
                 distance(row.bound, row.measured), _coloured(row.passes), escape(row.baseline),
@@ -87,6 +87,6 @@ def write_json(path: Path, results: Sequence[Result]) -> None:
             "baseline_verdict": verdict(row.baseline_passes),
         }
         for result in results
-        for row in result.found.rows
+        for row in result.figures.rows
     ]
     json_file.write_json(path, {"cases": cases})

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from lapwing.studies.stability import console_output, stability_page
-from lapwing.studies.stability.case_runner import chosen, measure
+from lapwing.studies.stability.case_runner import measure, select
 
 WIDTH = 180  # letters of a table that goes to no terminal
 
@@ -26,7 +26,7 @@ def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Pa
         ValueError: there is no such case, or it has no sweep.
     """
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
-    names = chosen(case, long, sweep)
+    names = select(case, long, sweep)
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("running the cases (the first time they are compiled)", total=len(names))
         results = measure(names, sweep, lambda name: progress.advance(task))

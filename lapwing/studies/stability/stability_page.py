@@ -36,7 +36,7 @@ def write(path: Path, results: Sequence[Result]) -> None:
 
 def _sections(results: Sequence[Result]) -> Iterator[Section]:
     for result in results:
-        yield Section(result.case, result.case, _plot(result.found.plot))
+        yield Section(result.case, result.case, _plot(result.figures.plot))
         if result.sweep:
             title = f"{result.case}: difficulty at which each method breaks"
             yield Section(f"{result.case}_sweep", title, _plot(result.sweep.plot(), _breaks(result.sweep)))

@@ -11,7 +11,7 @@ from lapwing.studies.tracking import AXES, shown
 from lapwing.studies.tune.corners import failure
 from lapwing.studies.tune.gain_refinement import rmse
 from lapwing.studies.tune.identify import LOOPS
-from lapwing.studies.tune.procedure import Tuned
+from lapwing.studies.tune.procedure import Tuning
 
 UNITS = {
     "altitude": "m/s^2 / N",
@@ -38,16 +38,16 @@ class Rows:
         self.rows.append(cells)
 
 
-def tables(tuning: Tuned) -> Iterator[Rows]:
+def tables(tuning: Tuning) -> Iterator[Rows]:
     """Yield every table of the study, the result first."""
     yield _margins(tuning)
-    if tuning.polished:
+    if tuning.refinement:
         yield _errors(tuning)
         yield _corners(tuning)
     yield _model(tuning)
 
 
-def show(console: Console, tuning: Tuned) -> None:
+def show(console: Console, tuning: Tuning) -> None:
     """Print the tables, failures in red."""
     for rows in tables(tuning):
         table = Table(title=rows.title, title_justify="left")
@@ -68,7 +68,7 @@ def cells(m: Margins) -> tuple[str, ...]:
     return f"{m.crossover:.1f}", f"{math.degrees(m.phase):.1f}", f"{up:+.1f}", f"{down:+.1f}"
 
 
-def _margins(tuning: Tuned) -> Rows:
+def _margins(tuning: Tuning) -> Rows:
     heads = ("loop", "gains", "crossover, rad/s", "phase margin, °", "gain margin, dB", "reduction, dB")
     rows = Rows("Margins of the loops before and after", *heads)
     for name in tuning.after.margins:
@@ -78,8 +78,8 @@ def _margins(tuning: Tuned) -> Rows:
     return rows
 
 
-def _errors(tuning: Tuned) -> Rows:
-    p = tuning.polished
+def _errors(tuning: Tuning) -> Rows:
+    p = tuning.refinement
     assert p is not None
     title = f"RMSE of {len(p.after)} flights of the scene: as designed and refined ({p.candidates} gain sets flown)"
     rows = Rows(title, "axis", "designed", "refined")
@@ -89,7 +89,7 @@ def _errors(tuning: Tuned) -> Rows:
     return rows
 
 
-def _corners(tuning: Tuned) -> Rows:
+def _corners(tuning: Tuning) -> Rows:
     rows = Rows(
         "Flights with a vehicle that differs from the controller's model",
         "vehicle",
@@ -101,17 +101,17 @@ def _corners(tuning: Tuned) -> Rows:
     return rows
 
 
-def _model(tuning: Tuned) -> Rows:
-    if tuning.identified is None:
+def _model(tuning: Tuning) -> Rows:
+    if tuning.identification is None:
         rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit")
         for name, unit in UNITS.items():
-            rows.add(name, f"{getattr(tuning.compiled, name):.4g}", unit)
+            rows.add(name, f"{getattr(tuning.compiled_model, name):.4g}", unit)
         return rows
     rows = Rows(
         "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %"
     )
     for name, unit in UNITS.items():
-        a, b = getattr(tuning.identified.model, name), getattr(tuning.compiled, name)
-        fit = f"{tuning.identified.fit[name]:.1f}" if name in LOOPS else ""
+        a, b = getattr(tuning.identification.model, name), getattr(tuning.compiled_model, name)
+        fit = f"{tuning.identification.fit[name]:.1f}" if name in LOOPS else ""
         rows.add(name, f"{a:.4g}", f"{b:.4g}", unit, fit)
     return rows

@@ -36,7 +36,7 @@ class Corner(NamedTuple):
 CORNERS = [Corner(*signs) for signs in product((1.0 - DEVIATION, 1.0 + DEVIATION), repeat=3)]
 
 
-def flown(setup: RunConfig) -> dict[str, Any]:
+def metrics_of(setup: RunConfig) -> dict[str, Any]:
     """Return the metrics of a flight."""
     return metrics(fly(setup, TOPICS))
 

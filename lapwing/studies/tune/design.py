@@ -35,7 +35,7 @@ def gain_set(model: Hover, bandwidths: Bandwidths) -> GainSet:
 
     def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
         d = w / effect
-        return _rounded(p * w * d), _rounded(i * w * p * w * d), _rounded(d)
+        return _round(p * w * d), _round(i * w * p * w * d), _round(d)
 
     roll = loop(model.roll, bandwidths.attitude, 0.12, 0.024)
     outer = loop(model.tilt, bandwidths.position, 0.39, 0.032)
@@ -49,7 +49,7 @@ def gain_set(model: Hover, bandwidths: Bandwidths) -> GainSet:
         roll_outer=outer,
         pitch_outer=outer,
         tilt_limit=0.6,
-        reference_bandwidth=_rounded(4.1 * bandwidths.position),
+        reference_bandwidth=_round(4.1 * bandwidths.position),
         reference_damping=0.55,
         feed_forward=True,
     )
@@ -120,5 +120,5 @@ def _decibel(factor: float) -> float:
     return 20.0 * math.log10(factor) if factor > 0.0 else -math.inf
 
 
-def _rounded(value: float) -> float:
+def _round(value: float) -> float:
     return float(f"{value:.4g}")

@@ -14,7 +14,7 @@ from lapwing.services.scene_resolver import reseed
 from lapwing.studies.campaign.campaign_config import campaign_setup
 from lapwing.studies.tracking import AXES
 from lapwing.studies.tune.bandwidths import Bandwidths
-from lapwing.studies.tune.corners import flown, with_gains
+from lapwing.studies.tune.corners import metrics_of, with_gains
 from lapwing.studies.tune.design import DELAY, assumed_airframe, gain_set, shortfalls
 from lapwing.studies.tune.linearise import Hover
 
@@ -33,7 +33,7 @@ MOVED_BY = {
 AT_ALL = 1e-6  # [m], [rad]: an axis that errs less, since nothing moves it, is not judged
 
 
-class Polished(NamedTuple):
+class Refinement(NamedTuple):
     """Result of the search."""
 
     gains: GainSet
@@ -43,14 +43,14 @@ class Polished(NamedTuple):
     candidates: int  # that kept their margins and were flown
 
 
-def polish(
+def refine(
     scene: Scene,
     model: Hover,
     airframe: Airframe,
     tick: float,
     start: Bandwidths,
     progress: Callable[[], None] = lambda: None,
-) -> Polished:
+) -> Refinement:
     """Refine the bandwidths that the scene's path excites by Nelder and Mead's search, from `start`.
 
     The objective is the mean over the axes of the RMSE over that of `start`. A gain set that does not land or lacks a
@@ -62,7 +62,7 @@ def polish(
     def fly(gains: GainSet) -> list[Figures]:
         progress()
         run = with_gains(setup, gains)
-        return [flown(reseed(run, setup.seed + k)) for k in range(SEEDS)]
+        return [metrics_of(reseed(run, setup.seed + k)) for k in range(SEEDS)]
 
     before = fly(gain_set(model, start))
     judged = [axis for axis in AXES if rmse(before, axis) > AT_ALL]
@@ -83,7 +83,7 @@ def polish(
         return ratio
 
     if not free:
-        return Polished(gain_set(model, start), start, before, before, 0)
+        return Refinement(gain_set(model, start), start, before, before, 0)
     at = np.log([getattr(start, name) for name in free])
     simplex = np.vstack([at, at + FIRST_STEP * np.eye(len(at))])
     options = {"maxfev": CANDIDATES, "xatol": FINE, "fatol": FINE, "initial_simplex": simplex}
@@ -95,7 +95,7 @@ def polish(
         )
         raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
     bandwidths, gains, after = tried[min(tried)]
-    return Polished(gains, bandwidths, before, after, len(tried))
+    return Refinement(gains, bandwidths, before, after, len(tried))
 
 
 def rmse(flights: list[Figures], axis: str) -> float:

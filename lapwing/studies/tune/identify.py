@@ -23,7 +23,7 @@ LEAST_FIT = 50.0  # [%]
 LOOPS = ("altitude", "roll", "pitch", "yaw")
 
 
-class Identified(NamedTuple):
+class Identification(NamedTuple):
     """Plant identified from a flight."""
 
     model: Hover
@@ -36,7 +36,7 @@ class _Signals(NamedTuple):
     used: np.ndarray  # (n,) bool: in the air
 
 
-def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
+def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identification:
     """Fit acceleration = gain * lag(demand) + constant to a log.
 
     Args:
@@ -61,14 +61,14 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
         if moved < QUIET * hovering:
             raise ValueError(f"{log}: {name} was not moved ({moved:.2g} N); fly the scene excitation and use its log")
     result = minimize_scalar(
-        lambda log_lag: sum(_fitted(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
+        lambda log_lag: sum(_fit(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
         bounds=np.log(LAGS),
         method="bounded",
     )
     lag = float(np.exp(result.x))
     gains, fit = {}, {}
     for k, name in enumerate(LOOPS):
-        (gains[name], *lead), left = _fitted(signals, k, lag, tick)
+        (gains[name], *lead), left = _fit(signals, k, lag, tick)
         if lead:
             gains["spin_up_zero"] = lead[0] / gains[name]
         fit[name] = float(100.0 * (1.0 - np.sqrt(left)))
@@ -77,7 +77,7 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identified:
                 f"{log}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
                 "fly the scene excitation in less wind and use its log"
             )
-    return Identified(guess._replace(lag=lag, **gains), fit)
+    return Identification(guess._replace(lag=lag, **gains), fit)
 
 
 def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
@@ -109,7 +109,7 @@ def _filters(tick: float) -> tuple[tuple, tuple]:
     return bilinear([1.0], below, 1.0 / tick), bilinear([1.0, 0.0], below, 1.0 / tick)
 
 
-def _fitted(signals: _Signals, k: int, lag: float, tick: float) -> tuple[list[float], float]:
+def _fit(signals: _Signals, k: int, lag: float, tick: float) -> tuple[list[float], float]:
     """Return a loop's gains of thrust, for yaw also of its rate, for a lag [s], and the unexplained variance share."""
     keep, used = np.exp(-tick / lag), signals.used
     thrust = lfilter([1.0 - keep], [1.0, -keep], signals.demand[:, k])

@@ -19,11 +19,11 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
-from lapwing.studies.tune.identify import Identified, identify
+from lapwing.studies.tune.identify import Identification, identify
 from lapwing.studies.tune.linearise import Hover, hover
 
 
-class Judged(NamedTuple):
+class GainReview(NamedTuple):
     """A gain set with its margins."""
 
     name: str
@@ -32,24 +32,24 @@ class Judged(NamedTuple):
     shortfalls: dict[str, str]
 
 
-class Tuned(NamedTuple):
+class Tuning(NamedTuple):
     """Result of a tuning."""
 
     scene: str
     tick: float  # [s] the controller's period
-    compiled: Hover  # from the model
-    identified: Identified | None  # from a log
-    assumed: Airframe  # airframe that the design assumes
-    before: Judged
-    after: Judged
+    compiled_model: Hover  # from the model
+    identification: Identification | None  # from a log
+    nominal: Airframe  # airframe that the design assumes
+    before: GainReview
+    after: GainReview
     gains: GainSet
-    polished: gain_refinement.Polished | None  # None without a trajectory
+    refinement: gain_refinement.Refinement | None  # None without a trajectory
     corners: dict[corners.Corner, gain_refinement.Figures]
 
     @property
     def model(self) -> Hover:
         """Linear model of the design."""
-        return self.identified.model if self.identified else self.compiled
+        return self.identification.model if self.identification else self.compiled_model
 
     @property
     def failures(self) -> list[str]:
@@ -65,7 +65,7 @@ def tune(
     say: Callable[[str], None],
     log: Path | None = None,
     progress: Callable[[], None] = lambda: None,
-) -> Tuned:
+) -> Tuning:
     """Design a gain set for the scene's vehicle about hover and refine it in flights of the scene.
 
     Args:
@@ -86,29 +86,31 @@ def tune(
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
     airframe, tick, config = known_airframe(scene), scene[Communication].interval, scene[Autopilot]
     own = build(scene[GainSet].plain(), airframe)
-    compiled = hover(scene)
-    identified = identify(FlightData.read(log), own, compiled) if log else None
-    model = identified.model if identified else compiled
+    compiled_model = hover(scene)
+    identification = identify(FlightData.read(log), own, compiled_model) if log else None
+    model = identification.model if identification else compiled_model
     plant = assumed_airframe(airframe, model)
-    before = _judged(config.gains, own, plant, tick)
+    before = _review(config.gains, own, plant, tick)
     for name, why in before.shortfalls.items():
         say(f"warning: present gains {config.gains} of the scene: {name}: {why}")
     reached = design(model, airframe, tick, initial, say)
-    gains, polished, at_corners = gain_set(model, reached), None, {}
+    gains, refinement, at_corners = gain_set(model, reached), None, {}
     if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not config.accept_commands:
-        polished = gain_refinement.polish(scene, model, airframe, tick, reached, progress)
-        gains = polished.gains
+        refinement = gain_refinement.refine(scene, model, airframe, tick, reached, progress)
+        gains = refinement.gains
         setup = corners.with_gains(campaign_setup(scene), gains)
-        at_corners = {c: corners.flown(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
+        at_corners = {c: corners.metrics_of(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
     else:
         say("gains not refined in flight: the scene has no [trajectory] that its autopilot follows")
-    after = _judged("new", build(gains.plain(), airframe), plant, tick)
-    return Tuned(scene.name, tick, compiled, identified, plant, before, after, gains, polished, at_corners)
+    after = _review("new", build(gains.plain(), airframe), plant, tick)
+    return Tuning(scene.name, tick, compiled_model, identification, plant, before, after, gains, refinement, at_corners)
 
 
-def _judged(name: str, parameters: Parameters, plant: Airframe, tick: float) -> Judged:
+def _review(name: str, parameters: Parameters, plant: Airframe, tick: float) -> GainReview:
     loops = open_loops(parameters, plant, tick, DELAY)
-    return Judged(name, parameters, {loop: margins(response) for loop, response in loops.items()}, shortfalls(loops))
+    return GainReview(
+        name, parameters, {loop: margins(response) for loop, response in loops.items()}, shortfalls(loops)
+    )
 
 
 def write(path: Path, gains: GainSet) -> None:

@@ -14,7 +14,7 @@ CANCEL = 1e-6  # relative distance of poles and zeros that cancel
 AXES = {"z": "altitude", "yaw": "yaw", "x": "x", "y": "y"}  # what a setpoint moves, and the loop that closes it
 
 
-class Stepped(NamedTuple):
+class StepResponse(NamedTuple):
     """Response of an axis to a unit step of its setpoint, nothing fed forward."""
 
     time: np.ndarray  # [s]
@@ -31,13 +31,13 @@ def systems(p: Parameters, airframe: Airframe, tick: float, delay: int) -> dict[
     return {name: control.minreal(loop, CANCEL, verbose=False) for name, loop in loops(p, airframe, s, late).items()}
 
 
-def closed(loop: Any) -> Any:
+def closed_loop(loop: Any) -> Any:
     """Return the loop closed by unit feedback."""
     return control.minreal(loop / (1.0 + loop), CANCEL, verbose=False)
 
 
-def step(loop: Any, seconds: float = 5.0) -> Stepped:
+def step(loop: Any, seconds: float = 5.0) -> StepResponse:
     """Step response of the closed loop."""
-    time, value = control.step_response(closed(loop), np.linspace(0.0, seconds, 1001))
+    time, value = control.step_response(closed_loop(loop), np.linspace(0.0, seconds, 1001))
     result = control.step_info(value, time, yfinal=1.0)
-    return Stepped(time, value, result["RiseTime"], result["Overshoot"] / 100.0, result["SettlingTime"])
+    return StepResponse(time, value, result["RiseTime"], result["Overshoot"] / 100.0, result["SettlingTime"])

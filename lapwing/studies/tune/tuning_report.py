@@ -13,7 +13,7 @@ from lapwing.studies.report.sections import Section
 from lapwing.studies.report.style import BOUND, FLOWN, QUIET, REFERENCE
 from lapwing.studies.tune.console_output import tables
 from lapwing.studies.tune.design import DELAY
-from lapwing.studies.tune.procedure import Judged, Tuned
+from lapwing.studies.tune.procedure import GainReview, Tuning
 from lapwing.studies.tune.systems import AXES, step, systems
 
 OMEGA = np.geomspace(0.2, 500.0, 1200)  # [rad/s]
@@ -27,10 +27,10 @@ SHOWN = {
 LOOKS = ((REFERENCE, "dash"), (FLOWN, "solid"))  # of before and after
 
 
-def write(path: Path, tuning: Tuned) -> None:
+def write(path: Path, tuning: Tuning) -> None:
     """Write the page to a file."""
     both = (tuning.before, tuning.after)
-    loops = [systems(j.parameters, tuning.assumed, tuning.tick, DELAY) for j in both]
+    loops = [systems(j.parameters, tuning.nominal, tuning.tick, DELAY) for j in both]
     sections = [
         Section("bode", "Open loops", _bode(both, loops)),
         Section("steps", "Steps of the setpoint", _steps(both, loops)),
@@ -42,7 +42,7 @@ def write(path: Path, tuning: Tuned) -> None:
     path.write_text(page, encoding="utf-8")
 
 
-def _outcome(tuning: Tuned) -> str:
+def _outcome(tuning: Tuning) -> str:
     """Return if the new gains have their margins, and how perturbed vehicles flew."""
     if tuning.failures:
         first, *others = tuning.failures
@@ -60,7 +60,7 @@ _BODE = (
 _STEPS = "Linear, about hover, nothing fed forward: what feedback alone makes of a unit step."
 
 
-def _bode(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
+def _bode(both: tuple[GainReview, ...], loops: list[dict]) -> Plot:
     panels = []
     for column, (name, title) in enumerate(SHOWN.items()):
         sizes: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]
@@ -83,7 +83,7 @@ def _bode(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
     return Plot(tuple(panels), _BODE, 5.4, (1.0, 1.0), (1.0,) * len(SHOWN))
 
 
-def _steps(both: tuple[Judged, ...], loops: list[dict]) -> Plot:
+def _steps(both: tuple[GainReview, ...], loops: list[dict]) -> Plot:
     panels = []
     for column, (axis, loop) in enumerate(AXES.items()):
         marks: list[Line | Level] = [Level(1.0, colour=QUIET, dash="solid")]

@@ -4,7 +4,7 @@
 
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.simd_batch import WIDTH, take
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate, seen
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate, motion_of
 from lapwing.kernels import kernel
 
 
@@ -23,5 +23,5 @@ def electrical_power(like, memory, columns, out, first, last):
     for m in range(first * WIDTH, last * WIDTH):
         x = take(like, memory, (m // WIDTH) * columns * WIDTH + m % WIDTH)
         drive = MultirotorDrive(x.parameters, x.body, x.memory, x.voltage)
-        _, rotors, _, _ = evaluate(drive, x.start, seen(x.parameters.layout, x.motion))
+        _, rotors, _, _ = evaluate(drive, x.start, motion_of(x.parameters.layout, x.motion))
         out[m] = total(rotors.power)

@@ -74,7 +74,7 @@ class PlantRows:
 
     def set_parameters(self, sets: Sequence[Mapping[str, Any]]) -> None:
         """Resolve the scene for other parameter sets."""
-        made = [self._made(values) for values in sets]
+        made = [self._build(values) for values in sets]
         self.rows = np.array([row for row, _, _ in made])
         self.mass = np.array([mass for _, mass, _ in made])
         self.inertia = np.array([inertia for _, _, inertia in made])
@@ -162,9 +162,9 @@ class PlantRows:
         return load_one(self._base, {**self._clock, **_whole_lists(self._base, values)})
 
     def _row(self, values: Mapping[str, Any]) -> np.ndarray:
-        return self._made(values)[0]
+        return self._build(values)[0]
 
-    def _made(self, values: Mapping[str, Any]) -> tuple[np.ndarray, float, np.ndarray]:
+    def _build(self, values: Mapping[str, Any]) -> tuple[np.ndarray, float, np.ndarray]:
         scene = self._scene(values)
         plant = _plant(scene)
         member = simd_batch.member(plant.core.vehicle, plant.start.vehicle)

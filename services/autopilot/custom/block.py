@@ -10,7 +10,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.cell import read
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.services.autopilot import motor_failure
 from lapwing.services.autopilot.block import Controller, block_outputs
 from lapwing.services.autopilot.custom.controller_output import (
@@ -22,7 +22,7 @@ from lapwing.services.autopilot.custom.controller_output import (
 )
 from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
 from lapwing.services.autopilot.mixer import at_rest
-from lapwing.services.common.ports import PerRotor, Setpoint, StateEstimate
+from lapwing.services.common.ports import PerRotor
 
 
 class PythonControllerProxy(NamedTuple):
@@ -61,27 +61,14 @@ def start(p: CustomController) -> CustomState:
     return CustomState(INITIAL_LANDED_STATE, p.own_start, held, watched, 0, float("nan"))
 
 
-def _call_user_step(
-    p: Any,
-    s: Any,
-    time: float,
-    estimate: StateEstimate,
-    setpoint: Setpoint,
-    by_port: tuple[InputSample, ...],
-    none: PerRotor,
-) -> tuple[Any, ControllerOutput]:
-    """Call `step` of the user's module, or read the port."""
-    raise NotImplementedError("compiled code only")
-
-
 @always_inline
 def _parsed(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
     """Return state and parsed output of the user's step."""
     return given[0], parse_controller_output(given[1], none)
 
 
-@overload_for(_call_user_step, inline=True)
-def _call_user_step_of(
+@generic(inline=True)
+def _call_user_step(
     p: types.Type,
     s: types.Type,
     time: types.Type,
@@ -90,6 +77,7 @@ def _call_user_step_of(
     by_port: types.Type,
     none: types.Type,
 ) -> Callable:
+    """Call `step` of the user's module, or read the port."""
     if p.instance_class is PythonControllerProxy:
         return lambda p, s, time, estimate, setpoint, by_port, none: (s, by_port[0].value)
     found = sys.modules[p.instance_class.__module__].step

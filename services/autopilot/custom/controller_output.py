@@ -8,12 +8,12 @@ from numba import types
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import compile_source, map_tuple, overload_for
+from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.services.autopilot import control
 from lapwing.services.autopilot.control import Command
 from lapwing.services.autopilot.land_detector import FLYING, LANDED
 from lapwing.services.autopilot.mixer import VirtualControls, active_allocation, at_rest, clamp_to_range, mix, saturate
-from lapwing.services.autopilot.motor import Motor, thrust_at, voltages
+from lapwing.services.autopilot.motor import thrusts_at, voltages
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments
 from lapwing.services.common.ports import PerRotor
 
@@ -86,11 +86,6 @@ def _parse_controller_output(output: types.Type, none: types.Type) -> Callable:
 
 
 @always_inline
-def _thrust_at(motor: Motor, volts: float, _: float) -> float:
-    return thrust_at(motor, volts)
-
-
-@always_inline
 def command(
     law: control.Parameters,
     lift: float,
@@ -118,7 +113,7 @@ def command(
         return Command(none, none, 0.0, 0.0, yaw, landed == LANDED)
     if asked.to_motors:
         volts = clamp_to_range(asked.volts, voltage_max)
-        thrust = map_tuple(_thrust_at, law.motor, volts, volts)
+        thrust = thrusts_at(law.motor, volts)
     else:
         shares, w = active_allocation(law.shares, failed), asked.wrench
         part = 1.0 / lift

@@ -6,7 +6,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_index, map_tuple
 from lapwing.services.autopilot.failure_injection.failure_state import SLOWED, Memory
-from lapwing.services.autopilot.motor import Motor, thrust_at
+from lapwing.services.autopilot.motor import Motor, thrusts_at
 from lapwing.services.common.failure_types import OFF, SLOW, STUCK, WRONG
 from lapwing.services.common.ports import MotorCommand, PerRotor
 
@@ -45,16 +45,11 @@ def _supplied(_: float, kind: int, volts: float) -> float:
 
 
 @always_inline
-def _thrust_at(motor: Motor, volts: float, _: float) -> float:
-    return thrust_at(motor, volts)
-
-
-@always_inline
 def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Memory, tuple, int]:
     """Output the command that reaches the motors; the controller does not see it."""
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
     commanded = d.motor_voltage if d.on else c.motor_voltage
-    thrust = map_tuple(_thrust_at, p.motor, commanded, commanded) if d.on else c.thrust
+    thrust = thrusts_at(p.motor, commanded) if d.on else c.thrust
     heard = map_index(_heard, commanded, kinds, s.last, commanded, s.readings)
     volts = map_tuple(_supplied, 0.0, kinds, heard)
     return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE

@@ -8,10 +8,10 @@ from numba import types
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.kernels.codegen import compile_source, generic
 from lapwing.services.autopilot.failure_injection.failure_state import Memory, silent
 from lapwing.services.autopilot.failure_injection.reading_failures import FAILURES
-from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG, Faults
+from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
 
 
 class SensorInjection(NamedTuple):
@@ -21,44 +21,28 @@ class SensorInjection(NamedTuple):
     key: Key  # of random numbers
 
 
-def kind_of(faults: Faults, r: Any) -> int:
+@generic(inline=True)
+def kind_of(faults: types.Type, r: types.Type) -> Callable:
     """Return the failure type of the sensor of `r`."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(kind_of, inline=True)
-def _kind_by(faults: types.Type, r: types.Type) -> Callable:
     kind = FAILURES[r.instance_class].kind
     return lambda faults, r: kind(faults)
 
 
-def wrong(r: Any) -> Any:
+@generic(inline=True)
+def wrong(r: types.Type) -> Any:
     """Return the reading of a wrong sensor."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(wrong, inline=True)
-def _wrong_by(r: types.Type) -> Any:
     return FAILURES[r.instance_class].wrong
 
 
-def garbage_reading(r: Any, key: Key, tick: int) -> Any:
+@generic(inline=True)
+def garbage_reading(r: types.Type, key: types.Type, tick: types.Type) -> Any:
     """Return a random reading at a tick."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(garbage_reading, inline=True)
-def _nonsense_by(r: types.Type, key: types.Type, tick: types.Type) -> Any:
     return FAILURES[r.instance_class].garbage
 
 
-def lost(r: Any) -> Any:
+@generic(inline=True)
+def lost(r: types.Type) -> Callable:
     """Return the reading marked as invalid."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(lost, inline=True)
-def _lost_by(r: types.Type) -> Callable:
     fields = ", ".join("False" if field == "valid" else f"r.{field}" for field in r.fields)
     return compile_source("lost(r)", {"Reading": r.instance_class}, f"return Reading({fields})")
 

@@ -11,7 +11,7 @@ from lapwing.services.autopilot.allocation import tables_for_failures
 from lapwing.services.autopilot.control import Command, sign
 from lapwing.services.autopilot.controller_parameters import Airframe, hover_thrust, moments, shares
 from lapwing.services.autopilot.mixer import Shares, VirtualControls, active_allocation, clamp_to_range, mix, saturate
-from lapwing.services.autopilot.motor import Motor, thrust_at
+from lapwing.services.autopilot.motor import Motor, thrust_at, thrusts_at
 from lapwing.services.autopilot.px4 import attitude, position, rates
 from lapwing.services.common.ports import Setpoint, StateEstimate
 
@@ -149,11 +149,6 @@ def _volts(p: Parameters, thrust: float, _: float) -> float:
 
 
 @always_inline
-def _thrust(motor: Motor, volts: float, _: float) -> float:
-    return thrust_at(motor, volts)
-
-
-@always_inline
 def start(estimate: StateEstimate) -> State:
     """Return the state at take-off."""
     return State(ZERO, ZERO, ZERO, estimate.omega_body, ZERO, ZERO)
@@ -200,4 +195,4 @@ def step(
     volts = map_tuple(_volts, p, parts, parts)
     roll, pitch, yaw = to_roll_pitch_yaw(reference)
     state = State(velocity_integral, acceleration, rate_integral, estimate.omega_body, angular_acceleration, cut)
-    return state, Command(volts, map_tuple(_thrust, p.motor, volts, volts), roll, pitch, yaw, False)
+    return state, Command(volts, thrusts_at(p.motor, volts), roll, pitch, yaw, False)

@@ -12,7 +12,7 @@ from lapwing.dynamics.vehicles import multirotor_euler
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.services.common.ports import BodyMotions, PerRotor
 
 
@@ -24,13 +24,9 @@ class FiveBodiesView(NamedTuple):
     off: PerRotor  # [V] before the first command
 
 
-def on_se3(x: Any) -> FiveBodies:
+@generic()
+def on_se3(x: types.Type) -> Callable:
     """Return the bodies' poses on SE(3), from any coordinates."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(on_se3)
-def _on_se3(x: types.Type) -> Callable:
     if x.instance_class is FiveBodies:
         return lambda x: x
     return lambda x: multirotor_euler.five(x)

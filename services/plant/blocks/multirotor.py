@@ -11,9 +11,9 @@ from lapwing.dynamics.effects._external_inputs import with_inputs_stored
 from lapwing.dynamics.effects.payload_release import RELEASED, PayloadRelease
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vehicles.multirotor import advance, observe
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, seen
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, motion_of
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.kernels.codegen import compile_source, generic
 from lapwing.kernels.state_tree import finite
 from lapwing.services.common.ports import BatteryReading, PerRotor, TrueState
 from lapwing.services.plant.blocks.termination import termination_status
@@ -58,7 +58,7 @@ def step(
         vehicle = MultirotorState(vehicle.motion, release_payload(p.vehicle.effects, vehicle.memory))
     if tick > 0:
         vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
-    motion = seen(p.vehicle.layout, vehicle.motion)
+    motion = motion_of(p.vehicle.layout, vehicle.motion)
     o = observe(p.vehicle, tick, p.interval, vehicle, command)
     last = min(s.last, tick + p.settle) if status.due and status.value.finished else s.last
     truth = TrueState(
@@ -71,13 +71,9 @@ def step(
     return MultirotorPlantState(vehicle, last), (truth, gauge), termination_status(tick, last, sound)
 
 
-def release_payload(effects: tuple, memory: tuple) -> tuple:
+@generic(inline=True)
+def release_payload(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
     """Return the effects' discrete state after the release of the payload; unchanged without a payload."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(release_payload, inline=True)
-def _let_go(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
     carried = [getattr(kind, "instance_class", None) is PayloadRelease for kind in effects]
     parts = "".join("gone, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
     body = f"return ({parts})" if any(carried) else "return memory"

@@ -8,7 +8,7 @@ from numba import types
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics.integrators import StepDoubling, integrate_fixed, integrate_step_doubling
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import finite
 from lapwing.services.plant.blocks.termination import termination_status
 
@@ -24,26 +24,18 @@ class AutonomousPlant(NamedTuple):
     last: int  # tick of the run
 
 
-def outputs_of(p: Any, t: float, x: Any) -> tuple:
-    """Return the port values of state x at time t [s], by the class of the parameters p."""
-    raise NotImplementedError("compiled code only")
-
-
 OUTPUT_FUNCTIONS = DispatchTable()
 """The compiled function of `outputs_of` by the class of a system's parameters."""
 
 
-@overload_for(outputs_of, inline=True)
-def _outputs_by(p: types.Type, t: types.Type, x: types.Type) -> Any:
+@generic(inline=True)
+def outputs_of(p: types.Type, t: types.Type, x: types.Type) -> Any:
+    """Return the port values of state x at time t [s], by the class of the parameters p."""
     return OUTPUT_FUNCTIONS[p.instance_class]
 
 
-def _marched(method: Any, p: AutonomousPlant, t: float, x: Any) -> Any:
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_marched, inline=True)
-def _marched_by(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
+@generic(inline=True)
+def _advance(method: types.Type, p: types.Type, t: types.Type, x: types.Type) -> Callable:
     if getattr(method, "instance_class", None) is StepDoubling:
         return lambda method, p, t, x: integrate_step_doubling(method, p.system, t, x, p.step, t + p.interval)
     return lambda method, p, t, x: integrate_fixed(method, p.system, t, x, p.step, p.steps)
@@ -54,5 +46,5 @@ def step(p: AutonomousPlant, s: Any, tick: int, inputs: tuple[InputSample, ...])
     """Integrate to `tick`; tick 0 is the initial state."""
     x = s
     if tick > 0:
-        x = _marched(p.method, p, (tick - 1) * p.interval, x)
+        x = _advance(p.method, p, (tick - 1) * p.interval, x)
     return x, outputs_of(p.system, tick * p.interval, x), termination_status(tick, p.last, finite(x))

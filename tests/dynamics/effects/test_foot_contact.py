@@ -39,9 +39,9 @@ def anchored(e, memory, s):
 @kernel
 def smooth(e, memory, s):
     return (
-        ground_contact.ground_contact_smooth(e, memory, s, 0.0),
-        ground_contact.forces_smooth(e, memory, s.motion),
-        ground_contact.touches_smooth(e, memory, s),
+        ground_contact.ground_contact(e, memory, s, 0.0),
+        ground_contact.forces(e, memory, s.motion),
+        ground_contact.touches(e, memory, s),
     )
 
 

@@ -44,7 +44,7 @@ def reduced():
 
 @kernel
 def looked(p, x):
-    return multirotor_equations.seen(p.layout, x)
+    return multirotor_equations.motion_of(p.layout, x)
 
 
 def fly(p, state, seconds, h):

@@ -39,7 +39,7 @@ def on_se3(x):
 
 @kernel
 def seen(p, x):
-    return multirotor_equations.seen(p.layout, x)
+    return multirotor_equations.motion_of(p.layout, x)
 
 
 @kernel

@@ -18,7 +18,6 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.fmi.exported_part import export_part
 from lapwing.fmi.variables import variables_of
 from lapwing.services import scene_resolver
-from lapwing.services.common import foreign_code
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 EFFECTS = """
@@ -198,7 +197,6 @@ def test_modes_campaign_and_resimulation_have_equal_bits(folder: Path) -> None:
 
 
 def test_exported_plant_has_named_inputs(folder: Path) -> None:
-    foreign_code.allow(True)  # a command that ran in this process before has withdrawn it
     exported = export_part(scene_resolver.resolve(scene_resolver.load(scene_with(folder, SUPPLY))), "plant")
     (voltage,) = [v for v in variables_of(exported) if v.name == "effect.battery.voltage"]
     assert (voltage.causality, voltage.unit) == ("input", "V")

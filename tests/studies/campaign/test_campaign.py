@@ -10,8 +10,9 @@ from page_texts import page_text
 from typer.testing import CliRunner
 
 from lapwing.cli.main import app
+from lapwing.studies import workers
 from lapwing.studies.campaign import folder as folder_module
-from lapwing.studies.campaign import local, run_table
+from lapwing.studies.campaign import run_table
 from lapwing.studies.campaign.campaign_comparison import compare
 from lapwing.studies.campaign.distributions import choice, normal, uniform
 from lapwing.studies.campaign.folder import begin, manifest, read
@@ -39,7 +40,7 @@ def started(path, **changes):
 def flown(tmp_path_factory):
     """A campaign that was flown in one go, in this process; and its digest."""
     folder, first = started(tmp_path_factory.mktemp("campaign") / "one")
-    campaign(folder, first, local.here)
+    campaign(folder, first, workers.here)
     return folder, folder.finish(csv=True)
 
 
@@ -66,11 +67,11 @@ def test_run_draws_flies_and_is_row(flown):
 
 def test_stop_keeps_complete_shards_for_any_workers(flown, tmp_path):
     folder, first = started(tmp_path / "c")
-    campaign(folder, first, local.here, part=range(0, len(folder.shards), 2))
+    campaign(folder, first, workers.here, part=range(0, len(folder.shards), 2))
     (tmp_path / "c" / "shards" / ".00001.csv.77").write_text("half written")
     assert len(folder.missing()) == len(folder.shards) // 2
     seen = []
-    count = campaign(folder, first, local.processes(2), seen.append)
+    count = campaign(folder, first, workers.processes(2), seen.append)
     assert (seen[0].runs, seen[-1].runs, count.runs) == (RUNS // 2, RUNS, RUNS)
     assert folder.finish() == flown[1]
 
@@ -170,11 +171,11 @@ def test_campaign_ends_at_interval_width_with_any_worker(tmp_path):
     counts = []
 
     def backwards(call, tasks):
-        yield from reversed(list(local.here(call, tasks)))
+        yield from reversed(list(workers.here(call, tasks)))
 
-    for workers in (local.here, backwards):
-        folder, first = started(tmp_path / workers.__name__)
-        counts.append(campaign(folder, first, workers, until=0.2))
+    for fliers in (workers.here, backwards):
+        folder, first = started(tmp_path / fliers.__name__)
+        counts.append(campaign(folder, first, fliers, until=0.2))
         assert counts[-1].failure.half_width <= 0.2
     assert counts[0] == counts[1]
     assert 0 < counts[0].runs < RUNS
@@ -186,7 +187,7 @@ def test_runs_beyond_interval_width_are_kept(tmp_path):
         yield from ()
 
     folder, first = started(tmp_path / "all")
-    whole = campaign(folder, first, local.here)
+    whole = campaign(folder, first, workers.here)
     digest = folder.finish()
     enough = campaign(folder, first, nobody, until=0.2)
     assert enough.runs < RUNS
@@ -262,7 +263,7 @@ def test_report_json_and_run_flown_again_to_bit(flown, tmp_path, monkeypatch):
 def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     folder, _ = flown
     other, first = started(tmp_path / "heavier", overrides=(*SHORT, "autopilot.gains=paper"))
-    campaign(other, first, local.here)
+    campaign(other, first, workers.here)
     code, output = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
     assert "the campaigns differ in: overrides\n" in output
@@ -279,7 +280,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     assert alone < 0.5 * Results(folder)["energy"].std()  # the masses drawn are the same in both
     assert lapwing("compare", folder.path, tmp_path)[0] == 2
     others, first = started(tmp_path / "laid_out", design="lhs")
-    campaign(others, first, local.here)
+    campaign(others, first, workers.here)
     drawn = [f"{key} (drawn otherwise)" for key in sorted(VARY)]
     assert compare(folder.path, others.path).differing == ["design", *drawn]
 

@@ -93,9 +93,9 @@ def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
 
 
 def test_long_keys_stand_beside_each_other():
-    assert campaign_plots._broken("effects.random_wind_force.mean.0") == "effects.\nrandom_wind_force.\nmean.0"
-    assert campaign_plots._broken("vehicle.mass") == "vehicle.mass"
-    assert campaign_plots._broken("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
+    assert campaign_plots._break_key("effects.random_wind_force.mean.0") == "effects.\nrandom_wind_force.\nmean.0"
+    assert campaign_plots._break_key("vehicle.mass") == "vehicle.mass"
+    assert campaign_plots._break_key("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
 
 
 def test_errors_are_shares_of_requirements():

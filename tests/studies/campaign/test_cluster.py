@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from lapwing.cosim.run_errors import RunFailed
-from lapwing.studies.campaign import local
+from lapwing.studies import workers
 from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import begin, manifest
 from lapwing.studies.campaign.plan import plan
@@ -25,7 +25,7 @@ def test_killed_and_late_workers_do_not_change_results(tmp_path):
     made = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
     first = reference(*first_setup(made))
     alone, folder = (begin(tmp_path / name, made, manifest(made, first)) for name in ("alone", "cluster"))
-    campaign(alone, first, local.here)
+    campaign(alone, first, workers.here)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,

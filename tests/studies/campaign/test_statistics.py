@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from lapwing.studies.campaign.statistics import ellipse, has_sobol, interval, paired, rank_correlation, sobol, spread
+from lapwing.studies.campaign.statistics import (
+    ellipse,
+    has_sobol,
+    interval,
+    paired_difference,
+    rank_correlation,
+    sobol,
+    spread,
+)
 
 
 def test_clopper_and_pearson():
@@ -22,7 +30,7 @@ def test_spread_names_worst():
 
 def test_difference_of_pairs_is_sharper_than_of_means():
     noise = np.random.default_rng(1).normal(0.0, 10.0, 400)
-    result = paired(noise, noise + np.tile([0.9, 1.1], 200))
+    result = paired_difference(noise, noise + np.tile([0.9, 1.1], 200))
     assert result.value == pytest.approx(1.0)
     assert result.high - result.low == pytest.approx(2.0 * 1.966 * 0.1 / 20.0, rel=0.01)
 

@@ -10,7 +10,7 @@ import pytest
 from lapwing.cli.study_commands import stability
 from lapwing.studies.stability import cases, console_output
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.case_runner import chosen, one
+from lapwing.studies.stability.case_runner import one, select
 
 pytestmark = pytest.mark.long
 
@@ -29,11 +29,11 @@ CHEAP = (
 @pytest.mark.parametrize("name", CHEAP)
 def test_case_passes_and_baseline_fails(name, monkeypatch):
     result = one(name, False)
-    assert result.found.rows
-    for row in result.found.rows:
+    assert result.figures.rows
+    for row in result.figures.rows:
         assert row.passes, (row.name, row.measured, row.bound)
         assert not row.baseline_passes, (row.name, row.baseline_measured)
-    assert result.found.plot.curves
+    assert result.figures.plot.curves
 
 
 def test_every_case_describes_its_difficulty():
@@ -92,7 +92,7 @@ def test_case_that_ends_in_error_falls_short(monkeypatch):
     monkeypatch.setattr(cases, "get", lambda name: SimpleNamespace(HARD="hard", run=broken))
     result = one("broken", False)
     assert not result.is_conclusive
-    assert "out of reach" in result.found.rows[0].invariant
+    assert "out of reach" in result.figures.rows[0].invariant
 
 
 @pytest.mark.parametrize(
@@ -113,9 +113,9 @@ def test_invalid_case_exits_with_code_2(arguments, message, capsys, tmp_path):
 
 
 def test_slow_cases_need_option():
-    assert "day_of_flight" not in chosen(None, False, False)
-    assert "day_of_flight" in chosen(None, True, False)
-    assert "lie_limits" not in chosen(None, False, True)
+    assert "day_of_flight" not in select(None, False, False)
+    assert "day_of_flight" in select(None, True, False)
+    assert "lie_limits" not in select(None, False, True)
 
 
 def test_where_method_breaks():

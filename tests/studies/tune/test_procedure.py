@@ -39,8 +39,8 @@ def test_written_gains_can_be_read_and_flown(found, tmp_path):
 
 def test_refinement_keeps_margins_and_reduces_errors(found):
     assert found.after.shortfalls == {}
-    assert rmse(found.polished.after, "z") < 0.9 * rmse(found.polished.before, "z")
-    moved, requested = found.polished.bandwidths, Bandwidths()
+    assert rmse(found.refinement.after, "z") < 0.9 * rmse(found.refinement.before, "z")
+    moved, requested = found.refinement.bandwidths, Bandwidths()
     assert moved.altitude != requested.altitude
     assert moved.position == requested.position  # nothing of this flight goes along x or y
 

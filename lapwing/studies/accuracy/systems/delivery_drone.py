@@ -21,7 +21,7 @@ from lapwing.dynamics.multibody.five_bodies import machine as five_bodies_machin
 from lapwing.dynamics.vehicles import multirotor, multirotor_euler, multirotor_multibody
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor import advance
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorState, seen
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorState, motion_of
 from lapwing.dynamics.vehicles.multirotor_euler import FiveEulerBodies
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import unloaded
 from lapwing.kernels import kernel
@@ -53,7 +53,7 @@ def _of_one(p: Any, x: Any) -> float:
 @kernel
 def _of_five(p: Any, x: Any) -> float:
     drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
-    return five_body_stabilisation.constraint_violation(unloaded(drive, seen(p.layout, x)), x)[0]
+    return five_body_stabilisation.constraint_violation(unloaded(drive, motion_of(p.layout, x)), x)[0]
 
 
 @kernel
@@ -73,7 +73,7 @@ def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, 
     for row in range(out.shape[0]):
         if row > 0:
             state = advance(method, p, (0, 0), row - 1, state, volts, h, n)
-        numbers = flatten(seen(p.layout, state.motion))
+        numbers = flatten(motion_of(p.layout, state.motion))
         for i in range(len(numbers)):
             out[row, i] = numbers[i]
     return gap(p, state.motion)

@@ -6,8 +6,8 @@ import re
 import pytest
 from rich.console import Console
 
-from lapwing.cli.study_progress import Countdown
-from lapwing.runs.time_left import TimeLeft
+from lapwing.cli.progress import StudyProgress
+from lapwing.runs.work_progress import TimeLeft
 
 
 class Clock:
@@ -56,7 +56,7 @@ def test_time_left_counts_down_between_reports():
 )
 def test_terminal_has_bar_and_anything_else_lines(terminal, expected):
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
-    with Countdown(console) as countdown:
+    with StudyProgress(console) as countdown:
         countdown.say("nominal", 1, 10)
         countdown.say("without [gravity]", 2, 10)
         if countdown._bar:
