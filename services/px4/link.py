@@ -132,6 +132,7 @@ class Px4Link:
             link.append(rare_messages(self._own, setup.period, tick, self._last_us, read))
         elif reason == SEND:  # also a full buffer: a firmware that has not read for a long time
             link.lose()
+            self._check_program()
         elif reason == POLL:
             return self._poll(tick, read)
         else:
