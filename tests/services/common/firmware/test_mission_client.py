@@ -178,6 +178,19 @@ def test_disarmed_vehicle_has_finished_and_failsafe_is_reported():
     assert FlightStatus("px4", client).output((0.0,) * 4, False).finished
 
 
+def test_event_names_cause_and_action_of_failsafe():
+    vehicle = Vehicle()
+    client = make(vehicle)
+    fly(vehicle, client, 3.0)
+    event = mavlink.mavlink_map[410]
+    arguments = struct.pack("<IBB34x", 4, 6, 3)  # mode, return, low battery
+    vehicle.tell(event(0, 0, (1 << 24) + 9751178, 30_000, 7, 0x42, tuple(arguments)))
+    vehicle.tell(mavlink.MAVLink_statustext_message(2, b"Failsafe activated\t"))
+    vehicle.tell(event(0, 0, (1 << 24) + 961599, 30_100, 8, 0x66, (0,) * 40))  # about sticks
+    client.poll(3.5)
+    assert client.failsafe == "low battery: return"
+
+
 def test_other_components_are_ignored():
     vehicle = Vehicle()
     client = make(vehicle)
