@@ -12,7 +12,7 @@ ACTIONS = (
     "disarm", "termination",
 )  # fmt: skip
 CAUSES = (
-    "failsafe", "loss of manual control", "loss of the ground station", "low battery", "critical battery",
+    "", "loss of manual control", "loss of the ground station", "low battery", "critical battery",
     "emergency battery", "low remaining flight time",
 )  # fmt: skip
 
@@ -35,12 +35,13 @@ _LAYOUTS = {  # mode, action, delay [s], cause
 
 
 def failsafe_text(number: int, arguments: bytes) -> str:
-    """Return cause and action of the failsafe that an event reports, "" if it reports none."""
+    """Return cause, if it is known, and action of the failsafe that an event reports, "" if it reports none."""
     if number not in _LAYOUTS:
         return ""
     layout, names = _LAYOUTS[number]
     given = dict(zip(names, struct.unpack_from(layout, arguments), strict=True))
-    result = f"{_name(CAUSES, given.get('cause', 0))}: {_name(ACTIONS, given['action'])}"
+    parts = [_name(CAUSES, given.get("cause", 0)), _name(ACTIONS, given["action"])]
+    result = ": ".join(filter(None, parts))
     return f"{result} in {given['delay']} s" if "delay" in given else result
 
 

@@ -25,8 +25,8 @@ def test_id_is_that_of_metadata(name):
     [
         ("commander_failsafe_enter", struct.pack("<IBB", 4, 6, 3), "low battery: return"),
         ("commander_failsafe_enter_hold", struct.pack("<IBHB", 4, 6, 5, 4), "critical battery: return in 5 s"),
-        ("commander_failsafe_enter_generic", struct.pack("<IB", 4, 8), "failsafe: descend"),
-        ("commander_failsafe_enter_generic_hold", struct.pack("<IBH", 4, 7, 2), "failsafe: land in 2 s"),
+        ("commander_failsafe_enter_generic", struct.pack("<IB", 4, 8), "descend"),
+        ("commander_failsafe_enter_generic_hold", struct.pack("<IBH", 4, 7, 2), "land in 2 s"),
         ("commander_failsafe_enter", struct.pack("<IBB", 4, 99, 98), "98: 99"),  # of a later version
     ],
 )
