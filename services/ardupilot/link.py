@@ -211,6 +211,9 @@ class ArduPilotLink:
         link.answer_sender()
         meaning = self._sequence.receive(packet.frame_count)
         self.report.resent, self.report.missed = self._sequence.resent, self._sequence.skipped
+        if self._sequence.restarts > self.report.reconnected and self._client:
+            self._client.restart()
+            self._simulated = SimulatedSensors(self._own, self._client)
         self.report.reconnected = self._sequence.restarts
         if meaning is Frame.RESENT:
             self._again = True

@@ -204,6 +204,8 @@ class Px4Link:
             self._fail("it closed its connection", "see its output")
         self.report.note(f"PX4 closed its connection at t = {self._time:.3f} s")
         self._shared.outputs[:], self._armed[0] = 0.0, False
+        if self._vehicle:
+            self._vehicle.restart()
         self._connect(waits, self._patience(self._setup.start_timeout))
         self.report.reconnected += 1
         self._epoch[0] = self._last_us - round(self._time * 1e6)

@@ -99,21 +99,33 @@ class MissionClient:
             parameters: firmware parameters to set before the upload.
         """
         self._transport, self._conventions, self._items = transport, conventions, list(items)
-        self._parameters = dict(parameters)
-        self._types: dict[str, int] = {}
+        self._wanted = dict(parameters)
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
         self._filter = FrameFilter(NEEDED)
+        self.next_poll = self._beat = -1.0  # [s] of the next poll, heartbeat
+        self.version = ""
+        self._begin()
+
+    def _begin(self) -> None:
+        """Forget the firmware."""
+        self._parameters = dict(self._wanted)
+        self._types: dict[str, int] = {}
         self._target = 0  # system id of the firmware
-        self.next_poll = self._beat = self._sent = -1.0  # [s] of the next poll, heartbeat, last request
+        self._sent = -1.0  # [s] of the last request
         self._in_mode = False
         self._rejections = 0
         self.stage = Stage.CONNECTING
         self.armed, self.landed, self.mode, self.text, self.error = False, True, "", "", ""
-        self.failsafe = self.version = ""
+        self.failsafe = ""
         self._has_event = False  # an event has named a failsafe
         self.blockers: list[str] = []
         self.reached = -1
+
+    def restart(self) -> None:
+        """Begin again with a firmware that has started again: it has lost its state, and what it has sent is old."""
+        self._transport.receive()
+        self._begin()
 
     def poll(self, time: float) -> None:
         """Read and answer messages at simulation `time` [s]."""
