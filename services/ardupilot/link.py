@@ -55,6 +55,7 @@ class ArduPilotLink:
         self._simulated: SimulatedSensors | None = None
         self._time = 0.0  # [s] of the simulation
         self._packet: ServoPacket | None = None
+        self._again = False  # a frame has come again since the last answer
 
     @property
     def address(self) -> tuple[str, int]:
@@ -99,7 +100,7 @@ class ArduPilotLink:
         while self._packet is None:
             waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
             self._client.read()  # ArduPilot waits for a connection before it starts
-            self._take(self._socket.receive(), resend=False)
+            self._take(self._socket.receive())
             self._check(patience, "no servo packet", "start arducopter with --model JSON:127.0.0.1")
 
     def _arguments(self) -> list[str]:
@@ -141,15 +142,24 @@ class ArduPilotLink:
         return self._status.output((), running=False)
 
     def _await(self, size: int, waits: Waits) -> None:
-        """Wait for the next servo packet, after the receipt of `size` bytes that are not simply this packet."""
-        self._packet = None
-        self._take(size, resend=True)
+        """Wait for the next servo packet, after the receipt of `size` bytes that are not simply this packet.
+
+        A frame that comes again is answered again only if no other packet follows it. It may have been on its way
+        before the answer, and ArduPilot would take a second answer as that to its next frame: all later outputs would
+        be a step late.
+        """
+        self._packet, self._again = None, False
+        self._take(size)
         patience: Patience | None = None
         while self._packet is None:
             patience = patience or self._patience()
             waits("ardupilot")
             self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
-            self._take(self._socket.receive(), resend=True)
+            size = self._socket.receive()
+            self._take(size)
+            if size < 0 and self._again:
+                self._again = False
+                self._send()
         self._shared.outputs[:] = [throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS]]
 
     def cpu(self) -> float:
@@ -183,8 +193,8 @@ class ArduPilotLink:
         if reason := self._socket.send():
             self.report.note(f"cannot send to ArduPilot ({reason})")
 
-    def _take(self, size: int, resend: bool) -> None:
-        """Take in a datagram of `size` bytes, negative: none has come; answer a resent frame if `resend`."""
+    def _take(self, size: int) -> None:
+        """Take in a datagram of `size` bytes; negative: none has come."""
         link = self._socket
         if size < 0:  # none, or the port of a firmware that has ended
             return
@@ -201,10 +211,12 @@ class ArduPilotLink:
         link.answer_sender()
         meaning = self._sequence.receive(packet.frame_count)
         self.report.resent, self.report.missed = self._sequence.resent, self._sequence.skipped
+        if self._sequence.restarts > self.report.reconnected and self._client:
+            self._client.restart()
+            self._simulated = SimulatedSensors(self._own, self._client)
         self.report.reconnected = self._sequence.restarts
         if meaning is Frame.RESENT:
-            if resend:
-                self._send()
+            self._again = True
             return
         self._rate(packet.frame_rate)
         self._packet = packet

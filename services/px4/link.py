@@ -132,6 +132,7 @@ class Px4Link:
             link.append(rare_messages(self._own, setup.period, tick, self._last_us, read))
         elif reason == SEND:  # also a full buffer: a firmware that has not read for a long time
             link.lose()
+            self._check_program()
         elif reason == POLL:
             return self._poll(tick, read)
         else:
@@ -203,6 +204,8 @@ class Px4Link:
             self._fail("it closed its connection", "see its output")
         self.report.note(f"PX4 closed its connection at t = {self._time:.3f} s")
         self._shared.outputs[:], self._armed[0] = 0.0, False
+        if self._vehicle:
+            self._vehicle.restart()
         self._connect(waits, self._patience(self._setup.start_timeout))
         self.report.reconnected += 1
         self._epoch[0] = self._last_us - round(self._time * 1e6)

@@ -3,6 +3,7 @@
 import math
 
 from lapwing.services.common.firmware.mission_client import Conventions
+from lapwing.services.px4.failsafe_events import failsafe_text
 
 MAIN = {
     1: "manual", 2: "altitude control", 3: "position control", 4: "auto", 5: "acro", 6: "offboard", 7: "stabilized",
@@ -22,4 +23,11 @@ def mode_name(custom_mode: int) -> str:
     return MAIN.get(main, f"mode {main}")
 
 
-CONVENTIONS = Conventions((AUTO, MISSION), home_first=False, open_value=math.nan, bytewise=True, mode_name=mode_name)
+CONVENTIONS = Conventions(
+    (AUTO, MISSION),
+    home_first=False,
+    open_value=math.nan,
+    bytewise=True,
+    mode_name=mode_name,
+    event_text=failsafe_text,
+)

@@ -43,6 +43,10 @@ class VehicleLink:
                 self._client.send_battery(battery.voltage, battery.current, battery.charge)
         return self._status.output((), running=False)
 
+    def restart(self) -> None:
+        """Begin again with a PX4 that has started again: upload the mission, and arm."""
+        self._client.restart()
+
     def close(self) -> None:
         """Close the link."""
         self._client.close()

@@ -100,6 +100,7 @@ def figures(log: Path, summary: Path, full: float) -> dict:
         "share": float(cpu[1]) / float(cpu[2]) if cpu else math.nan,
         "own_us": 1e6 * float(cpu[1]) / steps if cpu else math.nan,  # CPU time of an exchange
         "firmware_us": 1e6 * float(cpu[2]) / steps if cpu else math.nan,
+        "load": os.getloadavg()[0],  # of the last minute
         "digest": result["digest"],
     }
 
@@ -139,11 +140,11 @@ def main() -> None:
     flown = [r for r in results if r["outcome"] != "failed"] if given.scripted else landed
     print(f"{len(landed)} of {len(results)} landed; hover by the airframe {hover_duty(f'{given.firmware}_quad'):.4f}")
     for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share",
-                 "own_us", "firmware_us"):  # fmt: skip
+                 "own_us", "firmware_us", "load"):  # fmt: skip
         values = [r[name] for r in flown]
         if values:
             print(f"{name:8} mean {np.mean(values):.4g}, least {min(values):.4g}, greatest {max(values):.4g}")
-    print(f"logs in {folder}")
+    print(f"{len({r['digest'] for r in flown})} different digests in {len(flown)} flights; logs in {folder}")
 
 
 if __name__ == "__main__":

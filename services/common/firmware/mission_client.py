@@ -22,6 +22,8 @@ POLL_EVERY = 0.1  # [s] between two looks at the link
 REJECTIONS = 20  # uploads, one per second, after which the mission is wrong
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
 BLOCKERS = 5  # last status texts kept while arming is rejected
+EVENT = 410  # message id; pymavlink has no constant for it
+ACTIVATED = "Failsafe activated"  # status text beside an event that names cause and action
 FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNORECASE)  # in status texts
 NEEDED = (  # messages with a handler
     mavlink.MAVLINK_MSG_ID_HEARTBEAT,
@@ -34,6 +36,7 @@ NEEDED = (  # messages with a handler
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
     mavlink.MAVLINK_MSG_ID_STATUSTEXT,
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
+    EVENT,
 )
 INTEGERS = {  # `struct` format by MAV_PARAM_TYPE
     mavlink.MAV_PARAM_TYPE_UINT8: "<Bxxx",
@@ -64,6 +67,7 @@ class Conventions(NamedTuple):
     open_value: float  # replaces NaN in the parameters of an item
     bytewise: bool  # integer parameters keep their bytes in the float field
     mode_name: Callable[[int], str]  # of a heartbeat's custom_mode
+    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # of a failsafe's EVENT, "" for others
 
 
 class MissionClient:
@@ -75,7 +79,7 @@ class MissionClient:
         landed: state of the last EXTENDED_SYS_STATE.
         mode: name of the flight mode.
         text: last status text of the level error or worse.
-        failsafe: last status text about a failsafe since arming.
+        failsafe: last event or status text about a failsafe since arming.
         blockers: status texts since arming was rejected.
         error: reason why the flight is impossible, "" as long as it is possible.
         version: of the firmware, "" until it reports it.
@@ -95,20 +99,33 @@ class MissionClient:
             parameters: firmware parameters to set before the upload.
         """
         self._transport, self._conventions, self._items = transport, conventions, list(items)
-        self._parameters = dict(parameters)
-        self._types: dict[str, int] = {}
+        self._wanted = dict(parameters)
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
         self._filter = FrameFilter(NEEDED)
+        self.next_poll = self._beat = -1.0  # [s] of the next poll, heartbeat
+        self.version = ""
+        self._begin()
+
+    def _begin(self) -> None:
+        """Forget the firmware."""
+        self._parameters = dict(self._wanted)
+        self._types: dict[str, int] = {}
         self._target = 0  # system id of the firmware
-        self.next_poll = self._beat = self._sent = -1.0  # [s] of the next poll, heartbeat, last request
+        self._sent = -1.0  # [s] of the last request
         self._in_mode = False
         self._rejections = 0
         self.stage = Stage.CONNECTING
         self.armed, self.landed, self.mode, self.text, self.error = False, True, "", "", ""
-        self.failsafe = self.version = ""
+        self.failsafe = ""
+        self._has_event = False  # an event has named a failsafe
         self.blockers: list[str] = []
         self.reached = -1
+
+    def restart(self) -> None:
+        """Begin again with a firmware that has started again: it has lost its state, and what it has sent is old."""
+        self._transport.receive()
+        self._begin()
 
     def poll(self, time: float) -> None:
         """Read and answer messages at simulation `time` [s]."""
@@ -275,11 +292,16 @@ class MissionClient:
         elif message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM and not accepted:
             self._in_mode = False  # a rejected mode change may have restored the mode
 
+    def _on_event(self, message: Any) -> None:
+        text = self._conventions.event_text(message.id, bytes(message.arguments))
+        if self.armed and text:
+            self.failsafe, self._has_event = text, True
+
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
         if message.severity <= mavlink.MAV_SEVERITY_ERROR:
             self.text = text
-        if self.armed and FAILSAFE.search(text):
+        if self.armed and FAILSAFE.search(text) and not (self._has_event and text.startswith(ACTIVATED)):
             self.failsafe = text
         if self.stage is Stage.ARMING and message.severity <= mavlink.MAV_SEVERITY_WARNING:
             self.blockers = [*[old for old in self.blockers if old != text], text][-BLOCKERS:]

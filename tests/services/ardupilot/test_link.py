@@ -92,6 +92,22 @@ def test_resent_frame_is_answered_without_step(link):
     assert link.report.resent == 2
 
 
+def test_frame_resent_before_its_answer_delays_no_later_step(link):
+    """ArduPilot takes each datagram as the answer to its newest frame."""
+
+    def script(peer):
+        peer.exchange()
+        for _ in range(2):  # frame 1 comes three times before its answer
+            peer.send(servo_packet(1))
+        return [peer.exchange()["timestamp"][0] for _ in range(5)]
+
+    background = begun(link, script)
+    fly(link, 5)
+    link._send()
+    assert background.join() == pytest.approx([0.004 * k for k in (1, 2, 3, 4, 4)], abs=1e-6)
+    assert link.report.resent == 2
+
+
 def test_malformed_packets_are_counted_and_named(link):
     def script(peer):
         peer.exchange()

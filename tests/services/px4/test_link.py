@@ -160,6 +160,28 @@ def test_lost_imu_does_not_block(link):
     assert link.report.missed == 0
 
 
+def test_program_that_ends_while_imu_is_lost_is_named(link):
+    class Ended:
+        pid = None
+
+        def check(self, when):
+            raise FirmwareError(f"px4: the program ended (signal 9){when}")
+
+        def close(self):
+            pass
+
+    def script(peer):
+        at_start(peer)
+        peer.close()
+
+    background = begun(link, script)
+    fly(link, 1)
+    background.join()
+    link._program = Ended()
+    with pytest.raises(FirmwareError, match=r"the program ended \(signal 9\) at t = 0.0\d+ s"):
+        fly(link, 20, 1, SAMPLES | {ports.IMU: ImuReading(valid=False)})
+
+
 def test_missed_answer_is_counted_and_outputs_are_held(link):
     def script(peer):
         at_start(peer)

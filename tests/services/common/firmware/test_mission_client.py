@@ -178,6 +178,35 @@ def test_disarmed_vehicle_has_finished_and_failsafe_is_reported():
     assert FlightStatus("px4", client).output((0.0,) * 4, False).finished
 
 
+def test_restarted_firmware_gets_mission_again_and_is_armed():
+    vehicle = Vehicle()
+    client = make(vehicle, parameters={"MPC_XY_VEL_MAX": 5.0})
+    fly(vehicle, client, 5.0)
+    assert client.stage is Stage.FLYING
+    vehicle.beat()  # the last one of the old program, armed
+    vehicle.armed, vehicle.items = False, {}
+    vehicle.parameters["MPC_XY_VEL_MAX"] = (12.0, 9)
+    client.restart()
+    fly(vehicle, client, 5.0, 5.0)
+    assert client.stage is Stage.FLYING
+    assert vehicle.armed
+    assert len(vehicle.items) == 2
+    assert vehicle.parameters["MPC_XY_VEL_MAX"][0] == 5.0
+
+
+def test_event_names_cause_and_action_of_failsafe():
+    vehicle = Vehicle()
+    client = make(vehicle)
+    fly(vehicle, client, 3.0)
+    event = mavlink.mavlink_map[410]
+    arguments = struct.pack("<IBB34x", 4, 6, 3)  # mode, return, low battery
+    vehicle.tell(event(0, 0, (1 << 24) + 9751178, 30_000, 7, 0x42, tuple(arguments)))
+    vehicle.tell(mavlink.MAVLink_statustext_message(2, b"Failsafe activated\t"))
+    vehicle.tell(event(0, 0, (1 << 24) + 961599, 30_100, 8, 0x66, (0,) * 40))  # about sticks
+    client.poll(3.5)
+    assert client.failsafe == "low battery: return"
+
+
 def test_other_components_are_ignored():
     vehicle = Vehicle()
     client = make(vehicle)

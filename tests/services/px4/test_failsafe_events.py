@@ -1,0 +1,38 @@
+"""Failsafe events of PX4: ids of PX4's generated metadata (all_events.json, May 2026), texts."""
+
+import struct
+
+import pytest
+
+from lapwing.services.px4.failsafe_events import event_id, failsafe_text
+
+NUMBERS = {
+    "commander_failsafe_enter": 9751178,
+    "commander_failsafe_enter_generic": 14605264,
+    "commander_failsafe_enter_hold": 13704694,
+    "commander_failsafe_enter_generic_hold": 4502496,
+    "commander_failsafe_enter_autopilot_disengaged": 12770418,
+}
+
+
+@pytest.mark.parametrize("name", NUMBERS)
+def test_id_is_that_of_metadata(name):
+    assert event_id(name) == (1 << 24) + NUMBERS[name]
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "text"),
+    [
+        ("commander_failsafe_enter", struct.pack("<IBB", 4, 6, 3), "low battery: return"),
+        ("commander_failsafe_enter_hold", struct.pack("<IBHB", 4, 6, 5, 4), "critical battery: return in 5 s"),
+        ("commander_failsafe_enter_generic", struct.pack("<IB", 4, 8), "descend"),
+        ("commander_failsafe_enter_generic_hold", struct.pack("<IBH", 4, 7, 2), "land in 2 s"),
+        ("commander_failsafe_enter", struct.pack("<IBB", 4, 99, 98), "98: 99"),  # of a later version
+    ],
+)
+def test_text_names_cause_and_action(name, arguments, text):
+    assert failsafe_text(event_id(name), arguments.ljust(40, b"\0")) == text
+
+
+def test_other_events_are_no_failsafe():
+    assert failsafe_text((1 << 24) + 961599, bytes(40)) == ""
