@@ -64,7 +64,8 @@ def present_state(value: Any) -> Any:
 
 def present_tables(tree: Mapping[str, Any]) -> dict[str, Any]:
     """Return the resolved tables of a scene, of one vehicle or of a fleet, under their present names."""
-    names, present = former_names(), {}
+    names = former_names()
+    present: dict[str, Any] = {}
     for former, value in tree.items():
         name = names["tables"].get(former, former)
         if name == "vehicle" and isinstance(value, list):
