@@ -1,34 +1,28 @@
 """Plant service: the clock owner, which integrates the model of the scene's `vehicle.model`."""
 
 from dataclasses import replace
+from itertools import groupby
 from typing import Any
-
-from numba import types
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import DivergedError
-from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.integrators import not_finite
-from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
-from lapwing.dynamics.vehicles.multirotor_multibody_equations import apply_constraint_impulse
-from lapwing.kernels import kernel
-from lapwing.kernels.cell import Cell, read, write
-from lapwing.kernels.codegen import generic
+from lapwing.dynamics.vehicles.propeller_failures import Failure
+from lapwing.kernels.cell import Cell, read
 from lapwing.services.common import ports
-from lapwing.services.common.ports import PerRotor
 from lapwing.services.plant.blocks import system_outputs  # noqa: F401 (registers output functions)
+from lapwing.services.plant.blocks.failing_multirotor import FailingMultirotorPlant
 from lapwing.services.plant.blocks.interaction import Interaction
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 from lapwing.services.plant.blocks.neighbour_state import PresenceView
 from lapwing.services.plant.encoders import wires
 from lapwing.services.plant.fleet_coupling import LOAD, PRESENCE
-from lapwing.services.plant.service_config import FleetCoupling, PlantEvent, PlantSetup
+from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
 
 NAME = "plant"
 
@@ -52,7 +46,7 @@ def create(setup: RunConfig) -> Service:
     )
     parts: list[Any] = [part]
     if plant.events:
-        parts.insert(0, PropellerFailures(plant, part))
+        parts.insert(0, PropellerFailures(plant))
     if plant.others:
         parts = _among_others(plant, plant.others, parts, state, bodies)
     if bodies and plant.bodies and not has_own_bodies:
@@ -108,53 +102,34 @@ class PropellerFailures:
     name = f"{NAME}.breakages"
     outputs = ()
 
-    def __init__(self, plant: PlantSetup, part: Block):
-        self._events, self._form = list(plant.events), multirotor_euler if plant.euler else multirotor_multibody
-        self._part, self._core = part, plant.core
-        self._bodies = plant.bodies
-        self._failed_plants: list[
-            tuple[Any, list[tuple[Block, BoundBlock]]]
-        ] = []  # vehicle and prepared blocks of each event
+    def __init__(self, plant: PlantSetup):
+        self._steps = {tick: tuple(events) for tick, events in groupby(plant.events, lambda event: event.tick)}
+        self._form = multirotor_euler if plant.euler else multirotor_multibody
+        self._core, self._bodies = plant.core, plant.bodies
+        self._blocks: dict[int, list[tuple[Block, BoundBlock]]] = {}  # by the tick at which they replace others
 
     def bind(self, graph: BlockDiagram) -> None:
         """Compile the plants of all failures before the first tick."""
-        self._graph = graph
-        p, s = self._core.vehicle, read(self._part.state)
-        for event in self._events:
-            p = self._form.with_propeller_failure(p, event.propeller, event.becomes)
-            if event.becomes == "locked":
-                lock(p, s.vehicle, self._core.off)
-            parts = [
-                replace(graph.part(name), parameters=parameters._replace(vehicle=p))
-                for name, parameters in ((NAME, self._core), (f"{NAME}.bodies", self._bodies))
-            ]
-            self._failed_plants.append((p, [(part, graph.prepare(part)) for part in parts]))
+        self._graph, core = graph, self._core
+        for tick, events in self._steps.items():
+            failures, p = [], core.vehicle
+            for event in events:
+                p = self._form.with_propeller_failure(p, event.propeller, event.becomes)
+                failures.append(Failure(event.time, p, event.becomes == "locked"))
+            failing, core = FailingMultirotorPlant(core, tuple(failures)), core._replace(vehicle=p)
+            view = self._bodies._replace(vehicle=p)
+            self._blocks[tick + 2] = [self._prepared(NAME, core)]
+            self._blocks[tick + 1] = [self._prepared(NAME, failing), self._prepared(f"{NAME}.bodies", view)]
+
+    def _prepared(self, name: str, parameters: Any) -> tuple[Block, BoundBlock]:
+        part = replace(self._graph.part(name), parameters=parameters)
+        return part, self._graph.prepare(part)
 
     def on_tick(self, tick: int) -> int:
-        """Apply the failures of `tick` after its state has been output."""
-        while self._events and self._events[0].tick < tick:
-            self._break(tick, self._events.pop(0), *self._failed_plants.pop(0))
-        return self._events[0].tick + 1 if self._events else NEVER
+        """Replace the plant of the step to `tick` by one with failures, and that of the step after it by one without.
 
-    def _break(self, tick: int, event: PlantEvent, p: Any, parts: list[tuple[Block, BoundBlock]]) -> None:
-        if event.becomes == "locked":
-            stamp = tick - self._part.inputs[0].delay
-            command = self._core.off if stamp < 0 else self._graph.latest(ports.ACTUATORS, stamp).motor_voltage
-            s = read(self._part.state)
-            write(self._part.state, s._replace(vehicle=lock(p, s.vehicle, command)))
-        for part, code in parts:
-            self._graph.replace(part, code)
-
-
-@kernel
-def lock(p: MultirotorParameters, s: MultirotorState, command: PerRotor) -> MultirotorState:
-    """Return the state s after an impulse that satisfies the constraints of p, under a command [V]."""
-    memory = s.memory
-    drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, command)
-    return MultirotorState(_after_impulses(drive, s.motion), memory)
-
-
-@generic()
-def _after_impulses(drive: types.Type, x: types.Type) -> Any:
-    """Return the bodies after impulses in their hinges, in any coordinates."""
-    return apply_constraint_impulse if x.instance_class is FiveBodies else multirotor_euler.apply_constraint_impulse
+        The plant of a step starts from the state that has been output.
+        """
+        for block, code in self._blocks.pop(tick, []):
+            self._graph.replace(block, code)
+        return min(self._blocks, default=NEVER)

@@ -7,11 +7,12 @@ from lapwing.services.plant.encoders import PlantWiring
 
 
 class PlantEvent(NamedTuple):
-    """Failure of a propeller in flight, after the output of `tick`."""
+    """Failure of a propeller in flight, in the communication step from `tick` on."""
 
     tick: int
     propeller: int  # from 0, in the order of the airframe
     becomes: str  # "locked", "free" or "torn_off"
+    time: float = 0.0  # [s]; a time before `tick` is that of the tick
 
 
 class FleetCoupling(NamedTuple):

@@ -6,6 +6,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le, Lt
 
 from lapwing.dynamics.atmosphere import pressure
+from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import always_inline, kernel
@@ -15,6 +16,21 @@ from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply
 from lapwing.services.sensors.sensor_inputs import Truth
 
 CHANNELS = ("pressure",)
+
+
+Share = Annotated[float, Ge(-2), Le(2)]  # of the dynamic pressure
+
+
+# Horizontal: a quadrotor in flight, barometer against satellite heights (PX4-Autopilot, pull request 19507, 2022,
+# EKF2_PCOEF_XP, XN, YP and YN). Vertical: chosen.
+class StaticPressureError(NamedTuple):
+    """Static pressure position error: share of the dynamic pressure by direction of flight through the air."""
+
+    forward: Share = -0.314  # along the body's x axis; below 0 the barometric height rises
+    backward: Share = -0.284  # against the x axis
+    right: Share = -0.753  # against the body's y axis
+    left: Share = -0.598  # along the y axis
+    vertical: Share = 0.0  # along the body's z axis, up and down
 
 
 class Barometer(NamedTuple):
@@ -29,7 +45,7 @@ class Barometer(NamedTuple):
     resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    airspeed_error: Annotated[float, Ge(-1), Le(1)] = 0.0  # of the dynamic pressure, added to the static one
+    static_pressure_error: StaticPressureError | None = None  # by wind and own motion; none if left out
     wash_pa_per_n: Annotated[float, Ge(-10), Le(10)] = 0.0  # [Pa/N] of the rotors' thrust, added to the pressure
     temperature_pa_per_k: Annotated[float, Ge(0)] = 0.0  # [Pa/K] what calibration leaves, one standard deviation
     warm_up_rise: Annotated[float, Ge(-200), Le(200)] = 0.0  # [K] still to come at the start
@@ -52,10 +68,21 @@ def blank() -> BarometerState:
     return BarometerState(0.0, 0.0, ZERO, BLANK, 0.0)
 
 
+@kernel
+def position_error(e: StaticPressureError | None, truth: Truth) -> float:
+    """Return what the flow around the vehicle adds to the static pressure [Pa] (theory.md, eq. (3.65))."""
+    if e is None:
+        return 0.0
+    x, y, z = rotate_back(truth.attitude, truth.air_velocity_world)
+    along = (e.forward if x > 0.0 else e.backward) * x * x
+    across = (e.left if y > 0.0 else e.right) * y * y
+    return 0.5 * truth.air_density * (along + across + e.vertical * z * z)
+
+
 @always_inline
 def _true_pressure(p: Barometer, truth: Truth) -> float:
     static = pressure(truth.atmosphere, truth.home.height + truth.position_world[2])
-    return static + p.airspeed_error * truth.dynamic_pressure + p.wash_pa_per_n * truth.thrust
+    return static + position_error(p.static_pressure_error, truth) + p.wash_pa_per_n * truth.thrust
 
 
 @kernel

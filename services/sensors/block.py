@@ -9,7 +9,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
-from lapwing.dynamics.vector import dot, subtract
+from lapwing.dynamics.vector import subtract
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.services.sensors.sensor_inputs import ROTORS, Truth
@@ -81,7 +81,6 @@ def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> t
         around.magnetic_field_world,
         around.terrain,
         x.angular_acceleration_body,
-        0.5 * x.air_density * dot(air, air),
         current,
         air,
         x.air_density,

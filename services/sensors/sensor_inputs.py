@@ -30,7 +30,6 @@ class Truth(NamedTuple):
     magnetic_field_world: Vec3 = STANDARD.magnetic_field_world  # [T]
     terrain: Any = STANDARD.terrain  # Level or Relief
     angular_acceleration_body: Vec3 = ZERO  # [rad/s^2]
-    dynamic_pressure: float = 0.0  # [Pa] of the air that the vehicle flies through
     motor_current: float = 0.0  # [A] of all motors
     air_velocity_world: Vec3 = ZERO  # [m/s] of the vehicle through the air
     air_density: float = 1.225  # [kg/m^3]

@@ -4,6 +4,7 @@
 run configuration.
 """
 
+import importlib
 import math
 import re
 import tomllib
@@ -14,6 +15,7 @@ from typing import Any
 
 FORMER_PACKAGES = ("cosim", "dynamics", "messages", "services", "studies")  # top-level before they moved below lapwing
 COUPLINGS = {"sequential": "gauss_seidel", "parallel": "jacobi"}
+DIRECTIONS = ("forward", "backward", "right", "left", "vertical")  # of the static pressure error of a barometer
 ANCHOR = 5  # numbers that a foot remembered in former versions
 METADATA = {"coupling": COUPLINGS, "mode": {"processes": "multi-process", "single": "single-process"}}
 
@@ -39,6 +41,10 @@ def present_fields(class_path: str, members: Mapping[str, Any]) -> dict[str, Any
     if class_path.endswith(":GroundContact") and (square := present.pop("square_stiction_velocity", None)):
         # anchors that a flag held became friction elements
         present |= {"tangential_damping": present["damping"], "inverse_stiction": 1.0 / math.sqrt(square)}
+    module, _, name = class_path.partition(":")
+    if name == "Barometer" and "static_pressure_error" not in present:  # one share for all directions
+        share, kind = present.pop("airspeed_error"), importlib.import_module(module).StaticPressureError
+        present["static_pressure_error"] = kind(*[share] * len(DIRECTIONS)) if share else None
     return present
 
 
@@ -58,13 +64,17 @@ def present_state(value: Any) -> Any:
 
 def present_tables(tree: Mapping[str, Any]) -> dict[str, Any]:
     """Return the resolved tables of a scene, of one vehicle or of a fleet, under their present names."""
-    names, present = former_names(), {}
+    names = former_names()
+    present: dict[str, Any] = {}
     for former, value in tree.items():
         name = names["tables"].get(former, former)
         if name == "vehicle" and isinstance(value, list):
             present[name] = [present_tables(entry) for entry in value]
         else:
             present[name] = _renamed(value, *(names[kind].get(name, {}) for kind in ("keys", "values", "removed")))
+    barometer = present.get("sensors", {}).get("barometer", {})
+    if "airspeed_error" in barometer:
+        barometer["static_pressure_error"] = dict.fromkeys(DIRECTIONS, barometer.pop("airspeed_error"))
     if isinstance(success := present.get("success"), dict):
         present["success"] = success | {"require": [_criterion(text) for text in success.get("require", ())]}
     return present

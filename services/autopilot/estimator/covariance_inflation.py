@@ -16,6 +16,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     GPS_VELOCITY,
     GYRO,
     IRON,
+    LIFT,
     MAG,
     MAG_SCALE,
     NEVER,
@@ -87,6 +88,7 @@ def forget_imu(p: Estimator, s: State) -> State:
             c[k, k] = deviation * deviation
             s.memory.considered[k, :] = 0.0
     s.memory.considered[:SIZE, :MAG_SCALE] = 0.0
+    s.memory.considered[:SIZE, LIFT:] = 0.0
     nominal = Nominal(
         n.attitude, n.velocity_world, n.position_world, ZERO, ZERO, n.gps_correlated_error,
         n.magnetometer_bias, n.heading_bias, n.barometer_bias, n.sonar_scale,

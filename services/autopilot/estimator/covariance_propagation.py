@@ -1,4 +1,4 @@
-"""Propagation of the covariance over one interval (theory.md, eqs. (3.22), (3.23) and (3.61))."""
+"""Propagation of the covariance over one interval (theory.md, eqs. (3.22), (3.23), (3.61) and (3.66))."""
 
 from typing import Any
 
@@ -11,6 +11,8 @@ from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
     CONSIDERED,
     GYRO,
+    GYRO_SCALE,
+    LIFT,
     POSITION,
     SIZE,
     THETA,
@@ -85,41 +87,68 @@ def _turns(omega: Vec3, r: Mat3, dt: float) -> Any:
 
 
 @always_inline
-def _turn_half(m: Memory, turns: Any) -> None:
-    """Add half of J V, the covariance of the turn by the gyroscopes' errors with these errors themselves."""
-    for i in range(6):
-        turned = unpack4(turns[i] * (0.5 * m.considered[VARIANCE, i]))
+def _lifts(f: Vec3, r: Mat3, dt: float) -> Any:
+    """Return the columns of J, the velocity [m/s] by each error of the accelerometers, as SIMD vectors with a zero."""
+    k = -dt * (f[0] * r[2] + f[1] * r[5] + f[2] * r[8])
+    return (
+        pack4(k * r[0], k * r[3], k * r[6], 0.0),
+        pack4(k * r[1], k * r[4], k * r[7], 0.0),
+        pack4(k * r[2], k * r[5], k * r[8], 0.0),
+    )
+
+
+@always_inline
+def _add_half(m: Memory, row: int, column: int, columns: Any) -> None:
+    """Add half of J V, the covariance of rows from `row` by the errors from `column` with these errors themselves."""
+    for i in range(len(columns)):
+        change = unpack4(columns[i] * (0.5 * m.considered[VARIANCE, column + i]))
         for a in range(3):
-            m.considered[THETA + a, i] += turned[a]
+            m.considered[row + a, column + i] += change[a]
 
 
 @always_inline
 def _turned(k: np.ndarray, j: int, turns: Any) -> Any:
-    """Return row j of C^T J^T as a SIMD vector."""
+    """Return row j of C^T J^T of the gyroscopes as a SIMD vector."""
     row = k[j]
     first = turns[0] * row[0] + turns[1] * row[1] + turns[2] * row[2]
     return first + (turns[3] * row[3] + turns[4] * row[4] + turns[5] * row[5])
 
 
 @always_inline
-def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) -> None:
-    """Propagate the covariance with the considered parameters, and add their effect on the attitude.
+def _lifted(k: np.ndarray, j: int, lifts: Any) -> Any:
+    """Return row j of C^T J^T of the accelerometers as a SIMD vector."""
+    row = k[j]
+    return lifts[0] * row[LIFT] + lifts[1] * row[LIFT + 1] + lifts[2] * row[LIFT + 2]
 
-    Call after `propagate_covariance`; `omega` is the rate [rad/s].
+
+@always_inline
+def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) -> None:
+    """Propagate the covariance with the considered parameters, and add their effect on attitude and velocity.
+
+    Call after `propagate_covariance`; `omega` is the rate [rad/s], f the specific force [m/s^2] in the world.
     """
     c, k = m.covariance, m.considered
     _transform_rows(k, CONSIDERED, f, r, dt)
-    turns = _turns(omega, r, dt)
-    _turn_half(m, turns)
-    block = (unpack4(_turned(k, 0, turns)), unpack4(_turned(k, 1, turns)), unpack4(_turned(k, 2, turns)))
-    for i in range(3):
-        for j in range(3):
-            c[THETA + i, THETA + j] += block[i][j] + block[j][i]
-    for j in range(THETA + 3, SIZE):
+    turns, lifts = _turns(omega, r, dt), _lifts(f, r, dt)
+    _add_half(m, THETA, GYRO_SCALE, turns)
+    _add_half(m, VELOCITY, LIFT, lifts)
+    for j in range(POSITION, SIZE):
         store(c, SIZE * j + THETA, load(c, SIZE * j + THETA) + _turned(k, j, turns))
-        for i in range(3):
-            c[THETA + i, j] = c[j, THETA + i]
-    _turn_half(m, turns)
+        store(c, SIZE * j + VELOCITY, load(c, SIZE * j + VELOCITY) + _lifted(k, j, lifts))
+        for i in range(POSITION):
+            c[i, j] = c[j, i]
+    for i in range(POSITION):  # rows and columns of both
+        turn, lift = unpack4(_turned(k, i, turns)), unpack4(_lifted(k, i, lifts))
+        for a in range(3):
+            c[i, THETA + a] += turn[a]
+            c[i, VELOCITY + a] += lift[a]
+            c[THETA + a, i] += turn[a]
+            c[VELOCITY + a, i] += lift[a]
+    for i in range(POSITION):  # the sums round differently: keep it exactly symmetric
+        for j in range(i):
+            c[i, j] = c[j, i]
+    _add_half(m, THETA, GYRO_SCALE, turns)
+    _add_half(m, VELOCITY, LIFT, lifts)
 
 
 @always_inline

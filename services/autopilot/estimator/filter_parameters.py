@@ -27,8 +27,10 @@ class Estimator(NamedTuple):
     gyro_bias_walk: Annotated[float, Ge(0)] = 3.3e-5  # [rad/s/sqrt(s)], instability and warm-up
     gyro_scale_std: Annotated[float, Ge(0)] = 1e-3  # ratio, each axis
     gyro_alignment_std: Annotated[float, Ge(0)] = 9e-4  # [rad] about each axis
-    accelerometer_bias_std: Annotated[float, Gt(0)] = 0.031  # [m/s^2] at the start, with scale and misalignment
+    accelerometer_bias_std: Annotated[float, Gt(0)] = 0.0295  # [m/s^2] at the start
     accelerometer_bias_walk: Annotated[float, Ge(0)] = 1e-4  # [m/s^2/sqrt(s)]
+    accelerometer_scale_std: Annotated[float, Ge(0)] = 1e-3  # ratio, of the body's z axis
+    accelerometer_alignment_std: Annotated[float, Ge(0)] = 9e-4  # [rad] about the body's x and y axes
     barometer_walk: Annotated[float, Ge(0)] = 0.02  # [m/sqrt(s)], with the weather
     magnetometer_bias_std: Annotated[float, Ge(0)] = 5.1e-8  # [T] hard iron after calibration
     magnetometer_bias_walk: Annotated[float, Ge(0)] = 6e-10  # [T/sqrt(s)]

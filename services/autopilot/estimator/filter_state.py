@@ -16,8 +16,8 @@ from lapwing.services.common.ports import StateEstimate
 SIZE = 24
 THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
 HEADING, BAROMETER, SCALE = 21, 22, 23
-CONSIDERED = 12  # constant errors of instruments that are considered and not estimated (theory.md, eq. (3.60))
-GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT = 0, 3, 6, 9
+CONSIDERED = 16  # constant errors of instruments that are considered and not estimated (theory.md, eq. (3.60))
+GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT, LIFT = 0, 3, 6, 9, 11  # LIFT: accelerometers, eq. (3.66)
 VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2  # rows of `considered`: theirs, of H, covariance with the innovation
 
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
@@ -66,7 +66,7 @@ class Memory(NamedTuple):
     correction: np.ndarray  # (24,) pending correction of the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
-    considered: np.ndarray  # (27, 12) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
+    considered: np.ndarray  # (27, 16) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
     history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, noise added to velocity and attitude
     since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
     refused: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
@@ -154,6 +154,9 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     m.refused[:] = m.repeats[:] = 0
     m.last[:] = math.nan
     m.nis[:] = 0.0
+    alignment = p.accelerometer_alignment_std * p.accelerometer_alignment_std
+    m.considered[VARIANCE, LIFT : LIFT + 2] = alignment
+    m.considered[VARIANCE, LIFT + 2] = p.accelerometer_scale_std * p.accelerometer_scale_std
     attitude = attitude_from_gravity(p, specific_force_body, field_body)
     nominal = Nominal(attitude, ZERO, position_world, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False, 0), m)

@@ -10,6 +10,7 @@ from lapwing.kernels.simd import load, splat, store
 from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
     CONSIDERED,
+    LIFT,
     PRODUCT,
     ROW,
     SIZE,
@@ -18,7 +19,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     Memory,
 )
 
-FLOOR = 1e-12  # minimum measurement variance, which keeps S positive with ideal instruments
+FLOOR = 1e-8  # minimum measurement variance, which keeps S well above round-off with ideal instruments
 
 
 @always_inline
@@ -43,15 +44,18 @@ def innovation_variance(m: Memory, variance: float) -> float:
     first = load(m.considered, CONSIDERED * ROW) * load(m.considered, CONSIDERED * VARIANCE)
     second = load(m.considered, CONSIDERED * ROW + 4) * load(m.considered, CONSIDERED * VARIANCE + 4)
     third = load(m.considered, CONSIDERED * ROW + 8) * load(m.considered, CONSIDERED * VARIANCE + 8)
+    fourth = load(m.considered, CONSIDERED * ROW + 12) * load(m.considered, CONSIDERED * VARIANCE + 12)
     for j in range(SIZE):
         h = m.row[j]
         if h != 0.0:
             first = first + h * load(m.considered, CONSIDERED * j)
             second = second + h * load(m.considered, CONSIDERED * j + 4)
             third = third + h * load(m.considered, CONSIDERED * j + 8)
+            fourth = fourth + h * load(m.considered, CONSIDERED * j + 12)
     store(m.considered, CONSIDERED * PRODUCT, first)
     store(m.considered, CONSIDERED * PRODUCT + 4, second)
     store(m.considered, CONSIDERED * PRODUCT + 8, third)
+    store(m.considered, CONSIDERED * PRODUCT + 12, fourth)
     total = variance + FLOOR
     for k in range(CONSIDERED):
         g = m.considered[ROW, k]
@@ -89,17 +93,19 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
     first = load(m.considered, CONSIDERED * PRODUCT) * inverse
     second = load(m.considered, CONSIDERED * PRODUCT + 4) * inverse
     third = load(m.considered, CONSIDERED * PRODUCT + 8) * inverse
+    fourth = load(m.considered, CONSIDERED * PRODUCT + 12) * inverse
     for i in range(SIZE):
         one, place = m.product[i], CONSIDERED * i
         store(m.considered, place, load(m.considered, place) - one * first)
         store(m.considered, place + 4, load(m.considered, place + 4) - one * second)
         store(m.considered, place + 8, load(m.considered, place + 8) - one * third)
+        store(m.considered, place + 12, load(m.considered, place + 12) - one * fourth)
     return y * y * inverse
 
 
 @kernel
 def acceleration_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, k: float) -> None:
-    """Add k times the row of the acceleration's error: theta x f - R b (theory.md, eq. (3.22))."""
+    """Add k times the row of the acceleration's error: theta x f - R b - R e f_z (theory.md, eqs. (3.22), (3.66))."""
     x, y, z = force_world
     if axis == 0:
         theta: Vec3 = (0.0, z, -y)
@@ -107,6 +113,8 @@ def acceleration_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, k: float)
         theta = (-z, 0.0, x)
     else:
         theta = (y, -x, 0.0)
+    lift = k * (x * r[2] + y * r[5] + z * r[8])
     for i in range(3):
         m.row[THETA + i] += k * theta[i]
         m.row[ACCELEROMETER + i] -= k * r[3 * axis + i]
+        m.considered[ROW, LIFT + i] -= lift * r[3 * axis + i]

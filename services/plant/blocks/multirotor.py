@@ -50,16 +50,39 @@ def step(
 
     The inputs are actuators, status, and the named inputs of effects.
     """
+    vehicle, command = commanded(p, s, inputs)
+    if tick > 0:
+        vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
+    return output(p, p.vehicle, s, tick, vehicle, command, inputs[1])
+
+
+@always_inline
+def commanded(
+    p: MultirotorPlant, s: MultirotorPlantState, inputs: tuple[InputSample, ...]
+) -> tuple[MultirotorState, PerRotor]:
+    """Return (vehicle with the inputs of its effects, motor voltages [V]). See `step` for arguments."""
     actuators, status = inputs[0], inputs[1]
     command = actuators.value.motor_voltage if actuators.due else p.off
     memory = with_inputs_stored(p.vehicle.effects, s.vehicle.memory, inputs[2:])
     vehicle = MultirotorState(s.vehicle.motion, memory)
     if status.due and status.value.released:
         vehicle = MultirotorState(vehicle.motion, release_payload(p.vehicle.effects, vehicle.memory))
-    if tick > 0:
-        vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
-    motion = motion_of(p.vehicle.layout, vehicle.motion)
-    o = observe(p.vehicle, tick, p.interval, vehicle, command)
+    return vehicle, command
+
+
+@always_inline
+def output(
+    p: MultirotorPlant,
+    parameters: MultirotorParameters,
+    s: MultirotorPlantState,
+    tick: int,
+    vehicle: MultirotorState,
+    command: PerRotor,
+    status: InputSample,
+) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:
+    """Return what `step` returns for a vehicle with these parameters after its motion to `tick`."""
+    motion = motion_of(parameters.layout, vehicle.motion)
+    o = observe(parameters, tick, p.interval, vehicle, command)
     last = min(s.last, tick + p.settle) if status.due and status.value.finished else s.last
     truth = TrueState(
         motion.position_world, motion.attitude, motion.velocity_world, motion.omega_body, o.acceleration_world,

@@ -10,6 +10,7 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
+from lapwing.dynamics.vehicles.multirotor_stepper import BREAK_ROUNDING
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, active, airframe
@@ -25,7 +26,7 @@ FORM = {"se3": multirotor_multibody, "euler": multirotor_euler}
 
 
 class Event(BaseModel):
-    """Failure of a propeller in flight, at the first tick not before `time`."""
+    """Failure of a propeller in flight, at `time`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     time: float = Field(ge=0.0)  # [s]
@@ -91,18 +92,16 @@ def described(scene: Scene) -> tuple[ModuleType, Any]:
     return form, form.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
 
 
-def _tick(scene: Scene, time: float) -> int:
-    return math.ceil(round(time * scene[Communication].rate, 6))
+def _event(scene: Scene, event: Event) -> PlantEvent:
+    tick = math.floor(event.time * scene[Communication].rate + BREAK_ROUNDING)
+    return PlantEvent(tick, event.propeller - 1, event.failure, event.time)
 
 
 def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of a multirotor of five bodies, with its failures."""
     form, p = described(scene)
     result = multirotor_plant(scene, form, p)
-    events = tuple(
-        PlantEvent(_tick(scene, event.time), event.propeller - 1, event.failure)
-        for event in sorted(_settings(scene).event, key=lambda event: event.time)
-    )
+    events = tuple(_event(scene, event) for event in sorted(_settings(scene).event, key=lambda event: event.time))
     plant = result.parameters
     view = FiveBodiesView(p, plant.core.interval, plant.core.off)
     parameters = plant._replace(

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cosim.config.former_names import former_names, present_name, present_tables
-from lapwing.cosim.config.serialise import _class_of, _fields
+from lapwing.cosim.config.former_names import DIRECTIONS, former_names, present_name, present_tables
+from lapwing.cosim.config.serialise import _class_of, _fields, from_json, to_json
 from lapwing.cosim.log import LogReader
 from lapwing.runs.resimulate import recorded_setup
 from lapwing.services.scene_resolver import from_resolved, load, vocabulary
+from lapwing.services.sensors.barometer import Barometer, StaticPressureError
 from lapwing.studies.flight_data import FlightData
 
 RECORDED = Path(__file__).parent / "recorded" / "hover_0_1_0.mcap.gz"  # 0.3 s of hover
@@ -118,6 +119,17 @@ def test_alias_leads_to_present_module_and_class(name):
     __import__(module)
     if name in former_names()["classes"]:
         assert hasattr(sys.modules[module], path)
+
+
+def test_former_airspeed_error_is_static_pressure_error_in_all_directions():
+    """A log of before: one share of the dynamic pressure, a field of the parameters and a key of the scene."""
+    table = {"sensors": {"barometer": {"airspeed_error": 0.2}}}
+    assert present_tables(table)["sensors"]["barometer"] == {"static_pressure_error": dict.fromkeys(DIRECTIONS, 0.2)}
+    assert StaticPressureError._fields == DIRECTIONS
+    for share, error in ((0.2, StaticPressureError(*[0.2] * 5)), (0.0, None)):
+        former = json.loads(to_json(Barometer()))
+        del former["static_pressure_error"]
+        assert from_json(json.dumps(former | {"airspeed_error": share})) == Barometer(static_pressure_error=error)
 
 
 def test_declared_module_may_have_name_of_former_package(tmp_path, monkeypatch):

@@ -4,10 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.integrators import get
-from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
+from lapwing.dynamics.lie.quaternion import exp, multiply, rotation_matrix
 from lapwing.dynamics.vehicles import (
     multirotor,
     multirotor_equations,
@@ -19,12 +20,14 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive
 from lapwing.dynamics.vehicles.multirotor_multibody import BECOMES
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
+from lapwing.dynamics.vehicles.propeller_failures import Failure, advance_through
 from lapwing.kernels import kernel
 
 pytestmark = pytest.mark.long
 
 DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
+RK8 = get("rk8_renormalised").Method()
 VOLTS, SPEED = (25.0, 27.0, 24.0, 28.0), 200.0
 VELOCITY, OMEGA, ATTITUDE = (1.0, -2.0, 0.5), (0.6, -0.4, 0.3), exp((0.1, -0.2, 0.3))
 FORMS = {"se3": multirotor_multibody, "euler": multirotor_euler}
@@ -81,9 +84,9 @@ def momenta(p, x):
     return np.concatenate([linear.sum(axis=0), angular.sum(axis=0)])
 
 
-def flown(p, state, ticks, begin=0, volts=VOLTS):
+def flown(p, state, ticks, begin=0, volts=VOLTS, method=RK4):
     for tick in range(begin, begin + ticks):
-        state = multirotor.advance(RK4, p, (0, 0), tick, state, volts, H, N)
+        state = multirotor.advance(method, p, (0, 0), tick, state, volts, H, N)
     return state
 
 
@@ -192,3 +195,68 @@ def test_detached_propeller_has_no_thrust():
     end = flown(p, state, 50)
     fallen = np.subtract(bodies(end.motion)[2].position_world, bodies(state.motion)[2].position_world)
     np.testing.assert_allclose(fallen, (0.0, 0.0, -0.5 * 9.80665 * (50 * N * H) ** 2), atol=1e-12)
+
+
+EFFECTS = effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE)
+
+
+@kernel
+def rate_of_bodies(p, x, memory, volts):
+    return multirotor_multibody_equations.rate(MultirotorDrive(p, p.body, memory, volts), 0.0, x)
+
+
+def coordinates_of(x):
+    return np.concatenate([np.concatenate(b) for b in (x.chassis, *x.propellers)])
+
+
+def bodies_of(x, y):
+    parts = [type(x.chassis)(*(tuple(part) for part in np.split(b, [3, 7, 10]))) for b in np.asarray(y).reshape(5, 13)]
+    return type(x)(parts[0], tuple(parts[1:]))
+
+
+def by_dop853(p, state, duration):
+    """The bodies after `duration` by SciPy, from the tangent; quaternions as plain numbers, q' = q (0, omega)/2."""
+
+    def rate(_, y):
+        x = bodies_of(state.motion, y)
+        tangent = rate_of_bodies(p, x, state.memory, VOLTS)
+        change = []
+        for b, d in zip((x.chassis, *x.propellers), (tangent.chassis, *tangent.propellers), strict=True):
+            turned = 0.5 * np.array(multiply(b.attitude, (0.0, *b.omega_body)))
+            change.append(np.concatenate([b.velocity_world, turned, d.velocity_world, d.omega_body]))
+        return np.concatenate(change)
+
+    y = solve_ivp(rate, (0.0, duration), coordinates_of(state.motion), "DOP853", rtol=1e-12, atol=1e-12).y[:, -1]
+    return state._replace(motion=bodies_of(state.motion, y))
+
+
+@pytest.mark.parametrize("becomes", BECOMES)
+def test_failures_between_ticks_equal_split_reference(becomes):
+    """Propeller 2 fails between two steps and propeller 3 tears off 1.4 ms later, both within one tick of 2 ms."""
+    p = multirotor_multibody.parameters(DRONE, EFFECTS, "torque")
+    start = multirotor_multibody.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA)
+    first = multirotor_multibody.with_propeller_failure(p, 1, becomes)
+    second = multirotor_multibody.with_propeller_failure(first, 2, "torn_off")
+    times = [5 * H * N + moment for moment in (0.0003, 0.0017)]
+    failures = (Failure(times[0], first, becomes == "locked"), Failure(times[1], second, False))
+    state = flown(p, start, 5, method=RK8)
+    state = advance_through(RK8, p, failures, (0, 0), 5, state, VOLTS, H, N)
+    state = flown(second, state, 4, 6, method=RK8)
+    expected = by_dop853(p, start, times[0])
+    if becomes == "locked":
+        expected = expected._replace(motion=struck(first, expected, VOLTS))
+    expected = by_dop853(first, expected, times[1] - times[0])
+    expected = by_dop853(second, expected, 10 * H * N - times[1])
+    error = coordinates_of(state.motion) - coordinates_of(expected.motion)
+    assert np.abs(error).max() < 1e-9
+
+
+def test_failure_at_tick_is_that_of_tick():
+    """Bit for bit: the plant without failures that starts from the tick's state."""
+    p = multirotor_multibody.parameters(DRONE, EFFECTS, "torque")
+    state = flown(p, multirotor_multibody.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA), 3)
+    after = multirotor_multibody.with_propeller_failure(p, 1, "locked")
+    expected = flown(after, state._replace(motion=struck(after, state, VOLTS)), 1, 3)
+    for time in (0.0, 3 * H * N * (1.0 + 1e-12)):
+        failures = (Failure(time, after, True),)
+        assert advance_through(RK4, p, failures, (0, 0), 3, state, VOLTS, H, N) == expected

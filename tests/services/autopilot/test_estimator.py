@@ -98,7 +98,7 @@ def dense_joint(rng):
 
 
 def test_considered_propagation_against_dense_matrices():
-    """Gyroscopes with M of (3.14) read M omega: the joint covariance of 24 errors and 12 parameters, F P F^T."""
+    """Gyroscopes read M omega with M of (3.14), accelerometers M f of lift f: the joint covariance, F P F^T."""
     rng = np.random.default_rng(2)
     m, joint = dense_joint(rng)
     n, f, omega, dt = len(joint), rng.normal(size=3), rng.normal(size=3), 0.01
@@ -113,6 +113,10 @@ def test_considered_propagation_against_dense_matrices():
         matrix = scale_and_misalignment(1.0, 1.0, tuple(draw[:3]), tuple(draw[3:]))
         wrong = (np.reshape(matrix, (3, 3)) - np.eye(3)) @ omega
         a[0:3, filter_state.SIZE + k] = -r @ wrong
+    lift = np.array([0.0, 0.0, (f @ r)[2]])
+    for k, (stretch, angles) in enumerate([((0, 0, 0), (0, 1, 0)), ((0, 0, 0), (-1, 0, 0)), ((0, 0, 1), (0, 0, 0))]):
+        matrix = scale_and_misalignment(1.0, 1.0, tuple(map(float, stretch)), tuple(map(float, angles)))
+        a[3:6, filter_state.SIZE + filter_state.LIFT + k] = -r @ (np.reshape(matrix, (3, 3)) - np.eye(3)) @ lift
     transition = np.eye(n) + dt * a
     expected = transition @ joint @ transition.T
     propagate_covariance(m.covariance, tuple(f), tuple(r.ravel()), dt)
@@ -166,6 +170,7 @@ def test_rows_of_acceleration_against_differences(axis):
     """Turn the estimate by a small angle and shift the bias: the row tells how the true acceleration then differs."""
     attitude, force = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([0.4, -0.3, 9.0])
     m = at_rest().memory
+    fuse.clear(m)
     r = np.array(rotation_matrix(attitude)).reshape(3, 3)
     fuse.acceleration_row(m, tuple(r @ force), tuple(r.ravel()), axis, 1.0)
     h = 1e-6
@@ -175,6 +180,9 @@ def test_rows_of_acceleration_against_differences(axis):
         assert m.row[filter_state.THETA + i] == pytest.approx((turned @ force - r @ force)[axis] / h, abs=1e-5)
         assert m.row[filter_state.ACCELEROMETER + i] == pytest.approx(
             (r @ (force - small) - r @ force)[axis] / h, abs=1e-5
+        )
+        assert m.considered[filter_state.ROW, filter_state.LIFT + i] == pytest.approx(
+            (r @ (force - force[2] * small) - r @ force)[axis] / h, abs=1e-5
         )
 
 
@@ -276,6 +284,8 @@ def textbook():
         gyro_bias_walk=2.28e-6,
         accelerometer_bias_std=0.0294,
         accelerometer_bias_walk=3.6e-5,
+        accelerometer_scale_std=0.0,
+        accelerometer_alignment_std=0.0,
         magnetometer_bias_std=5.1e-8,
         magnetometer_bias_walk=5.1e-10,
         magnetometer_scale_std=0.0,
@@ -316,9 +326,10 @@ def test_consistent_in_world_as_modelled(agility):
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
-def test_consistent_on_presets():
+@pytest.mark.parametrize("agility", [1.0, 2.0])
+def test_consistent_on_presets(agility):
     """Consistency with all errors of the presets; scale and alignment are considered and not estimated."""
-    flights = ensemble()
+    flights = ensemble(agility=agility)
     _, mean_inside = inside(flights.nees[:, SETTLED], 9)
     assert mean_inside
     for source, degrees in DEGREES.items():

@@ -43,7 +43,7 @@ CASES = [
     ("imu", {"kind": "dropout", "stop": START + 0.3}, {"imu"}, 0.2),
     ("imu", {"kind": "freeze", "stop": START + 0.3}, {"imu"}, 0.2),
     ("imu", {"kind": "bias", "channel": "gyro", "size": [0.02, 0.0, 0.0]}, {"gps"}, 1.0),
-    ("imu", {"kind": "bias", "channel": "accelerometer", "size": [0.5, 0.0, 0.0]}, {"gps_velocity"}, 1.0),
+    ("imu", {"kind": "bias", "channel": "accelerometer", "size": [0.5, 0.0, 0.0]}, {"gps"}, 1.0),
     ("imu", {"kind": "spikes", "channel": "gyro", "size": 5.0, "probability": 0.02}, set(), 0.2),
     ("imu", {"kind": "spikes", "channel": "accelerometer", "size": 50.0, "probability": 0.02}, {"imu"}, 0.2),
     ("imu", {"kind": "drift", "channel": "gyro", "size": 0.01}, {"gps_velocity"}, 1.0),

@@ -68,6 +68,22 @@ def test_propellers_break_in_flight(coordinates):
     assert bodies.torque[2].z == pytest.approx(0.0, abs=1e-9)
 
 
+@pytest.mark.parametrize("coordinates", ["se3", "euler"])
+def test_failure_between_ticks_acts_at_its_own_time(coordinates):
+    """Half a tick later half of the impulse of the lost thrust; the two of one tick one after the other."""
+    failures = [[event(time, 1, "locked"), event(0.103, 2, "torn_off")] for time in (0.1, 0.102, 0.104)]
+    failures[2].reverse()
+    flown = [
+        lifted([FLOWN, *CALM, f"multibody.coordinates={coordinates}", f"multibody.event=[{', '.join(f)}]"], ticks=26)[0]
+        for f in failures
+    ]
+    early, between, late = (f.angular_velocity.x for f in flown)
+    assert abs(late - early) > 1e-3
+    assert between == pytest.approx(0.5 * (early + late), abs=0.05 * abs(late - early))
+    assert [f.rotor_speed[0] > 1.0 for f in flown] == [False, False, True]
+    assert [f.rotor_speed[1] for f in flown] == [0.0, 0.0, 0.0]
+
+
 def test_pitch_of_90_degrees_ends_only_euler_angles():
     """Two rotors on one side only, once it has risen; the angles' divisor is looked at before it is divided by."""
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from lapwing.dynamics.atmosphere import pressure
+from lapwing.dynamics.atmosphere import pressure, pressure_altitude
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import enu_to_geodetic
 from lapwing.dynamics.lie.quaternion import (
@@ -23,6 +23,7 @@ from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
+from lapwing.services.sensors.registry import parameters
 from lapwing.services.sensors.sensor_inputs import Truth
 
 KEY = stream_key(7, "drone1", "test")
@@ -213,15 +214,45 @@ def test_gps_has_no_fix_under_roof():
     assert [read(gps, p, truth((*place, 2.0))).valid for place in places] == [True, False, True, False, False, True]
 
 
-def test_magnetometer_near_leads_and_barometer_in_wind():
-    """10 A at 30 nT/A along y; a hole that feels 0.2 of the 60 Pa of 10 m/s."""
-    near = truth()._replace(motor_current=10.0, dynamic_pressure=60.0)
+def test_magnetometer_near_leads_of_motors():
+    """10 A at 30 nT/A along y."""
+    near = truth()._replace(motor_current=10.0)
     leads = magnetometer.Magnetometer(current_nt_per_a=(0.0, 30.0, 0.0))
     change = np.subtract(read(magnetometer, leads, near).field_body, FIELD)
     np.testing.assert_allclose(change, (0.0, 300e-9, 0.0), atol=1e-15)
-    hole = barometer.Barometer(airspeed_error=0.2)
-    still = read(barometer, barometer.Barometer(), near).pressure
-    assert read(barometer, hole, near).pressure - still == pytest.approx(12.0)
+
+
+SIDES = {  # velocity through the air, body: published share of the dynamic pressure
+    (10.0, 0.0, 0.0): -0.314,
+    (-10.0, 0.0, 0.0): -0.284,
+    (0.0, -10.0, 0.0): -0.753,
+    (0.0, 10.0, 0.0): -0.598,
+    (0.0, 0.0, 10.0): 0.0,
+}
+
+
+@pytest.mark.parametrize("air", SIDES)
+def test_barometer_static_pressure_error_by_direction(air):
+    """Published coefficients of a quadrotor (PX4 pull request 19507); 60 Pa at 10 m/s, whatever the heading."""
+    p = parameters("barometer", {"preset": "ideal", "static_pressure_error": {}}, 0.004)
+    for attitude in (NO_ROTATION, from_roll_pitch_yaw(0.2, -0.3, 2.0)):
+        flying = truth(attitude=attitude)._replace(air_density=1.2, air_velocity_world=rotate(attitude, air))
+        still = read(barometer, barometer.Barometer(), flying).pressure
+        assert read(barometer, p, flying).pressure - still == pytest.approx(60.0 * SIDES[air], abs=1e-9)
+
+
+def test_barometer_height_rises_by_static_pressure_error():
+    """At 9 m/s sideways -0.753 * 49.6 Pa = -37.4 Pa are 3.1 m by dp/dz = -rho g."""
+    p = parameters("barometer", {"preset": "ideal", "static_pressure_error": {}}, 0.004)
+    flying = truth()._replace(air_density=1.225, air_velocity_world=(0.0, -9.0, 0.0))
+    height = pressure_altitude(STANDARD.atmosphere, read(barometer, p, flying).pressure) - STANDARD.home.height
+    assert height == pytest.approx(0.753 * 0.5 * 81.0 / 9.80665, rel=0.03)  # density and gravity of the place
+
+
+def test_barometer_table_of_static_pressure_error_changes_one_direction():
+    p = parameters("barometer", {"static_pressure_error": {"vertical": 0.1}}, 0.004)
+    assert p.static_pressure_error == barometer.StaticPressureError(vertical=0.1)
+    assert parameters("barometer", {}, 0.004).static_pressure_error is None
 
 
 def test_airspeed_feels_air_along_body_alone():

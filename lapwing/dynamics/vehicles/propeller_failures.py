@@ -1,0 +1,68 @@
+"""A communication step in which propellers fail: it is split at the times of the failures (theory.md, section 6.8)."""
+
+import math
+from typing import Any, NamedTuple
+
+from numba import types
+
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.multibody.five_bodies import FiveBodies
+from lapwing.dynamics.vehicles import multirotor_euler
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import apply_constraint_impulse
+from lapwing.dynamics.vehicles.multirotor_stepper import BREAK_ROUNDING, begin, parts, steps
+from lapwing.kernels import kernel
+from lapwing.kernels.codegen import generic
+
+
+class Failure(NamedTuple):
+    """Failure of a propeller: the vehicle that it leaves behind, and its time."""
+
+    time: float  # [s]; a time before the communication step is its start
+    vehicle: MultirotorParameters  # from then on
+    impulse: bool  # the new constraints do not hold at that time: hinge impulses satisfy them
+
+
+@generic()
+def _after_impulses(drive: types.Type, x: types.Type) -> Any:
+    """Return the bodies after impulses in their hinges, in any coordinates."""
+    return apply_constraint_impulse if x.instance_class is FiveBodies else multirotor_euler.apply_constraint_impulse
+
+
+@kernel
+def _failed(failure, memory, voltage, x):
+    """Return (drive, motion) after a failure."""
+    p = failure.vehicle
+    drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
+    return drive, _after_impulses(drive, x) if failure.impulse else x
+
+
+@kernel
+def advance_through(method, p, failures, key, tick, state, command, h, n):
+    """Return the state a communication step later, in which `failures` occur. See `multirotor.advance` for arguments.
+
+    Args:
+        failures: of type `Failure`, ascending in time; at least one.
+    """
+    interval = n * h
+    start, end = tick * interval, tick * interval + interval
+    count, rounding = len(failures), BREAK_ROUNDING * interval
+    k = 0
+    while k < count and failures[k].time <= start + rounding:
+        drive, x = _failed(failures[k], state.memory, command, state.motion)
+        p, state = failures[k].vehicle, MultirotorState(x, state.memory)
+        k += 1
+    drive, x = begin(p, key, tick, state, command, interval), state.motion
+    split, whole = parts(p.layout, h), k == count
+    size, number, longest = h / split, n * split, h / split
+    while True:
+        until = failures[k].time if k < count else end
+        if not whole:
+            number = max(1, math.ceil((until - start) / longest - BREAK_ROUNDING))
+            size = (until - start) / number
+        x, memory = steps(method, drive, x, start, until, size, 0, number)
+        if k == count:
+            return MultirotorState(x, memory)
+        drive, x = _failed(failures[k], memory, drive.voltage, x)
+        start = until
+        k += 1
