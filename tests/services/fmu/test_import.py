@@ -197,7 +197,7 @@ def test_units_of_one_quantity_are_converted(tmp_path: Path) -> None:
     write_small_fmu(tmp_path / "small.fmu", unit_u="ft", unit_y="m")
     inputs, outputs = 'u = "truth.position_world.2"', '"trajectory.position_world.2" = "y"'
     setup = scene_resolver.resolve(scene_resolver.load(scene_with(tmp_path, inputs=inputs, outputs=outputs)))
-    (fmu,) = setup.services["fmu"].parameters.fmus
+    fmu = setup.services["motor_fmu"].parameters
     assert fmu.inputs[0].factor == pytest.approx(1 / 0.3048)
     assert fmu.outputs[0].factor == 1.0
 
@@ -222,7 +222,7 @@ def test_unit_of_fmu_is_converted_by_its_definition(tmp_path: Path) -> None:
     write_event_fmu(tmp_path / "ball.fmu", unit="foot")
     scene = scene_with(tmp_path, "ball.fmu", "", '"trajectory.position_world.2" = "h"')
     setup = scene_resolver.resolve(scene_resolver.load(scene))
-    assert setup.services["fmu"].parameters.fmus[0].outputs[0].factor == pytest.approx(0.3048)
+    assert setup.services["motor_fmu"].parameters.outputs[0].factor == pytest.approx(0.3048)
 
 
 BALL = """
@@ -308,7 +308,8 @@ def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> Non
         assert done.returncode == 0, done.stderr
         return
     assert done.returncode == 2
-    assert "services.first.delay: an algebraic loop of the FMUs first, second; expected delay = 1" in done.stderr
+    keys, names = "services.second.delay, services.first.delay", "first_fmu, second_fmu"
+    assert f"{keys}: an algebraic loop, a loop without delay, through {names}; expected delay = 1" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
