@@ -2,6 +2,7 @@
 
 import base64
 import math
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from lapwing.services.fmu.service_config import CO_SIMULATION, MODEL_EXCHANGE, E
 
 INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
 TYPES = ("Real", "Float64", "Float32", "Integer", *INTEGERS, "Boolean", "Enumeration")
+TEXTS = ("String", "Binary")  # types that start values may have, Binary in hexadecimal
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # base units of FMI
 
 
@@ -48,6 +50,9 @@ class Description:
         self.interface = _interface(key, path, model, interface)
         interfaces = {CO_SIMULATION: model.coSimulation, MODEL_EXCHANGE: model.modelExchange}
         check_binary(key, path, content, self.version, interfaces[self.interface].modelIdentifier or "")
+        if clock := next((v for v in model.modelVariables if _must_tick(v)), None):
+            message = f"{path}: input clock {clock.name}, which the importer must activate in time, is not supported"
+            raise ConfigError(key, message, "an FMU without clocks, or with triggered ones")
         self._units = {u.name: u.baseUnit for u in model.unitDefinitions or () if u.baseUnit is not None}
         self._variables = {v.name: v for v in model.modelVariables}
         self._references = {v.valueReference: v for v in model.modelVariables}
@@ -66,8 +71,11 @@ class Description:
             raise ConfigError.unknown(key, "variable", name, self._variables)
         if causality and v.causality != causality:
             raise ConfigError(key, f"{name} has causality {v.causality}", f"an {causality} of the FMU")
-        if v.type not in TYPES:
+        if v.type not in (TYPES if causality else TYPES + TEXTS):
             raise ConfigError(key, f"{name} has the type {v.type}", f"a variable of type {', '.join(TYPES)}")
+        if v.clocks:
+            clock = v.clocks[0].name
+            raise ConfigError(key, f"{name} changes with the clock {clock}", "a variable without a clock")
         if v.causality == "structuralParameter":
             raise ConfigError(key, f"{name} is a structural parameter, which keeps its value", "another variable")
         shape = self._shape(v)
@@ -108,6 +116,11 @@ class Description:
         if (known := parse_unit(name)) is None:
             raise ConfigError(key, f"{v.name} is in {name}, which the FMU does not define", "a unit with a definition")
         return NamedUnit(name, known)
+
+
+def _must_tick(v: Any) -> bool:
+    """Return True for a clock whose ticks are due at times that the FMU or its description defines."""
+    return v.type == "Clock" and v.causality == "input" and v.intervalVariability != "triggered"
 
 
 def _position(key: str, name: str, index: str, shape: tuple[int, ...]) -> int:
@@ -153,9 +166,18 @@ def content_of(key: str, path: Path, embedded: str | None) -> bytes:
         raise ConfigError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}", "an FMU") from None
 
 
-def start_elements(elements: list[Element], key: str, value: Any) -> Mapping[Element, float]:
-    """Return the start value of each element. Raise ConfigError if the number of values differs."""
+def start_elements(elements: list[Element], key: str, value: Any) -> Mapping[Element, float | str]:
+    """Return the start value of each element. Raise ConfigError if the number or the type of values differs."""
     values = list(value) if isinstance(value, (list, tuple)) else [value]
     if len(values) != len(elements):
         raise ConfigError(key, f"{len(values)} values for {len(elements)} elements", "a value for each element")
-    return dict(zip(elements, map(float, values), strict=True))
+    kind = elements[0].type
+    if kind not in TEXTS:
+        if isinstance(value, str):
+            raise ConfigError(key, f"got the text {value!r} for the type {kind}", "a number")
+        return dict(zip(elements, map(float, values), strict=True))
+    if not isinstance(value, str) or elements[0].size > 1:
+        raise ConfigError(key, f"got {value!r} for the type {kind}", "a text for a scalar variable")
+    if kind == "Binary" and not re.fullmatch(r"([0-9a-fA-F]{2})*", value):
+        raise ConfigError(key, f"got {value!r} for the type Binary", "hexadecimal digits, two for each byte")
+    return {elements[0]: value}

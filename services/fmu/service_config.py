@@ -32,7 +32,7 @@ class StartValue(NamedTuple):
     """A start value."""
 
     element: Element
-    value: float
+    value: float | str  # a text for the types String, and Binary in hexadecimal
 
 
 class FmuConfig(NamedTuple):

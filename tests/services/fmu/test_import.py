@@ -165,7 +165,11 @@ def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
         ({"outputs": f'"{COLUMN}" = "u"'}, "u has causality input; expected an output of the FMU"),
         ({"inputs": 'u = "wing.lift"'}, "unknown port 'wing'"),
         ({"inputs": 'u = "truth.position_world.7"'}, "unknown column"),
-        ({"start": "label = 1.0"}, "label has the type String"),
+        (
+            {"start": "label = 1.0"},
+            "services.motor.start.label: expected a text for a scalar variable, got 1.0 for the type String",
+        ),
+        ({"start": 'gain = "a"'}, "services.motor.start.gain: expected a number, got the text 'a' for the type Real"),
         (
             {"inputs": 'u = "actuators.motor_voltage.0"', "outputs": '"truth.position_world.2" = "y"'},
             "a loop without delay",
