@@ -213,7 +213,8 @@ DESCRIPTION3 = """<?xml version="1.0" encoding="UTF-8"?>
     <Int32 name="bounces" valueReference="7" causality="output"/>
     <Int32 name="fault" valueReference="12" causality="parameter" variability="fixed" start="0"/>
     <Int8 name="small" valueReference="13" causality="input" start="0"/>
-    <Binary name="blob" valueReference="14" causality="parameter" variability="fixed"><Start value="00"/></Binary>{clocks}
+    <Binary name="blob" valueReference="14" causality="parameter" variability="fixed"><Start value="00"/>
+    </Binary>{clocks}
   </ModelVariables>
   <ModelStructure><Output valueReference="2"/><Output valueReference="4"/><Output valueReference="5"/>
     <Output valueReference="6"/><Output valueReference="7"/><ContinuousStateDerivative valueReference="10"/>
