@@ -1,7 +1,8 @@
 """Process table: every process of a run, and when it is required.
 
 A service of the lock step has `resolve(scene)` in `resolve.py`, which returns its `ServiceConfig`, or None if the scene
-does not need it, and `create(config)` in `service.py`. Any other process has `run(participant, spec)` in `service.py`,
+does not need it, and `create(config)` in `service.py`. An FMU of the scene is a service `NAME_fmu` each, with the entry
+`fmu`. Any other process has `run(participant, spec)` in `service.py`,
 and `resolve(scene)` if it reads the scene (`lapwing.services.scene_resolver`).
 """
 
@@ -13,6 +14,9 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.multi_vehicle import members, merge_services
 from lapwing.cosim.transport.bus_keys import ENCODER
+from lapwing.services.common.foreign_code import FMU_SUFFIX
+from lapwing.services.fmu.replaced_ports import rewire
+from lapwing.services.fmu.service_config import fmus_of, replaced_ports
 
 
 class ProcessEntry(NamedTuple):
@@ -140,7 +144,7 @@ def entry(name: str) -> ProcessEntry:
         ValueError: unknown name; the text lists the choices.
     """
     for process in PROCESSES:
-        if process.name == name:
+        if process.name == (FMU if name.endswith(FMU_SUFFIX) else name):
             return process
     raise ValueError(f"unknown service {name}; expected one of {', '.join(p.name for p in PROCESSES)}")
 
@@ -148,12 +152,19 @@ def entry(name: str) -> ProcessEntry:
 def required_processes(setup: RunConfig, external: Iterable[str] = ()) -> list[str]:
     """Return the names of the processes that a run requires, with an encoder for each service in `external`."""
     own = [p.name for p in PROCESSES if (p.name in setup.services if p.lock_step else not p.optional)]
+    own += [name for name in setup.services if entry(name).name == FMU]
     return own + [f"{name}{ENCODER}" for name in external]
 
 
 def always_required() -> list[str]:
     """Return the names of the processes that a run may need without any option."""
-    return [p.name for p in PROCESSES if not (p.optional or p.foreign)]
+    return [p.name for p in PROCESSES if not (p.optional or p.foreign or p.name == FMU)]
+
+
+def certificate_name(name: str) -> str:
+    """Return the name in the certificate of a participant; the FMUs of all scenes share one."""
+    service = encoded_service(name) or name
+    return (FMU if service.endswith(FMU_SUFFIX) else service) + name.removeprefix(service)
 
 
 def optional() -> list[str]:
@@ -196,9 +207,13 @@ def create(
             own = {"operator": operators[member.vehicle]}
         elif entry(name).foreign and member.vehicle in recorded:
             own = {"recorded": recorded[member.vehicle]}
+        elif entry(name).name == FMU:
+            own = {"name": name}
         service = module.create(member, **own)
-        if FMU in member.services and name != FMU:
-            service.parts = _fmu().rewire(service.parts, member.services[FMU].parameters)
+        own_ports = {port.name for port in member.services[name].ports}
+        replaced = {a: b for a, b in replaced_ports(fmus_of(member.services)).items() if a not in own_ports}
+        if replaced and entry(name).name != FMU:
+            service.parts = rewire(service.parts, replaced)
         return service
 
     if setup.vehicle:

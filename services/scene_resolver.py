@@ -23,7 +23,7 @@ from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.services.plant import models
-from lapwing.services.process_table import AUTOPILOT, FMU, PROCESSES
+from lapwing.services.process_table import AUTOPILOT, FMU, PROCESSES, entry
 
 
 def _resolvers() -> dict[str, ModuleType]:
@@ -124,7 +124,7 @@ def reseed(setup: RunConfig, seed: int) -> RunConfig:
         return multi_vehicle.merge_configs([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
     services_of = dict(setup.services)
     for name, config in services_of.items():
-        module = _resolvers()[name]
+        module = _resolvers()[entry(name).name]
         if hasattr(module, "reseed"):
             services_of[name] = module.reseed(config, seed, setup.vehicle)
     run = {**setup.resolved[Run.TABLE], "seed": seed}
@@ -160,7 +160,7 @@ def _with_fleet_coupling(members: list[RunConfig], key: str) -> list[RunConfig]:
     """
     keys = {member.vehicle: key.format(i) for i, member in enumerate(members)}
     for name in dict.fromkeys(name for member in members for name in member.services):
-        module = _resolvers()[name]
+        module = _resolvers()[entry(name).name]
         if hasattr(module, "fleet"):
             shares = {member.vehicle: member.services[name] for member in members if name in member.services}
             result = module.fleet(shares, keys)

@@ -9,7 +9,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.transport.bus_keys import ENCODER
 from lapwing.messages.topics import EVENTS
-from lapwing.services.process_table import PROCESSES, ROUTER, create
+from lapwing.services.process_table import PROCESSES, ROUTER, certificate_name, create
 
 
 def names() -> list[str]:
@@ -19,14 +19,15 @@ def names() -> list[str]:
 
 
 def says(setup: RunConfig, key_prefix: str) -> dict[str, list[str]]:
-    """Return the key expressions that each participant may publish on, by name."""
+    """Return the key expressions that each participant may publish on, by the name in its certificate."""
     result = {name: [f"{key_prefix}/*/{name}"] for name in names()}
     result[MONITOR] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
     for name in setup.services:
         topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
-        result[name] += topics
-        result[f"{name}{ENCODER}"] += [*topics, f"{key_prefix}/*/{name}"]
-    return result
+        maker = f"{name}{ENCODER}"
+        result[certificate_name(name)] += [*topics, f"{key_prefix}/*/{name}"]
+        result[certificate_name(maker)] += [*topics, f"{key_prefix}/*/{name}", f"{key_prefix}/*/{maker}"]
+    return {name: list(dict.fromkeys(keys)) for name, keys in result.items()}
 
 
 def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[str, Any]:
@@ -39,7 +40,7 @@ def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[st
     """
     if not keys:
         return withholding(key_prefix) if name == ROUTER else {}
-    return {**tls(Path(keys), name), **by_certificate(key_prefix, says(setup, key_prefix))}
+    return {**tls(Path(keys), certificate_name(name)), **by_certificate(key_prefix, says(setup, key_prefix))}
 
 
 def door_settings(name: str, key_prefix: str, keys: str) -> dict[str, Any]:
@@ -48,4 +49,4 @@ def door_settings(name: str, key_prefix: str, keys: str) -> dict[str, Any]:
     Raises:
         ValueError: the certificate cannot be used.
     """
-    return {**(tls(Path(keys), name) if keys else {}), **door(key_prefix, bool(keys))}
+    return {**(tls(Path(keys), certificate_name(name)) if keys else {}), **door(key_prefix, bool(keys))}

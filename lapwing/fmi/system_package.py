@@ -12,6 +12,7 @@ from lapwing.fmi import variables as kinds
 from lapwing.fmi.fmu import ZIP_DATE, export_fmu
 from lapwing.fmi.machine_code import PORTABLE
 from lapwing.fmi.variables import variables_of
+from lapwing.services.fmu.service_config import fmus_of
 from lapwing.services.fmu.system_structure import COMMON, DESCRIPTION, PART, SCENE, STRUCTURE
 
 SSP_VERSIONS = {3: "2.0", 2: "1.0"}  # by the version of FMI; SSP 1.0 does not know FMI 3.0
@@ -29,7 +30,7 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
     Raises:
         ValueError: a part cannot be exported, or there is no C compiler.
     """
-    if "fmu" in setup.services or setup.modules:
+    if fmus_of(setup.services) or setup.modules:
         raise ValueError(f"{setup.scene}: has code of other authors; export a scene without [services] and modules")
     connectors: dict[str, list[tuple[str, str]]] = {}
     with tempfile.TemporaryDirectory() as name:

@@ -19,6 +19,7 @@ from lapwing.runs.observer import Observer
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.common.firmware.playback import TOPICS, Recorded
 from lapwing.services.common.firmware.schema import FIRMWARES
+from lapwing.services.fmu.service_config import fmus_of
 from lapwing.services.process_table import Operator
 
 
@@ -88,8 +89,8 @@ def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = F
             raise ValueError(f"{log}: contains code of its author ({files}); read it, then use --allow-code to run it")
         user_module.install(modules)
         setup = without_plan(recorded_setup(read, modules))
-        if "fmu" in setup.services and not allow_code:
-            files = ", ".join(fmu.path for fmu in setup.services["fmu"].parameters.fmus)
+        if not allow_code and (fmus := [fmu.path for each in members(setup) for fmu in fmus_of(each.services)]):
+            files = ", ".join(dict.fromkeys(fmus))
             raise ValueError(f"{log}: has FMUs, machine code of their authors ({files}); use --allow-code to run them")
         if external := read.metadata.get("external"):
             raise ValueError(f"{log}: cannot be resimulated: {external} was an external service")

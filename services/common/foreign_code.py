@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
 
+FMU_SUFFIX = "_fmu"  # of the service of an FMU
 _allowed = [True]
 
 
@@ -25,6 +26,8 @@ def permission(granted: bool) -> Iterator[None]:
 
 def check(setup: "RunConfig") -> None:
     """Raise ValueError if a run has FMUs and foreign code is not allowed."""
-    if "fmu" in setup.services and not _allowed[0]:
-        names = ", ".join(f"services.{name}" for name in setup.resolved.get("services", {}))
-        raise ValueError(f"{names}: an FMU is machine code of its author; if you trust it, use --allow-code to run it")
+    names = [f"services.{name.removesuffix(FMU_SUFFIX)}" for name in setup.services if name.endswith(FMU_SUFFIX)]
+    if names and not _allowed[0]:
+        raise ValueError(
+            f"{', '.join(names)}: an FMU is machine code of its author; if you trust it, use --allow-code to run it"
+        )

@@ -1,22 +1,21 @@
 """Description of an FMU, and the variables that can be connected."""
 
 import base64
-import importlib.util
 import math
-import tempfile
-import zipfile
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.field_units import Unit, parse_unit
+from lapwing.services.fmu.archive import LARGEST, check_binary, read_description
 from lapwing.services.fmu.service_config import CO_SIMULATION, MODEL_EXCHANGE, Element
 
 INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
 TYPES = ("Real", "Float64", "Float32", "Integer", *INTEGERS, "Boolean", "Enumeration")
+TEXTS = ("String", "Binary")  # types that start values may have, Binary in hexadecimal
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # base units of FMI
-BINARIES = {2: "binaries/linux64/", 3: "binaries/x86_64-linux/"}
 
 
 class NamedUnit(NamedTuple):
@@ -46,15 +45,14 @@ class Description:
         Raises:
             ConfigError: no FMU, of another platform, or without this interface.
         """
-        model, names = _read(key, path, content)
-        if model.fmiVersion[:1] not in ("2", "3"):
-            raise ConfigError(key, f"{path}: FMI {model.fmiVersion}", "an FMU of version 2.0 or 3.0")
+        model = read_description(key, path, content)
         self.version = int(model.fmiVersion[0])
         self.interface = _interface(key, path, model, interface)
-        if not any(name.startswith(BINARIES[self.version]) and name.endswith(".so") for name in names):
-            folders = {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
-            listed = ", ".join(sorted(folders)) or "no platform"
-            raise ConfigError(key, f"{path}: has binaries for {listed}", "an FMU for Linux on x86-64")
+        interfaces = {CO_SIMULATION: model.coSimulation, MODEL_EXCHANGE: model.modelExchange}
+        check_binary(key, path, content, self.version, interfaces[self.interface].modelIdentifier or "")
+        if clock := next((v for v in model.modelVariables if _must_tick(v)), None):
+            message = f"{path}: input clock {clock.name}, which the importer must activate in time, is not supported"
+            raise ConfigError(key, message, "an FMU without clocks, or with triggered ones")
         self._units = {u.name: u.baseUnit for u in model.unitDefinitions or () if u.baseUnit is not None}
         self._variables = {v.name: v for v in model.modelVariables}
         self._references = {v.valueReference: v for v in model.modelVariables}
@@ -73,8 +71,11 @@ class Description:
             raise ConfigError.unknown(key, "variable", name, self._variables)
         if causality and v.causality != causality:
             raise ConfigError(key, f"{name} has causality {v.causality}", f"an {causality} of the FMU")
-        if v.type not in TYPES:
+        if v.type not in (TYPES if causality else TYPES + TEXTS):
             raise ConfigError(key, f"{name} has the type {v.type}", f"a variable of type {', '.join(TYPES)}")
+        if v.clocks:
+            clock = v.clocks[0].name
+            raise ConfigError(key, f"{name} changes with the clock {clock}", "a variable without a clock")
         if v.causality == "structuralParameter":
             raise ConfigError(key, f"{name} is a structural parameter, which keeps its value", "another variable")
         shape = self._shape(v)
@@ -117,6 +118,11 @@ class Description:
         return NamedUnit(name, known)
 
 
+def _must_tick(v: Any) -> bool:
+    """Return True for a clock whose ticks are due at times that the FMU or its description defines."""
+    return v.type == "Clock" and v.causality == "input" and v.intervalVariability != "triggered"
+
+
 def _position(key: str, name: str, index: str, shape: tuple[int, ...]) -> int:
     try:
         indices = [int(part) for part in index.split(",")]
@@ -129,24 +135,6 @@ def _position(key: str, name: str, index: str, shape: tuple[int, ...]) -> int:
     for i, n in zip(indices, shape, strict=True):
         position = position * n + i
     return position
-
-
-def _read(key: str, path: Path, content: bytes) -> tuple[Any, list[str]]:
-    """Return FMPy's model description and the names of the files."""
-    if importlib.util.find_spec("fmpy") is None:
-        raise ConfigError(key, "FMUs need FMPy", "it installed: pip install lapwing[fmi]")
-    import fmpy
-
-    with tempfile.NamedTemporaryFile(suffix=".fmu") as file:
-        file.write(content)
-        file.flush()
-        try:
-            with zipfile.ZipFile(file.name) as archive:
-                names = archive.namelist()
-            return fmpy.read_model_description(file.name, validate=False), names
-        except Exception as error:  # zipfile and lxml raise many
-            text = " ".join(str(error).split()).replace(file.name, path.name)[:120]
-            raise ConfigError(key, f"{path}: not an FMU: {text}", "an FMU") from None
 
 
 def _interface(key: str, path: Path, model: Any, desired: str | None) -> str:
@@ -167,16 +155,29 @@ def content_of(key: str, path: Path, embedded: str | None) -> bytes:
         ConfigError: neither can be read.
     """
     try:
+        if not embedded and (size := path.stat().st_size) > LARGEST:
+            raise ConfigError(key, f"{path}: has {size / 1e9:.3g} GB", f"at most {LARGEST / 1e9:g} GB")
         return base64.b64decode(embedded, validate=True) if embedded else path.read_bytes()
+    except ConfigError:
+        raise
     except ValueError:
         raise ConfigError(key, "the embedded FMU is damaged", "a whole log, or the scene") from None
     except OSError as error:
         raise ConfigError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}", "an FMU") from None
 
 
-def start_elements(elements: list[Element], key: str, value: Any) -> Mapping[Element, float]:
-    """Return the start value of each element. Raise ConfigError if the number of values differs."""
+def start_elements(elements: list[Element], key: str, value: Any) -> Mapping[Element, float | str]:
+    """Return the start value of each element. Raise ConfigError if the number or the type of values differs."""
     values = list(value) if isinstance(value, (list, tuple)) else [value]
     if len(values) != len(elements):
         raise ConfigError(key, f"{len(values)} values for {len(elements)} elements", "a value for each element")
-    return dict(zip(elements, map(float, values), strict=True))
+    kind = elements[0].type
+    if kind not in TEXTS:
+        if isinstance(value, str):
+            raise ConfigError(key, f"got the text {value!r} for the type {kind}", "a number")
+        return dict(zip(elements, map(float, values), strict=True))
+    if not isinstance(value, str) or elements[0].size > 1:
+        raise ConfigError(key, f"got {value!r} for the type {kind}", "a text for a scalar variable")
+    if kind == "Binary" and not re.fullmatch(r"([0-9a-fA-F]{2})*", value):
+        raise ConfigError(key, f"got {value!r} for the type Binary", "hexadecimal digits, two for each byte")
+    return {elements[0]: value}

@@ -69,7 +69,13 @@ class FmuInstance:
 
     def initialise(self) -> None:
         """Set start values and inputs, initialise the FMU at time 0, and read the outputs."""
-        start = self.spec["start"]
+        texts = [(element, value) for element, value in self.spec["start"] if isinstance(value, str)]
+        for (_, reference, kind, *_), value in texts:
+            if kind == "Binary":
+                self.fmu.setBinary([reference], [bytes.fromhex(value)])
+            else:
+                self.fmu.setString([reference], [value])
+        start = [each for each in self.spec["start"] if not isinstance(each[1], str)]
         values = (ctypes.c_double * len(start))(*(value for _, value in start))
         for group in self._groups("Set", [element for element, _ in start], values):
             if group.partial:

@@ -22,7 +22,7 @@ class FmuTable(BaseModel):
     accuracy: float | None = Field(default=None, ge=1e-12, le=1e-2)  # of a state, relative to 1 + size; default 1e-8
     inputs: dict[str, str] = Field(default_factory=dict)  # FMU variable = "PORT.COLUMN", or "NAME.VARIABLE" of an FMU
     outputs: dict[str, str] = Field(default_factory=dict)  # "PORT.COLUMN" = FMU variable
-    start: dict[str, float | list[float]] = Field(default_factory=dict)  # start values of FMU variables
+    start: dict[str, float | str | list[float]] = Field(default_factory=dict)  # start values of FMU variables
     delay: int = Field(default=0, ge=0, le=1)  # [ticks] of the inputs; 1 where the FMU closes an algebraic loop
     timeout: float = Field(default=10.0, gt=0.0)  # [s] of wall time in which a step must end
 

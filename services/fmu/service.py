@@ -1,14 +1,11 @@
-"""The FMUs of a run as a service."""
+"""An FMU as a service of the lock step."""
 
-from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
-from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.kernels.row_packing import row_width
@@ -17,37 +14,25 @@ from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common import foreign_code
 from lapwing.services.fmu.block import FmuBlock
-from lapwing.services.fmu.service_config import FmuSetup, replaced_port
-
-NAME = "fmu"
+from lapwing.services.fmu.service_config import FmuConfig, replaced_port
 
 
-def create(setup: RunConfig) -> Service:
-    """Return the FMUs of a run.
+def create(setup: RunConfig, name: str) -> Service:
+    """Return the service of an FMU.
+
+    Args:
+        setup: configuration of the run.
+        name: of the service.
 
     Raises:
         ValueError: foreign code is not allowed.
     """
     foreign_code.check(setup)
-    config: FmuSetup = setup.services[NAME].parameters
-    own = {port.name: port for port in setup.services[NAME].ports}
-    blocks = []
-    for fmu in config.fmus:
-        names = dict.fromkeys(each.port for each in fmu.outputs)
-        blocks.append(FmuBlock(fmu, {name: own.get(name) or own[replaced_port(fmu.name, name)] for name in names}))
-    return Service(NAME, blocks, [_encoder(setup.vehicle, port) for port in own.values()])
-
-
-def rewire(parts: Sequence[Any], setup: FmuSetup) -> list[Any]:
-    """Return the blocks of another service, which read the ports of FMUs in place of the ones that they replace."""
-    replaced = setup.replaced
-
-    def rewired(part: Any) -> Any:
-        if not isinstance(part, Block):
-            return part
-        return replace(part, inputs=tuple(i._replace(port=replaced.get(i.port, i.port)) for i in part.inputs))
-
-    return [rewired(part) for part in parts]
+    fmu: FmuConfig = setup.services[name].parameters
+    own = {port.name: port for port in setup.services[name].ports}
+    ports = dict.fromkeys(each.port for each in fmu.outputs)
+    block = FmuBlock(fmu, {port: own.get(port) or own[replaced_port(fmu.name, port)] for port in ports})
+    return Service(name, [block], [_encoder(setup.vehicle, port) for port in own.values()])
 
 
 def _encoder(vehicle: str, port: Port) -> TopicEncoder:

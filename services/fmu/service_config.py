@@ -1,7 +1,9 @@
 """Configuration of the FMUs of a run."""
 
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.services.common.ports import EFFECT
 
 CO_SIMULATION, MODEL_EXCHANGE = "co_simulation", "model_exchange"
@@ -30,7 +32,7 @@ class StartValue(NamedTuple):
     """A start value."""
 
     element: Element
-    value: float
+    value: float | str  # a text for the types String, and Binary in hexadecimal
 
 
 class FmuConfig(NamedTuple):
@@ -51,20 +53,16 @@ class FmuConfig(NamedTuple):
     timeout: float  # [s]
 
 
-class FmuSetup(NamedTuple):
-    """All FMUs of a run, each after those whose outputs it reads without delay."""
+def fmus_of(services: Mapping[str, ServiceConfig]) -> list[FmuConfig]:
+    """Return the FMUs among the services of a vehicle."""
+    return [service.parameters for service in services.values() if isinstance(service.parameters, FmuConfig)]
 
-    fmus: tuple[FmuConfig, ...]
 
-    @property
-    def replaced(self) -> dict[str, str]:
-        """The port that other services read in place of each port with columns of an FMU."""
-        return {
-            each.port: replaced_port(fmu.name, each.port)
-            for fmu in self.fmus
-            for each in fmu.outputs
-            if not is_new(each.port)
-        }
+def replaced_ports(fmus: Iterable[FmuConfig]) -> dict[str, str]:
+    """Return the port that other services read in place of each port with columns of an FMU."""
+    return {
+        each.port: replaced_port(fmu.name, each.port) for fmu in fmus for each in fmu.outputs if not is_new(each.port)
+    }
 
 
 def own_port(name: str) -> str:

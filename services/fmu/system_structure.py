@@ -32,7 +32,7 @@ class _Part(NamedTuple):
 
 class _Fmu(NamedTuple):
     source: str  # path in the package
-    start: dict[str, float]
+    start: dict[str, float | str]
     inputs: dict[str, str]
     outputs: dict[str, str]
 
@@ -160,9 +160,9 @@ def _sort(package: _Package, component: Xml.Element, name: str, parts: dict[str,
         raise package.error(f"component {name} has the type {kind}", f"{FMU_TYPE} or {SCENE_TYPE}")
 
 
-def _start(package: _Package, component: Xml.Element) -> dict[str, float]:
+def _start(package: _Package, component: Xml.Element) -> dict[str, float | str]:
     """Return the start values that parameter bindings give an FMU, in the package or in files of it."""
-    result = {}
+    result: dict[str, float | str] = {}
     for binding in component.iterfind("d:ParameterBindings/d:ParameterBinding", _NAMES):
         if binding.find("d:ParameterMapping", _NAMES) is not None:
             message = f"component {component.get('name')} has a parameter mapping"
@@ -171,10 +171,12 @@ def _start(package: _Package, component: Xml.Element) -> dict[str, float]:
         sets = [package.xml(source)] if source else binding.iterfind("d:ParameterValues/v:ParameterSet", _NAMES)
         for each in sets:
             for parameter in each.iterfind("v:Parameters/v:Parameter", _NAMES):
-                text = next((value.get("value", "") for value in parameter), "")
+                text, kind = next(((v.get("value", ""), v.tag) for v in parameter), ("", ""))
                 try:
                     number = {"true": 1.0, "false": 0.0}.get(text)
-                    result[prefix + parameter.get("name", "")] = float(text) if number is None else number
+                    is_text = kind.endswith(("}String", "}Binary"))
+                    value = text if is_text else float(text) if number is None else number
+                    result[prefix + parameter.get("name", "")] = value
                 except ValueError:
                     message = f"parameter {parameter.get('name')} has the value {text!r}"
                     raise package.error(message, "a number, true or false") from None

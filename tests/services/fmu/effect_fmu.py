@@ -50,7 +50,7 @@ def write_effect_fmu(path: Path) -> None:
     begin, end = tail.index("void fmi2FreeInstance"), tail.index("int fmi2ExitInitializationMode")
     terminate, set_real = tail.index("int fmi2Terminate"), tail.index("int fmi2SetReal")
     source = head + MODEL + common + tail[begin:end] + tail[terminate:set_real] + tail[tail.index("#define NO") :]
-    source += "NO(fmi2SetInteger) NO(fmi2GetInteger)\n"
+    source += "NO(fmi2SetInteger) NO(fmi2GetInteger) NO(fmi2SetString)\n"
     c_file, library = path.with_suffix(".c"), path.with_suffix(".so")
     c_file.write_text(source)
     subprocess.run([*compiler(), "-w", "-ffp-contract=off", "-shared", "-fPIC", c_file, "-o", library], check=True)

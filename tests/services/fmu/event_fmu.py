@@ -148,6 +148,9 @@ int fmi3SetInt8(void *c, const unsigned r[], size_t n, const int8_t v[], size_t 
     ((model *)c)->small = v[0]; return 0;
 }
 int fmi3GetInt8(void *c, const unsigned r[], size_t n, int8_t v[], size_t k) { v[0] = ((model *)c)->small; return 0; }
+int fmi3SetBinary(void *c, const unsigned r[], size_t n, const size_t sizes[], const uint8_t *v[], size_t k) {
+    ((model *)c)->e = v[0][sizes[0] - 1] / 256.0; return 0;
+}
 int fmi3DoStep(void *c, double t, double h, bool a, bool *event, bool *end, bool *early, double *reached) {
     model *m = c;
     double g = m->u[0] + m->u[1], v = m->x[1], s = g < 0 ? (-v - sqrt(v * v - 2 * g * m->x[0])) / g : h + 1;
@@ -159,7 +162,9 @@ int fmi3DoStep(void *c, double t, double h, bool a, bool *event, bool *end, bool
     return m->early ? 0 : 3;
 }
 #define N2(a, b) NO(fmi3Get##a) NO(fmi3Set##a) NO(fmi3Get##b) NO(fmi3Set##b)
-N2(Float32, UInt8) N2(Int16, UInt16) N2(UInt32, Int64) N2(UInt64, Boolean) N2(String, Binary) N2(Clock, IntervalDecimal)
+N2(Float32, UInt8) N2(Int16, UInt16) N2(UInt32, Int64) N2(UInt64, Boolean)
+NO(fmi3GetString) NO(fmi3SetString) NO(fmi3GetBinary)
+N2(Clock, IntervalDecimal)
 N2(IntervalFraction, ShiftDecimal) N2(ShiftFraction, FMUState) NO(fmi3SetDebugLogging)
 NO(fmi3InstantiateScheduledExecution) NO(fmi3Terminate) NO(fmi3Reset) NO(fmi3FreeFMUState)
 NO(fmi3SerializedFMUStateSize) NO(fmi3SerializeFMUState) NO(fmi3DeserializeFMUState) NO(fmi3GetDirectionalDerivative)
@@ -208,6 +213,8 @@ DESCRIPTION3 = """<?xml version="1.0" encoding="UTF-8"?>
     <Int32 name="bounces" valueReference="7" causality="output"/>
     <Int32 name="fault" valueReference="12" causality="parameter" variability="fixed" start="0"/>
     <Int8 name="small" valueReference="13" causality="input" start="0"/>
+    <Binary name="blob" valueReference="14" causality="parameter" variability="fixed"><Start value="00"/>
+    </Binary>{clocks}
   </ModelVariables>
   <ModelStructure><Output valueReference="2"/><Output valueReference="4"/><Output valueReference="5"/>
     <Output valueReference="6"/><Output valueReference="7"/><ContinuousStateDerivative valueReference="10"/>
@@ -216,14 +223,24 @@ DESCRIPTION3 = """<?xml version="1.0" encoding="UTF-8"?>
 """
 
 
-def write_event_fmu(path: Path, version: int = 3, kind: str = "ModelExchange", unit: str = "") -> None:
-    """Compile and write the FMU; `kind` is that of FMI 3.0: ModelExchange, CoSimulation or ScheduledExecution."""
+def write_event_fmu(
+    path: Path, version: int = 3, kind: str = "ModelExchange", unit: str = "", clocks: str = ""
+) -> None:
+    """Compile and write the FMU.
+
+    Args:
+        path: of the FMU.
+        version: of FMI.
+        kind: ModelExchange, CoSimulation or ScheduledExecution, for FMI 3.0.
+        unit: of the height h, for FMI 3.0.
+        clocks: XML of further variables, for FMI 3.0.
+    """
     source, library = path.with_suffix(".c"), path.with_suffix(".so")
     source.write_text(MODEL + (FMI2 if version == 2 else FMI3))
     subprocess.run([*compiler(), "-w", "-shared", "-fPIC", "-O1", str(source), "-lm", "-o", str(library)], check=True)
     more = ' hasEventMode="true" mightReturnEarlyFromDoStep="true"' if kind == "CoSimulation" else ""
     unit = f' unit="{unit}"' if unit else ""
     with zipfile.ZipFile(path, "w") as archive:
-        text = DESCRIPTION2 if version == 2 else DESCRIPTION3.format(kind=kind, more=more, unit=unit)
+        text = DESCRIPTION2 if version == 2 else DESCRIPTION3.format(kind=kind, more=more, unit=unit, clocks=clocks)
         archive.writestr("modelDescription.xml", text)
         archive.write(library, f"binaries/{'linux64' if version == 2 else 'x86_64-linux'}/ball.so")

@@ -36,6 +36,7 @@ int fmi2GetReal(void *c, const unsigned r[], size_t n, double x[]) {
     return 0;
 }
 int fmi2SetInteger(void *c, const unsigned r[], size_t n, const int x[]) { ((model *)c)->fault = x[0]; return 0; }
+int fmi2SetString(void *c, const unsigned r[], size_t n, const char *x[]) { ((model *)c)->gain = atof(x[0]); return 0; }
 int fmi2GetInteger(void *c, const unsigned r[], size_t n, int x[]) { x[0] = ((model *)c)->fault; return 0; }
 int fmi2DoStep(void *c, double t, double h, int p) {
     model *m = c;
@@ -50,7 +51,7 @@ int fmi2DoStep(void *c, double t, double h, int p) {
     return 0;
 }
 #define NO(f) int f(void) { return 3; }
-NO(fmi2SetDebugLogging) NO(fmi2GetBoolean) NO(fmi2SetBoolean) NO(fmi2GetString) NO(fmi2SetString)
+NO(fmi2SetDebugLogging) NO(fmi2GetBoolean) NO(fmi2SetBoolean) NO(fmi2GetString)
 NO(fmi2GetFMUstate) NO(fmi2SetFMUstate) NO(fmi2FreeFMUstate) NO(fmi2SerializedFMUstateSize) NO(fmi2SerializeFMUstate)
 NO(fmi2DeSerializeFMUstate) NO(fmi2GetDirectionalDerivative) NO(fmi2SetRealInputDerivatives)
 NO(fmi2GetRealOutputDerivatives) NO(fmi2CancelStep) NO(fmi2GetStatus) NO(fmi2GetRealStatus) NO(fmi2GetIntegerStatus)

@@ -173,7 +173,11 @@ def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
         ({"outputs": f'"{COLUMN}" = "u"'}, "u has causality input; expected an output of the FMU"),
         ({"inputs": 'u = "wing.lift"'}, "unknown port 'wing'"),
         ({"inputs": 'u = "truth.position_world.7"'}, "unknown column"),
-        ({"start": "label = 1.0"}, "label has the type String"),
+        (
+            {"start": "label = 1.0"},
+            "services.motor.start.label: expected a text for a scalar variable, got 1.0 for the type String",
+        ),
+        ({"start": 'gain = "a"'}, "services.motor.start.gain: expected a number, got the text 'a' for the type Real"),
         (
             {"inputs": 'u = "actuators.motor_voltage.0"', "outputs": '"truth.position_world.2" = "y"'},
             "a loop without delay",
@@ -205,7 +209,7 @@ def test_units_of_one_quantity_are_converted(tmp_path: Path) -> None:
     write_small_fmu(tmp_path / "small.fmu", unit_u="ft", unit_y="m")
     inputs, outputs = 'u = "truth.position_world.2"', '"trajectory.position_world.2" = "y"'
     setup = scene_resolver.resolve(scene_resolver.load(scene_with(tmp_path, inputs=inputs, outputs=outputs)))
-    (fmu,) = setup.services["fmu"].parameters.fmus
+    fmu = setup.services["motor_fmu"].parameters
     assert fmu.inputs[0].factor == pytest.approx(1 / 0.3048)
     assert fmu.outputs[0].factor == 1.0
 
@@ -230,7 +234,7 @@ def test_unit_of_fmu_is_converted_by_its_definition(tmp_path: Path) -> None:
     write_event_fmu(tmp_path / "ball.fmu", unit="foot")
     scene = scene_with(tmp_path, "ball.fmu", "", '"trajectory.position_world.2" = "h"')
     setup = scene_resolver.resolve(scene_resolver.load(scene))
-    assert setup.services["fmu"].parameters.fmus[0].outputs[0].factor == pytest.approx(0.3048)
+    assert setup.services["motor_fmu"].parameters.outputs[0].factor == pytest.approx(0.3048)
 
 
 BALL = """
@@ -321,7 +325,8 @@ def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> Non
         assert done.returncode == 0, done.stderr
         return
     assert done.returncode == 2
-    assert "services.first.delay: an algebraic loop of the FMUs first, second; expected delay = 1" in done.stderr
+    keys, names = "services.second.delay, services.first.delay", "first_fmu, second_fmu"
+    assert f"{keys}: an algebraic loop, a loop without delay, through {names}; expected delay = 1" in done.stderr
     assert done.stderr.count("\n") == 1
 
 

@@ -1,0 +1,63 @@
+"""Blocks of other services, which read the ports of FMUs in place of the ones that these replace."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.tick_schedule import InputPort
+
+
+def rewire(parts: Sequence[Any], replaced: Mapping[str, str]) -> list[Any]:
+    """Return the blocks of a service with other inputs.
+
+    Args:
+        parts: compiled and Python blocks.
+        replaced: port to read in place of each port of another service.
+    """
+    return [
+        replace(part, inputs=_renamed(part.inputs, replaced))
+        if isinstance(part, Block)
+        else _PythonBlock(part, replaced)
+        for part in parts
+    ]
+
+
+def _renamed(inputs: Sequence[InputPort], replaced: Mapping[str, str]) -> tuple[InputPort, ...]:
+    return tuple(i._replace(port=replaced.get(i.port, i.port)) for i in inputs)
+
+
+class _PythonBlock:
+    """A Python block, which reads ports by name from the diagram that it gets."""
+
+    def __init__(self, part: Any, replaced: Mapping[str, str]):
+        self._part, self._replaced = part, replaced
+        self.inputs = _renamed(getattr(part, "inputs", ()), replaced)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._part, name)
+
+    def bind(self, graph: Any) -> None:
+        self._part.bind(_Diagram(graph, self._replaced))
+
+
+class _Diagram:
+    """View of a block diagram, or of a vehicle's view of one, in which ports of FMUs have the names of others."""
+
+    def __init__(self, graph: Any, replaced: Mapping[str, str]):
+        self._graph, self._replaced = graph, replaced
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._graph, name)
+
+    def has(self, port: str) -> bool:
+        return bool(self._graph.has(self._replaced.get(port, port)))
+
+    def latest(self, port: str, tick: int) -> Any:
+        return self._graph.latest(self._replaced.get(port, port), tick)
+
+    def row(self, port: str, tick: int) -> Any:
+        return self._graph.row(self._replaced.get(port, port), tick)
+
+    def ring(self, port: str) -> Any:
+        return self._graph.ring(self._replaced.get(port, port))
