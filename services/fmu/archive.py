@@ -58,7 +58,10 @@ def _check_files(key: str, path: Path, archive: zipfile.ZipFile) -> None:
         raise ConfigError(key, f"{path}: has no file {DESCRIPTION}", "an FMU")
     if outside := [name for name in names if re.search(r"^/|^\w:|\\|(^|/)\.\.(/|$)", name)]:
         raise ConfigError(key, f"{path}: file {outside[0]!r} leads out of the FMU", "relative paths without ..")
-    if (size := sum(file.file_size for file in files)) > LARGEST:
+    size = 0
+    for file in files:
+        size += file.file_size
+    if size > LARGEST:
         raise ConfigError(key, f"{path}: its files have {size / 1e9:.3g} GB", f"at most {LARGEST / 1e9:g} GB")
     if archive.getinfo(DESCRIPTION).file_size > LARGEST_DESCRIPTION:
         raise ConfigError(key, f"{path}: {DESCRIPTION} is too large", f"at most {LARGEST_DESCRIPTION / 1e6:g} MB")

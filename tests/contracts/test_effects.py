@@ -221,6 +221,7 @@ def test_step_takes_about_as_long_as_one_written_by_hand():
     assert plant < 1.5 * by_hand  # measured: 1.02
 
 
+@pytest.mark.long
 def test_disabled_effect_changes_no_bit():
     """High above the ground the contact changes nothing."""
     assert fly({"gravity": {}, "ground_contact": {}}, RK4).motion == fly({"gravity": {}}, RK4).motion

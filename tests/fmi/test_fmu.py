@@ -61,6 +61,7 @@ def plant(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFacto
     return path
 
 
+@pytest.mark.long
 def test_plant_has_recorded_outputs_bit_for_bit(plant: Path) -> None:
     assert validate_fmu(str(plant)) == []
     recorded = RecordedPorts(scene_config("hover", **{"run.duration": 2.0}))

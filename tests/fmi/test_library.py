@@ -76,6 +76,7 @@ def hover(tmp_path_factory: pytest.TempPathFactory) -> tuple[NativePart, Recorde
     return built(tmp_path_factory.mktemp("hover"), "hover", "plant", **SHORT)
 
 
+@pytest.mark.long
 def test_command_exports_library_with_recorded_bits(tmp_path: Path) -> None:
     arguments = ["hover", "--part", "plant", "--cpu", "x86-64-v2", "--out", str(tmp_path), "--set", "run.duration=2.0"]
     done = subprocess.run(

@@ -203,6 +203,7 @@ def test_members_over_any_terrain_have_bits_of_one_alone(ground):
     assert (end.position_world[:, 2] > heights).all()
 
 
+@pytest.mark.long
 def test_bumps_of_members_differ():
     vary = {"environment.terrain.bump_height": lapwing.uniform(0.01, 0.3)}
     batch = lapwing.BatchSimulator("hover", 3, vary, {"environment.terrain.bump_length": 4.0})

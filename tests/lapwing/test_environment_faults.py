@@ -39,6 +39,7 @@ def test_scene_that_is_device_is_rejected(tmp_path, command, device):
     check_rejected(lapwing(tmp_path, command, device), f"{device}: is not a regular file")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("device", ["fifo", "/dev/zero"])
 @pytest.mark.parametrize(
     "command",

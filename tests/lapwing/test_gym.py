@@ -40,6 +40,7 @@ def flown(task, n=8, seconds=8.0):
     return environments, observed, total, ended
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("task", TASKS)
 @pytest.mark.filterwarnings("error")
 def test_env_checker_passes_without_warning(task):

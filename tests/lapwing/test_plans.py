@@ -36,6 +36,7 @@ def test_plan_of_unknown_vehicle_is_rejected(given):
         plan_options.files(given, load("fleet"))
 
 
+@pytest.mark.long
 def test_plan_of_one_vehicle_does_not_change_others():
     values, only = [f"right={PLAN}"], ["run.duration=8.0"]
     scene = load("fleet", [*only, *plan_options.overrides(values, Path("fleet"), only)])

@@ -75,6 +75,7 @@ def test_points_of_long_recording_are_few(log):
     assert scans(flight, np.array([2.0]), 3000)[0].times == pytest.approx([2.0])
 
 
+@pytest.mark.long
 def test_flight_in_memory_has_points():
     box = [{"position": [6.0, 0.0], "size": [2.0, 4.0], "top": 9.0}]
     overrides = {"run.duration": 2.0, "sensors.lidar.preset": "ideal", "success.require": []}

@@ -3,6 +3,7 @@
 import math
 from itertools import combinations
 
+from lapwing.dynamics.vector import norm, subtract
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.performance import CELL_VOLTAGE, DENSITY, Rotor, trim
 
@@ -19,11 +20,11 @@ def power_fault(airframe: Airframe, rotor: Rotor, density: float = DENSITY) -> s
     assumed that leaves the nearest other hub free, so the true limit is higher.
     """
     hover, (_, k_torque) = trim(airframe, 0.0, density, rotor=rotor), rotor.constants(density)
-    hubs = [place[:2] for place in airframe.rotors.position]
-    apart = [distance for a, b in combinations(hubs, 2) if (distance := math.dist(a, b)) > 0.0]
+    hubs = [(x, y, 0.0) for x, y, _ in airframe.rotors.position]
+    apart = [distance for a, b in combinations(hubs, 2) if (distance := norm(subtract(a, b))) > 0.0]
     radius = 0.5 * airframe.propeller.diameter if airframe.propeller else min(apart, default=math.inf)
-    ideal = hover.thrust**1.5 / (radius * math.sqrt(2.0 * math.pi * density))
-    shaft = k_torque * hover.rotor_speed**3
+    ideal = hover.thrust * math.sqrt(hover.thrust) / (radius * math.sqrt(2.0 * math.pi * density))
+    shaft = k_torque * hover.rotor_speed * hover.rotor_speed * hover.rotor_speed
     if shaft >= ideal:
         return ""
     return f"the torque constant is too small: a rotor takes {shaft:.2g} W in hover, an ideal one {ideal:.2g} W"

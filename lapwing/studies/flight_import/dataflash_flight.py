@@ -4,7 +4,8 @@ ArduPilot's axes are NED and FRD. Which outputs drive motors, and their range of
 """
 
 from collections import defaultdict
-from contextlib import redirect_stderr, redirect_stdout
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -75,6 +76,19 @@ def read_dataflash_flight(path: Path) -> Recording:
     return to_recording(path, channels, "RCOU", "IMU")
 
 
+@contextmanager
+def _opened(kind: type, path: Path) -> Iterator[Any]:
+    """Yield a reader of pymavlink, and close its file, also if its constructor fails after opening it."""
+    reader = kind.__new__(kind)
+    try:
+        reader.__init__(str(path))
+        yield reader
+    finally:
+        for name in ("data_map", "filehandle"):
+            if hasattr(reader, name):
+                getattr(reader, name).close()
+
+
 def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, float], set[str]]:
     """Return the messages of the first instance by name, the parameters, and the names of all other messages."""
     from pymavlink.DFReader import DFReader_binary, DFReader_text
@@ -82,8 +96,9 @@ def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, fl
     result: dict[str, list[dict[str, Any]]] = defaultdict(list)
     parameters, unknown = {}, set()
     try:
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # pymavlink prints what it finds damaged
-            reader = (DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text)(str(path))
+        kind = DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text
+        # pymavlink prints what it finds damaged
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), _opened(kind, path) as reader:
             while (message := reader.recv_msg()) is not None:
                 name, fields = message.get_type(), message.to_dict()
                 if name == "PARM":

@@ -2,13 +2,10 @@
 
 from functools import cache
 from selectors import BaseSelector
-from typing import TYPE_CHECKING
 
 from lapwing.dynamics import discovery
 from lapwing.services.mavlink.links.link import Link
-
-if TYPE_CHECKING:
-    from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.receiver import Receiver
 
 __all__ = ["Link", "check", "for_vehicle_index", "kinds", "open_link"]
 
@@ -48,7 +45,7 @@ def for_vehicle_index(url: str, i: int) -> str:
         raise ValueError(f"--mavlink {url}: {error}") from None
 
 
-def open_link(url: str, adapter: "Adapter", selector: BaseSelector) -> Link:
+def open_link(url: str, adapter: Receiver, selector: BaseSelector) -> Link:
     """Open the link of a URL.
 
     Raises:

@@ -3,12 +3,9 @@
 import os
 from collections.abc import Callable
 from selectors import EVENT_READ, BaseSelector
-from typing import TYPE_CHECKING
 
 from lapwing.services.mavlink.links.link import PIECE, ROUND
-
-if TYPE_CHECKING:
-    from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.receiver import Receiver
 
 MAX_PENDING = 256 * 1024  # [bytes] of unread data, above which an endpoint is disconnected
 
@@ -20,7 +17,7 @@ class ByteStream:
         self,
         descriptor: int,
         local: bool,
-        adapter: "Adapter",
+        adapter: Receiver,
         selector: BaseSelector,
         may_read: Callable[[], bool],
         on_end: Callable[[], None],

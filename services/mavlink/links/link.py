@@ -4,11 +4,9 @@ import re
 import socket
 import time
 from selectors import BaseSelector
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-if TYPE_CHECKING:
-    from lapwing.services.mavlink.adapter import Adapter
-
+from lapwing.services.mavlink.links.receiver import Receiver
 
 ROUND = 64  # pieces of bytes read from one socket before others get their turn
 PIECE = 2048  # [bytes] longest piece
@@ -39,7 +37,7 @@ class Link:
     FORM: ClassVar[str] = ""
     LISTENS: ClassVar[bool] = False  # True if several vehicles need a port each
 
-    def __init__(self, rest: str, adapter: "Adapter", selector: BaseSelector):
+    def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):
         """Open the link. `rest` is the URL without its scheme. Raise OSError if it cannot be opened."""
         self.adapter, self.selector, self.budget = adapter, selector, Budget()
 

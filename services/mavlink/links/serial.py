@@ -5,13 +5,11 @@ import re
 import termios
 import tty
 from selectors import BaseSelector
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from lapwing.services.mavlink.links.byte_stream import ByteStream
 from lapwing.services.mavlink.links.link import Link
-
-if TYPE_CHECKING:
-    from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.receiver import Receiver
 
 
 class Serial(Link):
@@ -27,7 +25,7 @@ class Serial(Link):
             raise ValueError(f"serial:{rest}: has room for one vehicle; expected udpout, udpin or tcpin")
         return rest
 
-    def __init__(self, rest: str, adapter: "Adapter", selector: BaseSelector):
+    def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         path, _, baud = rest.rpartition(":")
         self._descriptor = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)

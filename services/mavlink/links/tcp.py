@@ -2,14 +2,12 @@
 
 import socket
 from selectors import EVENT_READ, BaseSelector
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from lapwing.services.common.address import is_loopback
 from lapwing.services.mavlink.links.byte_stream import ByteStream
 from lapwing.services.mavlink.links.link import Link, socket_address
-
-if TYPE_CHECKING:
-    from lapwing.services.mavlink.adapter import Adapter
+from lapwing.services.mavlink.links.receiver import Receiver
 
 MAX_ENDPOINTS = 8
 
@@ -21,7 +19,7 @@ class TcpIn(Link):
     FORM: ClassVar[str] = "tcpin:HOST:PORT"
     LISTENS: ClassVar[bool] = True
 
-    def __init__(self, rest: str, adapter: "Adapter", selector: BaseSelector):
+    def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         self._server = socket.create_server(socket_address(rest))
         self._server.setblocking(False)

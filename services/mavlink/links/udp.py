@@ -3,14 +3,11 @@
 import socket
 import time
 from selectors import EVENT_READ, BaseSelector
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from lapwing.services.common.address import is_loopback
 from lapwing.services.mavlink.links.link import PIECE, ROUND, Link, socket_address
-
-if TYPE_CHECKING:
-    from lapwing.services.mavlink.adapter import Adapter
-    from lapwing.services.mavlink.endpoint import Endpoint
+from lapwing.services.mavlink.links.receiver import Endpoint, Receiver
 
 MAX_ENDPOINTS = 8
 SILENT = 10.0  # [s] of wall time without a message after which another endpoint may replace it
@@ -21,7 +18,7 @@ Address = tuple[str, int]
 class _Udp(Link):
     """UDP socket, and its endpoints by address."""
 
-    def __init__(self, rest: str, adapter: "Adapter", selector: BaseSelector):
+    def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.setblocking(False)
@@ -29,7 +26,7 @@ class _Udp(Link):
         self.last_received: dict[Address, float] = {}
         selector.register(self.socket, EVENT_READ, self.read)
 
-    def connect(self, address: Address) -> "Endpoint":
+    def connect(self, address: Address) -> Endpoint:
         """Return a new endpoint at an address."""
 
         def put(data: bytes) -> None:
@@ -68,7 +65,7 @@ class UdpOut(_Udp):
     SCHEME: ClassVar[str] = "udpout"
     FORM: ClassVar[str] = "udpout:HOST:PORT"
 
-    def __init__(self, rest: str, adapter: "Adapter", selector: BaseSelector):
+    def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         address = socket_address(rest)
         self.endpoints[address] = self.connect(address)
@@ -89,7 +86,7 @@ class UdpIn(_Udp):
     FORM: ClassVar[str] = "udpin:HOST:PORT"
     LISTENS: ClassVar[bool] = True
 
-    def __init__(self, rest: str, adapter: "Adapter", selector: BaseSelector):
+    def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):
         super().__init__(rest, adapter, selector)
         try:
             self.socket.bind(socket_address(rest))

@@ -26,6 +26,7 @@ def test_files_are_private_with_any_umask(tmp_path):
     assert modes == {"plant": 0o700, **files}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("place", "time", "message"),
     [(1, "200101000000Z", "expired on 2020-01-01"), (0, "490101000000Z", "is valid from 2049")],

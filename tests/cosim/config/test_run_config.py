@@ -34,6 +34,7 @@ def test_resolution_is_deterministic_and_overrides_change_it():
     assert after == 9.5 != before
 
 
+@pytest.mark.long
 def test_set_up_from_its_text_flies_to_same_digest():
     setup = resolve(load("hover", ["run.duration=0.4", "effects.random_wind_force.sigma=1.0"]))
     assert fly(from_json(to_json(setup))).digest == fly(setup).digest

@@ -67,6 +67,7 @@ def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
     assert [payload for _, payload in alone.payloads("tf")] == transforms[setup.vehicles.index(vehicle) :: 3]
 
 
+@pytest.mark.long
 def test_random_numbers_go_by_vehicle(flown):
     """Two of one type under the same law: what differs beside their place is the wind, drawn for each."""
     left, right = (flown.view(f"{name}/ground_truth").wind for name in ("left", "right"))

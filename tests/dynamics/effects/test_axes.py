@@ -68,6 +68,7 @@ def test_static_thrust_and_moments_by_hand(drone):
     assert result.torque == pytest.approx(torque, rel=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     "tables",
     [

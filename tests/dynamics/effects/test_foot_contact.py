@@ -105,6 +105,7 @@ def drawn(rng, e):
     return s, tuple(memory)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("ground", GROUNDS)
 @pytest.mark.parametrize("law", ["stick_slip", "regularised"])
 def test_feet_are_independent(drone, law, ground):

@@ -63,6 +63,7 @@ def test_lands_on_treads_of_stair(drone, x, ground):
     assert m.position_world[2] == pytest.approx(ground + HEIGHT, abs=1e-4)
 
 
+@pytest.mark.long
 def test_grid_is_slope_that_its_points_are(drone):
     slope = relief(slope=(0.1, 0.0))
     ends = []

@@ -67,6 +67,7 @@ def test_drone_against_dense_pseudo_inverse(driven, rank, count):
         assert ours.conflict < 1e-11 * scale
 
 
+@pytest.mark.long
 def test_normal_equations_lose_digits_that_factorisation_keeps():
     """The naive way, one LU of the assembled 62 x 62 matrix, is singular: it has no answer."""
     drone, q, v, wrench, drive = state(np.random.default_rng(8))

@@ -38,6 +38,7 @@ def imposed(p):
     return np.array([[r.speed, r.drive] for r in p.rotors])
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("driven", ["speed", "torque"])
 def test_projection_is_general_one(driven):
     rng = np.random.default_rng(41)

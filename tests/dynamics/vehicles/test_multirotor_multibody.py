@@ -61,6 +61,7 @@ def reference():
     return fly(p, multirotor.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED, omega_body=OMEGA), 0.2, 2.5e-4).motion
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stabilisation", ["projection", "partitioning", "baumgarte", "none"])
 def test_symmetric_propellers_at_imposed_speed_are_reduced_model(reference, stabilisation):
     p = multirotor_multibody.parameters(SYMMETRIC, ACTIVE, "speed", stabilisation)

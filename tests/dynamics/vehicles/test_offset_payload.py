@@ -105,6 +105,7 @@ def test_carried_payload_acts_as_part_of_body():
     assert np.array(state.motion.omega_body) == pytest.approx(other.motion.omega_body, abs=1e-10)
 
 
+@pytest.mark.long
 def test_empty_vehicle_is_vehicle_described_without_box():
     """After the release it flies as the bare airframe does whose state is that of its own centre of mass."""
     tables = {"gravity": {}, "rotor_thrust": {}, "h_force": {"coefficient": 1e-4}, "gyroscopic_torque": {}}
@@ -128,6 +129,7 @@ def test_empty_vehicle_is_vehicle_described_without_box():
     assert np.array(state.motion.omega_body) == pytest.approx(np.array(other.motion.omega_body), abs=1e-7)
 
 
+@pytest.mark.long
 def test_flight_lets_payload_go_that_hangs_ahead():
     """The front rotors carry more with it; without it all carry the rest about the vehicle's own centre."""
     ahead, arm, g = 0.1, 0.35171491, 9.80665
@@ -152,6 +154,7 @@ def test_flight_lets_payload_go_that_hangs_ahead():
     assert without == pytest.approx(np.full(4, 0.25 * 8.0224 * g), rel=1e-2)
 
 
+@pytest.mark.long
 def test_batch_release_is_bit_for_bit_identical():
     box = {"mass": 2.0, "position": [0.1, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
     scene = load(

@@ -31,6 +31,7 @@ def run(p, x, seconds, start=0.0, h=H):
     return integrate_fixed(RK4, p, start, x, h, round(seconds / h))
 
 
+@pytest.mark.long
 def test_contact_of_equal_velocities_does_no_work():
     """Pack and door turn together about the hinge: what the door takes from the pack, the pack gets."""
     p = P._replace(floor_height=5.0, ramp_start=-1.0, door_damping=0.0, depth=9.0)
@@ -64,6 +65,7 @@ def test_door_alone_swings_with_its_period():
     assert x.door[1] == pytest.approx(0.5 * w * math.sin(w), abs=1e-9)
 
 
+@pytest.mark.long
 def test_pack_rests_below_friction_angle():
     p = P._replace(ramp_start=NEVER, pickup=NEVER)
     settled = run(p, initial_state(p), 1.0)
@@ -142,6 +144,7 @@ def test_ramp_and_pickup_between_ticks_are_exact():
     assert np.array(flatten(x)) == pytest.approx(split_reference(settled, 0.1), abs=1e-8)
 
 
+@pytest.mark.long
 def test_event_on_tick_takes_effect_there():
     """12 ticks of 4 ms are 0.048 s only up to rounding; what is off by it is on the tick."""
     x = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)

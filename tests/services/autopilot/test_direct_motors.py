@@ -73,6 +73,7 @@ def test_invalid_voltages_are_rejected(volts):
     assert any("the last was rejected: expected 4 voltages, got [5.0" in text for text in said(flown))
 
 
+@pytest.mark.long
 def test_six_motors_take_six():
     sets = [*OPERATED, "run.duration=1", "autopilot.estimator=ground_truth"]
     script = {0.0: [motors(*range(1, 7)), *START], (0.1, 1.0): [motors(*range(1, 7))]}

@@ -53,6 +53,7 @@ CASES = [
 ]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("sensor", "fault", "refused", "largest"), CASES)
 def test_fault(sensor, fault, refused, largest):
     p = registry.parameters(sensor, {"faults": [{"start": START, "stop": STOP, **fault}]}, ef.INTERVAL)

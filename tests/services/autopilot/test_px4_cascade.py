@@ -181,6 +181,7 @@ def test_hover_returns_from_offset():
     assert path[-1][:2] == pytest.approx((1.0, 1.0), abs=0.05)
 
 
+@pytest.mark.long
 def test_command_line_flies_it(tmp_path):
     log = tmp_path / "px4.mcap"
     run = [sys.executable, "-m", "lapwing", "run", "hover", "--mode", "single-process", "--log", str(log), "--set", PX4]

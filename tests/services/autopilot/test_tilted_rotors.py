@@ -34,6 +34,7 @@ def test_axes_along_z_are_those_of_rotors_without_axes():
     assert np.array_equal(tilted, effectiveness(x, y, reaction))
 
 
+@pytest.mark.long
 def test_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     flown = fly(load(SCENE))
     assert str(flown.outcome).startswith("Landed")

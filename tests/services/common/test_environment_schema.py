@@ -46,6 +46,7 @@ def test_all_services_share_environment():
     assert setup.auxiliary["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
 
 
+@pytest.mark.long
 def test_barometer_and_rotors_share_atmosphere():
     scene = load("delivery_mission", {**PLACE, "sensors.barometer.preset": "ideal", "sensors.gps.preset": "standard"})
     sensors, plant = Alone(scene, "sensors"), resolve(scene).services["plant"].parameters

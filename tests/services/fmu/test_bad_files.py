@@ -62,6 +62,7 @@ def assert_rejected(folder: Path, message: str) -> None:
     assert not (folder / "a.mcap").exists()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("change", "message"),
     [

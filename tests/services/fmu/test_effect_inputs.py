@@ -196,6 +196,7 @@ def test_modes_campaign_and_resimulation_have_equal_bits(folder: Path) -> None:
     assert "is identical" in done.stdout
 
 
+@pytest.mark.long
 def test_exported_plant_has_named_inputs(folder: Path) -> None:
     exported = export_part(scene_resolver.resolve(scene_resolver.load(scene_with(folder, SUPPLY))), "plant")
     (voltage,) = [v for v in variables_of(exported) if v.name == "effect.battery.voltage"]

@@ -48,6 +48,7 @@ def fly(scene: Path, log: Path) -> None:
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_vehicles_of_fleet_have_winds_of_own_fmus(tmp_path: Path) -> None:
     write_effect_fmu(tmp_path / "parts.fmu")
     scene, log = tmp_path / "fleet.toml", tmp_path / "fleet.mcap"
@@ -66,6 +67,7 @@ def test_vehicles_of_fleet_have_winds_of_own_fmus(tmp_path: Path) -> None:
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.long
 def test_thevenin_battery_of_fmu_supplies_motors_with_inductance(tmp_path: Path) -> None:
     write_effect_fmu(tmp_path / "parts.fmu")
     scene, log = tmp_path / "battery.toml", tmp_path / "battery.mcap"

@@ -68,6 +68,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_fmus_before_and_after_autopilot_step_in_one_tick(folder: Path, mode: str) -> None:
     logs = [folder / f"{name}_{mode}.mcap" for name in ("plain", "two")]
@@ -131,6 +132,7 @@ u = "battery.charge"
 """
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_failsafe_acts_on_battery_of_fmu(folder: Path, mode: str) -> None:
     """The autopilot lands with a battery that is nearly empty."""

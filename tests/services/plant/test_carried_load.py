@@ -136,6 +136,7 @@ def test_invalid_shared_load_is_rejected(tmp_path, override, message):
         resolve(two(tmp_path, override))
 
 
+@pytest.mark.long
 def test_shipped_scene_lifts_load(tmp_path):
     setup = resolve(load("carried_load", ["run.duration=14.0"]))
     log = fly(setup)

@@ -68,6 +68,7 @@ def test_downwash_acts_only_below(flown):
     assert height[-1] < height[500] - 0.02  # pushed down
 
 
+@pytest.mark.long
 def test_interaction_is_equal_with_diagram_per_service(setup, flown):
     assert fly_apart(setup, None).digest == flown.digest
 

@@ -34,7 +34,7 @@ def record(p, key, truth, push, spin, out):
         now = Truth(
             truth.position_world, truth.attitude, truth.velocity_world, spin_body, push_world,
             truth.height_above_ground, truth.gravity, truth.home, truth.atmosphere, truth.magnetic_field_world,
-            truth.terrain, truth.angular_acceleration_body, 0.0, 0.0, truth.air_velocity_world, truth.air_density, 0.0,
+            truth.terrain, truth.angular_acceleration_body, 0.0, truth.air_velocity_world, truth.air_density, 0.0,
             truth.rotor_speed, truth.rotor_speeds,
         )  # fmt: skip
         s, r = imu.sample(p, s, key, k, now)

@@ -83,6 +83,7 @@ def test_custom_sensor_is_logged_and_reaches_estimator(scene):
     assert reported.max() > 0.0
 
 
+@pytest.mark.long
 def test_several_are_logged_each_on_its_topic(scene, tmp_path):
     (tmp_path / "own_height.py").write_text(
         ANEMOMETER.replace("AnemometerReading", "HeightReading").replace(

@@ -63,6 +63,7 @@ def test_smallest_set_leaves_out_all_that_may_go_together():
     assert _smallest(Crew(worth), {name: {} for name in worth}, moved([0, 0]), [], 0.01, output.append)[1] == 0.0
 
 
+@pytest.mark.long
 def test_density_changes_real_flight_little():
     scene = load(HOVER, ["run.duration=2.0"])
     tables = dict(scene[Effects].tables)

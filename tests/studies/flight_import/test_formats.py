@@ -23,6 +23,7 @@ from flight_writers import (
 from scipy.spatial.transform import Rotation
 
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_import.dataflash_flight import read_dataflash_flight
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotation_vector
@@ -197,3 +198,12 @@ def test_crazyflie_log_of_real_vehicle_is_in_si_units(tmp_path):
     result = open_flight(tmp_path / "log10")
     assert np.median(result.specific_force[:, 2]) == pytest.approx(GRAVITY, rel=0.03)
     assert result.interval == pytest.approx(1e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("content", [b"", b"\xa3\x95\x80" + bytes(20)], ids=["empty", "cut"])
+def test_unreadable_dataflash_log_is_closed(tmp_path, content):
+    path = tmp_path / "flight.bin"
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match="dataflash"):
+        read_dataflash_flight(path)
+    assert path not in [link.resolve() for link in Path("/proc/self/fd").iterdir()]

@@ -72,6 +72,7 @@ def test_fall_without_motors_is_no_rest(flight, moving):
     assert "no 2 s at rest" in notes[0]
 
 
+@pytest.mark.long
 def test_command_fits_imu_of_columns_as_of_imported_log(tmp_path):
     path = write_csv(tmp_path / "flight.csv", *simulated(PlantRows("crazyflie_21", FLIGHT_INTERVAL), 4.0, [1]))
     mapping = ("--mapping", "nanobench")

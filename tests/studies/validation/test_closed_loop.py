@@ -34,6 +34,7 @@ def test_own_setpoints_give_own_flight(log):
     assert flown.difference < 0.01  # begins in the recording's climb, from rest
 
 
+@pytest.mark.long
 def test_flight_without_setpoints_is_left_out(log):
     assert fly_setpoints(SCENE, replace(open_flight(log), setpoint=np.empty((0, 3)))) is None
 

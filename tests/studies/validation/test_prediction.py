@@ -121,6 +121,7 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     assert "Errors over the envelope" in page_text(page)
 
 
+@pytest.mark.long
 def test_repeated_flight_counts_once(plant, tmp_path):
     """The copy is an imported log of the same file: errors and intervals are those of the first flights alone."""
     paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 2.0, [1, 2])]

@@ -1,0 +1,22 @@
+"""The adapter as links see it. They do not import it: a URL is checked without the MAVLink protocol."""
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any, Protocol
+
+Endpoint = Any  # made by a receiver, opaque to links but for the time of its last message
+
+
+class Receiver(Protocol):
+    """Receiver of the bytes of endpoints. `Adapter` documents the methods."""
+
+    counts: Counter[str]
+
+    def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None], strict: bool = False) -> Endpoint:
+        """Return a new endpoint."""
+
+    def disconnect(self, endpoint: Endpoint) -> None:
+        """Remove an endpoint."""
+
+    def receive(self, endpoint: Endpoint, data: bytes) -> int:
+        """Handle bytes from an endpoint. Return the number of valid messages."""
