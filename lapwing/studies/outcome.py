@@ -31,7 +31,7 @@ class FlightOutcome(NamedTuple):
       ends in the air, or a run that ends before its trajectory.
     - "landed elsewhere": as "landed", but farther from the target.
     - "ended in failsafe": a failsafe ended the mission and the vehicle landed.
-    - "timed out": the mission was not finished.
+    - "timed out": the mission was not finished, or the vehicle never left the ground.
     - "aborted": something else ended the run early.
     - "crashed": the vehicle turned over, hit the ground at more than 2 m/s, or was not at rest on its feet after the
       mission.
@@ -101,6 +101,8 @@ def classify(
         if completion and not failsafe:
             return outcome("completed", end, completion)
         return outcome("timed out", end, _unfinished(status, failsafe), failsafe)
+    if mission is not None and contacts and contacts[0].stop - contacts[0].start == len(truth.times):
+        return outcome("timed out", end, "never took off" + _failsafe_text(failsafe), failsafe)
     if fault := _not_resting(truth, status, cosine):
         return outcome("crashed", end, fault, failsafe)
     # the last touch before the motors went off; a plant without contact information has none
@@ -174,4 +176,8 @@ def _unfinished(status: TopicView, failsafe: tuple[float, str] | None) -> str:
     if not ("armed" in status.fields and status.armed.any()):
         return "mission not finished, motors never armed"
     mode = " ".join(filter(None, (str(status.mode[-1]), f"({status.phase[-1]})" if status.phase[-1] else "")))
-    return f"mission not finished, in {mode}" + (f", {failsafe[1]} at {failsafe[0]:.2f} s" if failsafe else "")
+    return f"mission not finished, in {mode}{_failsafe_text(failsafe)}"
+
+
+def _failsafe_text(failsafe: tuple[float, str] | None) -> str:
+    return f", {failsafe[1]} at {failsafe[0]:.2f} s" if failsafe else ""

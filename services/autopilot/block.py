@@ -86,7 +86,7 @@ def block_outputs(
         c: output of the control law.
     """
     height = e.position_world[2] - p.law.value.resting_height
-    watched = motor_failure.step(p.failure_detector.value, watched, p.interval, e.omega_body, height, c.thrust)
+    watched = motor_failure.step(p.failure_detector.value, watched, p.interval, e, height, c.thrust)
     flying = landed_state == FLYING
     armed = flying if order.follow else order.armed
     finished = (c.finished and setpoint.final) if order.follow else order.finished

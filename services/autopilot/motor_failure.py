@@ -7,17 +7,20 @@ causes one along its own arm. ArduPilot's thrust-loss check detects the same fai
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from lapwing.dynamics.lie.quaternion import Quaternion, rotate_back
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.controller_parameters import Airframe, lift, rotor_effectiveness
-from lapwing.services.common.ports import PerRotor
+from lapwing.services.common.ports import PerRotor, StateEstimate
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
 LOST = 0.3  # minimum fraction of lost thrust
 ALIGNED = 0.25  # maximum squared fraction of the disturbance that is not along the rotor's arm
 DETECTION_TIME = 0.1  # [s]
 CLEAR = 0.3  # [m] height below which the feet may push too
+IMPACT = 1.0  # [g] specific force upwards beyond that of the rotors, of which only a contact is capable
+PAUSE = 0.5  # [s] after an impact, in which feet may push or bounce
 LEAST = 0.3  # minimum expected thrust, as a fraction of the hover thrust
 
 
@@ -29,6 +32,7 @@ class Parameters(NamedTuple):
     inertia_body: Vec3  # [kg m^2]
     time_constant: float  # of the rotor speeds [s]
     hovering: float  # thrust of each rotor [N]
+    gravity: float  # [m/s^2]
     enabled: bool  # False: no failure is detected
 
 
@@ -42,6 +46,7 @@ class State(NamedTuple):
     suspect: int  # number of the suspected rotor, from 1; 0: none
     lasting: float  # [s] since it is suspected
     failed: int  # number of the failed rotor, from 1; 0: none
+    pause: float  # [s] left of the time after an impact
 
 
 def build(airframe: Airframe, values: Mapping[str, float]) -> Parameters:
@@ -50,7 +55,7 @@ def build(airframe: Airframe, values: Mapping[str, float]) -> Parameters:
     _, roll, pitch, _ = rotor_effectiveness(a).tolist()
     hovering = a.mass * a.gravity / lift(a)
     enabled = values.get("FD_ACT_EN", 1.0) != 0.0  # absent from former logs
-    return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, hovering, enabled)
+    return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, hovering, a.gravity, enabled)
 
 
 @always_inline
@@ -62,7 +67,7 @@ def _none(_: float, x: float, y: float) -> float:
 def start(p: Parameters) -> State:
     """Return the initial state."""
     none = map_tuple(_none, 0.0, p.roll_arm, p.pitch_arm)
-    return State(none, none, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0)
+    return State(none, none, (0.0, 0.0), (0.0, 0.0), 0, 0.0, 0, 0.0)
 
 
 @always_inline
@@ -92,29 +97,43 @@ def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> 
 
 
 @always_inline
-def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, asked: PerRotor) -> State:
+def excess(p: Parameters, root: PerRotor, attitude: Quaternion, acceleration_world: Vec3) -> float:
+    """Return the specific force along body z that the rotors do not explain [g]; positive on ground that pushes."""
+    x, y, z = acceleration_world
+    load = rotate_back(attitude, (x, y, z + p.gravity))[2]
+    thrust = 0.0
+    for k in range(len(root)):
+        thrust += root[k] * root[k]
+    return load / p.gravity - thrust / (len(root) * p.hovering)
+
+
+@always_inline
+def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, asked: PerRotor) -> State:
     """Return the state after a tick.
 
     Args:
         p: parameters.
         s: state; initially `start`.
         dt: length of the tick [s].
-        omega_body: body rates [rad/s].
+        e: state estimate.
         height: above the resting height [m].
         asked: commanded thrusts from now on [N].
     """
     share = 1.0 - math.exp(-dt / p.time_constant)
     root = map_tuple(_follow, share, s.root, s.asked)
     ix, iy, iz = p.inertia_body
-    wx, wy, wz = omega_body
+    wx, wy, wz = e.omega_body
     ax, ay = (iy - iz) * wy * wz / ix, (iz - ix) * wz * wx / iy
     for k in range(len(p.roll_arm)):
         thrust = root[k] * root[k]
         ax += p.roll_arm[k] * thrust / ix
         ay += p.pitch_arm[k] * thrust / iy
     before = s.failed if p.enabled else 0
-    if height < CLEAR:
-        return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, before)
+    # the ground may be higher than that at the start
+    has_hit = excess(p, root, e.attitude, e.acceleration_world) > IMPACT
+    pause = PAUSE if has_hit else max(s.pause - dt, 0.0)
+    if height < CLEAR or pause > 0.0:
+        return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, before, pause)
     ex, ey = wx - s.rate[0], wy - s.rate[1]
     gain = 2.0 * BANDWIDTH
     rate = (
@@ -126,4 +145,4 @@ def step(p: Parameters, s: State, dt: float, omega_body: Vec3, height: float, as
     suspected = suspect(p, root, disturbance)
     lasting = s.lasting + dt if suspected > 0 and suspected == s.suspect else 0.0
     failed = suspected if lasting > DETECTION_TIME and before == 0 and p.enabled else before
-    return State(asked, root, rate, disturbance, suspected, lasting, failed)
+    return State(asked, root, rate, disturbance, suspected, lasting, failed, pause)

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.common.success_types import check_types
 
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
@@ -40,6 +41,12 @@ class Success(SceneTable):
             except ValueError:
                 shown = text if len(text) <= 80 else f"{text[:77]}..."
                 raise ConfigError(f"success.require.{i}", f"got {shown!r}", EXPECTED) from None
+            try:
+                check_types(ast.parse(text.strip(), mode="eval").body)
+                _check_constants(text)
+            except ValueError as error:
+                expected = 'a condition such as "rmse.x < 0.1"'
+                raise ConfigError(f"success.require.{i}", str(error), expected) from None
 
     def check_names(self, known: Mapping[str, Any]) -> None:
         """Raise ConfigError if an expression uses an unknown metric."""
@@ -60,8 +67,7 @@ class _Expression(NamedTuple):
 def holds(text: str, figures: Mapping[str, Any]) -> bool:
     """Return True if the expression holds. For a NaN, such as the touch-down speed in the air, only != holds."""
     try:
-        names = {"__builtins__": {}, "number": _number, **FUNCTIONS}
-        return bool(eval(_expression(text).code, names, {"figures": figures}))
+        return bool(eval(_expression(text).code, NAMES, {"figures": figures}))
     except (ArithmeticError, TypeError, ValueError):
         return False
 
@@ -71,6 +77,9 @@ def _number(value: Any) -> float:
     if not isinstance(value, int | float):
         raise TypeError(f"{type(value).__name__} in arithmetic")
     return value
+
+
+NAMES: dict[str, Any] = {"__builtins__": {}, "number": _number, **FUNCTIONS}
 
 
 @cache
@@ -89,6 +98,24 @@ def _expression(text: str) -> _Expression:
     return _Expression(
         compile(ast.fix_missing_locations(lookup.visit(tree)), "<success>", "eval"), frozenset(lookup.names)
     )
+
+
+def _check_constants(text: str) -> None:
+    """Raise ValueError if a part without metrics, such as 1 / 0, cannot be computed."""
+    tree = ast.fix_missing_locations(_Lookup().visit(ast.parse(text.strip(), mode="eval")))
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.expr) or any(isinstance(n, ast.Subscript | ast.Name) for n in _values(node)):
+            continue
+        try:
+            eval(compile(ast.Expression(node), "<success>", "eval"), NAMES)
+        except (ArithmeticError, TypeError, ValueError) as error:
+            raise ValueError(f"a part of {text!r} cannot be computed: {error}") from None
+
+
+def _values(node: ast.expr) -> list[ast.AST]:
+    """Return the nodes of an expression without the names of its functions."""
+    functions = {id(n.func) for n in ast.walk(node) if isinstance(n, ast.Call)}
+    return [n for n in ast.walk(node) if id(n) not in functions]
 
 
 class _Lookup(ast.NodeTransformer):

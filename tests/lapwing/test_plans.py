@@ -1,5 +1,7 @@
 """Plans of a fleet from the command line: which vehicle flies which, and that it does."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -46,3 +48,13 @@ def test_plan_of_one_vehicle_does_not_change_others():
     without = fly(resolve(load("fleet", only)))
     for name in ("left", "scout"):
         assert (flown.view(f"{name}/ground_truth").position == without.view(f"{name}/ground_truth").position).all()
+
+
+def test_impact_on_slope_is_no_motor_failure(tmp_path):
+    command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--plan", PLAN, "--speed", "max"]
+    command += ["--mode", "single-process", "--log", str(tmp_path / "flown.mcap")]
+    command += ["--set", "environment.terrain.slope=[0.0, 0.27]"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "motor has failed" not in done.stdout
+    assert "Landed at" in done.stdout

@@ -43,6 +43,12 @@ def test_landing_reports_time_speed_place_and_target_distance():
     )
 
 
+def test_vehicle_that_slides_without_takeoff_never_took_off():
+    hops = (T % 1.0 >= 0.2) | (T < 1.0)
+    outcome = fly(Mission((13.0, 7.0, 0.0)), ground_contact=hops, status={"armed": T < 4.5})
+    assert (outcome.kind, outcome.how) == ("timed out", "never took off")
+
+
 def test_landing_far_from_target_is_landed_elsewhere():
     outcome = fly(Mission((13.0, 7.0, 0.0)))
     assert (outcome.kind, outcome.target_distance) == ("landed elsewhere", pytest.approx(13.0))

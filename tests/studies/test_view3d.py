@@ -208,7 +208,8 @@ def test_contact_forces_are_drawn_at_their_points():
 )
 def test_drawn_beam_starts_at_sensor_and_ends_at_surface(name, table, origin, direction):
     ranges = np.where(T < 2.0, 1.5, np.inf)
-    whole = flight(scene={"airframe": AIRFRAME, "sensors": {name: table}})
+    airframe = AIRFRAME | {"mass": {"centre": [0.05, -0.02, 0.01]}}  # sensors have their places about it
+    whole = flight(scene={"airframe": airframe, "sensors": {name: table}})
     reading = TopicView(np.arange(TICKS) * 10**7, {"range": ranges, "field_of_view": np.full(TICKS, 0.5)})
     values = FlightData({**{key: whole.topic(key) for key in whole.topics}, name: reading}, whole.origin)
     scene = Recorder()

@@ -12,9 +12,12 @@ from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.dynamics import simd_batch
 from lapwing.dynamics.effects._types import Motion
 from lapwing.kernels.row_packing import pack_row, row_width
+from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.vehicle_schema import Effects, airframe
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
-from lapwing.services.scene_resolver import load_one, resolve
+from lapwing.services.plant.resolve import resolve
+from lapwing.services.plant.schema import Solver
+from lapwing.services.scene_resolver import load_one
 
 LONGEST_STEP = 0.01  # [s] of the integrator
 FORCE, TORQUE = "effects.body_wrench.force", "effects.body_wrench.torque"
@@ -59,7 +62,7 @@ class PlantRows:
         steps = int(np.ceil(interval / LONGEST_STEP - 1e-9))
         self.interval = interval
         self._base = _with_wrench(load_one(scene, overrides))
-        self._clock = {"communication.rate": rate, "solver.step": interval / steps}
+        self._rate, self._step = rate, interval / steps
         first = self._resolved({})
         self._core = first.core
         self.like = simd_batch.member(first.core.vehicle, first.start.vehicle)
@@ -159,7 +162,14 @@ class PlantRows:
         return _plant(self._scene(values))
 
     def _scene(self, values: Mapping[str, Any]) -> Scene:
-        return load_one(self._base, {**self._clock, **_whole_lists(self._base, values)})
+        """Return the scene with the recording's clock, which its sensors and its autopilot need not divide."""
+        scene = load_one(self._base, _whole_lists(self._base, values))
+        rates = {name: self._rate for name in Rates.model_fields if getattr(scene[Rates], name) is not None}
+        return (
+            scene.replaced(scene[Communication].model_copy(update={"rate": self._rate}))
+            .replaced(scene[Solver].model_copy(update={"step": self._step}))
+            .replaced(Rates(**rates))
+        )
 
     def _row(self, values: Mapping[str, Any]) -> np.ndarray:
         return self._build(values)[0]
@@ -205,7 +215,8 @@ def _whole_lists(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _plant(scene: Scene) -> Any:
-    plant = resolve(scene).services["plant"].parameters
+    with scene.located():
+        plant = resolve(scene).parameters
     if not isinstance(plant.core, MultirotorPlant) or not isinstance(plant.start.vehicle.motion, Motion):
         raise SceneError("vehicle.model", f"got {plant.model!r}", "the model of a single rigid body")
     return plant

@@ -29,7 +29,6 @@ class BeamSamples(NamedTuple):
 def beams(flight: FlightData, times: np.ndarray) -> list[BeamSamples]:
     """Return the beams of the distance sensors of a flight at `times` [s], shape (k,)."""
     sensors, result = flight.origin.scene.get("sensors", {}), []
-    centre = flight.origin.scene.get("airframe", {}).get("mass", {}).get("centre", (0.0, 0.0, 0.0))
     for name in TOPICS:
         if not flight.has(name) or not len(readings := flight.topic(name)):
             continue
@@ -37,10 +36,9 @@ def beams(flight: FlightData, times: np.ndarray) -> list[BeamSamples]:
         azimuth, elevation = (np.radians(table.get(f"{k}_deg", d)) for k, d in (("azimuth", 0.0), ("elevation", DOWN)))
         level = float(np.cos(elevation))
         direction = np.array([[level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)]])
-        origin = np.array(table["position"]) - np.array(centre) if "position" in table else np.zeros(3)
         half = max(NARROWEST, 0.5 * float(readings.field_of_view[0]))
         length = readings.range[nearest(readings.times, times)].astype(float)
-        x, y, z = origin.tolist()
+        x, y, z = table.get("position", (0.0, 0.0, 0.0))  # about the centre of mass, as in the simulation
         result.append(BeamSamples(name, (x, y, z), tuple(along(direction)[0].tolist()), half, length))
     return result
 

@@ -7,6 +7,7 @@ from lapwing.kernels import python_function
 from lapwing.services.autopilot import motor_failure as watch
 from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.motor import Motor
+from lapwing.services.common.ports import StateEstimate
 
 ARM, TICK = 0.35, 0.004
 FRAME = Airframe(
@@ -16,16 +17,18 @@ FRAME = Airframe(
 HOVER = 0.25 * FRAME.mass * FRAME.gravity
 
 
-def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0, values=None):
+def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0, values=None, impact=-1.0):
     """State of the watch over a body whose rotors give the shares `left` of what a shaking command asks for."""
     p, omega = watch.build(FRAME, values or {}), np.zeros(3)
     s = python_function(watch.start)(p)
     random = np.random.default_rng(seed)
     thrust = np.full(4, HOVER)
     x, y = np.array(FRAME.rotor_x), np.array(FRAME.rotor_y)
-    for _ in range(round(seconds / TICK)):
+    for k in range(round(seconds / TICK)):
         requested = HOVER * (1.0 + 0.3 * random.standard_normal(4)).clip(0.2, 2.0)
-        s = watch.step(p, s, TICK, tuple(omega), height, tuple(requested))
+        upwards = 40.0 if k == round(impact / TICK) else 0.0
+        estimate = StateEstimate(omega_body=tuple(omega), acceleration_world=(0.0, 0.0, upwards))
+        s = watch.step(p, s, TICK, estimate, height, tuple(requested))
         thrust += (1.0 - np.exp(-TICK / 0.02)) * (requested - thrust)
         torque = np.array([(y * left * thrust).sum() + push[0], -(x * left * thrust).sum() + push[1], 0.0])
         inertia = np.array(FRAME.inertia_body)
@@ -60,6 +63,23 @@ def test_push_along_axis_blames_no_motor():
 
 def test_on_ground_feet_may_push():
     assert campaign_setup(np.array([1.0, 1.0, 0.0, 1.0]), height=0.1).failed == 0
+
+
+def test_detection_pauses_after_impact_and_resumes():
+    left = np.array([1.0, 1.0, 0.0, 1.0])
+    assert campaign_setup(left, seconds=0.4, impact=0.02).failed == 0
+    assert campaign_setup(left, seconds=0.4).failed == 3
+    assert campaign_setup(left, seconds=0.9, impact=0.02).failed == 3
+
+
+def test_excess_is_zero_in_flight_and_weight_on_ground():
+    p = watch.build(FRAME, {})
+    half = (0.5 * HOVER) ** 0.5
+    tilted = (np.cos(0.2), np.sin(0.2), 0.0, 0.0)  # 0.4 rad about x
+    thrust = 2.0 * FRAME.gravity * np.array([0.0, -np.sin(0.4), np.cos(0.4)])  # two hover thrusts [m/s^2], world
+    flying = watch.excess(p, ((2.0 * HOVER) ** 0.5,) * 4, tilted, tuple(thrust - (0.0, 0.0, FRAME.gravity)))
+    assert flying == pytest.approx(0.0, abs=1e-12)
+    assert watch.excess(p, (half,) * 4, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) == pytest.approx(0.5, abs=1e-12)
 
 
 def test_disturbance_is_angular_acceleration_that_lacks():

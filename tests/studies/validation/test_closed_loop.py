@@ -76,3 +76,23 @@ def test_command_overlays_closed_loop(log, tmp_path):
     (flight,) = json.loads(out.read_text())["closed_loop"]
     assert flight["difference"] < 0.05
     assert "the recorded setpoints, flown" in page_text(page)
+
+
+@pytest.mark.parametrize("scene", ["delivery_mission", "crazyflie_21", "px4_quad", "betaflight_quad", "ardupilot_quad"])
+@pytest.mark.parametrize("interval", [0.01, 0.008])
+def test_sensor_rates_need_not_divide_rate_of_recording(scene, interval):
+    assert PlantRows(scene, interval).interval == interval
+
+
+def test_command_validates_log_with_sensors(tmp_path):
+    path, out = tmp_path / "flown.mcap", tmp_path / "errors.json"
+    calm = ["--set", "effects.random_wind_force.mean=[0.0, 0.0, 0.0]", "--set", "effects.random_wind_force.sigma=0.0"]
+    options = ["--set", "run.duration=15.0", "--set", "success.require=[]", *calm]
+    done = lapwing("run", "delivery_mission", "--mode", "single-process", "--log", path, *options)
+    assert done.returncode == 0, done.stderr
+    done = lapwing("validate", "delivery_mission", path, "--json", out, *calm)
+    assert done.returncode == 0, done.stderr
+    for row in json.loads(out.read_text())["horizons"]:
+        error, baseline = row["position"], row["baselines"]["constant_velocity"]["position"]
+        assert error < 1e-3, row["steps"]
+        assert error < 0.25 * baseline, row["steps"]
