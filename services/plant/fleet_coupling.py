@@ -115,7 +115,9 @@ def _load(
             raise ConfigError(f"{key}.stiffness", message, f"at most {FASTEST:g} rad: a softer cable, or a higher rate")
     field = hooks.all_fields(core.vehicle.effects, shares[owner].parameters.start.vehicle.memory, ZERO)
     method = integrators.get("rk4").Method()
-    plant = LoadPlant(tuple(carriers.values()), field, method, core.step, core.steps, core.interval)
+    plant = LoadPlant(
+        tuple(carriers.values()), field, method, core.step, core.steps, core.interval, core.vehicle.tolerance
+    )
     inputs = tuple(PRESENCE if name == owner else neighbour_port(name, PRESENCE) for name in carriers)
     return {"load": plant, "load_start": start, "load_inputs": inputs}
 

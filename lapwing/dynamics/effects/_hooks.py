@@ -28,6 +28,8 @@ Hooks between evaluations:
     substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
     wrench_and_rate      (e, memory, motion) -> (force_world, torque_body, rate of its memory)    of a stiff effect
                          whose memory is integrated with the motion; the force is that of its wrench
+    switches             (e, memory, motion, t, h) -> bool           True if the loads can jump or have a kink in the
+                         step of h [s] from t [s], at a moment that depends on the motion
     timed_update         (e, memory, t) -> memory                    of an effect that changes at a moment of its own
     break_time           (e, memory, t, h, value) -> the lesser of value and the first time after t [s] at which the
                          loads jump or have a kink: steps, of at most h [s], end and timed updates are made there
@@ -35,8 +37,9 @@ Hooks between evaluations:
     contact_forces       (e, memory, motion) -> ((place [m], force [N]) of each contact point), world
     wind                 (e, memory, wind) -> wind                   [m/s] world, for the log only
 
-While all effects that can sleep are sleeping, steps are taken without them. While a stiff one is awake, steps are taken
-under error control, which includes memories that have a rate (`lapwing.dynamics.vehicles.multirotor_stepper`).
+While all effects that can sleep are sleeping, steps are taken without them. While a stiff one is awake or one switches,
+steps are taken under error control, which includes memories that have a rate
+(`lapwing.dynamics.vehicles.multirotor_stepper`).
 
 The discrete state of an effect is a tuple of floats, at first `initial_discrete_state()` of its parameter class, or ().
 """
@@ -88,6 +91,7 @@ substeps = _hook("substeps")
 contact = _hook("contact")
 contact_forces = _hook("contact_forces")
 is_sleeping = _hook("is_sleeping")
+switches = _hook("switches")
 wind = _hook("wind")
 
 
@@ -229,6 +233,15 @@ all_contact_forces = _written_out(
     "forces",
     default="()",
     more="forces = forces + f{i}(effects[{i}], memory[{i}], motion)",
+)
+all_switches = _written_out(
+    "all_switches",
+    "switches",
+    "motion, t, h",
+    "switching = f{i}(effects[{i}], memory[{i}], motion, t, h)",
+    "switching",
+    default="False",
+    more="switching = switching or f{i}(effects[{i}], memory[{i}], motion, t, h)",
 )
 all_sleeping = _written_out(
     "all_sleeping",

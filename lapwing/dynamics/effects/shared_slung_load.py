@@ -5,13 +5,14 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le, Lt
 
 from lapwing.dynamics.effects._from_scene import checked
-from lapwing.dynamics.effects._hooks import wrench
+from lapwing.dynamics.effects._hooks import switches, wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
-from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable
-from lapwing.kernels import math
+from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable, cable_slackens
+from lapwing.kernels import always_inline, math
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -71,13 +72,25 @@ def fastened(e, memory, own, others, interval):
     return memory
 
 
+@always_inline
+def _with_load(memory, motion, t):
+    """Return the SlungMotion of vehicle and load at t [s]."""
+    place, velocity, acceleration, time = memory
+    ahead = t - time
+    place = add(place, scale(ahead, add(velocity, scale(0.5 * ahead, acceleration))))
+    return SlungMotion(motion, place, add(velocity, scale(ahead, acceleration)))
+
+
 @wrench(SharedSlungLoad)
 def shared_slung_load(e, memory, s, rotors):
     """Return the force [N] of the cable in world coordinates and its torque [N m] in the body."""
-    place, velocity, acceleration, time = memory
-    if time < 0.0:
+    if memory[3] < 0.0:
         return (0.0, 0.0, 0.0), NOTHING
-    ahead = s.t - time
-    place = add(place, scale(ahead, add(velocity, scale(0.5 * ahead, acceleration))))
-    velocity = add(velocity, scale(ahead, acceleration))
-    return cable(e.sling, s.R_world_body, SlungMotion(s.motion, place, velocity))
+    return cable(e.sling, s.R_world_body, _with_load(memory, s.motion, s.t))
+
+
+@switches(SharedSlungLoad)
+def comes_taut_or_slack(e, memory, motion, t, h):
+    """Return True unless the cable stays taut, or the load is unknown."""
+    both = _with_load(memory, motion, t)
+    return memory[3] >= 0.0 and cable_slackens(e.sling, rotation_matrix(motion.attitude), both, h)

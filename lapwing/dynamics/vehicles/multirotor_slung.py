@@ -136,17 +136,35 @@ def accelerations(drive, t, x):
 
 
 @always_inline
-def switches(layout, x, h):
-    """Return True unless the cable stays taut and the load off the ground for h [s]."""
-    sling, v, load = layout.bodies, x.vehicle, x.load_velocity
-    R_world_body = rotation_matrix(v.attitude)
+def slackens(sling, away, speed_away, h):
+    """Return True unless the cable stays taut for h [s]. See `tension` for other arguments."""
+    distance = norm(away)
+    reach = 2.0 * abs(dot(away, speed_away)) / max(distance, sling.length)
+    return distance - sling.length <= reach * (h + sling.damping / sling.stiffness)
+
+
+@always_inline
+def lands(sling, position, velocity, h):
+    """Return True unless the load stays off the ground for h [s]."""
+    height, _ = surface(sling.terrain, position[0], position[1])
+    return position[2] - height <= 2.0 * norm(velocity) * h + CLEARANCE
+
+
+@always_inline
+def cable_slackens(sling, R_world_body, x, h):
+    """Return True unless the cable between vehicle and load stays taut for h [s]."""
+    v = x.vehicle
     away = subtract(x.load_position, add(v.position_world, apply(R_world_body, sling.hook_body)))
     hook_velocity = add(v.velocity_world, apply(R_world_body, cross(v.omega_body, sling.hook_body)))
-    distance = norm(away)
-    reach = 2.0 * abs(dot(away, subtract(load, hook_velocity))) / max(distance, sling.length)
-    height, _ = surface(sling.terrain, x.load_position[0], x.load_position[1])
-    slackens = distance - sling.length <= reach * (h + sling.damping / sling.stiffness)
-    return slackens or x.load_position[2] - height <= 2.0 * norm(load) * h + CLEARANCE
+    return slackens(sling, away, subtract(x.load_velocity, hook_velocity), h)
+
+
+@always_inline
+def switches(layout, x, h):
+    """Return True unless the cable stays taut and the load off the ground for h [s]."""
+    sling = layout.bodies
+    slack = cable_slackens(sling, rotation_matrix(x.vehicle.attitude), x, h)
+    return slack or lands(sling, x.load_position, x.load_velocity, h)
 
 
 FORMS[SlungMotion] = StateForm(motion_of, rate, _itself, accelerations, switches)

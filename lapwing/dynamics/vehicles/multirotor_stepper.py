@@ -200,11 +200,12 @@ def steps(method, drive, x, start, end, h, first, n):
         until = min(stop, end)
         layout, airborne = p.layout, _airborne(p, body, memory, voltage)
         for i in range(first, n):
-            switches = _switches(layout, x, h)
-            if not switches and hooks.all_sleeping(p.effects, memory, motion_of(layout, x), h):
+            seen = motion_of(layout, x)
+            switches = _switches(layout, x, h) or hooks.all_switches(p.effects, memory, seen, start + i * h, h)
+            if not switches and hooks.all_sleeping(p.effects, memory, seen, h):
                 x = _step(method, airborne, start + i * h, x, h)
                 continue
-            if switches or not hooks.all_stiff_sleeping(p.effects, memory, motion_of(layout, x), h):
+            if switches or not hooks.all_stiff_sleeping(p.effects, memory, seen, h):
                 drive = MultirotorDrive(p, body, memory, voltage)
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break

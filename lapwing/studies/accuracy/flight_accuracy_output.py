@@ -84,7 +84,7 @@ def _remedy(result: FlightAccuracy) -> list[str]:
     """Return what to do about a missed accuracy."""
     if result.met:
         return []
-    cause = "solver.step: selected for gentle flight, and this one is not"
+    cause = "solver.step: selected for a less violent flight"
     if not result.step_selected:
         cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
         if not _is_fleet(result):

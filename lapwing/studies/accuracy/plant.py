@@ -8,13 +8,14 @@ import numpy as np
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import integrators
 from lapwing.dynamics.integrators import rkmk54
-from lapwing.dynamics.lie.quaternion import exp
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
 from lapwing.dynamics.noise import Key, stream_key
+from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles import multirotor, multirotor_slung
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, motion_of
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels.codegen import map_index
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
@@ -29,12 +30,39 @@ DURATION = 2.0  # [s], about
 HEIGHT = 20.0  # [m] clear of the ground
 FINEST = 64  # steps in an exchange interval, of the reference; the runs that are compared have half as many at most
 EXTENDED = (multirotor, multirotor_slung)  # forms whose steps can be made in extended precision
+JUMP, JUMPS_APART = 0.02, 0.4  # [s] of a motor at its limit, from one manoeuvre to the next
 TICK = 1000  # of the first exchange, so that random effects have begun
 
 
+Voltages = Callable[[MultirotorParameters, float], tuple[float, ...]]  # [V] of each motor at a time [s]
+
+
+def waves(p: MultirotorParameters, t: float) -> tuple[float, ...]:
+    """Return voltages [V] of a gentle flight: they vary by 2 % about hover. See `jumps` for arguments."""
+    volts = hover_speed(p) / p.layout.speed_per_volt
+    return tuple(volts * (1.0 + 0.02 * math.sin(3.0 * t + 2.4 * i)) for i in range(len(p.layout.x_body)))
+
+
+def jumps(p: MultirotorParameters, t: float) -> tuple[float, ...]:
+    """Return voltages [V] that jump over the whole range, as those of an autopilot whose setpoint jumps.
+
+    Args:
+        p: the multirotor.
+        t: time [s] since the start.
+    """
+    layout = p.layout
+    number, part = divmod(t, JUMPS_APART)
+    axis = (layout.y_body, layout.x_body, layout.reaction_sign)[int(number) % 3]
+    volts = hover_speed(p) / layout.speed_per_volt
+    if part >= 4.0 * JUMP:
+        return (volts,) * len(axis)
+    sign = 1.0 if part < JUMP or part >= 3.0 * JUMP else -1.0
+    return tuple(layout.max_voltage if sign * arm > 0.0 else 0.0 for arm in axis)
+
+
 @always_inline
-def _wave(t: float, volts: float, phase: float) -> float:
-    return volts * (1.0 + 0.02 * math.sin(3.0 * t + phase))
+def _entry(rows: np.ndarray, row: int, i: int) -> float:
+    return rows[row, i]
 
 
 @kernel
@@ -43,30 +71,35 @@ def flight(
     p: MultirotorParameters,
     key: Key,
     state: MultirotorState,
-    volts: tuple[float, ...],
-    phase: tuple[float, ...],
+    voltages: np.ndarray,
     h: float,
     n: int,
     every: int,
     out: np.ndarray,
 ) -> None:
-    """Fly exchanges of n steps of h [s] under waving voltages; a row of `out` for each `every` of them."""
-    tick = TICK
+    """Fly exchanges of n steps of h [s] under the rows of `voltages`; a row of `out` for each `every` of them."""
+    tick = 0
     for row in range(out.shape[0]):
         if row > 0:
             for _ in range(every):
-                state = advance(method, p, key, tick, state, map_tuple(_wave, tick * n * h, volts, phase), h, n)
+                volts = map_index(_entry, p.layout.x_body, voltages, tick)
+                state = advance(method, p, key, TICK + tick, state, volts, h, n)
                 tick += 1
         numbers = flatten(motion_of(p.layout, state.motion))
         for i in range(len(numbers)):
             out[row, i] = numbers[i]
 
 
-def physics(scene: Scene) -> tuple[MultirotorParameters, MultirotorState]:
-    """Return (parameters, initial state) of a scene with a multirotor of one or more bodies, airborne and rotating."""
+def physics(scene: Scene, level: bool = False) -> tuple[MultirotorParameters, MultirotorState]:
+    """Return (parameters, initial state) of a scene with a multirotor of one or more bodies, airborne.
+
+    Args:
+        scene: such a scene.
+        level: start level without rotation; otherwise tilted and rotating.
+    """
     form, p = model(scene).described(scene)
-    start = ((0.0, 0.0, HEIGHT), exp((0.1, -0.15, 0.3)), hover_speed(p), (3.0, 1.0, -0.5), (0.4, -0.6, 0.3))
-    state = form.initial_state(p, *start)
+    attitude, omega_body = (NO_ROTATION, ZERO) if level else (exp((0.1, -0.15, 0.3)), (0.4, -0.6, 0.3))
+    state = form.initial_state(p, (0.0, 0.0, HEIGHT), attitude, hover_speed(p), (3.0, 1.0, -0.5), omega_body)
     if form is multirotor_slung:  # stretched by the load: the cable stays taut, and no step is split
         sling, (x, y, z) = p.layout.bodies, state.motion.load_position
         load = (x, y, z - sling.load_mass * gravity(scene) / sling.stiffness)
@@ -85,22 +118,22 @@ def longest_step(scene: Scene) -> float:
     return result(scene) if result else math.inf
 
 
-def problem(scene: Scene) -> Problem:
-    """Return the plant of such a scene as a problem with its solver methods."""
+def problem(scene: Scene, manoeuvre: Voltages = waves) -> Problem:
+    """Return the plant of such a scene, under the voltages of a manoeuvre, as a problem with its solver methods."""
     exchange = scene[Communication]
-    (p, state), longest = physics(scene), longest_step(scene)
+    (p, state), longest = physics(scene, manoeuvre is jumps), longest_step(scene)
     form = model(scene).described(scene)[0]
     motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
-    volts = (hover_speed(p) / p.layout.speed_per_volt,) * len(motion.rotor_speed)
-    phase = tuple(2.4 * i for i in range(len(volts)))
     every = max(1, round(DURATION * exchange.rate / SAMPLES))
     duration = SAMPLES * every * exchange.interval
+    start = 0 if manoeuvre is jumps else TICK
+    voltages = np.array([manoeuvre(p, (start + i) * exchange.interval) for i in range(SAMPLES * every)])
     key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
 
     def flight_of(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         out = np.empty((rows, len(flatten(motion))))
         token, h = method.Method(), exchange.interval / steps
-        return lambda: (flight(token, p, key, state, volts, phase, h, steps, every, out), out)[1]
+        return lambda: (flight(token, p, key, state, voltages, h, steps, every, out), out)[1]
 
     def way(name: str) -> SolverMethod:
         method = integrators.get(name)
@@ -117,8 +150,7 @@ def problem(scene: Scene) -> Problem:
             count = round(exchange.interval / step)
             fly, h = extended(advance), Number(exchange.interval / count)
             x, numbers = in_extended_precision(state), in_extended_precision(p)
-            for tick in range(TICK, TICK + SAMPLES * every):
-                voltage = map_tuple(_wave, tick * count * float(h), volts, phase)
+            for tick, voltage in enumerate(map(tuple, voltages.tolist()), TICK):
                 x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)
             return extended_coordinates(motion, extended(motion_of)(numbers.layout, x.motion))
 
@@ -129,7 +161,7 @@ def problem(scene: Scene) -> Problem:
         )  # fmt: skip
 
     return Problem(
-        f"{scene.name}: its multirotor in the air under prescribed voltages",
+        f"{scene.name}: its multirotor in the air under {'jumping' if manoeuvre is jumps else 'prescribed'} voltages",
         "s",
         duration,
         [way(name) for name in integrators.compatible_methods(p, state.motion)],

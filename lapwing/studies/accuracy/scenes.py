@@ -25,9 +25,18 @@ def problem(scene: Scene) -> Problem:
     Raises:
         ValueError: its model is none that this study knows how to integrate.
     """
+    return manoeuvres(scene)[0]
+
+
+def manoeuvres(scene: Scene) -> list[Problem]:
+    """Return the problems that a solver of the scene is selected by: the one to compare integrators on is the first.
+
+    Raises:
+        ValueError: see `problem`.
+    """
     if hasattr(plant.model(scene), "described"):
-        return plant.problem(scene)
-    return _marched(scene, *physics(scene))
+        return [plant.problem(scene), plant.problem(scene, plant.jumps)]
+    return [_marched(scene, *physics(scene))]
 
 
 def physics(scene: Scene) -> tuple[Any, Any]:

@@ -1,16 +1,20 @@
-"""The load that vehicles of a fleet carry together: a point mass under the pull of their cables."""
+"""The load that vehicles of a fleet carry together: a point mass under the pull of their cables.
+
+While a cable can come taut or slack, or the load touches the ground, steps are under error control.
+"""
 
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
-from lapwing.dynamics.integrators import RATES, integrate_fixed
+from lapwing.dynamics.integrators import RATES, StepDoubling, integrate_step_doubling
+from lapwing.dynamics.integrators import step as step_of_method
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
-from lapwing.dynamics.vehicles.multirotor_slung import Sling, load_acceleration, tension
-from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import map_tuple
+from lapwing.dynamics.vehicles.multirotor_slung import Sling, lands, load_acceleration, slackens, tension
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_tuple, reduce_tuple
 from lapwing.services.common.ports import BodyMotions
 
 
@@ -23,6 +27,7 @@ class LoadPlant(NamedTuple):
     step: float  # [s]
     steps: int  # of a tick
     interval: float  # [s] a tick
+    tolerance: float  # of a part of a step while forces switch, relative to 1 + size
 
 
 class LoadMotion(NamedTuple):
@@ -41,14 +46,28 @@ class LoadDrive(NamedTuple):
 
 
 @always_inline
-def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
-    """Return the force [N] of a cable on its hook, whose acceleration is constant over the step."""
-    x, ahead = c
+def _from_hook(x: LoadMotion, ahead: float, carrier: NeighbourState) -> LoadMotion:
+    """Return the load's motion relative to a hook with a constant acceleration."""
     velocity = add(carrier.hook_velocity, scale(ahead, carrier.hook_acceleration))
     way = scale(ahead, add(carrier.hook_velocity, scale(0.5 * ahead, carrier.hook_acceleration)))
     hook = add(carrier.hook_world, way)
-    force, _ = tension(sling, subtract(x.load_position, hook), subtract(x.load_velocity, velocity))
+    return LoadMotion(subtract(x.load_position, hook), subtract(x.load_velocity, velocity))
+
+
+@always_inline
+def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
+    """Return the force [N] of a cable on its hook."""
+    x, ahead = c
+    away, speed_away = _from_hook(x, ahead, carrier)
+    force, _ = tension(sling, away, speed_away)
     return force
+
+
+@always_inline
+def _slackens(c: Any, before: bool, sling: Sling, carrier: NeighbourState) -> bool:
+    x, ahead, h = c
+    away, speed_away = _from_hook(x, ahead, carrier)
+    return before or slackens(sling, away, speed_away, h)
 
 
 @always_inline
@@ -71,6 +90,26 @@ RATES[LoadDrive] = rate
 
 
 @always_inline
+def _switches(p: LoadDrive, t: float, x: LoadMotion, h: float) -> bool:
+    """Return True unless all cables stay taut and the load off the ground for h [s]."""
+    landing = lands(p.load.slings[0], x.load_position, x.load_velocity, h)
+    return reduce_tuple(_slackens, (x, t - p.start, h), landing, p.load.slings, p.carriers)
+
+
+@kernel
+def moved(p: LoadDrive, x: LoadMotion) -> LoadMotion:
+    """Return the motion of the load a communication step later."""
+    load = p.load
+    for i in range(load.steps):
+        t = p.start + i * load.step
+        if _switches(p, t, x, load.step):
+            exact = StepDoubling(load.method, load.tolerance)
+            return integrate_step_doubling(exact, p, t, x, load.step, p.start + load.interval)
+        x = step_of_method(load.method, p, t, x, load.step)
+    return x
+
+
+@always_inline
 def _presence(_: float, received: InputSample, same: InputSample) -> NeighbourState:
     return received.value
 
@@ -83,7 +122,7 @@ def step(
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
         drive = LoadDrive(p, map_tuple(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
-        x = integrate_fixed(p.method, drive, drive.start, x, p.step, p.steps)
+        x = moved(drive, x)
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))
     place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)

@@ -46,9 +46,19 @@ def measured(monkeypatch, tmp_path):
 def test_scene_that_lands_gets_share_for_impacts(overrides, step, measured, monkeypatch):
     """An impact amplifies errors of the flight before it; an integrator that cannot reach the share meets the rest."""
     points = [Point("rkmk2", 2, "s", 0.002, 9e-4, 1e-5, 1, {}), Point("rk4", 4, "s", 0.004, 2e-6, 1.5e-5, 1, {})]
-    monkeypatch.setattr(solver_selection, "measure", lambda problem: points)
+    exact = [p._replace(error=1e-9) for p in points]
+    monkeypatch.setattr(solver_selection, "measure", lambda problem: exact if "jumping" in problem.title else points)
     result = solver_selection.overrides(load(ROOT / "lapwing/scenes/hover.toml", overrides), lambda text: None)
     assert result[1] == f"solver.step={step!r}"
+
+
+@pytest.mark.parametrize(("accuracy", "step"), [(1e-3, 0.004), (5e-4, 0.002), (1e-4, 0.002)])
+def test_voltages_that_jump_count_with_their_share(accuracy, step, measured, monkeypatch):
+    gentle = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]
+    jumping = [p._replace(error=error) for p, error in zip(gentle, (8e-5, 5e-6, 3e-7), strict=True)]
+    monkeypatch.setattr(solver_selection, "measure", lambda problem: jumping if "jumping" in problem.title else gentle)
+    scene = load(ROOT / "lapwing/scenes/hover.toml", [f"solver.accuracy={accuracy}"])
+    assert solver_selection.overrides(scene, lambda text: None)[1] == f"solver.step={step!r}"
 
 
 @pytest.mark.parametrize(
@@ -126,7 +136,7 @@ def test_measured_in_earnest_on_scene(monkeypatch, tmp_path):
     monkeypatch.setattr(integrate.integrators, "compatible_methods", lambda p, x: few)
     path = scene(tmp_path, "accuracy = 1e-6")
     result = solver_selection.overrides(load(path), lambda text: None)
-    points = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())
+    (points,) = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())
     (chosen,) = [p for p in points if result == [f'solver.integrator="{p["way"]}"', f"solver.step={p['setting']!r}"]]
     assert chosen["error"] <= 1e-6
     assert chosen["time"] == min(p["time"] for p in points if p["error"] <= 1e-6)
