@@ -70,9 +70,9 @@ def item_message(items: Sequence[Any], number: int, target: int, seq: int, open_
         seq: number that the firmware asks for.
         open_value: replaces NaN in the parameters.
     """
+    parameters: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     if number < 0:
         frame, command, place = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, mavlink.MAV_CMD_NAV_WAYPOINT, (0, 0, 0.0)
-        parameters = (0.0, 0.0, 0.0, 0.0)
     else:
         item = items[number]
         frame, command, place = item.frame, item.command, (item.x, item.y, item.z)
