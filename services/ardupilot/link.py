@@ -160,6 +160,8 @@ class ArduPilotLink:
             if size < 0 and self._again:
                 self._again = False
                 self._send()
+            elif size < 0 and self._client:
+                self._client.read()  # ArduPilot waits for a connection before it starts again
         self._shared.outputs[:] = [throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS]]
 
     def cpu(self) -> float:
@@ -218,13 +220,9 @@ class ArduPilotLink:
         if meaning is Frame.RESENT:
             self._again = True
             return
-        self._rate(packet.frame_rate)
+        if packet.frame_rate <= LOOP_RATE:  # a rate that ArduPilot cannot keep
+            self.report.note(f"SIM_RATE_HZ is {packet.frame_rate}; set it above the loop rate of {LOOP_RATE} Hz")
         self._packet = packet
-
-    def _rate(self, rate: int) -> None:
-        """Warn of a loop rate that ArduPilot cannot keep."""
-        if rate <= LOOP_RATE:
-            self.report.note(f"SIM_RATE_HZ is {rate}; set it above the loop rate of {LOOP_RATE} Hz")
 
     def _reject(self, text: str) -> None:
         self.report.rejected += 1

@@ -13,12 +13,8 @@ from contextlib import suppress
 
 from lapwing.services.betaflight import boot, msp
 from lapwing.services.betaflight.clock import slow_down
-from lapwing.services.betaflight.packets import (
-    Ports,
-    parse_motors,
-    rc_packet,
-    state_packet,
-)
+from lapwing.services.betaflight.pace import Pace
+from lapwing.services.betaflight.packets import Ports, parse_motors, rc_packet, state_packet
 from lapwing.services.betaflight.pilot import OFF, Pilot, Sticks
 from lapwing.services.betaflight.resolve import PilotSetup
 from lapwing.services.betaflight.state_source import StateSource
@@ -33,8 +29,6 @@ RC_EVERY = 0.01  # [s]
 STARTS = 3  # starts of the program while it does not receive RC channels
 STATUS_EVERY = 0.2  # [s]
 RUNNING = 0.02  # motor output of an armed vehicle, at least
-LATE = 1.0  # ticks after its time at which a packet counts as late
-FASTEST = 0.8  # shortest fraction of a tick between two packets
 REPLY = 0.05  # [s] that the firmware has for its motor outputs; the simulation waits for them
 FORGOTTEN = 1.0  # [s] of silence after which another firmware may take over
 
@@ -55,8 +49,8 @@ class BetaflightLink:
         self._outputs: tuple[float, ...] = (0.0,) * 4
         self._sender: tuple[str, int] | None = None  # of the motor outputs
         self._armed = False
-        self._next = self._sent = self._heard = 0.0  # [s] of the wall clock
-        self._intervals = [0.0, 0.0, 0.0]  # count, sum [s], sum of squares [s^2] of the time between packets
+        self._heard = 0.0  # [s] of the wall clock
+        self._pace = Pace(self.report)
         self._clock_rate = pilot.clock_rate
         self._stamp = TIME  # [s] in all packets
         self._rate = 1.0  # of the firmware's clock
@@ -115,7 +109,7 @@ class BetaflightLink:
         t = tick * interval
         motion = self._source.update(t, read)
         self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), motion)
-        self._pace(interval / self._rate)
+        self._pace.wait(interval / self._rate, self._rate)
         self._drain(0.0)  # what has come since the last reply is older than this tick
         if t >= self._rc_at + RC_EVERY:
             self._rc_at = t
@@ -143,26 +137,6 @@ class BetaflightLink:
         if self._program:
             self._program.close()
         self._program = self._msp = self._socket = None
-
-    def _pace(self, interval: float) -> None:
-        """Wait for the time of the packet, `interval` [s] of wall time after the last, and count its lateness."""
-        now = time.monotonic()
-        if self._sent == 0.0:
-            self._next = now
-        if now < self._next:
-            time.sleep(self._next - now)
-            now = time.monotonic()
-        if now - self._next > LATE * interval:
-            self.report.late += 1
-        self.report.skew_max = max(self.report.skew_max, self._rate * (now - self._next))
-        if self._sent > 0.0:
-            gap = now - self._sent
-            n, total, squares = self._intervals
-            self._intervals = [n + 1, total + gap, squares + gap * gap]
-            mean = self._intervals[1] / self._intervals[0]
-            self.report.jitter = math.sqrt(max(0.0, self._intervals[2] / self._intervals[0] - mean * mean))
-        self._sent = now
-        self._next = max(self._next + interval, now + FASTEST * interval)
 
     def _send(self, sticks: Sticks | None) -> None:
         assert self._socket is not None

@@ -1,6 +1,5 @@
 """TCP server of PX4's simulator interface: one firmware at a time, which may come back."""
 
-import contextlib
 import select
 import socket
 
@@ -68,15 +67,17 @@ class Connection:
         self._poll.register(self._peer, select.POLLIN)
         return True
 
-    def refuse_others(self) -> None:
-        """Close the connection of a second firmware, unless the first one has gone."""
+    def refuse_others(self) -> bool:
+        """Close the connection of a second firmware, unless the first one has gone. Return True if one came."""
         if self._peer is None or self._gone(self._peer):
-            return
+            return False
         self._server.settimeout(0.0)
-        with contextlib.suppress(OSError):
-            other, _ = self._server.accept()
-            other.close()
-            self.refused += 1
+        try:
+            self._server.accept()[0].close()
+        except OSError:
+            return False
+        self.refused += 1
+        return True
 
     def send_sensors(self, time_us: int, sensors: Sensors) -> None:
         """Send HIL_SENSOR; it is lost if the firmware has gone."""

@@ -147,7 +147,8 @@ class Px4Link:
         assert self._vehicle is not None
         if self._time >= self._others_at:
             self._others_at = self._time + OTHERS_EVERY
-            self._look_for_others()
+            if link.refuse_others():
+                self.report.note(f"a second PX4 tried to connect at t = {self._time:.3f} s")
         self.report.rejected = link.rejected + link.refused
         result = self._vehicle.poll(self._time, read)
         self.report.version = self._vehicle.version
@@ -226,14 +227,6 @@ class Px4Link:
                 self.report.missed += 1
                 self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are held")
         return result
-
-    def _look_for_others(self) -> None:
-        link = self._connection
-        assert link is not None
-        before = link.refused
-        link.refuse_others()
-        if link.refused > before:
-            self.report.note(f"a second PX4 tried to connect at t = {self._time:.3f} s")
 
     def _patience(self, timeout: float) -> Patience:
         return Patience(timeout, self._program.pid if self._program else None)

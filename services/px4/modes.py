@@ -2,7 +2,7 @@
 
 import math
 
-from lapwing.services.common.firmware.mission_client import Conventions
+from lapwing.services.common.firmware.conventions import Conventions
 from lapwing.services.px4.failsafe_events import failsafe_text
 
 MAIN = {

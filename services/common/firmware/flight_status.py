@@ -36,6 +36,6 @@ class FlightStatus:
             client.landed and not running,
             client.stage is Stage.FINISHED,
             client.mode,
-            client.failsafe if client.armed else "",
-            tuple(client.blockers),
+            client.texts.failsafe if client.armed else "",
+            tuple(client.texts.blockers),
         )

@@ -4,15 +4,16 @@ It is polled from the lock step and never waits. All its times are simulation ti
 speed of the run. Source: MAVLink guide, "Mission Protocol", "Parameter Protocol", "Command Protocol".
 """
 
-import math
-import re
-import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum, auto
-from typing import Any, NamedTuple
+from typing import Any
 
+from lapwing.services.common.firmware.conventions import Conventions
 from lapwing.services.common.firmware.frame_filter import FrameFilter
 from lapwing.services.common.firmware.mavlink_transport import Transport
+from lapwing.services.common.firmware.mission import item_message, result_name
+from lapwing.services.common.firmware.parameter_client import ParameterClient
+from lapwing.services.common.firmware.status_texts import StatusTexts
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import saturated
 
@@ -21,10 +22,7 @@ RETRY = 1.0  # [s] until an unanswered message is sent again
 POLL_EVERY = 0.1  # [s] between two looks at the link
 REJECTIONS = 20  # uploads, one per second, after which the mission is wrong
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
-BLOCKERS = 5  # last status texts kept while arming is rejected
 EVENT = 410  # message id; pymavlink has no constant for it
-ACTIVATED = "Failsafe activated"  # status text beside an event that names cause and action
-FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNORECASE)  # in status texts
 NEEDED = (  # messages with a handler
     mavlink.MAVLINK_MSG_ID_HEARTBEAT,
     mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
@@ -38,14 +36,6 @@ NEEDED = (  # messages with a handler
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     EVENT,
 )
-INTEGERS = {  # `struct` format by MAV_PARAM_TYPE
-    mavlink.MAV_PARAM_TYPE_UINT8: "<Bxxx",
-    mavlink.MAV_PARAM_TYPE_INT8: "<bxxx",
-    mavlink.MAV_PARAM_TYPE_UINT16: "<Hxx",
-    mavlink.MAV_PARAM_TYPE_INT16: "<hxx",
-    mavlink.MAV_PARAM_TYPE_UINT32: "<I",
-    mavlink.MAV_PARAM_TYPE_INT32: "<i",
-}
 
 
 class Stage(Enum):
@@ -59,17 +49,6 @@ class Stage(Enum):
     FINISHED = auto()
 
 
-class Conventions(NamedTuple):
-    """Differences between firmwares."""
-
-    mission_mode: tuple[float, float]  # parameters 2 and 3 of MAV_CMD_DO_SET_MODE
-    home_first: bool  # item 0 of a mission is the home position
-    open_value: float  # replaces NaN in the parameters of an item
-    bytewise: bool  # integer parameters keep their bytes in the float field
-    mode_name: Callable[[int], str]  # of a heartbeat's custom_mode
-    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # of a failsafe's EVENT, "" for others
-
-
 class MissionClient:
     """Uploads a mission, arms, and follows the flight.
 
@@ -78,9 +57,7 @@ class MissionClient:
         armed: state of the last heartbeat.
         landed: state of the last EXTENDED_SYS_STATE.
         mode: name of the flight mode.
-        text: last status text of the level error or worse.
-        failsafe: last event or status text about a failsafe since arming.
-        blockers: status texts since arming was rejected.
+        texts: status texts and events.
         error: reason why the flight is impossible, "" as long as it is possible.
         version: of the firmware, "" until it reports it.
         next_poll: [s] simulation time.
@@ -109,17 +86,14 @@ class MissionClient:
 
     def _begin(self) -> None:
         """Forget the firmware."""
-        self._parameters = dict(self._wanted)
-        self._types: dict[str, int] = {}
+        self._parameters = ParameterClient(self._wanted, self._conventions.bytewise)
         self._target = 0  # system id of the firmware
         self._sent = -1.0  # [s] of the last request
         self._in_mode = False
         self._rejections = 0
         self.stage = Stage.CONNECTING
-        self.armed, self.landed, self.mode, self.text, self.error = False, True, "", "", ""
-        self.failsafe = ""
-        self._has_event = False  # an event has named a failsafe
-        self.blockers: list[str] = []
+        self.armed, self.landed, self.mode, self.error = False, True, "", ""
+        self.texts = StatusTexts()
         self.reached = -1
 
     def restart(self) -> None:
@@ -183,11 +157,10 @@ class MissionClient:
     def _request(self) -> None:
         """Send what the stage needs next."""
         if self.stage is Stage.PARAMETERS:
-            if not self._parameters:
+            if message := self._parameters.request(self._target):
+                self._send(message)
+            else:
                 self._advance(Stage.UPLOADING if self._items else Stage.FLYING)
-                return
-            name, value = next(iter(self._parameters.items()))
-            self._send(self._parameter(name, value))
         elif self.stage is Stage.UPLOADING:
             count = len(self._items) + self._conventions.home_first
             self._send(mavlink.MAVLink_mission_count_message(self._target, 1, count))
@@ -202,15 +175,6 @@ class MissionClient:
     def _command(self, command: int, *parameters: float) -> None:
         padded = (*parameters, *(0.0,) * (7 - len(parameters)))
         self._send(mavlink.MAVLink_command_long_message(self._target, 1, command, 0, *padded))
-
-    def _parameter(self, name: str, value: float) -> Any:
-        """Return the message that sets a parameter, or reads its type first."""
-        kind = self._types.get(name)
-        if kind is None:
-            return mavlink.MAVLink_param_request_read_message(self._target, 1, name.encode(), -1)
-        if self._conventions.bytewise and kind in INTEGERS:
-            value = struct.unpack("<f", struct.pack(INTEGERS[kind], round(value)))[0]
-        return mavlink.MAVLink_param_set_message(self._target, 1, name.encode(), value, kind)
 
     def _handle(self, message: Any) -> None:
         handler = getattr(self, f"_on_{message.get_type().lower()}", None)
@@ -229,8 +193,7 @@ class MissionClient:
         was, self.armed = self.armed, bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._conventions.mode_name(message.custom_mode)
         if self.armed and self.stage is Stage.ARMING:
-            self.blockers.clear()
-            self.failsafe = ""
+            self.texts.arm()
             self._advance(Stage.FLYING)
         if was and not self.armed and self.stage is Stage.FLYING:
             self._advance(Stage.FINISHED)
@@ -243,30 +206,14 @@ class MissionClient:
         self.landed = message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
 
     def _on_param_value(self, message: Any) -> None:
-        name = message.param_id
-        if name not in self._parameters:
-            return
-        value, desired = message.param_value, self._parameters[name]
-        if self._conventions.bytewise and message.param_type in INTEGERS:
-            value = struct.unpack(INTEGERS[message.param_type], struct.pack("<f", value))[0]
-        if abs(value - desired) <= 1e-6 * max(1.0, abs(desired)):
-            del self._parameters[name]
-        self._types[name] = message.param_type
-        self._sent = -1.0
+        if self._parameters.receive(message):
+            self._sent = -1.0
 
     def _on_mission_request(self, message: Any) -> None:
         number = message.seq - self._conventions.home_first
         if self.stage is not Stage.UPLOADING or not -1 <= number < len(self._items):
             return
-        item = self._items[max(number, 0)]
-        requested = (item.param1, item.param2, item.param3, item.param4)
-        parameters = (self._conventions.open_value if math.isnan(value) else value for value in requested)
-        fields = (item.frame, item.command, 0, 1, *parameters)
-        place = (item.x, item.y, item.z)
-        if number < 0:
-            frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
-            fields, place = (frame, mavlink.MAV_CMD_NAV_WAYPOINT, 0, 1, 0.0, 0.0, 0.0, 0.0), (0, 0, 0.0)
-        self._send(mavlink.MAVLink_mission_item_int_message(self._target, 1, message.seq, *fields, *place))
+        self._send(item_message(self._items, number, self._target, message.seq, self._conventions.open_value))
 
     _on_mission_request_int = _on_mission_request
 
@@ -278,7 +225,7 @@ class MissionClient:
             return
         self._rejections += 1  # ArduPilot has no space for a mission until it has started
         if self._rejections > REJECTIONS:
-            self.error = f"the mission is rejected ({_name('MAV_MISSION_RESULT', message.type)}) {self.text}".rstrip()
+            self.error = f"the mission is rejected ({result_name(message.type)}) {self.texts.error}".rstrip()
 
     def _on_mission_item_reached(self, message: Any) -> None:
         self.reached = message.seq - self._conventions.home_first
@@ -295,19 +242,8 @@ class MissionClient:
     def _on_event(self, message: Any) -> None:
         text = self._conventions.event_text(message.id, bytes(message.arguments))
         if self.armed and text:
-            self.failsafe, self._has_event = text, True
+            self.texts.add_event(text)
 
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
-        if message.severity <= mavlink.MAV_SEVERITY_ERROR:
-            self.text = text
-        if self.armed and FAILSAFE.search(text) and not (self._has_event and text.startswith(ACTIVATED)):
-            self.failsafe = text
-        if self.stage is Stage.ARMING and message.severity <= mavlink.MAV_SEVERITY_WARNING:
-            self.blockers = [*[old for old in self.blockers if old != text], text][-BLOCKERS:]
-
-
-def _name(enum: str, value: int) -> str:
-    """Return the name of an enum's value without the enum's name."""
-    entry = mavlink.enums[enum].get(value)
-    return entry.name.lower() if entry else str(value)
+        self.texts.add(text, message.severity, self.armed, self.stage is Stage.ARMING)

@@ -174,6 +174,27 @@ def test_restarted_firmware_with_new_address_takes_over(link):
     assert states[0]["timestamp"][0] >= 0.004 - 1e-6  # the plant goes on where it was
 
 
+def test_restarted_firmware_is_connected_to_before_its_first_frame(link):
+    """ArduPilot starts only once a client has connected to its first MAVLink port, also when it starts again."""
+
+    def script(peer):
+        peer.exchange()
+        peer.exchange()
+        peer.close()
+        with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE * link._setup.instance)) as server:
+            server.settimeout(20.0)
+            with server.accept()[0]:
+                other = ArduPilotPeer(link.address[1])
+                return [other.exchange() for _ in range(3)]
+
+    link._setup = link._setup._replace(step_timeout=15.0)
+    background = begun(link, script)
+    fly(link, 4)
+    link._send()
+    background.join()
+    assert link.report.reconnected == 1
+
+
 def test_stall_is_named(link):
     link._setup = link._setup._replace(step_timeout=0.5)
     background = begun(link, lambda peer: peer.exchange())

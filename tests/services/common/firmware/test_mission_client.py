@@ -143,10 +143,10 @@ def test_refused_arming_is_tried_again_and_blockers_are_named():
     vehicle = Vehicle(refusals=3)
     client = make(vehicle)
     fly(vehicle, client, 2.5)
-    assert client.blockers == ["Preflight Fail: no position"]
+    assert client.texts.blockers == ["Preflight Fail: no position"]
     fly(vehicle, client, 10.0, 2.5)
     assert client.stage is Stage.FLYING
-    assert client.blockers == []
+    assert client.texts.blockers == []
 
 
 def test_mission_without_space_is_tried_again():
@@ -204,7 +204,7 @@ def test_event_names_cause_and_action_of_failsafe():
     vehicle.tell(mavlink.MAVLink_statustext_message(2, b"Failsafe activated\t"))
     vehicle.tell(event(0, 0, (1 << 24) + 961599, 30_100, 8, 0x66, (0,) * 40))  # about sticks
     client.poll(3.5)
-    assert client.failsafe == "low battery: return"
+    assert client.texts.failsafe == "low battery: return"
 
 
 def test_other_components_are_ignored():

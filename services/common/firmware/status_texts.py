@@ -1,0 +1,43 @@
+"""Status texts and events of a firmware: its last error, failsafe, and reasons against arming."""
+
+import re
+
+from lapwing.services.common.mavlink.dialect import mavlink
+
+BLOCKERS = 5  # last status texts kept while arming is rejected
+ACTIVATED = "Failsafe activated"  # status text beside an event that names cause and action
+FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNORECASE)  # in status texts
+
+
+class StatusTexts:
+    """What a firmware has said since it started.
+
+    Attributes:
+        error: last status text of the level error or worse.
+        failsafe: last event or status text about a failsafe since arming.
+        blockers: status texts since arming was rejected.
+    """
+
+    def __init__(self) -> None:
+        """Create it without texts."""
+        self.error = self.failsafe = ""
+        self.blockers: list[str] = []
+        self._has_event = False  # an event has named a failsafe
+
+    def arm(self) -> None:
+        """Forget what was said before arming."""
+        self.failsafe = ""
+        self.blockers.clear()
+
+    def add_event(self, text: str) -> None:
+        """Take in the text of an event about a failsafe."""
+        self.failsafe, self._has_event = text, True
+
+    def add(self, text: str, severity: int, armed: bool, is_arming: bool) -> None:
+        """Take in a status text of a MAV_SEVERITY."""
+        if severity <= mavlink.MAV_SEVERITY_ERROR:
+            self.error = text
+        if armed and FAILSAFE.search(text) and not (self._has_event and text.startswith(ACTIVATED)):
+            self.failsafe = text
+        if is_arming and severity <= mavlink.MAV_SEVERITY_WARNING:
+            self.blockers = [*[old for old in self.blockers if old != text], text][-BLOCKERS:]
