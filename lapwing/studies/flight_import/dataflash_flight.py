@@ -79,7 +79,7 @@ def read_dataflash_flight(path: Path) -> Recording:
 @contextmanager
 def _opened(kind: type, path: Path) -> Iterator[Any]:
     """Yield a reader of pymavlink, and close its file, also if its constructor fails after opening it."""
-    reader = kind.__new__(kind)
+    reader: Any = object.__new__(kind)
     try:
         reader.__init__(str(path))
         yield reader
