@@ -194,6 +194,7 @@ def bare_steps(p, m, h, n):
     return m
 
 
+@pytest.mark.long
 def test_effects_that_are_off_leave_every_bit():
     """The plant with the whole catalogue installed against a kernel that knows of no effects at all."""
     state = fly({"gravity": {}, "rotor_thrust": {}}, RK4)

@@ -4,9 +4,12 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 LAPWING = Path(sys.executable).with_name("lapwing")
 
 
+@pytest.mark.long
 def test_working_directory_does_not_shadow_packages(tmp_path):
     for name in ("messages", "services", "lapwing", "numpy"):
         (tmp_path / name).mkdir()

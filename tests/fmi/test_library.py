@@ -15,6 +15,8 @@ from lapwing.fmi.library import export_library
 from lapwing.fmi.native_build import NATIVE, compiler
 from lapwing.kernels.row_packing import row_width
 
+pytestmark = pytest.mark.long
+
 SHORT = {"run.duration": 6.0, "success.require": "[]"}
 SCENES = ["delivery_mission", "carried_load", "fleet", "os4_hover", "unload", "hexacopter"]
 VOID = ctypes.c_void_p
@@ -76,7 +78,6 @@ def hover(tmp_path_factory: pytest.TempPathFactory) -> tuple[NativePart, Recorde
     return built(tmp_path_factory.mktemp("hover"), "hover", "plant", **SHORT)
 
 
-@pytest.mark.long
 def test_command_exports_library_with_recorded_bits(tmp_path: Path) -> None:
     arguments = ["hover", "--part", "plant", "--cpu", "x86-64-v2", "--out", str(tmp_path), "--set", "run.duration=2.0"]
     done = subprocess.run(
@@ -272,7 +273,6 @@ def test_invalid_export_is_rejected_in_one_line(arguments: list[str], message: s
     assert not out.exists() or not any(out.iterdir())
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("part", ["plant", "vehicle"])
 @pytest.mark.parametrize(
     "scene", ["delivery_mission", "carried_load", "fleet", "os4_hover", "unload", "gyrostat_chaotic"]
@@ -283,7 +283,6 @@ def test_scene_has_bits_of_its_run(scene: str, part: str, tmp_path: Path) -> Non
     assert native.call("missed")(native.instance) == 0
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("part", ["sensors", "autopilot"])
 def test_part_of_mission_has_bits_of_its_run(part: str, tmp_path: Path) -> None:
     native, recorded = built(tmp_path, "delivery_mission", part)

@@ -33,6 +33,7 @@ def _run(package):
     return json.loads(out), errors.splitlines()
 
 
+@pytest.mark.long
 def test_unknown_numba_compiles_with_equal_results(package):
     known, no_lines = _run(package)
     (package.folder / "sitecustomize.py").write_text(UNKNOWN)

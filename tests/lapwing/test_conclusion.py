@@ -97,6 +97,7 @@ def test_end_of_run_reads_all_topics_that_it_shows(tmp_path, scene):
     assert str(metrics(part)) == str(metrics(whole))  # as texts: some are NaN
 
 
+@pytest.mark.long
 def test_run_that_ends_in_failsafe_fails(lapwing):
     fault = 'sensors.gps.faults=[{kind="dropout", start=5.0}]'
     code, out, err = lapwing("run", "delivery_mission", "--mode", "single-process", "--json", "a.json", *sets(fault))

@@ -50,6 +50,7 @@ def test_env_checker_passes_without_warning(task):
     assert np.isfinite([space.low, space.high]).all()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("task", TASKS)
 def test_observations_stay_within_bounds_under_random_actions(task):
     environments, random = many(task, 20), np.random.default_rng(4)

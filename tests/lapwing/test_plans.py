@@ -50,6 +50,7 @@ def test_plan_of_one_vehicle_does_not_change_others():
         assert (flown.view(f"{name}/ground_truth").position == without.view(f"{name}/ground_truth").position).all()
 
 
+@pytest.mark.long
 def test_impact_on_slope_is_no_motor_failure(tmp_path):
     command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--plan", PLAN, "--speed", "max"]
     command += ["--mode", "single-process", "--log", str(tmp_path / "flown.mcap")]

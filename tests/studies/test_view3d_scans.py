@@ -13,6 +13,8 @@ from lapwing.studies.view3d import headless as chromium
 from lapwing.studies.view3d.recording import page
 from lapwing.studies.view3d.scans import FEWEST, ScanPoints, scans
 
+pytestmark = pytest.mark.long
+
 RINGS = {"sensors.lidar.rings": 6, "sensors.lidar.elevation_min_deg": -40.0, "sensors.lidar.columns": 90}
 SCENE = {
     "environment.terrain.box": "[{position=[6.0,0.0],size=[2.0,4.0],top=9.0}]",
@@ -75,7 +77,6 @@ def test_points_of_long_recording_are_few(log):
     assert scans(flight, np.array([2.0]), 3000)[0].times == pytest.approx([2.0])
 
 
-@pytest.mark.long
 def test_flight_in_memory_has_points():
     box = [{"position": [6.0, 0.0], "size": [2.0, 4.0], "top": 9.0}]
     overrides = {"run.duration": 2.0, "sensors.lidar.preset": "ideal", "success.require": []}
@@ -100,7 +101,6 @@ def test_cloud_is_sent_once_for_each_scan(log):
     assert scene.nodes["/lidar"].visible
 
 
-@pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_browser_shows_points_and_hides_their_layer(log, tmp_path):
     pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")

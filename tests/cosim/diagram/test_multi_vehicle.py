@@ -21,6 +21,8 @@ from tests.cosim.parts.signals import Signals
 from tests.cosim.small_graph import graph_of
 from tests.cosim.test_agreement import fly_apart
 
+pytestmark = pytest.mark.long
+
 WIND = ["effects.random_wind_force.sigma=1.0", "effects.random_wind_force.allow_body_drag=true"]
 SHORT = ["run.duration=1.0", *WIND]
 COMMON = """
@@ -54,7 +56,6 @@ def flown(setup):
     return fly(setup)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("vehicle", ["left", "right", "scout"])
 def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
     alone = fly(member(setup, vehicle))
@@ -67,7 +68,6 @@ def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
     assert [payload for _, payload in alone.payloads("tf")] == transforms[setup.vehicles.index(vehicle) :: 3]
 
 
-@pytest.mark.long
 def test_random_numbers_go_by_vehicle(flown):
     """Two of one type under the same law: what differs beside their place is the wind, drawn for each."""
     left, right = (flown.view(f"{name}/ground_truth").wind for name in ("left", "right"))

@@ -76,6 +76,7 @@ def test_grid_is_slope_that_its_points_are(drone):
     assert ends[0] == pytest.approx(ends[1], abs=1e-9)
 
 
+@pytest.mark.long
 def test_slides_off_edge_and_falls(drone):
     """0.7 m before the edge at 3 m/s; the tread below lies 0.4 m lower."""
     p = vehicle(drone, STAIR)

@@ -80,6 +80,7 @@ def test_normal_equations_lose_digits_that_factorisation_keeps():
     assert np.abs(J @ ours - e.gamma).max() < 1e-10 * np.abs(e.gamma).max()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("driven", [True, False])
 def test_embedding_technique_agrees_with_augmented_form(driven):
     rng = np.random.default_rng(6)

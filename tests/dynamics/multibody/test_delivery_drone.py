@@ -30,6 +30,7 @@ def loads(rng):
     return Loads(*(tuple(rng.normal(size=n).tolist()) for n in (3, 3, 4, 4, 4)), GRAVITY)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("driven", ["torque", "speed"])
 def test_least_coordinates_are_five_bodies(driven):
     rng = np.random.default_rng(51)

@@ -76,6 +76,7 @@ def test_projection_keeps_momentum():
     np.testing.assert_allclose(masses @ after[:, :3], masses @ before[:, :3], atol=1e-12)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stabilisation", [NONE, PARTITION, PROJECTION])
 def test_order_four_with_every_stabilisation(stabilisation):
     _, p, x, *_ = scene(np.random.default_rng(44), "torque")

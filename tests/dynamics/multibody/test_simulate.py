@@ -21,6 +21,7 @@ def tumbling():
     return drone, *arrays(assembled_state(machine(drone, (0.0, 0.0, -9.81)), chassis, (0.1, 0.2, 0.3, 0.4), SPEEDS))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stabilisation", ["none", "baumgarte", "partitioning", "projection"])
 def test_order_four_with_every_stabilisation(stabilisation):
     drone, q, v = tumbling()

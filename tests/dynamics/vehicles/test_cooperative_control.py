@@ -87,6 +87,7 @@ def test_desired_forces_produce_desired_motion():
         assert link_acceleration(p, x, force, specific, i) == pytest.approx(exact, abs=1e-12)
 
 
+@pytest.mark.long
 def test_derivatives_of_desired_forces_along_motion():
     p, x = published()
     links = tuple(normalise(Swing(q, (0.4, -0.2, 0.3))) for q in ((0.3, 0.1, -0.9), (-0.4, 0.2, -0.8)))

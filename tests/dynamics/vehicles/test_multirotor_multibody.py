@@ -79,6 +79,7 @@ def hovering(blades, drive, omega=(0.0, 0.0, 0.0)):
     return p, state, (SPEED * DRONE.motor.rotor_constant,) * 4
 
 
+@pytest.mark.long
 def test_uneven_propellers_wobble_at_twice_their_speed():
     """Turning about x only, the momentum about x is kept: w (I + 4 half cos 2 phi) = constant (eq. (8.50))."""
     p, state, volts = hovering(DRONE, "speed", (0.5, 0.0, 0.0))

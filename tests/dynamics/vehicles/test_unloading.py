@@ -13,6 +13,8 @@ from lapwing.dynamics.vehicles.unloading import UnloadingParameters, energy, ini
 from lapwing.dynamics.vehicles.unloading_contact_points import roller_speed
 from lapwing.kernels.state_tree import flatten, retract, scale, unflatten
 
+pytestmark = pytest.mark.long
+
 RK4 = get("rk4_renormalised").Method()
 G, H = 9.81, 2.5e-4
 SIZE, MASS = (0.2, 0.13, 0.23), 2.0
@@ -31,7 +33,6 @@ def run(p, x, seconds, start=0.0, h=H):
     return integrate_fixed(RK4, p, start, x, h, round(seconds / h))
 
 
-@pytest.mark.long
 def test_contact_of_equal_velocities_does_no_work():
     """Pack and door turn together about the hinge: what the door takes from the pack, the pack gets."""
     p = P._replace(floor_height=5.0, ramp_start=-1.0, door_damping=0.0, depth=9.0)
@@ -56,7 +57,6 @@ def test_contact_of_equal_velocities_does_no_work():
     assert (ahead - behind) / (2 * step) == pytest.approx(0.0, abs=1e-6)
 
 
-@pytest.mark.long
 def test_door_alone_swings_with_its_period():
     p = P._replace(gravity=0.0, floor_height=1.0, ramp_start=-1.0, pickup=0.0, door_damping=0.0, door_preload=-1.5)
     x = run(p, initial_state(p)._replace(position_world=(0.0, 0.0, 5.0), door=(1.0, 0.0)), 1.0)
@@ -65,7 +65,6 @@ def test_door_alone_swings_with_its_period():
     assert x.door[1] == pytest.approx(0.5 * w * math.sin(w), abs=1e-9)
 
 
-@pytest.mark.long
 def test_pack_rests_below_friction_angle():
     p = P._replace(ramp_start=NEVER, pickup=NEVER)
     settled = run(p, initial_state(p), 1.0)
@@ -134,7 +133,6 @@ def ambient(x, p, t, y):
     return np.concatenate([tangent[0], turned, np.array(flatten(tangent))[6:]])
 
 
-@pytest.mark.long
 def test_ramp_and_pickup_between_ticks_are_exact():
     """0.1 s of a pack that has settled on the rollers, in ticks of 4 ms and steps of 1 ms."""
     x = settled = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)
@@ -144,7 +142,6 @@ def test_ramp_and_pickup_between_ticks_are_exact():
     assert np.array(flatten(x)) == pytest.approx(split_reference(settled, 0.1), abs=1e-8)
 
 
-@pytest.mark.long
 def test_event_on_tick_takes_effect_there():
     """12 ticks of 4 ms are 0.048 s only up to rounding; what is off by it is on the tick."""
     x = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)
@@ -162,7 +159,6 @@ def test_event_on_tick_takes_effect_there():
     assert ends[0].velocity_world[2] > 0.05 > abs(ends[2].velocity_world[2])
 
 
-@pytest.mark.long
 def test_whole_unloading_converges_and_door_shuts():
     coarse, fine = (
         integrate_step_doubling(StepDoubling(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)

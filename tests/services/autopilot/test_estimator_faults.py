@@ -70,6 +70,7 @@ def test_fault(sensor, fault, refused, largest):
     assert flight.health[-1] == 0
 
 
+@pytest.mark.long
 def test_health_reports_loss_and_recovery():
     p = registry.parameters("gps", {"faults": [{"kind": "dropout", "start": START, "stop": STOP}]}, ef.INTERVAL)
     health = ef.flight(seed=3, instruments=ef.equipment(gps=p)).health

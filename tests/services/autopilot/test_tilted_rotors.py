@@ -50,6 +50,7 @@ def test_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     )
 
 
+@pytest.mark.long
 def test_spin_up_reaction_is_that_of_plant():
     scene = load(SCENE)
     assert known_airframe(scene).spin_up_zero == pytest.approx(hover(scene).spin_up_zero, rel=0.1)

@@ -73,6 +73,7 @@ def test_interaction_is_equal_with_diagram_per_service(setup, flown):
     assert fly_apart(setup, None).digest == flown.digest
 
 
+@pytest.mark.long
 def test_isolated_vehicle_equals_flight_without_effects(tmp_path, setup):
     """No wash and no contact: the same bits as if they knew nothing of one another."""
     far = ["vehicle.1.initial_position=[0.0, 500.0]", "run.duration=1.0"]

@@ -383,6 +383,7 @@ def test_integrated_readings_bring_coning_body_home():
     assert ends[False] > 0.02
 
 
+@pytest.mark.long
 def test_integrated_readings_restore_velocity_at_imu():
     """Turning and speeding up: the sum of R_before f / rate - g t is the change of v + R (omega x r)."""
     rate, place = 100.0, (0.2, -0.1, 0.05)

@@ -106,6 +106,7 @@ def test_dilution_over_a_day_is_that_of_full_constellation():
         assert result[k].vdop == pytest.approx(math.sqrt(expected[2]), rel=1e-6)
 
 
+@pytest.mark.long
 def test_errors_are_least_squares_of_range_errors():
     """The mean square error over receivers is the stated variance, sigma^2 (A^T A)^-1."""
     p = gps.Gps(constellation=GALILEO, range_correlated_error=3.0, range_noise_m_per_sqrt_hz=1.0)

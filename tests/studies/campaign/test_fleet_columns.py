@@ -43,6 +43,7 @@ def folder(tmp_path_factory):
     return path, output
 
 
+@pytest.mark.long
 def test_flights_of_fleet_are_those_of_its_vehicles():
     setup = resolve(load("fleet", ["run.duration=1.0"]))
     flights, log = fly_each(setup, TOPICS), fly(setup)

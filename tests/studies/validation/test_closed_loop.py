@@ -12,6 +12,8 @@ from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.validation.closed_loop import fly_setpoints
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 
+pytestmark = pytest.mark.long
+
 SCENE = "crazyflie_21"
 
 
@@ -27,14 +29,12 @@ def log(tmp_path_factory):
     return path
 
 
-@pytest.mark.long
 def test_own_setpoints_give_own_flight(log):
     flown = fly_setpoints(SCENE, open_flight(log))
     assert flown.time[-1] > 3.0
     assert flown.difference < 0.01  # begins in the recording's climb, from rest
 
 
-@pytest.mark.long
 def test_flight_without_setpoints_is_left_out(log):
     assert fly_setpoints(SCENE, replace(open_flight(log), setpoint=np.empty((0, 3)))) is None
 
@@ -67,7 +67,6 @@ def test_recording_without_power_has_no_power_error():
     assert np.isnan(constant_velocity(flight, np.arange(20, 40), (1, 10)).power).all()
 
 
-@pytest.mark.long
 def test_command_overlays_closed_loop(log, tmp_path):
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
     done = lapwing("validate", SCENE, log, "--closed-loop", "--horizons", "50", "--json", out, "--report", page)
