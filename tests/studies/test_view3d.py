@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+import rich
 import synthetic_flights
 from flights_in_space import AIRFRAME, HUBS, READY, TICKS, Recorder, T, flight
 
@@ -20,6 +21,7 @@ from lapwing.studies.view3d import headless as chromium
 from lapwing.studies.view3d import sampling, solids, vehicle_bodies
 from lapwing.studies.view3d.coloured_mesh import coloured_mesh
 from lapwing.studies.view3d.live_trail import LINES, POINTS, LiveTrail
+from lapwing.studies.view3d.local_server import serving
 from lapwing.studies.view3d.recording import page as view_page
 from lapwing.studies.view3d.rotors import Rotors
 from lapwing.studies.view3d.samples import sample
@@ -465,3 +467,11 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
     assert 1 <= names < 8  # those behind others are hidden
     assert frames <= seconds + 1.0  # viser's own one a second
     assert after > 0
+
+
+def test_message_that_viser_prints_late_is_dropped(capsys):
+    with serving():
+        pass
+    rich.print("[bold](viser)[/bold] Server stopped")
+    rich.print("another message")
+    assert capsys.readouterr().out == "another message\n"

@@ -5,6 +5,7 @@ import http
 import logging
 import threading
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 from unittest import mock
 
@@ -24,6 +25,7 @@ def serving(token: str = "", changed: Callable[[str], str] | None = None) -> Ite
         changed: turns the client's page into the one that is served.
     """
     with _LOCK:
+        _mute_viser()
         import viser
         import websockets.asyncio.server as sockets
 
@@ -41,12 +43,25 @@ def serving(token: str = "", changed: Callable[[str], str] | None = None) -> Ite
     try:
         yield server
     finally:
-        with mock.patch("rich.print", _silent):  # it prints when it starts and stops
-            server.stop()
+        server.stop()
 
 
 def _silent(*_: Any) -> None:
     """Print nothing."""
+
+
+@cache
+def _mute_viser() -> None:
+    """Drop viser's message that it has stopped: on a busy machine its thread prints it after `stop` has returned."""
+    import rich
+
+    original = rich.print
+
+    def other_messages(*objects: Any, **options: Any) -> None:
+        if not str(objects[0] if objects else "").startswith("[bold](viser)"):
+            original(*objects, **options)
+
+    mock.patch("rich.print", other_messages).start()
 
 
 class Guard:
