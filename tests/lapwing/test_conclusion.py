@@ -86,6 +86,7 @@ def test_run_that_fails_early_ignores_older_log(lapwing, monkeypatch):
     assert lapwing(*HOVER)[1:] == ("", "lapwing: ended by SIGTERM\n")
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scene", ["delivery_mission", "cooperative_load"])
 def test_end_of_run_reads_all_topics_that_it_shows(tmp_path, scene):
     """Page, metrics and events need only some topics of a log with every sensor."""

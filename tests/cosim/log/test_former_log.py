@@ -72,6 +72,7 @@ def test_command_accepts_former_log(log, tmp_path, command):
     assert done.returncode == 0, done.stderr
 
 
+@pytest.mark.long
 def test_resimulated_former_contact_has_another_digest(log, tmp_path):
     """The law of friction was mended: a vehicle that stands on the ground flies again, but not to the bit."""
     done = run(log, tmp_path, "resimulate")

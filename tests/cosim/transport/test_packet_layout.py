@@ -1,5 +1,7 @@
 """The layout that programs of one's own read is that of the bundles."""
 
+import pytest
+
 from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.transport.packet_layout import columns, layout
@@ -20,6 +22,7 @@ def test_columns_are_named_in_order_of_row():
     assert columns(EXACT)[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
 
 
+@pytest.mark.long
 def test_packet_length_equals_layout():
     setup = resolve(load("hover"))
     reported = layout(setup)

@@ -13,6 +13,8 @@ from lapwing.dynamics.terrain import relief, surface
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.ground_equilibrium import resting_pose, static_equilibrium
 
+pytestmark = pytest.mark.long
+
 RK4 = get("rk4_renormalised").Method()
 G, HEIGHT, OFF = 9.80665, 0.35, (0.0,) * 4
 BUMPS = relief(bump_height=0.02, bump_length=1.3)
@@ -43,7 +45,6 @@ def still(motion):
     return np.abs(motion.velocity_world + motion.omega_body).max() < 1e-5
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("place", [(0.05, 0.02), (0.4, 0.3), (-0.3, 0.9)])
 def test_lands_on_bumps_on_three_feet_at_least(drone, place):
     p = vehicle(drone, BUMPS)
@@ -54,7 +55,6 @@ def test_lands_on_bumps_on_three_feet_at_least(drone, place):
     assert np.sort(heights)[2] < 1e-5
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("x", "ground"), [(0.0, 0.0), (1.5, 0.1), (3.0, -0.3)])
 def test_lands_on_treads_of_stair(drone, x, ground):
     p = vehicle(drone, STAIR)
@@ -63,7 +63,6 @@ def test_lands_on_treads_of_stair(drone, x, ground):
     assert m.position_world[2] == pytest.approx(ground + HEIGHT, abs=1e-4)
 
 
-@pytest.mark.long
 def test_grid_is_slope_that_its_points_are(drone):
     slope = relief(slope=(0.1, 0.0))
     ends = []
@@ -76,7 +75,6 @@ def test_grid_is_slope_that_its_points_are(drone):
     assert ends[0] == pytest.approx(ends[1], abs=1e-9)
 
 
-@pytest.mark.long
 def test_slides_off_edge_and_falls(drone):
     """0.7 m before the edge at 3 m/s; the tread below lies 0.4 m lower."""
     p = vehicle(drone, STAIR)

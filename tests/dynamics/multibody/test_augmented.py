@@ -15,6 +15,8 @@ from lapwing.dynamics.multibody.mechanisms import bricard, drone_system
 from lapwing.dynamics.multibody.stabilisation import rows
 from lapwing.dynamics.multibody.system import assemble
 
+pytestmark = pytest.mark.long
+
 PAPER = {
     "central_frame": 8.0,
     "payload": 2.0,
@@ -43,7 +45,6 @@ def state(rng):
     return drone, *arrays(x), wrench, np.stack([speeds, 10.0 * rng.normal(size=4)], axis=1)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("driven", "rank", "count"), [(True, 24, 32), (False, 20, 20)])
 def test_drone_against_dense_pseudo_inverse(driven, rank, count):
     """30 coordinates, 32 rows of rank 24: unique accelerations, shortest multipliers; 10 freedoms undriven."""
@@ -67,7 +68,6 @@ def test_drone_against_dense_pseudo_inverse(driven, rank, count):
         assert ours.conflict < 1e-11 * scale
 
 
-@pytest.mark.long
 def test_normal_equations_lose_digits_that_factorisation_keeps():
     """The naive way, one LU of the assembled 62 x 62 matrix, is singular: it has no answer."""
     drone, q, v, wrench, drive = state(np.random.default_rng(8))
@@ -80,7 +80,6 @@ def test_normal_equations_lose_digits_that_factorisation_keeps():
     assert np.abs(J @ ours - e.gamma).max() < 1e-10 * np.abs(e.gamma).max()
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("driven", [True, False])
 def test_embedding_technique_agrees_with_augmented_form(driven):
     rng = np.random.default_rng(6)

@@ -92,6 +92,7 @@ def test_set_up_survives_text_and_another_seed(setup, tmp_path):
     assert first_difference(reseed(setup, 7), resolve(scene(tmp_path, "run.seed=7"))) is None
 
 
+@pytest.mark.long
 def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
     meeting = fly(resolve(scene(tmp_path, "vehicle.0.trajectory.phase.0.z.to=1.0")))
     a, b = (meeting.view(f"{name}/ground_truth").position for name in ("above", "below"))
