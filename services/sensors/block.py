@@ -11,7 +11,7 @@ from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import subtract
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import compile_source, overload_for
+from lapwing.kernels.codegen import compile_source, generic
 from lapwing.services.sensors.sensor_inputs import ROTORS, Truth
 
 
@@ -24,33 +24,21 @@ class Instrument(NamedTuple):
     around: Environment
 
 
-def _sample(p: Any, s: Any, key: Key, tick: int, truth: Truth) -> tuple:
+@generic(inline=True)
+def _sample(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Any:
     """Call `sample` of the sensor with parameters `p`."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_sample, inline=True)
-def _sample_of(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Any:
     return sys.modules[p.instance_class.__module__].sample
 
 
-def _initial(p: Any, key: Key, truth: Truth) -> Any:
+@generic(inline=True)
+def _initial(p: types.Type, key: types.Type, truth: types.Type) -> Any:
     """Call `initial` of the sensor with parameters `p`."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_initial, inline=True)
-def _initial_of(p: types.Type, key: types.Type, truth: types.Type) -> Any:
     return sys.modules[p.instance_class.__module__].initial
 
 
-def first_rotors(speed: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the speeds of ROTORS rotors, 0 for those that the vehicle does not have; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(first_rotors, inline=True)
-def _first_rotors(speed: types.Type) -> Any:
+@generic(inline=True)
+def first_rotors(speed: types.Type) -> Any:
+    """Return the speeds of ROTORS rotors, 0 for those that the vehicle does not have."""
     items = ", ".join(f"speed[{i}]" if i < len(speed) else "0.0" for i in range(ROTORS))
     return compile_source("first_rotors(speed)", {}, f"return ({items})")
 

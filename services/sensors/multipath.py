@@ -9,7 +9,7 @@ from lapwing.dynamics.terrain import Level
 from lapwing.dynamics.terrain.ray_casting import cast
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 
 SPEED_OF_LIGHT = 299_792_458.0  # [m/s]
 WAVELENGTH = SPEED_OF_LIGHT / 1575.42e6  # [m] of L1 and E1
@@ -25,11 +25,6 @@ class Reflections(NamedTuple):
     phase_deg: Annotated[float, Ge(-360), Le(360)] = 180.0  # [deg] by which a wall turns the carrier
 
 
-def in_shadow(terrain: Any, position: Vec3, towards: Vec3, steepness: float) -> bool:
-    """Return True if an obstacle or the ground is between a position and a satellite; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
 @always_inline
 def _never(terrain: Any, position: Vec3, towards: Vec3, steepness: float) -> bool:
     return False
@@ -40,8 +35,9 @@ def _behind_relief(terrain: Any, position: Vec3, towards: Vec3, steepness: float
     return cast(terrain, position, towards, steepness, FARTHEST) < math.inf
 
 
-@overload_for(in_shadow, inline=True)
-def _in_shadow(terrain: types.Type, position: types.Type, towards: types.Type, steepness: types.Type) -> Any:
+@generic(inline=True)
+def in_shadow(terrain: types.Type, position: types.Type, towards: types.Type, steepness: types.Type) -> Any:
+    """Return True if an obstacle or the ground is between a position and a satellite."""
     return _never if terrain.instance_class is Level else _behind_relief
 
 
@@ -95,16 +91,6 @@ def phase_delay(r: Reflections, further: float) -> float:
     return WAVELENGTH / (2.0 * math.pi) * math.atan2(r.amplitude * sine, 1.0 + r.amplitude * cosine)
 
 
-def code_error(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
-    """Return the error [m] of a code measurement by all walls; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
-def phase_error(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
-    """Return the error [m] of a carrier phase by all walls; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
 @always_inline
 def _no_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) -> float:
     return 0.0
@@ -132,11 +118,13 @@ def _phase_at_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3)
     return result
 
 
-@overload_for(code_error, inline=True)
-def _code_error(r: types.Type, terrain: types.Type, position: types.Type, towards: types.Type) -> Any:
+@generic(inline=True)
+def code_error(r: types.Type, terrain: types.Type, position: types.Type, towards: types.Type) -> Any:
+    """Return the error [m] of a code measurement by all walls."""
     return _no_walls if terrain.instance_class is Level else _code_at_walls
 
 
-@overload_for(phase_error, inline=True)
-def _phase_error(r: types.Type, terrain: types.Type, position: types.Type, towards: types.Type) -> Any:
+@generic(inline=True)
+def phase_error(r: types.Type, terrain: types.Type, position: types.Type, towards: types.Type) -> Any:
+    """Return the error [m] of a carrier phase by all walls."""
     return _no_walls if terrain.instance_class is Level else _phase_at_walls

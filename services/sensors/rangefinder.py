@@ -13,7 +13,7 @@ from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray
 from lapwing.dynamics.vector import ZERO, Vec3, add
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.messages import Range, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
@@ -45,11 +45,6 @@ class Rangefinder(NamedTuple):
 READING = DistanceReading()
 
 
-def to_ground(terrain: Any, origin: Vec3, direction: Vec3) -> float:
-    """Return the distance [m] along a unit vector to the ground or an obstacle; inf without an intersection."""
-    raise NotImplementedError("compiled code only")
-
-
 @always_inline
 def _to_level(terrain: Any, origin: Vec3, direction: Vec3) -> float:
     if origin[2] <= 0.0:
@@ -62,8 +57,9 @@ def _to_relief(terrain: Any, origin: Vec3, direction: Vec3) -> float:
     return ray(terrain, origin, direction, FARTHEST)
 
 
-@overload_for(to_ground, inline=True)
-def _to_ground(terrain: types.Type, origin: types.Type, direction: types.Type) -> Any:
+@generic(inline=True)
+def to_ground(terrain: types.Type, origin: types.Type, direction: types.Type) -> Any:
+    """Return the distance [m] along a unit vector to the ground or an obstacle; inf without an intersection."""
     return _to_level if terrain.instance_class is Level else _to_relief
 
 

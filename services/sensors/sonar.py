@@ -11,7 +11,7 @@ from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray, surface
 from lapwing.dynamics.vector import add, apply, dot, scale
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
@@ -38,13 +38,9 @@ class Sonar(NamedTuple):
 RAYS = 8  # along the edge of the beam, for bodies off its axis
 
 
-def _distance(p: Sonar, truth: Truth) -> float:
+@generic(inline=True)
+def _distance(p: types.Type, truth: types.Type) -> Any:
     """Return the distance to the nearest ground in the beam; +inf without an echo (theory.md, eq. (3.16))."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(_distance, inline=True)
-def _distance_over(p: types.Type, truth: types.Type) -> Any:
     return _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
 
 

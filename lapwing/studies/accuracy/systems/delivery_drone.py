@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numba import types
 from scipy.integrate import solve_ivp
 
 from lapwing.dynamics import effects, integrators
@@ -25,7 +26,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, Mult
 from lapwing.dynamics.vehicles.multirotor_euler import FiveEulerBodies
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import unloaded
 from lapwing.kernels import kernel
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.coordinates import coordinates
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
@@ -37,11 +38,6 @@ SPEED = 100.0  # [rad/s] of the propellers: slow, so that their uneven inertia s
 ATTITUDE, OMEGA = exp((0.2, -0.4, 0.1)), (1.0, -0.7, 0.4)
 METHOD = integrators.get("rk4_renormalised")
 STILL = (0.0, 0.0, 0.0)
-
-
-def gap(p: Any, x: Any) -> float:
-    """Return the violation of the constraints [m, -]."""
-    raise NotImplementedError("compiled code only")
 
 
 @kernel
@@ -61,10 +57,10 @@ def _of_euler(p: Any, x: Any) -> float:
     return _of_five(p, multirotor_euler.five(x))
 
 
-@overload_for(gap)
-def _gap(p, x):  # type: ignore[no-untyped-def] # numba compares its signature with that of what it gives
-    result = {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
-    return lambda p, x: result(p, x)
+@generic()
+def gap(p: types.Type, x: types.Type) -> Any:
+    """Return the violation of the constraints [m, -]."""
+    return {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
 
 
 @kernel

@@ -6,7 +6,7 @@ from numba import types
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator, State
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
@@ -49,13 +49,9 @@ UPDATES[DistanceReading] = _distance
 UPDATES[OpticalFlowReading] = _flow
 
 
-def update(p: Estimator, x: State, r: Reading) -> State:
-    """Return the filter's state after a reading; compiled code only."""
-    raise NotImplementedError("compiled code only")
-
-
-@overload_for(update, inline=True)
-def _update_by(p: types.Type, x: types.Type, r: types.Type) -> Any:
+@generic(inline=True)
+def update(p: types.Type, x: types.Type, r: types.Type) -> Any:
+    """Return the filter's state after a reading."""
     return UPDATES[r.instance_class]
 
 
