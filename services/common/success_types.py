@@ -8,12 +8,8 @@ NUMBER, TEXT, TRUTH, LIST = "a number", "a text", "true or false", "a list"
 
 def check_types(tree: ast.expr) -> None:
     """Raise ValueError with one line for a result that is not true or false, or a comparison of unlike types."""
-    _expect_truth(tree)
-
-
-def _expect_truth(node: ast.expr) -> None:
-    if (kind := _kind(node)) != TRUTH:
-        raise ValueError(f"{ast.unparse(node)!r} is {kind}, not true or false")
+    if (kind := _kind(tree)) != TRUTH:
+        raise ValueError(f"{ast.unparse(tree)!r} is {kind}, not true or false")
 
 
 def _kind(node: ast.expr) -> str:
@@ -35,9 +31,9 @@ def _check_parts(node: ast.expr) -> None:
     match node:
         case ast.BoolOp(values=values):
             for value in values:
-                _expect_truth(value)
+                check_types(value)
         case ast.UnaryOp(operand=operand):
-            _expect_truth(operand)
+            check_types(operand)
         case ast.Compare(left=left, ops=ops, comparators=others):
             for one, op, other in zip((left, *others), ops, others, strict=False):
                 _check_comparison(one, op, other)

@@ -76,6 +76,15 @@ class Run:
 
 
 @pytest.mark.filterwarnings("error::DeprecationWarning")
+def show(run, page, frames):
+    """Show a run at its start and in frames after it."""
+    follow = LiveFeed(run.setup, [page.show])
+    follow.observe(run)
+    for _ in range(frames):
+        run.step()
+        follow.observe(run)
+
+
 def test_page_opens_without_deprecated_options_of_viser():
     with LivePage(Run().setup) as page:
         assert page.address.startswith("http://127.0.0.1:")
@@ -108,11 +117,7 @@ def test_page_needs_its_secret_its_host_and_its_origin():
 def test_events_of_fleet_are_published_and_listed_by_vehicle():
     run = Run("fleet")
     with LivePage(run.setup) as page:
-        follow = LiveFeed(run.setup, [page.show])
-        follow.observe(run)
-        for _ in range(2):
-            run.step()
-            follow.observe(run)
+        show(run, page, 2)
         names = [vehicle.name for vehicle in page._vehicles]
         lines = page._events.value.splitlines()
     assert names == ["left", "right", "scout"]
@@ -124,11 +129,7 @@ def test_events_of_fleet_are_published_and_listed_by_vehicle():
 def test_latest_scan_of_lidar_is_shown_live():
     run = Run(overrides={"sensors.lidar.columns": 36, "success.require": []})
     with LivePage(run.setup) as page:
-        follow = LiveFeed(run.setup, [page.show])
-        follow.observe(run)
-        for _ in range(3):
-            run.step()
-            follow.observe(run)
+        show(run, page, 3)
         page._player.join(3.0)  # it shows the frames meanwhile
         (vehicle,) = page._vehicles
         cloud = vehicle._optional["lidar"]._cloud

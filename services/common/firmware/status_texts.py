@@ -10,7 +10,8 @@ FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNOR
 
 
 class StatusTexts:
-    """What a firmware has said since it started.
+    """Last error, last failsafe and reasons against arming of a firmware.
+
 
     Attributes:
         error: last status text of the level error or worse.
@@ -25,7 +26,7 @@ class StatusTexts:
         self._has_event = False  # an event has named a failsafe
 
     def arm(self) -> None:
-        """Forget what was said before arming."""
+        """Forget the failsafe and the reasons of before arming."""
         self.failsafe = ""
         self.blockers.clear()
 

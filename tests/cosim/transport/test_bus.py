@@ -46,7 +46,7 @@ def test_messages_that_wait_take_little_memory():
     assert grown < 2048 * MESSAGES
 
 
-def test_deferred_subscription_returns_messages_of_known_sender_in_order():
+def test_deferred_subscription_returns_messages_in_order_of_sending():
     other = bytes(15) + b"x"
     (endpoint,) = loopback_endpoints(["a"]).values()
     with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], gid=MARK) as here:

@@ -24,7 +24,7 @@ def test_wakes_once_until_socket_has_been_served():
                 watch.served()
 
 
-def test_end_does_not_wait_for_sockets_that_nobody_serves():
+def test_watch_ends_while_ready_socket_has_not_been_read():
     wakes = queue.SimpleQueue()
     near, far = socket.socketpair()
     with near, far, selectors.DefaultSelector() as selector:
