@@ -12,7 +12,6 @@ FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNOR
 class StatusTexts:
     """Last error, last failsafe and reasons against arming of a firmware.
 
-
     Attributes:
         error: last status text of the level error or worse.
         failsafe: last event or status text about a failsafe since arming.
