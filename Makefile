@@ -9,8 +9,8 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: mission test test-all check stability compatibility fuzz chaos bench portability docs wheel release sbom audit docker-build docker-test clean
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
-# with the same versions as constraints.
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+# with the same versions as constraints. Byte code is compiled on import: most modules are never imported.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
 PINNED := $(INSTALL) --constraint $(VENV)/versions.txt --editable
 $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)

@@ -13,12 +13,12 @@ T = TypeVar("T")
 
 def names(package: ModuleType | str) -> list[str]:
     """Return the sorted names of a package's modules without a leading _, without importing them."""
-    return list(_names(_dotted(package)))
+    return list(_names(_package_name(package)))
 
 
 def modules(package: ModuleType | str) -> dict[str, ModuleType]:
     """Import a package's modules without a leading _. Return them by name, sorted."""
-    return {name: _module(_dotted(package), name) for name in names(package)}
+    return {name: _module(_package_name(package), name) for name in names(package)}
 
 
 def get(package: ModuleType | str, name: str, what: str) -> ModuleType:
@@ -33,7 +33,7 @@ def get(package: ModuleType | str, name: str, what: str) -> ModuleType:
         ValueError: "unknown effect 'gravty'; did you mean gravity? (effects: ...)".
     """
     result = names(package)
-    return _module(_dotted(package), choose(dict(zip(result, result, strict=True)), name, what))
+    return _module(_package_name(package), choose(dict(zip(result, result, strict=True)), name, what))
 
 
 def choose(choices: Mapping[str, T], name: str, what: str) -> T:
@@ -49,7 +49,7 @@ def choose(choices: Mapping[str, T], name: str, what: str) -> T:
     raise ValueError(f"unknown {what} {name!r}{hint} ({what}s: {', '.join(choices)})")
 
 
-def _dotted(package: ModuleType | str) -> str:
+def _package_name(package: ModuleType | str) -> str:
     return package if isinstance(package, str) else package.__name__
 
 

@@ -209,22 +209,22 @@ def _finish(method, like, memory, at, interval, h, first, n):
 def _peek(context, array, index):
     """Return array[index] without a check for a negative index."""
 
-    def loaded(context, builder, sig, args):
+    def lower_load(context, builder, sig, args):
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
         return builder.load(builder.gep(data, [args[1]]))
 
-    return signature(types.float64, array, types.intp), loaded
+    return signature(types.float64, array, types.intp), lower_load
 
 
 @intrinsic
 def _poke(context, array, index, value):
-    def stored(context, builder, sig, args):
+    def lower_store(context, builder, sig, args):
         data = context.make_array(sig.args[0])(context, builder, args[0]).data
         number = args[2] if args[2].type == ir.DoubleType() else builder.sitofp(args[2], ir.DoubleType())
         builder.store(number, builder.gep(data, [args[1]]))
         return context.get_dummy_value()
 
-    return signature(types.none, array, types.intp, value), stored
+    return signature(types.none, array, types.intp, value), lower_store
 
 
 @generic(inline=True)

@@ -43,7 +43,7 @@ def fault(error: ValidationError, model: type) -> ConfigError:
         cause = context["error"]
         return cause.with_prefix(key) if isinstance(cause, ConfigError) else ConfigError(key, str(cause))
     unit = _unit(model, location) if kind in OF_NUMBERS else ""
-    return ConfigError(key, f"got {_short(value)}", _expected(kind, first["msg"], context, hint) + unit)
+    return ConfigError(key, f"got {_short(value)}", _expectation(kind, first["msg"], context, hint) + unit)
 
 
 def _unit(model: type, location: Sequence[str | int]) -> str:
@@ -59,7 +59,7 @@ def _unit(model: type, location: Sequence[str | int]) -> str:
     return ""
 
 
-def _expected(kind: str, message: str, context: dict[str, Any], hint: Any) -> str:
+def _expectation(kind: str, message: str, context: dict[str, Any], hint: Any) -> str:
     if kind in OF_NUMBERS and hint is not None:
         return describe(hint)
     if kind == "tuple_type":

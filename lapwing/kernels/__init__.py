@@ -16,8 +16,8 @@ from lapwing.kernels.compiler.decorators import (
     no_refcount,
     noinline,
     python_function,
-    uncached,
     vectorise_loops,
+    without_cache,
 )
 from lapwing.kernels.compiler.dispatch_table import DispatchTable
 from lapwing.kernels.compiler.source_digest import digest as source_digest
@@ -37,6 +37,6 @@ __all__ = [
     "python_function",
     "source_digest",
     "statistics",
-    "uncached",
     "vectorise_loops",
+    "without_cache",
 ]

@@ -14,7 +14,7 @@ from numba.core import types
 from numba.core.targetconfig import ConfigStack
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from lapwing.kernels import uncached
+from lapwing.kernels import without_cache
 
 GENERATORS: dict[Callable, Callable[..., Any]] = {}
 """Functions with an implementation of their own in compiled code: its generator, from the numba types of arguments."""
@@ -79,7 +79,7 @@ def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> 
             flags = ConfigStack().top().copy()
             flags.forceinline = flags.forceinline or inline
             if (args, flags.forceinline) not in chosen:
-                chosen[args, flags.forceinline] = uncached(choose(*args))
+                chosen[args, flags.forceinline] = without_cache(choose(*args))
             kernel = types.Dispatcher(chosen[args, flags.forceinline])
             with ConfigStack().enter(flags):
                 signature = kernel.get_call_type(self.context, args, {})

@@ -61,7 +61,7 @@ def _binary(operation: Any, instruction: str) -> None:
     for pair in pairs:
 
         @lower_builtin(operation, *pair)
-        def _lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+        def _lower(context: Any, builder: Any, sig: Any, args: Any) -> Any:
             return getattr(builder, instruction)(*(_splat(builder, a) for a in args))
 
 
@@ -78,7 +78,7 @@ class _Negative(ConcreteTemplate):
 
 
 @lower_builtin(operator.neg, LANES)
-def _negated(context: Any, builder: Any, sig: Any, args: Any) -> Any:
+def _negate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
     return builder.fneg(args[0])
 
 
@@ -127,11 +127,11 @@ def sqrt(context, x):
 def select(context, flag, a, b):
     """Return a where flag > 0, else b, lane by lane; a and b are vectors or floats."""
 
-    def chosen(context, builder, sig, args):
+    def choose(context, builder, sig, args):
         zero = ir.Constant(VECTOR, [0.0] * 4)
         return builder.select(builder.fcmp_ordered(">", args[0], zero), *(_splat(builder, a) for a in args[1:]))
 
-    return signature(LANES, LANES, a, b), chosen
+    return signature(LANES, LANES, a, b), choose
 
 
 @always_inline

@@ -36,7 +36,7 @@ class Flattener:
 
     def __init__(self, example: Any):
         """Generate the function for the structure of an example, which `structure` must know."""
-        self._flatten = _written(example)
+        self._flatten = _generate(example)
         tuples, parts = self._flatten(example)
         self._types = tuple(map(type, tuples)), tuple(map(type, parts))
         # types whose class does not determine their structure
@@ -60,7 +60,7 @@ def _is_of(value: Any, known: Any) -> bool:
         return False
 
 
-def _written(example: Any) -> Any:
+def _generate(example: Any) -> Any:
     """Return a function that unpacks values like the example: (value) -> (tuples, leaves)."""
     lines: list[str] = []
     tuples: list[str] = []

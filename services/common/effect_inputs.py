@@ -17,7 +17,9 @@ def with_inputs(scene: Scene) -> list[str]:
     tables = scene.tables(EFFECTS)
     modules = {name: table.get("module") for name, table in tables.items()}
     return [
-        name for name in effects.ordered(tables) if hasattr(effects.parameter_class(name, modules[name]), "with_inputs")
+        name
+        for name in effects.in_evaluation_order(tables)
+        if hasattr(effects.parameter_class(name, modules[name]), "with_inputs")
     ]
 
 

@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 
 from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.environment import STANDARD, Environment
 
 if TYPE_CHECKING:  # a process that flies has no need of pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-__all__ = ["checked", "from_scene", "get", "names", "ordered", "parameter_class"]
+__all__ = ["from_scene", "get", "in_evaluation_order", "names", "parameter_class", "validate_table"]
 
 # Effects are evaluated in the order of these keys, by default their names. Sums round differently in another order, so
 # an effect that is renamed keeps its key.
@@ -76,7 +76,7 @@ def parameter_class(name: str, module: str | None = None) -> type:
     return getattr(defining, expected)
 
 
-def ordered(active: Iterable[str]) -> list[str]:
+def in_evaluation_order(active: Iterable[str]) -> list[str]:
     """Return names of effects in the order of evaluation."""
     return sorted(active, key=lambda name: _ORDER.get(name, name))
 
@@ -101,7 +101,7 @@ def from_scene(
     """
     active = []
     kinds: dict[str, str] = {}
-    for name in ordered(tables):
+    for name in in_evaluation_order(tables):
         table = dict(tables[name])
         module = table.pop("module", None)
         kind = getattr(get(name, module), "KIND", name)
@@ -116,7 +116,7 @@ def from_scene(
         cls = parameter_class(name, module)
         build = getattr(cls, "from_scene", None)
         try:
-            effect = build(table, airframe) if build else checked(cls, table)
+            effect = build(table, airframe) if build else validate_table(cls, table)
         except ConfigError as error:
             raise error.with_prefix(f"effects.{name}") from None
         effect = effect.in_environment(environment) if hasattr(effect, "in_environment") else effect

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, upright
 from lapwing.dynamics.vector import ZERO, Vec3
@@ -59,7 +59,7 @@ class GroundContact(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundContact | GroundContactSmooth":
         """Return the parameters with the airframe's feet and mass."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         if settings.friction_dynamic > settings.friction_static:
             expected = f"at most friction_static = {settings.friction_static}"
             raise ConfigError("friction_dynamic", f"got {settings.friction_dynamic}", expected)

@@ -33,20 +33,20 @@ def initial_state(e: Any) -> tuple:
 
 
 @always_inline
-def given_or(own, value):
+def input_or(own, value):
     """Return the input `value`, or `own` where the external model computes none."""
     return own if math.isnan(value) else value
 
 
 @always_inline
-def _given_or(_, own, value):
-    return given_or(own, value)
+def _input_or(_, own, value):
+    return input_or(own, value)
 
 
 @always_inline
 def all_given_or(own, values):
-    """Return `given_or` of each entry of two tuples."""
-    return map_tuple(_given_or, 0.0, own, values)
+    """Return `input_or` of each entry of two tuples."""
+    return map_tuple(_input_or, 0.0, own, values)
 
 
 @generic(inline=True)

@@ -58,7 +58,7 @@ def idle_current(e, speed):
 
 
 @always_inline
-def _accelerated(e, torque, air_torque):
+def _acceleration(e, torque, air_torque):
     return (torque - air_torque) * e.inverse_inertia
 
 
@@ -84,7 +84,7 @@ def external_motor(e, memory, s, loads, voltage):
     (before, ramp), inputs = memory
     speed = s.motion.rotor_speed
     acceleration, own_current, power = hooks.all_motors((e.own,), (before,), s, loads, voltage, ())
-    driven = map_tuple(_accelerated, e.own, inputs.torque, loads.torque)
+    driven = map_tuple(_acceleration, e.own, inputs.torque, loads.torque)
     acceleration = all_given_or(all_given_or(acceleration, driven), ramp)
     current = all_given_or(own_current, map_tuple(_current_of, e.own, inputs.torque, speed))
     current = all_given_or(current, inputs.current)

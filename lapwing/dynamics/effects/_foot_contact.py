@@ -79,7 +79,7 @@ def _touch_four(terrain, places_world):
 
 
 @always_inline
-def footing(e, stance, feet_body):
+def contact_of_feet(e, stance, feet_body):
     """Return the contact of four feet (theory.md, eq. (2.12))."""
     arm = apply(stance.R_world_body, feet_body)
     place = add(stance.position_world, arm)

@@ -19,7 +19,7 @@ def _adapter(cls: type) -> "TypeAdapter":
     return TypeAdapter(cls, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
-def checked(cls: type[T], table: Mapping[str, Any]) -> T:
+def validate_table(cls: type[T], table: Mapping[str, Any]) -> T:
     """Return the NamedTuple `cls` with the keys of a table.
 
     Raises:

@@ -100,7 +100,7 @@ def initial_discrete_state(e: Any) -> tuple:
     return e.initial_discrete_state() if hasattr(e, "initial_discrete_state") else ()
 
 
-def _written_out(
+def _generate_calls(
     fold: str, hook: str, arguments: str, call: str, result: str, default: str = "", more: str = ""
 ) -> Callable:
     """Return a function of (effects, memory, arguments) that calls `hook` of each effect that has it.
@@ -138,7 +138,7 @@ def _written_out(
 
 def _chain(hook: str, before: str = "") -> Callable:
     call = f"value = f{{i}}(effects[{{i}}], memory[{{i}}], {before}value)"
-    return _written_out(f"all_{hook}", hook, f"{before}value", call, "value")
+    return _generate_calls(f"all_{hook}", hook, f"{before}value", call, "value")
 
 
 all_mass_properties = _chain("mass_properties")
@@ -148,14 +148,14 @@ all_load_factors = _chain("load_factors", "s, ")
 all_loads = _chain("loads", "s, factors, ")
 all_supply_voltage = _chain("supply_voltage")
 all_winds = _chain("wind")
-all_torques = _written_out(
+all_torques = _generate_calls(
     "all_torques",
     "torque",
     "s, rotors, torque",
     "torque = add(torque, f{i}(effects[{i}], memory[{i}], s, rotors))",
     "torque",
 )
-all_body_wrenches = _written_out(
+all_body_wrenches = _generate_calls(
     "all_body_wrenches",
     "wrench_body",
     "s, rotors, thrust, torque",
@@ -164,21 +164,21 @@ all_body_wrenches = _written_out(
     default="(in_world(thrust, s.R_world_body), torque)",
     more="w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
 )
-all_wrenches = _written_out(
+all_wrenches = _generate_calls(
     "all_wrenches",
     "wrench",
     "s, rotors, force, torque",
     "w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
     "(force, torque)",
 )
-all_fields = _written_out(
+all_fields = _generate_calls(
     "all_fields",
     "field",
     "value",
     "value = add(value, f{i}(effects[{i}], memory[{i}]))",
     "value",
 )
-all_motors = _written_out(
+all_motors = _generate_calls(
     "all_motors",
     "motor",
     "s, loads, voltage, default",
@@ -186,7 +186,7 @@ all_motors = _written_out(
     "value",
     default="default",
 )
-all_battery_states = _written_out(
+all_battery_states = _generate_calls(
     "all_battery_states",
     "battery_state",
     "default",
@@ -194,20 +194,20 @@ all_battery_states = _written_out(
     "value",
     default="default",
 )
-all_discrete_updates = _written_out(
+all_discrete_updates = _generate_calls(
     "all_discrete_updates",
     "discrete_update",
     "s, rotors, key, tick, interval",
     "m{i} = f{i}(effects[{i}], memory[{i}], s, rotors, key, tick, interval)",
     "memory",
 )
-all_timed_updates = _written_out(
+all_timed_updates = _generate_calls(
     "all_timed_updates", "timed_update", "t", "m{i} = f{i}(effects[{i}], memory[{i}], t)", "memory"
 )
-next_breakpoint = _written_out(
+next_breakpoint = _generate_calls(
     "next_breakpoint", "break_time", "t, h, value", "value = f{i}(effects[{i}], memory[{i}], t, h, value)", "value"
 )
-all_substeps = _written_out(
+all_substeps = _generate_calls(
     "all_substeps",
     "substeps",
     "motion, h",
@@ -216,7 +216,7 @@ all_substeps = _written_out(
     default="1",
     more="n = max(n, f{i}(effects[{i}], memory[{i}], motion, h))",
 )
-all_contacts = _written_out(
+all_contacts = _generate_calls(
     "all_contacts",
     "contact",
     "s",
@@ -225,7 +225,7 @@ all_contacts = _written_out(
     default="False",
     more="touching = touching or f{i}(effects[{i}], memory[{i}], s)",
 )
-all_contact_forces = _written_out(
+all_contact_forces = _generate_calls(
     "all_contact_forces",
     "contact_forces",
     "motion",
@@ -234,7 +234,7 @@ all_contact_forces = _written_out(
     default="()",
     more="forces = forces + f{i}(effects[{i}], memory[{i}], motion)",
 )
-all_switches = _written_out(
+all_switches = _generate_calls(
     "all_switches",
     "switches",
     "motion, t, h",
@@ -243,7 +243,7 @@ all_switches = _written_out(
     default="False",
     more="switching = switching or f{i}(effects[{i}], memory[{i}], motion, t, h)",
 )
-all_sleeping = _written_out(
+all_sleeping = _generate_calls(
     "all_sleeping",
     "is_sleeping",
     "motion, h",
@@ -286,7 +286,7 @@ def known_wrench(e, memory, s, rotors):
     return e.force_world, e.torque_body
 
 
-def _integrated(effects: Any) -> list[tuple[int, Callable]]:
+def _hooks_with_rate(effects: Any) -> list[tuple[int, Callable]]:
     """Return (number, hook) of each effect whose memory has a rate."""
     rates = HOOKS["wrench_and_rate"]
     return [(i, rates[e.instance_class]) for i, e in enumerate(effects.types) if e.instance_class in rates]
@@ -295,7 +295,7 @@ def _integrated(effects: Any) -> list[tuple[int, Callable]]:
 @generic(inline=True)
 def with_rates(effects: Any, memory: Any, motion: Any) -> Callable:
     """Return (effects, with the wrenches of those that have one in their place; rates of their memories)."""
-    active = dict(_integrated(effects))
+    active = dict(_hooks_with_rate(effects))
     names = {"known": KnownWrench, **{f"f{i}": hook for i, hook in active.items()}}
     lines = [f"force{i}, torque{i}, rate{i} = f{i}(effects[{i}], memory[{i}], motion)" for i in active]
     count = len(effects.types)
@@ -307,14 +307,14 @@ def with_rates(effects: Any, memory: Any, motion: Any) -> Callable:
 @generic(inline=True)
 def all_integrated(effects: Any, memory: Any) -> Callable:
     """Return the memories that have a rate."""
-    members = "".join(f"memory[{i}], " for i, _ in _integrated(effects))
+    members = "".join(f"memory[{i}], " for i, _ in _hooks_with_rate(effects))
     return compile_source("all_integrated(effects, memory)", {}, f"return ({members})")
 
 
 @generic(inline=True)
 def with_integrated(effects: Any, memory: Any, integrated: Any) -> Callable:
     """Return the memories of all effects, with those that have a rate from `integrated`."""
-    integrated = [i for i, _ in _integrated(effects)]
+    integrated = [i for i, _ in _hooks_with_rate(effects)]
     members = [
         f"integrated[{integrated.index(i)}]" if i in integrated else f"memory[{i}]" for i in range(len(effects.types))
     ]

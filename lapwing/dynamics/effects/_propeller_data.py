@@ -15,7 +15,7 @@ from lapwing.dynamics.config_error import ConfigError
 NEEDED = {"j": "J", "ct": "CT", "cp": "CP or CQ"}
 
 
-def parsed(key: str, text: str) -> dict[str, Any]:
+def parse_table(key: str, text: str) -> dict[str, Any]:
     """Return the keys of `rotor_table` in a text.
 
     Args:

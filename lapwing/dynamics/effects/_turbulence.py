@@ -4,7 +4,7 @@ from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.noise import normal3
@@ -50,7 +50,7 @@ class Part(NamedTuple):
 
 def conditions(table: dict) -> Conditions:
     """Return the conditions of a scene's table. Raise ConfigError if it is invalid."""
-    settings = checked(Settings, table)
+    settings = validate_table(Settings, table)
     airspeed, altitude = settings.airspeed or 0.0, settings.altitude or 0.0
     return Conditions(
         settings.wind_speed, airspeed, altitude, math.cos(settings.direction_to), math.sin(settings.direction_to)
@@ -80,7 +80,7 @@ def surroundings(c: Conditions, s: Any) -> tuple[float, float]:
 
 
 @always_inline
-def passing(c: Conditions, s: Any) -> tuple[Vec3, Vec3]:
+def deviation_and_rate(c: Conditions, s: Any) -> tuple[Vec3, Vec3]:
     """Return (standard deviations [m/s], airspeed over scale [1/s]) for a vehicle in a situation."""
     altitude, airspeed = surroundings(c, s)
     sigma, scale = intensity(c.wind_speed, altitude)
@@ -115,7 +115,7 @@ def second_order(x1, x2, theta, n1, n2):
 
 
 @always_inline
-def elapsed(started, rate, interval):
+def time_since_update(started, rate, interval):
     """Return the time [s] since the last update: `LONG_AGO` before the first, at these rates [1/s] of the filters."""
     return interval if started > 0.0 else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
 
@@ -149,7 +149,7 @@ def calm(parts: tuple[Part, ...]) -> tuple[tuple, Vec3, float]:
 
 
 @always_inline
-def _advanced(c, part, state):
+def _advance_part(c, part, state):
     """Return (states, gust for unit deviations) of a part, `theta` correlation times of the whole later."""
     theta, key, tick = c
     first, second = normal3(key, tick, part.lanes[0]), normal3(key, tick, part.lanes[1])
@@ -165,9 +165,9 @@ def _gust(axis, part, _):
 @always_inline
 def drawn(e, memory, s, key, tick, interval):
     """Return the states of the parts, the wind [m/s, world] for the next interval, and 1: started."""
-    sigma, rate = passing(e.conditions, s)
-    theta = scale(elapsed(memory[2], rate, interval), rate)
-    parts = map_tuple(_advanced, (theta, key, tick), e.parts, memory[0])
+    sigma, rate = deviation_and_rate(e.conditions, s)
+    theta = scale(time_since_update(memory[2], rate, interval), rate)
+    parts = map_tuple(_advance_part, (theta, key, tick), e.parts, memory[0])
     gust = (
         total(map_tuple(_gust, 0, parts, parts)),
         total(map_tuple(_gust, 1, parts, parts)),
@@ -178,6 +178,6 @@ def drawn(e, memory, s, key, tick, interval):
 
 
 @always_inline
-def blown(memory, before):
+def add_to_air(memory, before):
     """Add the turbulence to the air."""
     return Air(before.density, add(before.wind_world, memory[1]))

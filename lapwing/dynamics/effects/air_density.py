@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.atmosphere import Atmosphere, density, density_slope
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
@@ -30,7 +30,7 @@ class AirDensity(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "AirDensity":
         """Return the standard atmosphere at sea level."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         return cls()
 
     def in_environment(self, environment: Environment) -> "AirDensity":

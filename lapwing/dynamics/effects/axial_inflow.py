@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import axial_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair, product
@@ -37,7 +37,7 @@ class AxialInflow(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "AxialInflow":
         """Return the parameters of the airframe's propeller."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         if propeller.zero_lift_angle != 0.0:
             reject("the propeller's zero_lift_angle must be 0: the correction is derived for that")

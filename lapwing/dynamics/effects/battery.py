@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._external_inputs import external, given_or, initial_state
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.kernels import always_inline, math, python_function
@@ -41,7 +41,7 @@ class Battery(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
         """Return the parameters of the airframe's battery."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")
         resistance = pack.cells * pack.cell_resistance
         return cls(
@@ -117,9 +117,9 @@ def discharge_external(e, memory, s, rotors, key, tick, interval):
     """Return the discrete state after an interval, with the inputs in place of the battery's own numbers."""
     before, inputs = memory
     charge, own_voltage, current = discharge(e.own, before, s, rotors, key, tick, interval)
-    voltage = given_or(own_voltage, inputs.voltage)
+    voltage = input_or(own_voltage, inputs.voltage)
     is_on = before[1] != 0.0 and voltage > e.own.cutoff_voltage
-    return (given_or(charge, inputs.charge), voltage if is_on else 0.0, current), inputs
+    return (input_or(charge, inputs.charge), voltage if is_on else 0.0, current), inputs
 
 
 @supply_voltage(ExternalBattery)

@@ -6,8 +6,8 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.atmosphere import temperature as air_temperature
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._external_inputs import external, given_or, initial_state
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects.battery import KIND, BatteryInputs, at_most, open_circuit_voltage
@@ -74,7 +74,7 @@ class BatteryThevenin(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
         """Return the parameters of the airframe's battery."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")
         if settings.restart is not None and settings.restart <= settings.cutoff_voltage:
             raise ConfigError(
@@ -166,9 +166,9 @@ def discharge_external(e, memory, s, rotors, key, tick, interval):
     """Return the discrete state after an interval, with the inputs in place of the battery's own numbers."""
     before, inputs = memory
     charge, voltage, current, temperature, fast, slow, _ = discharge(e.own, before, s, rotors, key, tick, interval)
-    voltage = max(given_or(voltage, inputs.voltage), 0.0)
+    voltage = max(input_or(voltage, inputs.voltage), 0.0)
     on = 1.0 if voltage > (e.own.cutoff_voltage if before[6] > 0.0 else e.own.restart) else 0.0
-    return (given_or(charge, inputs.charge), voltage, current, temperature, fast, slow, on), inputs
+    return (input_or(charge, inputs.charge), voltage, current, temperature, fast, slow, on), inputs
 
 
 @supply_voltage(ExternalBatteryThevenin)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
 
@@ -35,7 +35,7 @@ class BodyDrag(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyDrag":
         """Return the parameters with the airframe's areas, unless the table has others."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         area = settings.area
         if area is None:
             area = airframe.drag.area if airframe.drag else reject("needs the key area: the vehicle has no [drag]")

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import Vec3
 
@@ -36,7 +36,7 @@ class BodyWrench(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyWrench":
         """Take both from the scene's table."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         return cls(settings.force, settings.torque)
 
 

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.vector import norm, pair
@@ -52,7 +52,7 @@ class CeilingEffect(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CeilingEffect":
         """Return the parameters of the airframe's propeller."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -84,7 +84,7 @@ def power_ratio(e, distance):
 
 
 @noinline
-def _changed(c, plan, z):
+def _rotor_factors(c, plan, z):
     """Return the factors on the thrust and the torque of a rotor."""
     e, s = c
     R, (px, py, pz) = s.R_world_body, s.motion.position_world
@@ -114,7 +114,7 @@ def _times_second(_, factor, change):
 @load_factors(CeilingEffect)
 def ceiling_effect(e, memory, s, before):
     """Multiply the thrust and torque factors."""
-    change = map_tuple(_changed, (e, s), map_tuple(pair, 0.0, s.layout.x_body, s.layout.y_body), s.layout.z_body)
+    change = map_tuple(_rotor_factors, (e, s), map_tuple(pair, 0.0, s.layout.x_body, s.layout.y_body), s.layout.z_body)
     return Factors(
         map_tuple(_times_first, 0.0, before.thrust, change), map_tuple(_times_second, 0.0, before.torque, change)
     )

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics import small_matrices
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import check_beside, checked, reject
+from lapwing.dynamics.effects._from_scene import check_beside, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
 from lapwing.dynamics.vector import pair
@@ -48,7 +48,7 @@ class CoaxialInterference(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialInterference":
         """Return the parameters of every rotor below another one."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         uppers = _uppers(airframe, radius)
@@ -99,7 +99,7 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     check_beside(tables, "rotor_thrust", NOT_BESIDE)
 
 
-def stacked(airframe: "Airframe") -> bool:
+def has_rotor_in_wake(airframe: "Airframe") -> bool:
     """Return True if a rotor lies in the wake of another one."""
     propeller = airframe.propeller
     return propeller is not None and any(number >= 0 for number, _ in _uppers(airframe, 0.5 * propeller.diameter))

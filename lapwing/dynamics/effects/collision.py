@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import (
@@ -52,7 +52,7 @@ class Collision(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Collision":
         """Return the parameters with a sphere around the rotors, unless the table has its own."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         radius = settings.radius
         if radius is None:
             propeller = airframe.propeller or reject("needs the key radius: the vehicle has no [propeller]")
@@ -69,7 +69,7 @@ class Collision(NamedTuple):
 
 
 @always_inline
-def _yielding(state, arm, normal, along):
+def _compliance(state, arm, normal, along):
     """Return the change of speed along a unit vector at the contact, by an impulse of 1 N s along it [1/kg]."""
     turning = scale(arm, cross(normal, along))
     return 1.0 / state.mass + dot(turning, apply(state.inverse_inertia_world, turning))
@@ -106,7 +106,9 @@ def touch(e, memory, own, others, interval):
         if speed == 0.0:
             continue
         along = scale(1.0 / speed, slip)
-        stop = speed / (_yielding(own, arm, normal, along) + _yielding(other, reach, normal, along)) / interval  # [N]
+        stop = (
+            speed / (_compliance(own, arm, normal, along) + _compliance(other, reach, normal, along)) / interval
+        )  # [N]
         rub = min(rough * push, stop)
         force = subtract(force, scale(rub, along))
         torque = add(torque, scale(arm * rub, cross(normal, along)))

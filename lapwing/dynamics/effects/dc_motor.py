@@ -8,7 +8,7 @@ from annotated_types import Ge, Le
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._external_motor import DcMotorInputs, ExternalDcMotor, idle_current
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, motor
 from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
@@ -56,13 +56,15 @@ class DcMotor(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "DcMotor":
         """Return the parameters of the airframe's motor."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         engine = airframe.motor
         inertia = airframe.rotors.inertia + engine.inertia / (engine.gear_ratio * engine.gear_ratio)
         resistance = engine.resistance + engine.esc_resistance
         winding = ()
         if settings.inductance:
-            winding = _winding(settings.inductance, resistance, engine.rotor_constant, engine.belt_efficiency, inertia)
+            winding = _winding_constants(
+                settings.inductance, resistance, engine.rotor_constant, engine.belt_efficiency, inertia
+            )
         return cls(
             engine.rotor_constant,
             1.0 / resistance,
@@ -87,7 +89,9 @@ class DcMotor(NamedTuple):
         return ExternalDcMotor(self, DcMotorInputs(unknown, unknown, unknown))
 
 
-def _winding(inductance: float, resistance: float, constant: float, efficiency: float, inertia: float) -> tuple:
+def _winding_constants(
+    inductance: float, resistance: float, constant: float, efficiency: float, inertia: float
+) -> tuple:
     """Return (lag, effective inverse inertia, rate) from the roots of the linear motor (theory.md, eq. (2.76))."""
     electrical = inductance / resistance
     mechanical = inertia * resistance / (efficiency * constant * constant)
@@ -107,7 +111,7 @@ def _free(e, speed, voltage):
 
 
 @always_inline
-def _limited(e, speed, current):
+def _limit_current(e, speed, current):
     """Return the current [A] that the controller allows."""
     desired = min(max(current, e.least_current), e.current_limit)
     # the power K w I + R I^2 is at its limit where I = 2 P / (K w + sqrt((K w)^2 + 4 R P))
@@ -133,15 +137,15 @@ def _power(e, speed, free, current, voltage):
 
 
 @always_inline
-def _driven(e, speed, torque, free, voltage):
+def _rotor_response(e, speed, torque, free, voltage):
     """Return (acceleration [rad/s^2], current [A], power [W]) of a rotor at a current before limits."""
-    current = _limited(e, speed, free)
+    current = _limit_current(e, speed, free)
     acceleration = _acceleration(e, e.inverse_inertia, speed, current, torque)
     return acceleration, current, _power(e, speed, free, current, voltage)
 
 
 @always_inline
-def _settled(e, speed, torque, voltage):
+def _steady_current(e, speed, torque, voltage):
     """Return the current [A] before limits once the transient of the winding is over."""
     free = _free(e, speed, voltage)
     lag, inverse_inertia, _ = e.winding
@@ -151,15 +155,15 @@ def _settled(e, speed, torque, voltage):
 @always_inline
 def _without_lag(c, both, voltage):
     speed, torque = both
-    return _driven(c[0], speed, torque, _free(c[0], speed, voltage), voltage)
+    return _rotor_response(c[0], speed, torque, _free(c[0], speed, voltage), voltage)
 
 
 @always_inline
-def _lagging(c, both, more):
+def _with_lag(c, both, more):
     e, decay = c
     speed, torque = both
     voltage, (transient, _) = more
-    return _driven(e, speed, torque, _settled(e, speed, torque, voltage) + decay * transient, voltage)
+    return _rotor_response(e, speed, torque, _steady_current(e, speed, torque, voltage) + decay * transient, voltage)
 
 
 @always_inline
@@ -169,20 +173,20 @@ def _all_without_lag(arguments):
 
 
 @always_inline
-def _all_lagging(arguments):
+def _all_with_lag(arguments):
     e, memory, t, both, voltage = arguments
     decay = exact.exp(-e.winding[2] * (t - memory[0]))
-    return map_tuple(_lagging, (e, decay), both, map_tuple(pair, 0.0, voltage, memory[1]))
+    return map_tuple(_with_lag, (e, decay), both, map_tuple(pair, 0.0, voltage, memory[1]))
 
 
 @always_inline
-def _continued(c, both, more):
+def _transient_after_step(c, both, more):
     """Return (transient [A], voltage [V]) of a rotor whose current goes on from a step of the voltage."""
     e, decay = c
     speed, torque = both
     voltage, (transient, before) = more
-    current = _limited(e, speed, _settled(e, speed, torque, before) + decay * transient)
-    return current - _settled(e, speed, torque, voltage), voltage
+    current = _limit_current(e, speed, _steady_current(e, speed, torque, before) + decay * transient)
+    return current - _steady_current(e, speed, torque, voltage), voltage
 
 
 @always_inline
@@ -191,17 +195,17 @@ def _update_without_lag(arguments):
 
 
 @always_inline
-def _update_lagging(arguments):
+def _update_with_lag(arguments):
     e, memory, s, rotors = arguments
     decay = exact.exp(-e.winding[2] * (s.t - memory[0]))
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, rotors.torque)
-    return s.t, map_tuple(_continued, (e, decay), both, map_tuple(pair, 0.0, rotors.voltage, memory[1]))
+    return s.t, map_tuple(_transient_after_step, (e, decay), both, map_tuple(pair, 0.0, rotors.voltage, memory[1]))
 
 
 @discrete_update(DcMotor)
 def continue_current(e, memory, s, rotors, key, tick, interval):
     """Return the transient of each winding after the voltages have changed."""
-    return by_axis(_update_without_lag, _update_lagging, e.winding, (e, memory, s, rotors))
+    return by_axis(_update_without_lag, _update_with_lag, e.winding, (e, memory, s, rotors))
 
 
 @always_inline
@@ -213,7 +217,7 @@ def _third(_, driven, __):
 def dc_motor(e, memory, s, loads, voltage):
     """Return (acceleration [rad/s^2], current [A], power [W]) of each rotor."""
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, loads.torque)
-    driven = by_axis(_all_without_lag, _all_lagging, e.winding, (e, memory, s.t, both, voltage))
+    driven = by_axis(_all_without_lag, _all_with_lag, e.winding, (e, memory, s.t, both, voltage))
     return (
         map_tuple(first, 0.0, driven, driven),
         map_tuple(second, 0.0, driven, driven),

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects._vehicle_interaction import interaction
@@ -42,7 +42,7 @@ class Downwash(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":
         """Return the parameters with the discs of the airframe's propellers."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         places = airframe.rotors.position
         opposite = 2.0 * max(math.hypot(x, y) for x, y, _ in places)
@@ -58,7 +58,7 @@ class Downwash(NamedTuple):
 
 
 @interaction(Downwash)
-def blown(e, memory, own, others, interval):
+def wind_of_jets(e, memory, own, others, interval):
     """Return the wind of all other vehicles' jets at this vehicle, for the coming interval."""
     wind = (0.0, 0.0, 0.0)
     for other in others:

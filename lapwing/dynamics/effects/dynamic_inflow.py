@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, loads
 from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects.axial_inflow import KIND
@@ -49,7 +49,7 @@ class DynamicInflow(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "DynamicInflow":
         """Return the parameters of the airframe's propeller."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -78,7 +78,7 @@ def _through(e, axial, speed, induced):
 
 
 @kernel
-def _followed(c, induced, both):
+def _advance_inflow(c, induced, both):
     """Return the induced velocity an interval later, on its way to that of momentum theory for the present thrust."""
     e, interval = c
     speed, (axial, across) = both
@@ -93,7 +93,7 @@ def _followed(c, induced, both):
 @discrete_update(DynamicInflow)
 def follow(e, memory, s, rotors, key, tick, interval):
     """Return the induced velocity of each rotor for the next interval [m/s]."""
-    return map_tuple(_followed, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
+    return map_tuple(_advance_inflow, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
 
 
 @always_inline

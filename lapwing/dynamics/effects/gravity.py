@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import field, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
@@ -29,7 +29,7 @@ class Gravity(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Gravity":
         """Return the standard acceleration."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         return cls()
 
     def in_environment(self, environment: Environment) -> "Gravity":

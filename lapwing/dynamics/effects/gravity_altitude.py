@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.atmosphere import EARTH_RADIUS
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, field, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
@@ -32,7 +32,7 @@ class GravityAltitude(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GravityAltitude":
         """Return the standard acceleration at sea level."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         return cls()
 
     def in_environment(self, environment: Environment) -> "GravityAltitude":

@@ -9,7 +9,7 @@ from lapwing.dynamics.effects._contact_parameters import (
     GroundContact,
     GroundContactSmooth,
 )
-from lapwing.dynamics.effects._foot_contact import NO_FOOT, footing, in_reach, stance_of
+from lapwing.dynamics.effects._foot_contact import NO_FOOT, contact_of_feet, in_reach, stance_of
 from lapwing.dynamics.effects._hooks import (
     contact,
     contact_forces,
@@ -74,7 +74,7 @@ def _friction(e, memory, foot):
 @always_inline
 def _push(e, stance, feet_body, memory):
     """(force, torque) of four feet, in world coordinates, in lanes; zero where a foot is in the air."""
-    foot = footing(e, stance, feet_body)
+    foot = contact_of_feet(e, stance, feet_body)
     force = add(scale(foot.press, foot.normal), _friction(e, memory, foot))
     pressing = select(in_reach(stance, feet_body), foot.press, 0.0)
     return select_vector(pressing, force, ZERO), select_vector(pressing, cross(foot.arm, force), ZERO)
@@ -88,7 +88,7 @@ def _in_turn(start, four):
 
 
 @always_inline
-def _pushed(c, before, feet, memory):
+def _add_push(c, before, feet, memory):
     e, stance = c
     feet_body = interleave(feet)
     if not any_above(in_reach(stance, feet_body)):
@@ -101,7 +101,7 @@ def _pushed(c, before, feet, memory):
 def _feet_wrench(e, memory, motion, R_world_body):
     stance = stance_of(e, motion, R_world_body)
     feet, memory = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
-    force, torque_world = reduce_tuple(_pushed, (e, stance), (ZERO, ZERO), feet, memory)
+    force, torque_world = reduce_tuple(_add_push, (e, stance), (ZERO, ZERO), feet, memory)
     return force, apply_transposed(R_world_body, torque_world)
 
 
@@ -140,15 +140,15 @@ def far_smooth(e, memory, motion, h):
 
 
 @always_inline
-def _loaded_four(c, feet, memory):
+def _load_four_feet(c, feet, memory):
     """Return (reach, force, torque, rates of the elements) of four feet; all but the rates in lanes."""
     e, stance = c
     feet_body, deflection = interleave(feet), interleave(memory)
     relaxing = scale(-e.tangential_stiffness / e.tangential_damping, deflection)
     reached = in_reach(stance, feet_body)
     if not any_above(reached):
-        return reached, feet_body, feet_body, deinterleave(relaxing)  # no loads, `_added` leaves them out
-    foot = footing(e, stance, feet_body)
+        return reached, feet_body, feet_body, deinterleave(relaxing)  # no loads, `_add_four_feet` leaves them out
+    foot = contact_of_feet(e, stance, feet_body)
     friction, rate = _element(e, deflection, foot)
     force = add(scale(foot.press, foot.normal), friction)
     pressing = select(reached, foot.press, 0.0)
@@ -157,7 +157,7 @@ def _loaded_four(c, feet, memory):
 
 
 @always_inline
-def _added(_, before, four, __):
+def _add_four_feet(_, before, four, __):
     reached, force, torque, _ = four
     if not any_above(reached):
         return before
@@ -175,8 +175,8 @@ def loads_and_stretching(e, memory, motion):
     R_world_body = rotation_matrix(motion.attitude)
     stance = stance_of(e, motion, R_world_body)
     feet, deflections = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])
-    fours = map_tuple(_loaded_four, (e, stance), feet, deflections)
-    force, torque_world = reduce_tuple(_added, 0.0, (ZERO, ZERO), fours, fours)
+    fours = map_tuple(_load_four_feet, (e, stance), feet, deflections)
+    force, torque_world = reduce_tuple(_add_four_feet, 0.0, (ZERO, ZERO), fours, fours)
     rates = unchunk4(map_tuple(_rates_of, 0.0, fours, fours), memory)
     return force, apply_transposed(R_world_body, torque_world), rates
 
@@ -206,7 +206,7 @@ def split_smooth(e, memory, motion, h):
 @always_inline
 def _press(c, touching, feet, _):
     e, stance = c
-    return touching or any_above(footing(e, stance, interleave(feet)).press)
+    return touching or any_above(contact_of_feet(e, stance, interleave(feet)).press)
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.environment import Environment
@@ -36,7 +36,7 @@ class GroundEffect(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
         """Return the parameters of the airframe's propeller."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius = 0.5 * propeller.diameter
         reach = max(math.hypot(*position) for position in airframe.rotors.position)
@@ -66,7 +66,7 @@ def _height(c, x, y):
 
 
 @always_inline
-def _gained(_, factor, height):
+def _multiply_gain(_, factor, height):
     return factor * gain(height)
 
 
@@ -74,7 +74,7 @@ def _gained(_, factor, height):
 def ground_effect(e, memory, s, before):
     """Multiply the thrust factors; torque is unchanged."""
     heights = map_tuple(_height, (e, s), s.layout.x_body, s.layout.y_body)
-    return Factors(map_tuple(_gained, 0.0, before.thrust, heights), before.torque)
+    return Factors(map_tuple(_multiply_gain, 0.0, before.thrust, heights), before.torque)
 
 
 @is_sleeping(GroundEffect)

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import by_axis
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.effects._rotor_sums import total, total_vector
 from lapwing.dynamics.vector import cross, product, scale, subtract
@@ -30,7 +30,7 @@ class GyroscopicTorque(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "GyroscopicTorque":
         """Return the parameters of the airframe's rotors."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         return cls(airframe.rotors.inertia)
 
 
@@ -45,18 +45,18 @@ def _along_z(arguments):
 
 
 @always_inline
-def _scaled(_, value, axis):
+def _scale_axis(_, value, axis):
     return scale(value, axis)
 
 
 @always_inline
 def _sum_along(axis, sign, values):
     """Return the sum of a value of each rotor along its axis, with the sign of its reaction."""
-    return total_vector(map_tuple(_scaled, 0.0, map_tuple(product, 0.0, sign, values), axis))
+    return total_vector(map_tuple(_scale_axis, 0.0, map_tuple(product, 0.0, sign, values), axis))
 
 
 @always_inline
-def _tilted(arguments):
+def _along_axes(arguments):
     e, s, rotors = arguments
     sign, axis = s.layout.reaction_sign, s.layout.axis
     momentum = scale(-e.inertia, _sum_along(axis, sign, s.motion.rotor_speed))
@@ -67,4 +67,4 @@ def _tilted(arguments):
 @torque(GyroscopicTorque)
 def gyroscopic_torque(e, memory, s, rotors):
     """Return the torque [N m] in body coordinates."""
-    return by_axis(_along_z, _tilted, s.layout.axis, (e, s, rotors))
+    return by_axis(_along_z, _along_axes, s.layout.axis, (e, s, rotors))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import air_body, by_axis, places
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
 from lapwing.dynamics.vector import add, cross, dot, pair, product, scale, subtract
@@ -39,7 +39,7 @@ class HForce(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "HForce":
         """Return the parameters of the airframe's propeller, unless the table has the coefficient."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         positions = airframe.rotors.position
         if len({z for _, _, z in positions}) > 1 and not airframe.rotors.tilted_axis:
             reject("the rotors must all be at one height")
@@ -77,7 +77,7 @@ def _of_rotor(c, speed, at):
 
 
 @always_inline
-def _tilted(arguments):
+def _along_axes(arguments):
     e, s = arguments
     air, omega = air_body(s)
     at = map_tuple(pair, 0.0, places(s.layout), s.layout.axis)
@@ -87,4 +87,4 @@ def _tilted(arguments):
 @wrench_body(HForce)
 def h_force(e, memory, s, rotors):
     """Return the force [N] and torque [N m] in body coordinates."""
-    return by_axis(_along_z, _tilted, s.layout.axis, (e, s))
+    return by_axis(_along_z, _along_axes, s.layout.axis, (e, s))

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.effects.ground_effect import KIND
@@ -62,7 +62,7 @@ class MultirotorGroundEffect(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "MultirotorGroundEffect":
         """Return the parameters of the airframe's propellers over level ground."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, places = 0.5 * propeller.diameter, airframe.rotors.position
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -105,14 +105,14 @@ def _heights(c, plan, z):
 
 
 @always_inline
-def _faded(e, z):
+def _height_share(e, z):
     """Return the share of the law that is left at a height [m]."""
     fade = min(max((z / e.radius - FADE_FROM) * (1.0 / (FADE_TO - FADE_FROM)), 0.0), 1.0)
     return 1.0 - fade * fade * (3.0 - 2.0 * fade)
 
 
 @noinline
-def _cancelled(c, row, own):
+def _flow_reduction(c, row, own):
     """Return the share of a rotor's flow that images cancel, in hover."""
     e, heights = c
     result = 0.0
@@ -124,12 +124,12 @@ def _cancelled(c, row, own):
             image, body = square + h * h, e.diagonal + h * h
             part = 0.25 * e.radius * e.radius * h / (image * math.sqrt(image))
             part += share * e.fountain * 0.5 * h / (body * math.sqrt(body))
-            result += part * _faded(e, 0.5 * h)
+            result += part * _height_share(e, 0.5 * h)
     return result / len(own)
 
 
 @always_inline
-def _calmed(e, speed, hub):
+def _speed_share(e, speed, hub):
     """Return the share of the effect that is left at a speed across (Cheeseman and Bennett)."""
     m = hub[1] / max(e.flow * speed, 1e-3)  # over the induced velocity in hover
     half = 0.5 * m * m
@@ -138,7 +138,7 @@ def _calmed(e, speed, hub):
 
 
 @always_inline
-def _gained(_, factor, both):
+def _multiply_gain(_, factor, both):
     return factor / (1.0 - min(both[0] * both[1], MOST))
 
 
@@ -147,9 +147,11 @@ def multirotor_ground_effect(e, memory, s, before):
     """Multiply the thrust factors; torque is unchanged."""
     plan = map_tuple(pair, 0.0, s.layout.x_body, s.layout.y_body)
     heights = map_tuple(_heights, (e, s), plan, s.layout.z_body)
-    cancelled = map_tuple(_cancelled, (e, heights), e.pairs, heights)
-    calmed = map_tuple(_calmed, e, s.motion.rotor_speed, hub_speeds(s))
-    return Factors(map_tuple(_gained, 0.0, before.thrust, map_tuple(pair, 0.0, cancelled, calmed)), before.torque)
+    cancelled = map_tuple(_flow_reduction, (e, heights), e.pairs, heights)
+    calmed = map_tuple(_speed_share, e, s.motion.rotor_speed, hub_speeds(s))
+    return Factors(
+        map_tuple(_multiply_gain, 0.0, before.thrust, map_tuple(pair, 0.0, cancelled, calmed)), before.torque
+    )
 
 
 @is_sleeping(MultirotorGroundEffect)

@@ -6,7 +6,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import break_time, mass_properties, timed_update
 from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
 
@@ -40,7 +40,7 @@ class PayloadRelease(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "PayloadRelease":
         """Return mass properties with and without the box."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         release = float("inf") if settings.release_time is None else settings.release_time
         if airframe.payload:
             if twice := {"mass", "size"} & set(table):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, wind, wrench
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
@@ -53,7 +53,7 @@ class RandomWindForce(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RandomWindForce":
         """Return the parameters of a scene's table."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         return cls(
             settings.mean,
             settings.sigma,

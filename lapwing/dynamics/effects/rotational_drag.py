@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.vector import Vec3, multiply, scale, subtract
 
@@ -33,7 +33,7 @@ class RotationalDrag(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotationalDrag":
         """Take the coefficients from the scene's table."""
-        return cls(checked(Settings, table).linear)
+        return cls(validate_table(Settings, table).linear)
 
 
 @torque(RotationalDrag)

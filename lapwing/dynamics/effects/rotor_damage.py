@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import break_time, load_factors, timed_update
 from lapwing.dynamics.effects._types import Factors, PerRotor
 from lapwing.dynamics.vector import product
@@ -38,7 +38,7 @@ class RotorDamage(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
         """Return the parameters for one of the airframe's rotors."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         count = len(airframe.rotors.position)
         if settings.rotor > count:
             raise ConfigError("rotor", f"got {settings.rotor}", f"one of the vehicle's rotors, 1 to {count}")

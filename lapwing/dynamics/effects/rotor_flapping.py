@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import air_body, by_axis, places
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total_wrench
 from lapwing.dynamics.vector import add, cross, dot, norm, pair, scale, subtract
@@ -43,7 +43,7 @@ class RotorFlapping(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorFlapping":
         """Return the parameters of the airframe's propeller."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         coefficient, radius = settings.coefficient, 0.5 * propeller.diameter
         if coefficient is None:
@@ -94,7 +94,7 @@ def _along_z(arguments):
 
 
 @always_inline
-def _tilted(arguments):
+def _along_axes(arguments):
     e, s, states = arguments
     air, omega = air_body(s)
     at = map_tuple(pair, 0.0, places(s.layout), s.layout.axis)
@@ -105,4 +105,4 @@ def _tilted(arguments):
 def rotor_flapping(e, memory, s, rotors):
     """Return the force [N] and torque [N m] in body coordinates."""
     states = map_tuple(pair, 0.0, rotors.thrust, s.motion.rotor_speed)
-    return by_axis(_along_z, _tilted, s.layout.axis, (e, s, states))
+    return by_axis(_along_z, _along_axes, s.layout.axis, (e, s, states))

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from lapwing.dynamics.effects._axes import air_body, hub_speeds
-from lapwing.dynamics.effects._from_scene import check_beside, checked, reject
+from lapwing.dynamics.effects._from_scene import check_beside, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects._vortex_wake import OFFSETS, SKEWS, mean_wash
@@ -48,7 +48,7 @@ class RotorInterference(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorInterference":
         """Return the parameters of every pair of rotors."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -101,7 +101,7 @@ def _share(wash, number, skew, offset):
 
 
 @always_inline
-def _induced(e, speed, hub):
+def _induced_velocity(e, speed, hub):
     """Return (induced velocity [m/s], air speed through the disc [m/s], air speed across [m/s])."""
     hover = max(e.flow * speed, SLOWEST)
     v = hover * inflow.induced_velocity(hub[0] / hover, hub[1] / hover, 1.0)
@@ -139,6 +139,6 @@ def rotor_interference(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
     speed = s.motion.rotor_speed
     air, _ = air_body(s)
-    flows = map_tuple(_induced, e, speed, hub_speeds(s))
+    flows = map_tuple(_induced_velocity, e, speed, hub_speeds(s))
     change = map_tuple(_change, (e, flows, (air[0], air[1])), e.pairs, map_tuple(pair, 0.0, e.numbers, speed))
     return with_changes(s, factors, before, change)

@@ -25,7 +25,7 @@ class RotorQuadratic(NamedTuple):
 
 
 @always_inline
-def _added(constant, speed, both):
+def _add_quadratic(constant, speed, both):
     return both[0] + constant * (speed * speed) * both[1]
 
 
@@ -34,6 +34,6 @@ def rotor_quadratic(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
     speed = s.motion.rotor_speed
     return Loads(
-        map_tuple(_added, e.thrust_constant, speed, map_tuple(pair, 0.0, before.thrust, factors.thrust)),
-        map_tuple(_added, e.torque_constant, speed, map_tuple(pair, 0.0, before.torque, factors.torque)),
+        map_tuple(_add_quadratic, e.thrust_constant, speed, map_tuple(pair, 0.0, before.thrust, factors.thrust)),
+        map_tuple(_add_quadratic, e.torque_constant, speed, map_tuple(pair, 0.0, before.torque, factors.torque)),
     )

@@ -10,9 +10,9 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
-from lapwing.dynamics.effects._propeller_data import parsed
+from lapwing.dynamics.effects._propeller_data import parse_table
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vector import pair
@@ -60,7 +60,7 @@ class RotorTable(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorTable":
         """Return the parameters of the table, with the airframe's diameter."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         diameter = settings.diameter
         if diameter is None:
             propeller = airframe.propeller or reject("needs the key diameter: the vehicle has no [propeller]")
@@ -90,7 +90,7 @@ def embed(table: dict[str, Any], folder: Path) -> None:
         raise ConfigError(min(settings), "stands beside file", "one of them")
     path = folder / file
     try:
-        table.update(parsed("file", read_text(path)))
+        table.update(parse_table("file", read_text(path)))
     except OSError as error:
         raise ConfigError("file", f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
     except UnicodeDecodeError:

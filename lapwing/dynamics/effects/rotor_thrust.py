@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, NamedTuple
 
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
@@ -32,7 +32,7 @@ class RotorThrust(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
         """Return the parameters of the airframe's propeller."""
-        checked(Settings, table)
+        validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]; name rotor_quadratic instead")
         square = math.square(2.0 * math.pi)
         return cls(

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import switches, wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.environment import Environment
@@ -44,7 +44,7 @@ class SharedSlungLoad(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "SharedSlungLoad":
         """Return the parameters with the damping for the airframe's mass."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         reduced = 1.0 / (1.0 / settings.mass + 1.0 / airframe.mass.total)
         damping = 2.0 * settings.damping_ratio * math.sqrt(settings.stiffness * reduced)
         hook = subtract(settings.hook, airframe.mass.centre)
@@ -64,7 +64,7 @@ class SharedSlungLoad(NamedTuple):
 
 
 @interaction(SharedSlungLoad)
-def fastened(e, memory, own, others, interval):
+def load_motion(e, memory, own, others, interval):
     """Return the position, velocity and acceleration of the load at the beginning of the coming interval."""
     for other in others:
         if other.is_load:

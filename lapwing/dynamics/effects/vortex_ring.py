@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import checked, reject
+from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.noise import normal3
@@ -55,7 +55,7 @@ class VortexRing(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "VortexRing":
         """Return the parameters of the airframe's propeller."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, count = 0.5 * propeller.diameter, len(airframe.rotors.position)
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
@@ -82,7 +82,7 @@ def strength(descent, across):
 
 
 @always_inline
-def _oscillated(c, state, both):
+def _advance_oscillation(c, state, both):
     """Return the oscillation of a rotor an interval later."""
     key, tick, interval = c
     speed, lane = both
@@ -97,7 +97,9 @@ def _oscillated(c, state, both):
 @discrete_update(VortexRing)
 def oscillate(e, memory, s, rotors, key, tick, interval):
     """Return the oscillation of each rotor for the next interval."""
-    return map_tuple(_oscillated, (key, tick, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, e.lanes))
+    return map_tuple(
+        _advance_oscillation, (key, tick, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, e.lanes)
+    )
 
 
 @always_inline

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
@@ -38,7 +38,7 @@ class WindBoundaryLayer(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "WindBoundaryLayer":
         """Return the parameters over level ground."""
-        settings = checked(Settings, table)
+        settings = validate_table(Settings, table)
         scale = settings.speed / math.log1p(settings.height / settings.roughness)
         return cls(
             (scale * math.cos(settings.direction_to), scale * math.sin(settings.direction_to)), 1.0 / settings.roughness

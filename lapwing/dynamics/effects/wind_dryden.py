@@ -4,7 +4,7 @@ import zlib
 from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._hooks import air, discrete_update
-from lapwing.dynamics.effects._turbulence import KIND, Conditions, Part, Settings, blown, calm, conditions, drawn
+from lapwing.dynamics.effects._turbulence import KIND, Conditions, Part, Settings, add_to_air, calm, conditions, drawn
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.vector import Vec3
 
@@ -51,4 +51,4 @@ def draw(e, memory, s, rotors, key, tick, interval):
 @air(WindDryden)
 def wind_dryden(e, memory, s, before):
     """Add the turbulence to the air."""
-    return blown(memory, before)
+    return add_to_air(memory, before)

@@ -6,19 +6,19 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects import wind_dryden
-from lapwing.dynamics.effects._from_scene import checked
+from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import air, air_rate, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
     Conditions,
     advance_filters,
     conditions,
-    elapsed,
+    deviation_and_rate,
     first_order,
     in_world,
     intensity,
-    passing,
     surroundings,
+    time_since_update,
 )
 from lapwing.dynamics.effects._turbulence import Settings as Turbulence
 from lapwing.dynamics.effects._types import Air
@@ -61,7 +61,7 @@ class WindDrydenRates(NamedTuple):
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDrydenRates":
         """Return the parameters over level ground; the default span is from tip to tip of the outer rotors."""
-        span = checked(Settings, table).span
+        span = validate_table(Settings, table).span
         if span is None:
             reach = max(math.hypot(x, y) for x, y, _ in airframe.rotors.position)
             span = 2.0 * reach + (airframe.propeller.diameter if airframe.propeller else 0.0)
@@ -77,7 +77,7 @@ class WindDrydenRates(NamedTuple):
 
 
 @always_inline
-def passed(x1, x2, z, beta, theta, n1, n2, n3):
+def low_pass(x1, x2, z, beta, theta, n1, n2, n3):
     """Return the low-passed transverse gust z, `theta` gust correlation times later (theory.md, eq. (2.40)).
 
     Args:
@@ -121,8 +121,8 @@ def draw(e, memory, s, rotors, key, tick, interval):
     """Return the filter states, the wind [m/s, world] and the air's rate [rad/s, world] for the next interval."""
     along, across1, across2, up1, up2, started = memory[0]
     roll, pitch, yaw = memory[2]
-    sigma, rate = passing(e.conditions, s)
-    time = elapsed(started, rate, interval)
+    sigma, rate = deviation_and_rate(e.conditions, s)
+    time = time_since_update(started, rate, interval)
     first, second = normal3(key, tick, FIRST), normal3(key, tick, SECOND)
     third = normal3(key, tick, LANE)
     altitude, airspeed = surroundings(e.conditions, s)
@@ -130,14 +130,14 @@ def draw(e, memory, s, rotors, key, tick, interval):
     per_span = math.pi / (4.0 * e.span)  # [1/m] of roll and pitch; four thirds of it of yaw
     beta_up, beta_across = per_span * length[2], 4.0 / 3.0 * per_span * length[1]
     roll = first_order(roll, per_span * airspeed * time, third[0])
-    pitch = passed(up1, up2, pitch, beta_up, rate[2] * time, first[2], second[1], third[1])
-    yaw = passed(across1, across2, yaw, beta_across, rate[1] * time, first[1], second[0], third[2])
+    pitch = low_pass(up1, up2, pitch, beta_up, rate[2] * time, first[2], second[1], third[1])
+    yaw = low_pass(across1, across2, yaw, beta_across, rate[1] * time, first[1], second[0], third[2])
     states, (u, v, w) = advance_filters((along, across1, across2, up1, up2), scale(time, rate), first, second)
     wind = in_world(e.conditions, sigma[0] * u, sigma[1] * v, sigma[2] * w)
     p = sigma[2] * math.pi * math.sqrt(0.1 * math.cbrt(per_span * length[2]) / (e.span * length[2])) * roll
     q, r = per_span * sigma[2] * (w - pitch), -4.0 / 3.0 * per_span * sigma[1] * (v - yaw)
-    turning = in_world(e.conditions, p, q, r)
-    return (states[0], states[1], states[2], states[3], states[4], 1.0), wind, (roll, pitch, yaw), turning
+    rotation = in_world(e.conditions, p, q, r)
+    return (states[0], states[1], states[2], states[3], states[4], 1.0), wind, (roll, pitch, yaw), rotation
 
 
 @air(WindDrydenRates)
@@ -147,6 +147,6 @@ def wind_dryden_rates(e, memory, s, before):
 
 
 @air_rate(WindDrydenRates)
-def turning(e, memory, s, before):
+def add_gust_rate(e, memory, s, before):
     """Add the turbulence's rate to the air's rate [rad/s], body coordinates."""
     return add(before, apply_transposed(s.R_world_body, memory[3]))

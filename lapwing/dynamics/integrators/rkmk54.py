@@ -14,7 +14,7 @@ Method = method_token(__name__)
 
 
 @always_inline
-def _pulled_back(x, u, k):
+def _dexpinv(x, u, k):
     """Return dexpinv(u, k) to the order of the method: k - [u, k]/2 + [u, [u, k]]/12 (theory.md, eq. (5.4))."""
     b = bracket(x, u, k)
     return axpy(1.0 / 12.0, bracket(x, u, b), axpy(-0.5, b, k))
@@ -28,19 +28,19 @@ def stages(rate, p, t, x, h, k1):
     `last` of the previous step.
     """
     u = scale(1 / 5, k1)
-    k2 = _pulled_back(x, u, scale(h, rate(p, t + h / 5, retract(x, u))))
+    k2 = _dexpinv(x, u, scale(h, rate(p, t + h / 5, retract(x, u))))
     u = axpy(9 / 40, k2, scale(3 / 40, k1))
-    k3 = _pulled_back(x, u, scale(h, rate(p, t + 3 * h / 10, retract(x, u))))
+    k3 = _dexpinv(x, u, scale(h, rate(p, t + 3 * h / 10, retract(x, u))))
     u = axpy(32 / 9, k3, axpy(-56 / 15, k2, scale(44 / 45, k1)))
-    k4 = _pulled_back(x, u, scale(h, rate(p, t + 4 * h / 5, retract(x, u))))
+    k4 = _dexpinv(x, u, scale(h, rate(p, t + 4 * h / 5, retract(x, u))))
     u = axpy(-212 / 729, k4, axpy(64448 / 6561, k3, axpy(-25360 / 2187, k2, scale(19372 / 6561, k1))))
-    k5 = _pulled_back(x, u, scale(h, rate(p, t + 8 * h / 9, retract(x, u))))
+    k5 = _dexpinv(x, u, scale(h, rate(p, t + 8 * h / 9, retract(x, u))))
     u = axpy(-5103 / 18656, k5, axpy(49 / 176, k4, axpy(46732 / 5247, k3, axpy(-355 / 33, k2, scale(9017 / 3168, k1)))))
-    k6 = _pulled_back(x, u, scale(h, rate(p, t + h, retract(x, u))))
+    k6 = _dexpinv(x, u, scale(h, rate(p, t + h, retract(x, u))))
     u = axpy(11 / 84, k6, axpy(-2187 / 6784, k5, axpy(125 / 192, k4, axpy(500 / 1113, k3, scale(35 / 384, k1)))))
     end = retract(x, u)
     last = scale(h, rate(p, t + h, end))
-    k7 = _pulled_back(x, u, last)
+    k7 = _dexpinv(x, u, last)
     e = axpy(-17253 / 339200, k5, axpy(71 / 1920, k4, axpy(-71 / 16695, k3, scale(71 / 57600, k1))))
     e = axpy(-1 / 40, k7, axpy(22 / 525, k6, e))
     return end, u, e, (k1, k3, k4, k5, k6, k7), last

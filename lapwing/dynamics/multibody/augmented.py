@@ -115,7 +115,7 @@ def factor_rows(a, p, e, count, tolerance, most):
 
 
 @noinline
-def constrained(a, p, e, force, gamma, tolerance, most):
+def constrained_acceleration(a, p, e, force, gamma, tolerance, most):
     """Return accelerations (n, 6) with M a = force - J^T lambda, J a = gamma: the core of every solve."""
     root, rotational, f = factor_rows(a, p, e, len(gamma), tolerance, most)
     free = force.copy().reshape(-1, 1)
@@ -146,12 +146,12 @@ def solve(a, configuration, velocity, wrench, drive, damping, stiffness, toleran
     if p.singular >= 0:
         return Solution(np.zeros((len(a.mass), 6)), np.zeros(len(gamma)), 0, 0.0), p.singular
     if damping != 0.0 or stiffness != 0.0:
-        gamma = stabilised(e, velocity, damping, stiffness)
-    return constrained(a, p, e, generalised_force(a, p, wrench), gamma, tolerance, most), p.singular
+        gamma = baumgarte_gamma(e, velocity, damping, stiffness)
+    return constrained_acceleration(a, p, e, generalised_force(a, p, wrench), gamma, tolerance, most), p.singular
 
 
 @kernel
-def stabilised(e, velocity, damping, stiffness):
+def baumgarte_gamma(e, velocity, damping, stiffness):
     """Return Baumgarte's right-hand side: gamma - damping (J v - target) - stiffness residual (eq. (8.30))."""
     gamma = e.gamma.copy()
     flat = velocity.copy().reshape(-1)
@@ -184,13 +184,13 @@ def accelerations(
     Raises:
         ValueError: a body's pitch is at 90 degrees in Euler coordinates.
     """
-    configuration, velocity, wrench, drive = prepared(system, configuration, velocity, wrench, drive)
+    configuration, velocity, wrench, drive = as_float_arrays(system, configuration, velocity, wrench, drive)
     solution, singular = solve(system.arrays, configuration, velocity, wrench, drive, 0.0, 0.0, RANK_TOLERANCE, ANY)
     refuse_singular(system, singular)
     return solution
 
 
-def prepared(
+def as_float_arrays(
     system: System,
     configuration: ArrayLike,
     velocity: ArrayLike,

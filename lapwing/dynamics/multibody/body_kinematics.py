@@ -99,7 +99,7 @@ def configuration_rate(configuration, velocity):
 
 
 @kernel
-def displaced(configuration, step):
+def add_increment(configuration, step):
     """Return the configuration plus an increment (n, 6); a body rotation vector for quaternions."""
     n, width = configuration.shape
     out = configuration.copy()

@@ -117,7 +117,7 @@ def free_turn(axis, gamma_1, gamma_2):
 
 
 @always_inline
-def _fed_back(rate, r, speed, x, chassis, R0, axis, own):
+def _baumgarte_feedback(rate, r, speed, x, chassis, R0, axis, own):
     """Return (drift, turn) of Baumgarte's feedback at `rate` [1/s] of a hinge's defect (theory.md, eq. (8.30))."""
     w, back = chassis.omega_body, rate * rate
     gap = subtract(apply_transposed(R0, subtract(x.position_world, chassis.position_world)), r.offset)
@@ -148,7 +148,7 @@ def _leaf(r, x, t, chassis, R0, C, gravity_body, feedback):
     torque = apply(C, subtract(scale(r.held, r.wrench.torque_body), gyroscopic))
     drift = subtract(scale(dot(w, r.offset), w), scale(dot(w, w), r.offset))
     if feedback > 0.0:
-        more, swing = _fed_back(feedback, r, speed, x, chassis, R0, axis, own)
+        more, swing = _baumgarte_feedback(feedback, r, speed, x, chassis, R0, axis, own)
         drift, turn = add(drift, more), add(turn, swing)
     inertia = reflected_inertia(C, moments, r.spins)
     drive = r.held * r.drive

@@ -20,7 +20,7 @@ def _gap(chassis, R0, offset, x):
 
 
 @always_inline
-def _resting(r, spins, C, drift, turn, force, torque):
+def _idle_leaves(r, spins, C, drift, turn, force, torque):
     """Return leaves with idle drives, under momenta or no loads."""
     mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
     return HingedBody(
@@ -39,7 +39,7 @@ def _resting(r, spins, C, drift, turn, force, torque):
 
 
 @always_inline
-def _turned(q, turn):
+def _rotate(q, turn):
     """Return the attitude after a rotation in the body [rad], of third order and unit length, without a root."""
     s = scale(0.25, turn)
     square = dot(s, s)
@@ -59,7 +59,7 @@ def _attitude(flag, a, b):
 
 
 @always_inline
-def _gathered(p, c, r, b):
+def _closed_lanes(p, c, r, b):
     """Return (chassis, propellers) as SIMD lanes with closed hinges."""
     R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
     axis = column(C, 2)
@@ -67,11 +67,11 @@ def _gathered(p, c, r, b):
     # rows v1 . v3 and v2 . v3 are axis[0], axis[1]; their increments must be the opposite
     turn = free_turn(axis, -axis[0], -axis[1])
     none, all_spin = scale(0.0, gap), 1.0 + 0.0 * r.mass
-    s = eliminate(_core(p, ZERO, ZERO), _resting(r, all_spin, C, scale(-1.0, gap), turn, none, none))
+    s = eliminate(_core(p, ZERO, ZERO), _idle_leaves(r, all_spin, C, scale(-1.0, gap), turn, none, none))
     moved = apply(R0, s.acceleration)
     position = add(b.position_world, add(moved, apply(R0, s.relative)))
-    attitude = _turned(b.attitude, apply_transposed(C, s.turned))
-    turned = _turned(c.attitude, s.angular_acceleration)
+    attitude = _rotate(b.attitude, apply_transposed(C, s.turned))
+    turned = _rotate(c.attitude, s.angular_acceleration)
     return (
         BodyState(add(c.position_world, moved), turned, c.velocity_world, c.omega_body),
         BodyState(
@@ -95,7 +95,7 @@ def project(p, t, x):
     One Newton step on position level, then the velocities: a drift of e leaves e^2.
     """
     r = interleave(p.rotors)
-    c, b = _gathered(p, x.chassis, r, interleave(x.propellers))
+    c, b = _closed_lanes(p, x.chassis, r, interleave(x.propellers))
     R0, C = quaternion.rotation_matrix(c.attitude), from_chassis(c, b)
     speed = r.speed + r.drive * t
     still = 0.0 * speed
@@ -103,7 +103,7 @@ def project(p, t, x):
     angular = apply(C, multiply(scale(r.held, r.inertia), b.omega_body))
     imposed = select_vector(r.spins, (still, still, still), (still, still, speed))
     core = _core(p, scale(p.mass, apply_transposed(R0, c.velocity_world)), multiply(p.inertia, c.omega_body))
-    s = eliminate(core, _resting(r, r.spins, C, (still, still, still), imposed, momentum, angular))
+    s = eliminate(core, _idle_leaves(r, r.spins, C, (still, still, still), imposed, momentum, angular))
     velocity = apply(R0, s.acceleration)
     return FiveBodies(
         BodyState(c.position_world, c.attitude, velocity, s.angular_acceleration),
@@ -203,16 +203,16 @@ def assembled_state(p, chassis, angles, speeds):
     return FiveBodies(
         chassis,
         (
-            _placed(r[0], R0, chassis, angles[0], speeds[0]),
-            _placed(r[1], R0, chassis, angles[1], speeds[1]),
-            _placed(r[2], R0, chassis, angles[2], speeds[2]),
-            _placed(r[3], R0, chassis, angles[3], speeds[3]),
+            _place_propeller(r[0], R0, chassis, angles[0], speeds[0]),
+            _place_propeller(r[1], R0, chassis, angles[1], speeds[1]),
+            _place_propeller(r[2], R0, chassis, angles[2], speeds[2]),
+            _place_propeller(r[3], R0, chassis, angles[3], speeds[3]),
         ),
     )
 
 
 @always_inline
-def _placed(r, R0, chassis, angle, speed):
+def _place_propeller(r, R0, chassis, angle, speed):
     half = quaternion.Quaternion(math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))
     position = add(chassis.position_world, apply(R0, r.offset))
     velocity = add(chassis.velocity_world, apply(R0, cross(chassis.omega_body, r.offset)))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from lapwing.dynamics.multibody.augmented import ANY, prepared, refuse_singular
+from lapwing.dynamics.multibody.augmented import ANY, as_float_arrays, refuse_singular
 from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import project, rows
 
@@ -12,7 +12,7 @@ NEAR = 0.2  # largest position defect that is corrected: beyond it, another asse
 
 def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> None:
     """Raise ValueError with every violated row and its defect if a state does not satisfy its constraints."""
-    configuration, velocity, _, drive = prepared(system, configuration, velocity, None, drive)
+    configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
     refuse_singular(system, p.singular)
     names, holonomic = system.row_names(), len(e.residual)
@@ -29,7 +29,7 @@ def consistent(system, configuration, velocity, drive=None):
     Raises:
         ValueError: a joint is apart by more than `NEAR`, or no state satisfies all rows; names the violated rows.
     """
-    configuration, velocity, _, drive = prepared(system, configuration, velocity, None, drive)
+    configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
     refuse_singular(system, p.singular)
     if len(e.residual) and np.max(np.abs(e.residual)) > NEAR:

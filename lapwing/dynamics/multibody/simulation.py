@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.multibody.augmented import RANK_TOLERANCE, prepared, refuse_singular, solve
-from lapwing.dynamics.multibody.body_kinematics import configuration_rate, displaced, place
+from lapwing.dynamics.multibody.augmented import RANK_TOLERANCE, as_float_arrays, refuse_singular, solve
+from lapwing.dynamics.multibody.body_kinematics import add_increment, configuration_rate, place
 from lapwing.dynamics.multibody.stabilisation import (
     BAUMGARTE,
     NAMES,
@@ -53,7 +53,7 @@ def _along(x, h, k):
 
 
 @kernel
-def _weighted(x, h, k1, k2, k3, k4):
+def _rk4_update(x, h, k1, k2, k3, k4):
     """Return x + h (k1 + 2 k2 + 2 k3 + k4) / 6."""
     out = x.copy()
     for i in range(x.shape[0]):
@@ -77,8 +77,8 @@ def _step(a, q, v, wrench, drive, t, h, damping, stiffness, ranks):
     q4, v4 = _along(q, h, k3), _along(v, h, a3)
     s4, b4 = solve(a, q4, v4, wrench, _drive_at(drive, t + h), damping, stiffness, RANK_TOLERANCE, ranks[1])
     k4, a4 = configuration_rate(q4, v4), s4.acceleration
-    q, v = _weighted(q, h, k1, k2, k3, k4), _weighted(v, h, a1, a2, a3, a4)
-    return displaced(q, np.zeros(v.shape)), v, max(max(b1, b2), max(b3, b4))
+    q, v = _rk4_update(q, h, k1, k2, k3, k4), _rk4_update(v, h, a1, a2, a3, a4)
+    return add_increment(q, np.zeros(v.shape)), v, max(max(b1, b2), max(b3, b4))
 
 
 def simulate(
@@ -103,7 +103,7 @@ def simulate(
     Raises:
         ValueError: bad shapes or numbers, an unknown stabilisation, Euler angles that reached a pitch of 90 degrees.
     """
-    configuration, velocity, wrench, drive = prepared(system, configuration, velocity, wrench, drive)
+    configuration, velocity, wrench, drive = as_float_arrays(system, configuration, velocity, wrench, drive)
     if not step > 0.0:
         raise ValueError(f"step must be positive, not {step}")
     if stabilisation not in NAMES:

@@ -2,14 +2,14 @@
 
 `project` moves every body by the shortest way in the metric of the masses. `partition` keeps the independent
 coordinates and velocities that the integration produced and solves for the dependent ones: the paper's
-generalised coordinate partitioning. Baumgarte's feedback is `augmented.stabilised`.
+generalised coordinate partitioning. Baumgarte's feedback is `augmented.baumgarte_gamma`.
 """
 
 import numpy as np
 
 from lapwing.dynamics.multibody import pivoted_qr
 from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, divide_root_transposed, factor_rows
-from lapwing.dynamics.multibody.body_kinematics import displaced, place
+from lapwing.dynamics.multibody.body_kinematics import add_increment, place
 from lapwing.dynamics.multibody.constraints import equations, in_coordinates, velocity_defect
 from lapwing.kernels import kernel, noinline
 
@@ -73,7 +73,7 @@ def project(a, configuration, velocity, drive, ranks):
         root, rotational, f = factor_rows(a, p, e, holonomic, _tolerance(e), ranks[0])
         y, _, _ = pivoted_qr.shortest(f, -e.residual)
         divide_root_transposed(root, rotational, y)
-        configuration = displaced(configuration, y.reshape(-1, 6))
+        configuration = add_increment(configuration, y.reshape(-1, 6))
         p, e = rows(a, configuration, velocity, drive)
     if len(e.target) > 0:
         root, rotational, f = factor_rows(a, p, e, len(e.target), _tolerance(e), ranks[1])
@@ -118,7 +118,7 @@ def partition(a, configuration, velocity, drive, ranks):
             if largest(e.residual) < ENOUGH:
                 break
             change = _correction(jacobian, mask, e.residual, _tolerance(e), ranks[0])
-            configuration = displaced(configuration, change.reshape(-1, 6))
+            configuration = add_increment(configuration, change.reshape(-1, 6))
             _, e = rows(a, configuration, velocity, drive)
             jacobian = np.ascontiguousarray(e.jacobian_t[:, :holonomic].T)
     if len(e.target) > 0:

@@ -45,7 +45,7 @@ def relief(
     Raises:
         ConfigError: ground steeper than 45 degrees, a grid without home, steps out of order.
     """
-    heights = np.zeros((0, 0)) if grid is None else _checked(grid, corner, spacing)
+    heights = np.zeros((0, 0)) if grid is None else _validate_grid(grid, corner, spacing)
     steep = math.hypot(*slope) + abs(bump_height) * 2.0 * math.pi / bump_length
     if steep > STEEPEST:
         key = "bump_height" if bump_height else "slope"
@@ -69,7 +69,7 @@ def relief(
     return result
 
 
-def _checked(grid: np.ndarray, corner: tuple[float, float], spacing: float) -> np.ndarray:
+def _validate_grid(grid: np.ndarray, corner: tuple[float, float], spacing: float) -> np.ndarray:
     heights = np.ascontiguousarray(grid, dtype=float)
     if heights.ndim != 2 or min(heights.shape) < 2:
         raise ConfigError("grid.heights", f"got an array of shape {heights.shape}", "at least 2 rows and 2 columns")

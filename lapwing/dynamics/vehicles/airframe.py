@@ -51,7 +51,7 @@ class Airframe(Section):
         return self
 
     @model_validator(mode="after")
-    def _extended(self) -> "Airframe":
+    def _expand(self) -> "Airframe":
         gyration = math.sqrt(min(self.mass.inertia) / self.mass.total)
         reach = max(dist(self.mass.centre, place) for place in self.rotors.position)
         if gyration < LEAST_GYRATION * reach:

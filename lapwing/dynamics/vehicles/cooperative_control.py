@@ -30,13 +30,13 @@ class FormationControl(NamedTuple):
 @kernel
 def formation_control(p, t, x):
     """Return thrusts and moments of all quadrotors at time t (theory.md, eqs. (7.22) to (7.27))."""
-    desired, slope = forces.wanted_specific(p, t, x, (0.0, 0.0, 0.0))
+    desired, slope = forces.desired_specific_force(p, t, x, (0.0, 0.0, 0.0))
     s, s_rate = forces.shares(p, x, desired, slope)
     thrust = map_index(forces.quad_thrust, x.link, p, x, desired, slope, s, s_rate)
     # these thrusts give the accelerations, and those the rates of the wanted forces
     force = map_index(formation.thrust_world, x.link, x, thrust)
     specific = load_acceleration(p, x, force)
-    desired, slope = forces.wanted_specific(p, t, x, add(specific, (0.0, 0.0, -p.gravity)))
+    desired, slope = forces.desired_specific_force(p, t, x, add(specific, (0.0, 0.0, -p.gravity)))
     s, s_rate = forces.shares(p, x, desired, slope)
     return LiftCommand(thrust, map_index(forces.quad_moment, x.link, p, x, desired, slope, s, s_rate, force, specific))
 

@@ -36,7 +36,7 @@ def desired_load(path, t):
 
 
 @always_inline
-def wanted_specific(p, t, x, acceleration):
+def desired_specific_force(p, t, x, acceleration):
     """Return the desired v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (eq. (7.22))."""
     c = p.drive
     position, velocity, wanted_acceleration = desired_load(c.path, t)
@@ -48,7 +48,7 @@ def wanted_specific(p, t, x, acceleration):
 
 
 @always_inline
-def _shared(matrix, x, b, b_rate):
+def _solve_damped(matrix, x, b, b_rate):
     """Return the solution of (sum of q q^T + damping) s = b and its derivative."""
     s = solve_symmetric(matrix, b)
     for i in range(len(x.link)):
@@ -64,9 +64,9 @@ def shares(p, x, desired, slope):
     matrix = (SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING, 0.0, 0.0, 0.0, SHARE_DAMPING)
     for i in range(len(x.link)):
         matrix = add_outer(matrix, 1.0, x.link[i].direction)
-    s, s_rate = _shared(matrix, x, scale(p.load_mass, desired), scale(p.load_mass, slope))
+    s, s_rate = _solve_damped(matrix, x, scale(p.load_mass, desired), scale(p.load_mass, slope))
     # once more on what the damping left out: its effect falls to second order
-    rest, rest_rate = _shared(matrix, x, scale(SHARE_DAMPING, s), scale(SHARE_DAMPING, s_rate))
+    rest, rest_rate = _solve_damped(matrix, x, scale(SHARE_DAMPING, s), scale(SHARE_DAMPING, s_rate))
     return add(s, rest), add(s_rate, rest_rate)
 
 

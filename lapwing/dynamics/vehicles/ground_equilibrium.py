@@ -47,10 +47,10 @@ def resting_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: P
         return (x0, y0, 0.0), NO_ROTATION
     slope = NO_SLOPE
     for _ in range(ITERATIONS):
-        R_world_body = _aligned(slope)
+        R_world_body = _attitude_on_plane(slope)
         arms = [apply(R_world_body, foot) for foot in feet]
         lifts = [surface(terrain, x0 + x, y0 + y)[0] - z for x, y, z in arms]  # [m] at which that foot touches
-        change = _carrying([(x, y, lift) for (x, y, _), lift in zip(arms, lifts, strict=True)]) or NO_SLOPE
+        change = _support_plane([(x, y, lift) for (x, y, _), lift in zip(arms, lifts, strict=True)]) or NO_SLOPE
         if math.hypot(*change) < CONVERGED:
             break
         slope = (slope[0] + change[0], slope[1] + change[1])
@@ -73,13 +73,13 @@ def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gr
     k = next((k for k, e in enumerate(p.effects) if isinstance(e, GroundContact | GroundContactSmooth)), None)
     if k is None or gravity <= 0.0:
         return form.initial_state(p, position, attitude)
-    position, attitude = _balanced(p.effects[k], p.body.mass * gravity, position, attitude)
+    position, attitude = _balance(p.effects[k], p.body.mass * gravity, position, attitude)
     state = form.initial_state(p, position, attitude)
     deflections = _deflections(p.effects[k], position, attitude)
     return state._replace(memory=(*state.memory[:k], deflections or state.memory[k], *state.memory[k + 1 :]))
 
 
-def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pose:
+def _balance(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pose:
     """Return the nearby pose in which springs and weight [N] balance, by Newton's method; `pose` if there is none."""
     R = rotation_matrix(attitude)
     x = np.array([position[2], R[6] / R[0], R[7] / R[4] - R[6] * R[1] / (R[0] * R[4])])  # height, slopes of the body
@@ -107,7 +107,7 @@ def _balanced(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Po
         return position, attitude
     slope = (float(x[1]), float(x[2]))
     level = NO_ROTATION if attitude == NO_ROTATION and math.hypot(*slope) < CONVERGED else None
-    return (*place, float(x[0])), level or from_matrix(_aligned(slope))
+    return (*place, float(x[0])), level or from_matrix(_attitude_on_plane(slope))
 
 
 def _springs(e: Any, weight: float, x: np.ndarray, place: Place) -> np.ndarray:
@@ -116,7 +116,7 @@ def _springs(e: Any, weight: float, x: np.ndarray, place: Place) -> np.ndarray:
     `x`: height [m] and slopes of the vehicle. A foot held by friction pushes vertically.
     """
     height, *slope = x.tolist()
-    R_world_body = _aligned(slope)
+    R_world_body = _attitude_on_plane(slope)
     force, x_moment, y_moment = -weight, 0.0, 0.0  # one by one: arrays of three numbers take longer
     for foot in e.feet:
         arm = apply(R_world_body, foot)
@@ -162,7 +162,7 @@ def _deflections(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Vec3, ..
     return tuple(result)
 
 
-def _aligned(slope: Sequence[float]) -> Mat3:
+def _attitude_on_plane(slope: Sequence[float]) -> Mat3:
     """Return R_world_body of a body on a plane z = a x + b y, with its x axis above the world's."""
     a, b = slope
     forward, normal = 1.0 / math.hypot(1.0, a), 1.0 / math.sqrt(1.0 + a * a + b * b)
@@ -172,7 +172,7 @@ def _aligned(slope: Sequence[float]) -> Mat3:
     return (x[0], y[0], z[0], x[1], y[1], z[1], x[2], y[2], z[2])
 
 
-def _carrying(points: Sequence[Vec3]) -> tuple[float, float] | None:
+def _support_plane(points: Sequence[Vec3]) -> tuple[float, float] | None:
     """Return the slope of the highest plane over the origin through three points around it, or None."""
     best: tuple[float, tuple[float, float]] | None = None
     for p, q, r in itertools.combinations(points, 3):

@@ -106,7 +106,7 @@ def _system(a, p):
 
 
 @kernel
-def _imposed(a, p):
+def _drive_motion(a, p):
     """Return the speed and acceleration of each drive, shape (4 or 0, 2)."""
     out = np.empty((len(a.drive_bodies), 2))
     for k in range(len(out)):
@@ -150,7 +150,7 @@ def _all_upright(x):
 
 
 @always_inline
-def _stopped(b):
+def _singular_tangent(b):
     """Return the tangent of one body at the singularity: infinite for a singular pitch, otherwise zero."""
     return EulerBody(ZERO, (0.0, 0.0 if _upright(b) else math.inf, 0.0), ZERO, ZERO)
 
@@ -166,23 +166,31 @@ def rate(drive, t, x):
     """Return the tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by cos(pitch)."""
     if not _all_upright(x):
         b = x.body
-        return FiveEulerBodies((_stopped(b[0]), _stopped(b[1]), _stopped(b[2]), _stopped(b[3]), _stopped(b[4])))
+        return FiveEulerBodies(
+            (
+                _singular_tangent(b[0]),
+                _singular_tangent(b[1]),
+                _singular_tangent(b[2]),
+                _singular_tangent(b[3]),
+                _singular_tangent(b[4]),
+            )
+        )
     p = on_se3.machine(drive, t, motion_of(drive.parameters.layout, x))
     bodies = drive.parameters.layout.bodies
     a = _system(bodies.arrays, p)
     q, v = _arrays(x)
     f = bodies.feedback
-    s, _ = solve(a, q, v, _wrenches(p), _imposed(a, p), 2.0 * f, f * f, RANK_TOLERANCE, _ranks(a)[1])
+    s, _ = solve(a, q, v, _wrenches(p), _drive_motion(a, p), 2.0 * f, f * f, RANK_TOLERANCE, _ranks(a)[1])
     return _tree(v, s.acceleration)
 
 
 @noinline
 def apply_constraint_impulse(drive, x):
     """See `multirotor_multibody_equations.apply_constraint_impulse`."""
-    p = on_se3.unloaded(drive, motion_of(drive.parameters.layout, x))
+    p = on_se3.without_loads(drive, motion_of(drive.parameters.layout, x))
     a = _system(drive.parameters.layout.bodies.arrays, p)
     q, v = _arrays(x)
-    q, v = stabilisation.project(a, q, v, _imposed(a, p), _ranks(a))
+    q, v = stabilisation.project(a, q, v, _drive_motion(a, p), _ranks(a))
     return _tree(q, v)
 
 
@@ -194,10 +202,10 @@ def project(drive, x):
         return x
     if bodies.hold == five_body_stabilisation.PROJECTION:
         return apply_constraint_impulse(drive, x)
-    p = on_se3.unloaded(drive, motion_of(drive.parameters.layout, x))
+    p = on_se3.without_loads(drive, motion_of(drive.parameters.layout, x))
     a = _system(bodies.arrays, p)
     q, v = _arrays(x)
-    q, v = stabilisation.partition(a, q, v, _imposed(a, p), _ranks(a))
+    q, v = stabilisation.partition(a, q, v, _drive_motion(a, p), _ranks(a))
     return _tree(q, v)
 
 
@@ -221,15 +229,15 @@ def singular(x: FiveEulerBodies) -> int:
 
 def parameters(*arguments, **named) -> MultirotorParameters:
     """See `multirotor_multibody.parameters`."""
-    return _assembled(multirotor_multibody.parameters(*arguments, **named))
+    return _assemble(multirotor_multibody.parameters(*arguments, **named))
 
 
 def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
     """See `multirotor_multibody.with_propeller_failure`."""
-    return _assembled(multirotor_multibody.with_propeller_failure(p, k, becomes))
+    return _assemble(multirotor_multibody.with_propeller_failure(p, k, becomes))
 
 
-def _assembled(p: MultirotorParameters) -> MultirotorParameters:
+def _assemble(p: MultirotorParameters) -> MultirotorParameters:
     bodies = p.layout.bodies
     drone = bodies.drone
     system = drone_system(drone, tuple(spins == 0.0 for spins in drone.spins))

@@ -76,12 +76,14 @@ def parameters(
 def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
     """Return the parameters after propeller k (0 to 3) failed as BECOMES names; see `apply_constraint_impulse`."""
 
-    def changed(values: PerRotor, value: float) -> PerRotor:
+    def replace_entry(values: PerRotor, value: float) -> PerRotor:
         return (*values[:k], value, *values[k + 1 :])
 
     bodies, (spins, powered, held) = p.layout.bodies, BECOMES[becomes]
-    drone = bodies.drone._replace(spins=changed(bodies.drone.spins, spins), held=changed(bodies.drone.held, held))
-    bodies = bodies._replace(drone=drone, powered=changed(bodies.powered, powered))
+    drone = bodies.drone._replace(
+        spins=replace_entry(bodies.drone.spins, spins), held=replace_entry(bodies.drone.held, held)
+    )
+    bodies = bodies._replace(drone=drone, powered=replace_entry(bodies.powered, powered))
     return p._replace(layout=p.layout._replace(bodies=bodies))
 
 

@@ -61,7 +61,7 @@ def _triple(accelerations, load, k):
 
 
 @always_inline
-def acting(drive, t, motion):
+def applied_loads(drive, t, motion):
     """Return (inputs, AppliedLoads): the effects of `multirotor_equations.evaluate`, separated by body."""
     s, rotors, force, torque = evaluate(drive, t, motion)
     R, layout = s.R_world_body, s.layout
@@ -91,7 +91,7 @@ def _rotor(k, layout, R, motion, part):
 @always_inline
 def machine(drive, t, motion):
     """Return `five_bodies.Machine` at a time, with the state's speeds as imposed ones."""
-    s, a = acting(drive, t, motion)
+    s, a = applied_loads(drive, t, motion)
     layout, R, part = s.layout, s.R_world_body, a.rotor
     rotors = (
         _rotor(0, layout, R, motion, part[0]),
@@ -112,7 +112,7 @@ def _still(k, layout, motion):
 
 
 @always_inline
-def unloaded(drive, motion):
+def without_loads(drive, motion):
     """Return the machine without loads, as projection needs it."""
     layout = drive.parameters.layout
     rotors = (
@@ -137,14 +137,14 @@ def project(drive, x):
     how = drive.parameters.layout.bodies.hold
     if how == hold.NONE:
         return x
-    p = unloaded(drive, motion_of(drive.parameters.layout, x))
+    p = without_loads(drive, motion_of(drive.parameters.layout, x))
     return hold.project(p, 0.0, x) if how == hold.PROJECTION else hold.partition(p, 0.0, x)
 
 
 @kernel
 def apply_constraint_impulse(drive, x):
     """Return the bodies after hinge impulses that satisfy all constraints and conserve momentum."""
-    return hold.project(unloaded(drive, motion_of(drive.parameters.layout, x)), 0.0, x)
+    return hold.project(without_loads(drive, motion_of(drive.parameters.layout, x)), 0.0, x)
 
 
 @kernel

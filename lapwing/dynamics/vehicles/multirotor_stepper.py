@@ -60,7 +60,7 @@ class AwakeState(NamedTuple):
 
 
 @always_inline
-def _seen_awake(layout, x):
+def _wake(layout, x):
     return motion_of(layout, x.motion)
 
 
@@ -75,7 +75,7 @@ def _project_form(drive, x):
 
 
 @always_inline
-def _remembering(drive, x):
+def _with_memories(drive, x):
     """Return the drive with the memories of the state."""
     p, body, memory, voltage = drive
     return MultirotorDrive(p, body, hooks.with_integrated(p.effects, memory, x.memory), voltage)
@@ -83,7 +83,7 @@ def _remembering(drive, x):
 
 @kernel
 def _awake_rate(drive, t, x):
-    p, body, memory, voltage = _remembering(drive, x)
+    p, body, memory, voltage = _with_memories(drive, x)
     effects, rates = hooks.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
     known = MultirotorParameters(p.body, p.layout, effects, p.tolerance)
     return AwakeState(_rate_of_form(MultirotorDrive(known, body, memory, voltage), t, x.motion), rates)
@@ -96,14 +96,14 @@ def _project_awake(drive, x):
 
 @always_inline
 def _awake_accelerations(drive, t, x):
-    return accelerations_of_form(_remembering(drive, x), t, x.motion)
+    return accelerations_of_form(_with_memories(drive, x), t, x.motion)
 
 
-FORMS[AwakeState] = StateForm(_seen_awake, _awake_rate, _project_awake, _awake_accelerations)
+FORMS[AwakeState] = StateForm(_wake, _awake_rate, _project_awake, _awake_accelerations)
 
 
 @generic(inline=True)
-def _extrapolated(method, halves, whole):
+def _extrapolate(method, halves, whole):
     share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
     return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))
 
@@ -143,7 +143,7 @@ def _stiff_steps(method, drive, t, x, h, end):
         part = size * _growth(error, allowed)
         if size > smallest and error > allowed:
             continue
-        x = _extrapolated(method, y, whole)
+        x = _extrapolate(method, y, whole)
         if last or not sound:
             return x.motion, hooks.with_integrated(p.effects, memory, x.memory)
         t += size

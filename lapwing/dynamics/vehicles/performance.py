@@ -13,7 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from lapwing.dynamics import atmosphere
 from lapwing.dynamics.atmosphere import Atmosphere
-from lapwing.dynamics.effects.coaxial_interference import CoaxialInterference, stacked
+from lapwing.dynamics.effects.coaxial_interference import CoaxialInterference, has_rotor_in_wake
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.airframe_tables import Motor
@@ -85,7 +85,7 @@ def rotor_of(airframe: Airframe) -> Rotor:
         pitch=propeller.pitch,
         parts=drag_coefficients(propeller),
         drag=h_force_coefficient(propeller),
-        wash=CoaxialInterference.from_scene({}, airframe) if stacked(airframe) else None,
+        wash=CoaxialInterference.from_scene({}, airframe) if has_rotor_in_wake(airframe) else None,
     )
 
 

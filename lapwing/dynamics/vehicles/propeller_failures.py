@@ -30,7 +30,7 @@ def _after_impulses(drive: types.Type, x: types.Type) -> Any:
 
 
 @kernel
-def _failed(failure, memory, voltage, x):
+def _after_failure(failure, memory, voltage, x):
     """Return (drive, motion) after a failure."""
     p = failure.vehicle
     drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
@@ -49,7 +49,7 @@ def advance_through(method, p, failures, key, tick, state, command, h, n):
     count, rounding = len(failures), BREAK_ROUNDING * interval
     k = 0
     while k < count and failures[k].time <= start + rounding:
-        drive, x = _failed(failures[k], state.memory, command, state.motion)
+        drive, x = _after_failure(failures[k], state.memory, command, state.motion)
         p, state = failures[k].vehicle, MultirotorState(x, state.memory)
         k += 1
     drive, x = begin(p, key, tick, state, command, interval), state.motion
@@ -63,6 +63,6 @@ def advance_through(method, p, failures, key, tick, state, command, h, n):
         x, memory = steps(method, drive, x, start, until, size, 0, number)
         if k == count:
             return MultirotorState(x, memory)
-        drive, x = _failed(failures[k], memory, drive.voltage, x)
+        drive, x = _after_failure(failures[k], memory, drive.voltage, x)
         start = until
         k += 1

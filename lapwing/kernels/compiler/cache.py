@@ -79,13 +79,13 @@ class KernelCache(_Cache):
         """
         rtsys.initialize(target_context)
         current = self._key(sig, target_context.codegen()) if self._enabled else None
-        result = self._loaded(current, sig, target_context)
+        result = self._load(current, sig, target_context)
         if result is None:
             for listener in _listeners:
                 listener(self._label)
             if current:
                 file_locks.acquire(f"{self._folder}/{self._file(current, self._is_inner())}-{current.sources}")
-                result = self._loaded(current, sig, target_context)
+                result = self._load(current, sig, target_context)
         if result is not None:
             _counted["loaded"] += 1
         return result
@@ -101,7 +101,7 @@ class KernelCache(_Cache):
             name = self._file(current, self._is_inner(data))
             cache_files.write(self._folder, name, current.sources, dumps((current, self._reduce(data))))
 
-    def _loaded(self, current: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
+    def _load(self, current: Key | None, sig: Any, target_context: Any) -> CompileResult | None:
         inner = self._is_inner()
         content = cache_files.read(self._folder, self._file(current, inner), current.sources) if current else None
         if content is None:
@@ -136,4 +136,4 @@ class KernelCache(_Cache):
             current = key(self._dispatcher, arguments, returns, codegen.magic_tuple())
         except NotKeptError:
             return None
-        return current if source_digest.unchanged(current.modules) else None
+        return current if source_digest.sources_are_current(current.modules) else None

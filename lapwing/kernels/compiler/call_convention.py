@@ -31,7 +31,7 @@ class _Whole:
     def as_arguments(self, builder: Any, values: Sequence[Any]) -> tuple:
         """Return the values to pass."""
         pairs = zip(values, self._kinds, strict=True)
-        return tuple(_converted(builder, value, kind) for value, kind in pairs if kind is not None)
+        return tuple(_convert(builder, value, kind) for value, kind in pairs if kind is not None)
 
     def from_arguments(self, builder: Any, passed: Sequence[Any]) -> list:
         """Return the values of the passed arguments."""
@@ -44,7 +44,7 @@ class _Whole:
             value.name = name
 
 
-def _converted(builder: Any, value: Any, kind: Any) -> Any:
+def _convert(builder: Any, value: Any, kind: Any) -> Any:
     """Return a value in its declared type: numba passes `*arguments` as a struct even where the type is an array."""
     if value.type == kind:
         return value

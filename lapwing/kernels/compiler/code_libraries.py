@@ -175,7 +175,7 @@ class InnerLibrary(KernelLibrary):
         return tuple((x.name, x.noinline, x._bitcode, x._environments) for x in (self, *self._noinline.values()))
 
     @classmethod
-    def restored(cls, codegen: Any, serialised: tuple) -> "InnerLibrary":
+    def restore(cls, codegen: Any, serialised: tuple) -> "InnerLibrary":
         """Return the library from the result of `serialize_using_object_code`."""
         libraries = []
         for name, noinline, bitcode, environments in serialised:

@@ -32,7 +32,7 @@ def _compile(function: Callable, **options: Any) -> Any:
     return compiled
 
 
-def uncached(function: Any) -> Any:
+def without_cache(function: Any) -> Any:
     """Compile a function without storing its code on disk; return a kernel unchanged."""
     return function if isinstance(function, _Dispatcher) else _Dispatcher(function, targetoptions={"nopython": True})
 

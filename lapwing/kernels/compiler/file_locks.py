@@ -39,7 +39,7 @@ _held = _Held()
 
 
 def acquire(name: str) -> None:
-    """Take the lock of the cache entry `name` and hold it to the end of `released_at_end`.
+    """Take the lock of the cache entry `name` and hold it to the end of `release_at_end`.
 
     Another process may have held it until now, so look up the cache entry again afterwards. No lock is taken if the
     file system has none or if another process holds it too long.
@@ -54,14 +54,14 @@ def acquire(name: str) -> None:
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         while time.monotonic() < until:
             try:
-                _held.locks.append(Lock(path, _locked(path)))
+                _held.locks.append(Lock(path, _lock(path)))
                 return
             except BlockingIOError:
                 time.sleep(LOOK)
 
 
 @contextlib.contextmanager
-def released_at_end() -> Iterator[None]:
+def release_at_end() -> Iterator[None]:
     """Release the locks that were taken within the context at its end."""
     before = len(_held.locks)
     try:
@@ -74,7 +74,7 @@ def released_at_end() -> Iterator[None]:
             os.close(lock.descriptor)
 
 
-def _locked(path: Path) -> int:
+def _lock(path: Path) -> int:
     """Return the descriptor of a file that is now locked.
 
     Raises:

@@ -24,7 +24,7 @@ from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from lapwing.kernels.compiler.cache import KernelCache
 from lapwing.kernels.compiler.call_convention import InnerLower, KernelLower, offer, uses_value_call_conv
 from lapwing.kernels.compiler.code_libraries import InnerLibrary, KernelLibrary
-from lapwing.kernels.compiler.file_locks import released_at_end
+from lapwing.kernels.compiler.file_locks import release_at_end
 
 
 class _Depth(threading.local):
@@ -37,7 +37,7 @@ _depth = _Depth()
 
 
 @contextmanager
-def _nested() -> Iterator[None]:
+def _nested_compilation() -> Iterator[None]:
     _depth.value += 1
     try:
         yield
@@ -90,7 +90,7 @@ class PipelineCache(KernelCache):
         serialised, fndesc, environment, signature, objectmode, lifted, annotation, reload_init, environments = payload
         for reload in reload_init:
             reload()
-        library = InnerLibrary.restored(target_context.codegen(), serialised)
+        library = InnerLibrary.restore(target_context.codegen(), serialised)
         return CompileResult(
             typing_context=target_context.typing_context, target_context=target_context, library=library,
             environment=environment, entry_point=_refusal(target_context), fndesc=fndesc, type_annotation=annotation,
@@ -186,7 +186,7 @@ class Pipeline(Compiler):
         return [pipeline]
 
     def _compile_core(self) -> CompileResult:
-        with _nested(), _no_collection():
+        with _nested_compilation(), _no_collection():
             result = super()._compile_core()
         if not is_nested():  # environments of its inner functions
             for environment in result._find_referenced_environments():
@@ -195,7 +195,7 @@ class Pipeline(Compiler):
         return result._replace(type_annotation="")
 
 
-def _widened(kind: types.Type) -> types.Type:
+def _widen(kind: types.Type) -> types.Type:
     """Return the plain number type of a constant's type."""
     return types.misc.unliteral(kind) if isinstance(kind, types.IntegerLiteral | types.BooleanLiteral) else kind
 
@@ -211,7 +211,7 @@ class KernelDispatcher(CPUDispatcher):
 
         numba would compile one for each constant. LLVM substitutes constants where it inlines the function.
         """
-        one, named = [_widened(kind) for kind in args], {name: _widened(kind) for name, kind in kws.items()}
+        one, named = [_widen(kind) for kind in args], {name: _widen(kind) for name, kind in kws.items()}
         return super().get_call_template(tuple(one), named)
 
     def compile(self, sig: Any) -> Any:
@@ -220,7 +220,7 @@ class KernelDispatcher(CPUDispatcher):
         Numba's method also measures the time of every LLVM call, which takes a twentieth of the compile time.
         """
         arguments, returns = sigutils.normalize_signature(sig)
-        with released_at_end(), global_compiler_lock, self._compiling_counter:
+        with release_at_end(), global_compiler_lock, self._compiling_counter:
             result = self.overloads.get(tuple(arguments))
             if result is not None and (is_nested() or not isinstance(result.library, InnerLibrary)):
                 return result.entry_point

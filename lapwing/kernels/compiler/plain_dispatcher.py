@@ -6,7 +6,7 @@ from typing import Any
 from numba.core.registry import CPUDispatcher
 
 from lapwing.kernels.compiler.cache import KernelCache
-from lapwing.kernels.compiler.file_locks import released_at_end
+from lapwing.kernels.compiler.file_locks import release_at_end
 
 
 class PlainCache(KernelCache):
@@ -29,5 +29,5 @@ class PlainDispatcher(CPUDispatcher):
 
     def compile(self, sig: Any) -> Any:
         """Return the entry point of the version for a signature."""
-        with released_at_end():
+        with release_at_end():
             return super().compile(sig)

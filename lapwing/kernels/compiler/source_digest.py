@@ -154,7 +154,7 @@ def forget() -> None:
         remembered.cache_clear()
 
 
-def unchanged(modules: Iterable[str]) -> bool:
+def sources_are_current(modules: Iterable[str]) -> bool:
     """Return True if this process executes these sources: no file has changed since it started."""
     try:
         states = [os.stat(path) for name in _all(frozenset(modules)) if (path := _source(name).path)]
@@ -180,12 +180,14 @@ def imports(module: str, is_package: bool, source: bytes, version: str) -> list[
     """
     text = cache_files.read("imports", module, version)
     if text is None:
-        text = "\n".join(sorted(_parsed(source, module if is_package else module.rpartition(".")[0]))).encode()
+        text = "\n".join(
+            sorted(_imported_modules(source, module if is_package else module.rpartition(".")[0]))
+        ).encode()
         cache_files.write("imports", module, version, text)
     return text.decode().split()
 
 
-def _parsed(source: bytes, package: str) -> set[str]:
+def _imported_modules(source: bytes, package: str) -> set[str]:
     imports: set[str] = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):

@@ -36,25 +36,25 @@ from math import (
 )  # fmt: skip
 
 from lapwing.kernels.math import exponential, inverse_trigonometric, logarithm, roots, trigonometric
-from lapwing.kernels.math._export import exported
+from lapwing.kernels.math._export import export
 from lapwing.kernels.math.sums import dist, hypot, total
 
-sin = exported(trigonometric.sin)
-cos = exported(trigonometric.cos)
-sincos = exported(trigonometric.sincos)
-tan = exported(trigonometric.tan)
-asin = exported(inverse_trigonometric.asin)
-acos = exported(inverse_trigonometric.acos)
-atan = exported(inverse_trigonometric.atan)
-atan2 = exported(inverse_trigonometric.atan2)
-exp = exported(exponential.exp, inline=True)
-expm1 = exported(exponential.expm1)
-tanh = exported(exponential.tanh)
-log = exported(logarithm.log, inline=True)
-log1p = exported(logarithm.log1p)
-pow = exported(logarithm.pow, inline=True)
-cbrt = exported(roots.cbrt)
-square = exported(roots.square, inline=True)
+sin = export(trigonometric.sin)
+cos = export(trigonometric.cos)
+sincos = export(trigonometric.sincos)
+tan = export(trigonometric.tan)
+asin = export(inverse_trigonometric.asin)
+acos = export(inverse_trigonometric.acos)
+atan = export(inverse_trigonometric.atan)
+atan2 = export(inverse_trigonometric.atan2)
+exp = export(exponential.exp, inline=True)
+expm1 = export(exponential.expm1)
+tanh = export(exponential.tanh)
+log = export(logarithm.log, inline=True)
+log1p = export(logarithm.log1p)
+pow = export(logarithm.pow, inline=True)
+cbrt = export(roots.cbrt)
+square = export(roots.square, inline=True)
 
 __all__ = [
     "acos", "asin", "atan", "atan2", "cbrt", "ceil", "copysign", "cos", "degrees", "dist", "e", "exp", "expm1", "fabs",

@@ -18,7 +18,7 @@ from lapwing.kernels.compiler.pipeline import KernelDispatcher
 PURE = ("memory(none)", "nounwind", "willreturn", "noinline")
 
 
-def exported(kernel: Any, *, inline: bool = False) -> Callable[..., Any]:
+def export(kernel: Any, *, inline: bool = False) -> Callable[..., Any]:
     """Return the plain Python function of a kernel of floats, which compiled code replaces by the kernel.
 
     Args:
@@ -27,12 +27,12 @@ def exported(kernel: Any, *, inline: bool = False) -> Callable[..., Any]:
             them like calls of the C library, and optimises the function once instead of at every call.
     """
     plain: Callable[..., Any] = python_function(kernel)
-    compiled_as(plain, kernel, inline=inline)
+    register_compiled(plain, kernel, inline=inline)
     return plain
 
 
-def compiled_as(function: Callable[..., Any], kernel: Any, *, inline: bool = False) -> None:
-    """Register a kernel of floats as the compiled form of a function of numbers; see `exported` for arguments."""
+def register_compiled(function: Callable[..., Any], kernel: Any, *, inline: bool = False) -> None:
+    """Register a kernel of floats as the compiled form of a function of numbers; see `export` for arguments."""
     if not hasattr(kernel, "py_func"):
         return  # NUMBA_DISABLE_JIT
     floats = (types.float64,) * len(inspect.signature(kernel.py_func).parameters)

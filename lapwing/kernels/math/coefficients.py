@@ -25,7 +25,7 @@ LIMB = 24  # [bits] of a limb of 1 / (2 pi)
 LIMBS = 58
 
 
-def rounded(value: Any, bits: int) -> float:
+def round_to_bits(value: Any, bits: int) -> float:
     """Return a real number rounded to some bits, as a double."""
     if value == 0:
         return 0.0
@@ -37,7 +37,7 @@ def parts(value: Any, *bits: int) -> list[float]:
     """Return a real number as the sum of doubles of so many bits, the largest first."""
     result = []
     for count in bits:
-        result.append(rounded(value, count))
+        result.append(round_to_bits(value, count))
         value = value - mpf(result[-1])
     return result
 
@@ -146,7 +146,7 @@ def log_tables() -> dict[str, list]:
     for _ in range(LOG_STEPS):
         width = mpf(2) ** -8 if low < 1 else mpf(2) ** -7
         high = low + width
-        short = mpf(1) if low <= 1 <= high else mpf(rounded(2 / (low + high), 12))
+        short = mpf(1) if low <= 1 <= high else mpf(round_to_bits(2 / (low + high), 12))
         lowest, highest = min(lowest, low * short - 1), max(highest, high * short - 1)
         scale = mpf(2) ** 42
         first = mp.nint(-mp.log(short) * scale) / scale

@@ -25,7 +25,7 @@ _powers = table("powers", POWERS)
 
 
 @always_inline
-def _reduced(x):
+def _reduce(x):
     """Return k, and r + r_low with x = k ln(2) / 64 + r + r_low, for |x| < 1e4."""
     shifted = x * STEPS_PER_LN2 + ROUNDER
     k = shifted - ROUNDER
@@ -47,7 +47,7 @@ def exp_parts(x, x_low):
         x_low: rest, at most 2**-40.
     """
     clipped = select(x > 710.0, 710.0, select(x > -760.0, x, -760.0))
-    k, r, r_low = _reduced(clipped)
+    k, r, r_low = _reduce(clipped)
     r_low += x_low
     t1, t2 = _powers(2 * (k & 63)), _powers(2 * (k & 63) + 1)
     t = t1 + t2
@@ -63,7 +63,7 @@ def exp_parts(x, x_low):
 
 
 @always_inline
-def scaled(value, n):
+def scale_by_power_of_two(value, n):
     """Return value * 2**n for -2000 <= n <= 2000, rounded once if value is exact."""
     half = n >> 1
     return value * _two_to(half) * _two_to(n - half)
@@ -73,13 +73,13 @@ def scaled(value, n):
 def exp(x):
     """Return the exponential function."""
     first, rest, n = exp_parts(x, 0.0)
-    return select(x != x, x, scaled(first + rest, n))
+    return select(x != x, x, scale_by_power_of_two(first + rest, n))
 
 
 @always_inline
 def expm1_parts(x):
     """Return exp(x) - 1 as two numbers, for -40 < x < 710."""
-    k, r, r_low = _reduced(x)
+    k, r, r_low = _reduce(x)
     scale = _two_to(k >> 6)  # 2**1023 at most
     t1, t2 = _powers(2 * (k & 63)) * scale, _powers(2 * (k & 63) + 1) * scale
     r_all = r + r_low
@@ -106,7 +106,7 @@ def expm1(x):
         return -1.0
     if x > 709.0:
         first, rest, n = exp_parts(x, 0.0)
-        return scaled(first + rest, n)
+        return scale_by_power_of_two(first + rest, n)
     first, rest = expm1_parts(x)
     return first + rest
 

@@ -54,7 +54,7 @@ def _angle(n, n_low, d, d_low, ratio):
 
 
 @always_inline
-def _placed(base, base_low, sign, t, t_low, first, rest):
+def _add_to_base(base, base_low, sign, t, t_low, first, rest):
     """Return base + sign * (t + first) of numbers with rests."""
     a, a_low = quick_two_sum(base, sign * t)
     b, b_low = quick_two_sum(a, sign * first)
@@ -80,7 +80,7 @@ def _direction(y, y_low, x, x_low, back, unscaled):
         t, t_low, first, rest = 0.0, 0.0, unscaled, 0.0
     base = _QUARTER if steep else (_HALF if back else 0.0)
     base_low = _QUARTER_LOW if steep else (_HALF_LOW if back else 0.0)
-    return _placed(base, base_low, 1.0 if steep == back else -1.0, t, t_low, first, rest)
+    return _add_to_base(base, base_low, 1.0 if steep == back else -1.0, t, t_low, first, rest)
 
 
 @always_inline

@@ -20,7 +20,7 @@ from lapwing.kernels.math._primitives import (
     with_sign,
 )
 from lapwing.kernels.math._tables import LN2_PARTS, LOG, LOG_START, LOGS
-from lapwing.kernels.math.exponential import exp_parts, scaled
+from lapwing.kernels.math.exponential import exp_parts, scale_by_power_of_two
 
 _START = bits(LOG_START)
 _LN2, _LN2_LOW = LN2_PARTS
@@ -89,7 +89,7 @@ def pow(x, y):
     clipped = select(order > 1e20, with_sign(1e20, y), y)  # beyond, the result is 0, infinite or 1
     p, p_low = product(clipped, height)
     a, b, n = exp_parts(p, select(abs(p) < 800.0, p_low + clipped * height_low, 0.0))
-    result = scaled(a + b, n)
+    result = scale_by_power_of_two(a + b, n)
     is_zero, is_infinite, reaches = size == 0.0, size == math.inf, order == math.inf
     result = select(is_zero | is_infinite, select(is_zero == (y < 0.0), math.inf, 0.0), result)
     limit = select(size == 1.0, 1.0, select((size > 1.0) == (y > 0.0), math.inf, 0.0))

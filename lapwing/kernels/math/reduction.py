@@ -29,14 +29,14 @@ _limb = table("turn_limbs", TURN_LIMBS)
 
 
 @always_inline
-def reduced(x):
+def reduce_argument(x):
     """Return k modulo 128 and r + r_low with x = k pi / 64 + r + r_low and |r| <= pi / 128.
 
     Args:
         x: [rad] any double; of an infinity or NaN r is NaN.
     """
     if abs(x) > LARGEST:
-        return reduced_large(x)
+        return reduce_large_argument(x)
     shifted = x * STEPS_PER_RADIAN + ROUNDER
     k = shifted - ROUNDER
     a, a_low = two_sum(x - k * _P1, -(k * _P2))
@@ -46,8 +46,8 @@ def reduced(x):
 
 
 @kernel
-def reduced_large(x):
-    """Return what `reduced` returns, for a magnitude of at least 2**15 (Payne and Hanek)."""
+def reduce_large_argument(x):
+    """Return the same as `reduce_argument`, for a magnitude of at least 2**15 (Payne and Hanek)."""
     if x - x != 0.0:
         return 0, x - x, 0.0
     magnitude = bits(x) & MAGNITUDE

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from lapwing.kernels.compiler.decorators import python_function
 from lapwing.kernels.math import roots
-from lapwing.kernels.math._export import compiled_as
+from lapwing.kernels.math._export import register_compiled
 
 _hypot = python_function(roots.hypot)
 
@@ -20,7 +20,7 @@ def hypot(*coordinates: float) -> float:
     return length
 
 
-compiled_as(hypot, roots.hypot)
+register_compiled(hypot, roots.hypot)
 
 
 def total(values: Iterable[float]) -> float:

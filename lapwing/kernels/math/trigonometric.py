@@ -9,7 +9,7 @@ sum has about 65 correct bits before its one rounding.
 from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import quotient, split, table
 from lapwing.kernels.math._tables import COSINE, SINE, SINES
-from lapwing.kernels.math.reduction import reduced
+from lapwing.kernels.math.reduction import reduce_argument
 
 _S3, _S5, _S7 = SINE
 _C4, _C6, _C8 = COSINE
@@ -19,7 +19,7 @@ _sines = table("sines", SINES)  # of each direction: upper and lower part of the
 @always_inline
 def _parts(x):
     """Return sine and cosine as two numbers each, to be added."""
-    k, r, r_low = reduced(x)
+    k, r, r_low = reduce_argument(x)
     at = 4 * k
     s1, s2, c1, c2 = _sines(at), _sines(at + 1), _sines(at + 2), _sines(at + 3)
     h1 = split(r)

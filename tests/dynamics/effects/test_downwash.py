@@ -8,7 +8,7 @@ import pytest
 
 from lapwing.dynamics.effects import from_scene
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
-from lapwing.dynamics.effects.downwash import blown
+from lapwing.dynamics.effects.downwash import wind_of_jets
 from lapwing.dynamics.vehicles.airframe import load_airframe
 
 ROOT = Path(__file__).parents[3]
@@ -26,7 +26,7 @@ def hovering(thrust=(0.0, 0.0, WEIGHT), disc_radius=R):
 
 def wind(offset, *others):
     place = tuple(float(a + b) for a, b in zip((1.0, 2.0, 50.0), offset, strict=True))
-    return np.array(blown(WASH, NO_WIND, NeighbourState(place), others or (hovering(),), 0.004))
+    return np.array(wind_of_jets(WASH, NO_WIND, NeighbourState(place), others or (hovering(),), 0.004))
 
 
 def test_disc_is_as_large_as_those_of_four_rotors():
@@ -77,7 +77,7 @@ OPPOSITE = 2.0 * math.hypot(0.13, 0.22)  # [m] the largest distance between roto
 def axial(core, way):
     wash = from_scene({"downwash": {"core": core}}, QUAD)[0]
     place = NeighbourState((1.0, 2.0, 50.0 - way))
-    return -blown(wash, NO_WIND, place, (hovering(),), 0.004)[2]
+    return -wind_of_jets(wash, NO_WIND, place, (hovering(),), 0.004)[2]
 
 
 def test_jet_spreads_only_beyond_its_core():

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects._turbulence import intensity, passing
+from lapwing.dynamics.effects._turbulence import deviation_and_rate, intensity
 from lapwing.dynamics.effects.wind_dryden import draw
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import stream_key
@@ -52,12 +52,12 @@ def test_turbulence_follows_height_and_airspeed(drone, situation, rotors, slope)
     fixed = make(drone, airspeed=math.hypot(6.0, 5.0), altitude=30.0)
     ours, values = (draw(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.01) for e in (follows, fixed))
     assert ours[1] == pytest.approx(values[1], rel=1e-12)
-    low, high, still = (passing(follows.conditions, situation(**where)) for where in (
+    low, high, still = (deviation_and_rate(follows.conditions, situation(**where)) for where in (
         {"position": (0, 0, 1.0), "velocity": (5, 0, 0)}, {"position": (0, 0, 2000.0), "velocity": (5, 0, 0)},
         {"position": (0, 0, 20.0)}))  # fmt: skip
-    assert low == passing(make(drone, airspeed=5.0, altitude=3.048).conditions, s)
-    assert high == passing(make(drone, airspeed=5.0, altitude=304.8).conditions, s)
-    assert still[1] == passing(make(drone, airspeed=0.1, altitude=20.0).conditions, s)[1]
+    assert low == deviation_and_rate(make(drone, airspeed=5.0, altitude=3.048).conditions, s)
+    assert high == deviation_and_rate(make(drone, airspeed=5.0, altitude=304.8).conditions, s)
+    assert still[1] == deviation_and_rate(make(drone, airspeed=0.1, altitude=20.0).conditions, s)[1]
 
 
 def test_spectra(drone, situation, rotors):

@@ -13,7 +13,7 @@ from lapwing.dynamics.effects import wind_dryden
 from lapwing.dynamics.effects._turbulence import intensity
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects.axial_inflow import axial_inflow
-from lapwing.dynamics.effects.wind_dryden_rates import draw, turning, wind_dryden_rates
+from lapwing.dynamics.effects.wind_dryden_rates import add_gust_rate, draw, wind_dryden_rates
 from lapwing.dynamics.noise import stream_key
 from lapwing.kernels import kernel
 
@@ -118,6 +118,6 @@ def test_rates_depend_on_vehicle_span(drone, situation):
     memory = (e.initial_discrete_state()[0], (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3))
     s = situation(turn=(0, 0, math.pi / 2))
     assert wind_dryden_rates.py_func(e, memory, s, Air(1.2, (0.0, 0.0, 0.0))).wind_world == (1.0, 2.0, 3.0)
-    assert turning.py_func(e, memory, s, (1.0, 0.0, 0.0)) == pytest.approx((1.2, -0.1, 0.3))
+    assert add_gust_rate.py_func(e, memory, s, (1.0, 0.0, 0.0)) == pytest.approx((1.2, -0.1, 0.3))
     with pytest.raises(ConfigError, match=r"both are a turbulence"):
         effects.from_scene({"wind_dryden": {"wind_speed": 7.0}, "wind_dryden_rates": {"wind_speed": 7.0}}, drone)

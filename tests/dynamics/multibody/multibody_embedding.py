@@ -10,9 +10,9 @@ from scipy.linalg import qr
 
 from lapwing.dynamics.multibody.augmented import (
     RANK_TOLERANCE,
+    as_float_arrays,
     generalised_force,
     mass_roots,
-    prepared,
     refuse_singular,
 )
 from lapwing.dynamics.multibody.stabilisation import rows
@@ -32,7 +32,7 @@ def accelerations(system, configuration, velocity, wrench=None, drive=None) -> R
 
     Arguments and errors as `augmented.accelerations`.
     """
-    configuration, velocity, wrench, drive = prepared(system, configuration, velocity, wrench, drive)
+    configuration, velocity, wrench, drive = as_float_arrays(system, configuration, velocity, wrench, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
     refuse_singular(system, p.singular)
     J, n = e.jacobian_t.T, 6 * len(system.bodies)

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.multibody.augmented import Solution, prepared, refuse_singular
+from lapwing.dynamics.multibody.augmented import Solution, as_float_arrays, refuse_singular
 from lapwing.dynamics.multibody.body_kinematics import place
 from lapwing.dynamics.multibody.constraints import equations
 
@@ -22,7 +22,7 @@ def reactions(system, configuration, velocity, solution: Solution, drive=None) -
 
     Single multipliers of redundant rows are only the shortest choice; their sum over a joint and its drive is unique.
     """
-    configuration, velocity, _, drive = prepared(system, configuration, velocity, None, drive)
+    configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p = place(configuration, velocity)
     refuse_singular(system, p.singular)
     e = equations(system.arrays, p, drive)  # twist columns: forces and torques, whatever the coordinates

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from multibody_angles import euler_from_quaternion, quaternion_from_euler
 
-from lapwing.dynamics.multibody.body_kinematics import displaced, place
+from lapwing.dynamics.multibody.body_kinematics import add_increment, place
 from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import rows
 from lapwing.dynamics.multibody.system import GROUND, Body, DrivingConstraint, Revolute, assemble
@@ -37,7 +37,7 @@ def test_rows_are_derivatives_of_residuals(kind):
 
     def at(t):
         """The state on a smooth motion: second-order in t with the given velocity and acceleration."""
-        moved = displaced(q, t * v + 0.5 * t * t * acceleration)
+        moved = add_increment(q, t * v + 0.5 * t * t * acceleration)
         speed = v + t * acceleration
         now = DRIVE + np.outer([t, t], [0.0, 0.0])
         now[:, 0] += t * DRIVE[:, 1]

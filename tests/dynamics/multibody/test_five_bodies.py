@@ -9,7 +9,7 @@ from test_delivery_drone import without_propeller
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.multibody import augmented
 from lapwing.dynamics.multibody.augmented import accelerations
-from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.body_kinematics import add_increment
 from lapwing.dynamics.multibody.delivery_drone import delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, FiveBodies, Wrench, arrays, machine, rate
 from lapwing.dynamics.multibody.five_bodies import reactions as from_chassis
@@ -77,7 +77,7 @@ def test_identical_off_constraints_too(feedback):
     for _ in range(20):
         drone, p, x, wrench, speeds, drive = scene(rng, "torque")
         q, v = arrays(x)
-        q, v = displaced(q, 0.01 * rng.normal(size=(5, 6))), v + 0.01 * rng.normal(size=(5, 6))
+        q, v = add_increment(q, 0.01 * rng.normal(size=(5, 6))), v + 0.01 * rng.normal(size=(5, 6))
         bodies = [
             BodyState(tuple(a[:3]), Quaternion(*a[3:]), tuple(b[:3]), tuple(b[3:]))
             for a, b in zip(q.tolist(), v.tolist(), strict=True)

@@ -6,7 +6,7 @@ from test_five_bodies import scene
 
 from lapwing.dynamics.integrators import get
 from lapwing.dynamics.lie.quaternion import Quaternion
-from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.body_kinematics import add_increment
 from lapwing.dynamics.multibody.five_bodies import BodyState, FiveBodies, arrays
 from lapwing.dynamics.multibody.five_body_stabilisation import (
     NONE,
@@ -26,7 +26,7 @@ METHOD = get("rk4_renormalised").Method()
 
 def disturbed(x, size, rng):
     q, v = arrays(x)
-    q, v = displaced(q, size * rng.normal(size=(5, 6))), v + size * rng.normal(size=(5, 6))
+    q, v = add_increment(q, size * rng.normal(size=(5, 6))), v + size * rng.normal(size=(5, 6))
     bodies = [
         BodyState(tuple(a[:3]), Quaternion(*a[3:]), tuple(b[:3]), tuple(b[3:]))
         for a, b in zip(q.tolist(), v.tolist(), strict=True)

@@ -10,7 +10,7 @@ from test_delivery_drone import momentum, without_propeller
 from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, accelerations, solve
-from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.body_kinematics import add_increment
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
 from lapwing.dynamics.multibody.five_body_stabilisation import (
@@ -186,7 +186,7 @@ def test_rank_found_afresh_locks_bricard():
     """Off the constraints by 1e-6 the redundant row looks independent: the naive rank decision leaves no freedom, and
     the mechanism stands still in mid-air. With the rank of the start as a bound it falls as it should."""
     system, q, v = bricard()
-    off = displaced(q, 1e-6 * np.random.default_rng(1).normal(size=v.shape))
+    off = add_increment(q, 1e-6 * np.random.default_rng(1).normal(size=v.shape))
     no_load, no_drive = np.zeros((5, 6)), np.zeros((0, 2))
     naive, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, ANY)
     held, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, 29)

@@ -5,7 +5,7 @@ import pytest
 from multibody_angles import euler_from_quaternion
 from test_augmented import state
 
-from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.body_kinematics import add_increment
 from lapwing.dynamics.multibody.initial_conditions import check, consistent
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system, four_bars
 
@@ -23,7 +23,7 @@ def test_violated_rows_are_named():
 def test_disturbed_mechanism_is_closed_again(build):
     system, q, v = build()
     rng = np.random.default_rng(1)
-    q, v = consistent(system, displaced(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape))
+    q, v = consistent(system, add_increment(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape))
     check(system, q, v, tolerance=1e-12)
 
 

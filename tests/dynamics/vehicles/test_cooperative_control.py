@@ -67,7 +67,7 @@ def test_desired_path_is_published_one():
 
 
 def forces(p, t, x, acceleration=ZERO, omega_rate=(ZERO,) * 3):
-    expected, slope = forces_of.wanted_specific(p, t, x, acceleration)
+    expected, slope = forces_of.desired_specific_force(p, t, x, acceleration)
     s, s_rate = forces_of.shares(p, x, expected, slope)
     n = len(x.link)
     return expected, [forces_of.desired_force(p, x, expected, slope, s, s_rate, omega_rate[i], i) for i in range(n)]

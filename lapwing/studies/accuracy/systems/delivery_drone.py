@@ -24,7 +24,7 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor import advance
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorState, motion_of
 from lapwing.dynamics.vehicles.multirotor_euler import FiveEulerBodies
-from lapwing.dynamics.vehicles.multirotor_multibody_equations import unloaded
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import without_loads
 from lapwing.kernels import kernel
 from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import flatten
@@ -49,7 +49,7 @@ def _of_one(p: Any, x: Any) -> float:
 @kernel
 def _of_five(p: Any, x: Any) -> float:
     drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
-    return five_body_stabilisation.constraint_violation(unloaded(drive, motion_of(p.layout, x)), x)[0]
+    return five_body_stabilisation.constraint_violation(without_loads(drive, motion_of(p.layout, x)), x)[0]
 
 
 @kernel

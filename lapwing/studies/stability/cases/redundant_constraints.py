@@ -14,7 +14,7 @@ from lapwing.dynamics.multibody.augmented import (
     mass_roots,
     solve,
 )
-from lapwing.dynamics.multibody.body_kinematics import displaced
+from lapwing.dynamics.multibody.body_kinematics import add_increment
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
 from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.initial_conditions import consistent
@@ -82,7 +82,7 @@ def off_by(size: float) -> tuple[float, float]:
     With the initial rank as a bound, and with a newly determined rank.
     """
     system, q, v = bricard()
-    off = displaced(q, size * np.random.default_rng(1).normal(size=v.shape))
+    off = add_increment(q, size * np.random.default_rng(1).normal(size=v.shape))
     no_load, no_drive = np.zeros((5, 6)), np.zeros((0, 2))
     true = accelerations(system, q, v).acceleration
     result = []
@@ -117,7 +117,7 @@ def inconsistent() -> tuple[float, float]:
     """Return the maximum constraint defect of a hand-assembled four-bar, after correction and before."""
     system, q, v = four_bars()
     rng, none = np.random.default_rng(1), np.zeros((0, 2))
-    q, v = displaced(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape)
+    q, v = add_increment(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape)
     closed, moving = consistent(system, q, v)
     return max(defects(system.arrays, closed, moving, none)), max(defects(system.arrays, q, v, none))
 
