@@ -1,12 +1,12 @@
-"""The effects that a scene may call for: one file each, found by scanning this folder.
+"""Effects: one file for each, discovered in this folder.
 
-The file `body_drag.py` is the effect `body_drag`; it has a parameter NamedTuple `BodyDrag` and registers hooks for it
-(see `_hooks`). Its parameters are the keys of the scene's table, checked against the annotations, unless the class has
-`from_scene(table, airframe)`. One that depends on where it flies has `in_environment(environment)`, which gives it as
-it is there. A module constant `KIND` names what only one active effect may be; a module's `check(table, tables)`
-refuses what it cannot be beside.
+The file `body_drag.py` defines the effect `body_drag`: a parameter NamedTuple `BodyDrag`, and hooks registered for it
+(see `_hooks`). Its parameters are the keys of the scene's table, validated against the annotations, unless the class
+has `from_scene(table, airframe)`. An effect that depends on the place of the flight has `in_environment(environment)`,
+which returns its parameters there. Of the effects whose modules have the same constant `KIND` only one may be active;
+a module's `check(table, tables)` rejects other combinations.
 
-An effect of the user's own is such a file elsewhere, which Python finds; the scene's table names it with `module`.
+A user's effect is such a file on Python's path; the scene's table names it with `module`.
 """
 
 import importlib
@@ -19,13 +19,13 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.environment import STANDARD, Environment
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["from_scene", "get", "in_evaluation_order", "names", "parameter_class", "validate_table"]
 
-# Effects are evaluated in the order of these keys, by default their names. Sums round differently in another order, so
-# an effect that is renamed keeps its key.
+# Effects are evaluated in the order of these keys, by default their names. The order affects the rounding of sums, so a
+# renamed effect keeps its key.
 _ORDER = {
     "axial_inflow": "rotor_inflow",
     "coaxial_interference": "coaxial_wash",
@@ -90,8 +90,8 @@ def from_scene(
     """Return the active effects of a scene in the order of evaluation, from the table of each.
 
     Args:
-        tables: of the effects, by name.
-        airframe: of the vehicle.
+        tables: tables of the effects by name.
+        airframe: airframe of the vehicle.
         environment: air, gravity and ground.
         external: names of effects whose named inputs an external model computes (see `_external_inputs`).
 

@@ -1,7 +1,7 @@
-"""Rotors' axes: body z where the airframe names none, at no cost; otherwise a direction for each rotor.
+"""Rotor axes: a direction for each rotor, or body z without cost if the airframe defines none.
 
-`layout.axis` is () or a unit vector in body coordinates for each rotor, along which it pushes; which of both it is, is
-part of its type, so that the choice is made when the plant is compiled.
+`layout.axis` is () or, for each rotor, the unit vector of its thrust in body coordinates. The choice is part of the
+type, so it is made when the plant is compiled.
 """
 
 import math

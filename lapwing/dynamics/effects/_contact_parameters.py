@@ -11,7 +11,7 @@ from lapwing.dynamics.terrain import LEVEL, upright
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import math
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(5)]
@@ -34,11 +34,11 @@ class Settings(NamedTuple):
 
 
 class GroundContact(NamedTuple):
-    """Feet that stick where they stand until the friction cone lets go (theory.md, eq. (2.12) to (2.16)).
+    """Feet that stick until the friction cone is exceeded (theory.md, eq. (2.12) to (2.16)).
 
     The friction is a spring and damper in series with a Coulomb slider, whose coefficient falls from the static to the
     dynamic one with the slip. Its deflection is a state under the integrator's error control: sticking, sliding and
-    reversal are not events, and the motion depends continuously on where it starts. Source: Cundall and Strack,
+    reversal are not events, and the motion depends continuously on its initial state. Source: Cundall and Strack,
     Geotechnique 29 (1979) 47, in its limit of short steps. Valid for hard ground and feet that are points; the ground
     is that of [environment].
     """
@@ -80,11 +80,11 @@ class GroundContact(NamedTuple):
         return cls(*common, settings.tangential_stiffness, damping, 1.0 / settings.stiction_velocity, rate)
 
     def in_environment(self, environment: Environment) -> "GroundContact":
-        """On the ground that is there."""
+        """Return the parameters over the scene's terrain."""
         return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
 
     def initial_discrete_state(self) -> tuple[Vec3, ...]:
-        """No foot is on the ground."""
+        """Return zero deflections: no foot is on the ground."""
         return (ZERO,) * len(self.feet)
 
 
@@ -109,19 +109,19 @@ class GroundContactSmooth(NamedTuple):
     mobility: float  # [1/kg] maximum acceleration of a foot by a unit force on all feet
 
     def in_environment(self, environment: Environment) -> "GroundContactSmooth":
-        """On the ground that is there."""
+        """Return the parameters over the scene's terrain."""
         return self._replace(terrain=environment.terrain, reach=_reach(self.feet, environment.terrain))
 
     def initial_discrete_state(self) -> tuple[tuple[()], ...]:
-        """Nothing to remember, foot by foot."""
+        """Return an empty memory for each foot."""
         return ((),) * len(self.feet)
 
 
 FASTEST_DEFLECTION = 10.0  # rate at which a deflection decays over the fastest undamped mode: the damper is no weaker
 STABLE = 1.25  # [rad] of the fastest oscillation in one step
-SUDDEN = 200.0  # [m/s^2] no vehicle is thrown to the ground faster
+SUDDEN = 200.0  # [m/s^2] limit of the acceleration towards the ground
 STABLE_REAL = 2.5  # decay rates times step: classical Runge-Kutta is stable to 2.78 on the real axis
-STABLE_DAMPER = 2.75  # the same of the damper, whose rate is known to the digit
+STABLE_DAMPER = 2.75  # the same of the damper, whose rate is exact
 
 
 def _reach(feet: tuple[Vec3, ...], terrain: Any = LEVEL) -> float:

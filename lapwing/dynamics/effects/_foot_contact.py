@@ -9,14 +9,14 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import generic, map_tuple
 from lapwing.kernels.simd import deinterleave, interleave, select, splat
 
-NO_FOOT = (math.nan, math.nan, math.nan)  # fills a group of four up: what is nowhere is under nothing
+NO_FOOT = (math.nan, math.nan, math.nan)  # completes a group of four; it never touches the ground
 
 
 class Stance(NamedTuple):
     """State shared by all feet."""
 
-    over: float  # [m] of the centre of mass over the slope, less what stands on it
-    upright_body: Vec3  # whose product with a foot's place is its height over the slope
+    over: float  # [m] height of the centre of mass over the slope, less the highest obstacle
+    upright_body: Vec3  # its product with a foot's position is the height over the slope
     position_world: Vec3
     velocity_world: Vec3
     omega_world: Vec3
@@ -52,7 +52,7 @@ class FootContact(NamedTuple):
     slip: Vec3  # [m/s] tangential velocity, of no meaning in the air
     normal: Vec3
     depth: float  # [m] along the normal, not positive in the air
-    approach: float  # [m/s] at which it grows
+    approach: float  # [m/s] its rate
 
 
 @always_inline

@@ -1,4 +1,4 @@
-"""From a scene's table to an effect's parameters."""
+"""Conversion of a scene's table to the parameters of an effect."""
 
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from lapwing.dynamics.config_error import ConfigError
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from pydantic import TypeAdapter
 
 T = TypeVar("T")

@@ -2,7 +2,7 @@
 
 The effects of a scene are a tuple of parameter NamedTuples, one per active effect, in the order of evaluation. A tuple
 of equal length holds the discrete state of each effect. An effect registers compiled functions ("hooks") for its
-parameter type. The calls are written out from the types in the tuple when the plant is compiled, so an effect that is
+parameter type. When the plant is compiled, the calls are generated from the types in the tuple, so an effect that is
 not in the tuple is not in the machine code.
 
 Hooks of one evaluation, in order:
@@ -30,7 +30,7 @@ Hooks between evaluations:
                          whose memory is integrated with the motion; the force is that of its wrench
     switches             (e, memory, motion, t, h) -> bool           True if the loads can jump or have a kink in the
                          step of h [s] from t [s], at a moment that depends on the motion
-    timed_update         (e, memory, t) -> memory                    of an effect that changes at a moment of its own
+    timed_update         (e, memory, t) -> memory                    of an effect that changes at a given moment
     break_time           (e, memory, t, h, value) -> the lesser of value and the first time after t [s] at which the
                          loads jump or have a kink: steps, of at most h [s], end and timed updates are made there
     contact              (e, memory, s) -> bool                      True if the vehicle touches the ground
@@ -274,7 +274,7 @@ def without_sleepers(effects: Any, values: Any) -> Callable:
 
 
 class KnownWrench(NamedTuple):
-    """Stands for an effect whose wrench has been evaluated together with the rate of its memory."""
+    """Placeholder of an effect whose wrench has been evaluated together with the rate of its memory."""
 
     force_world: Vec3  # [N]
     torque_body: Vec3  # [N m]

@@ -1,6 +1,6 @@
-"""Propeller test data: thrust and power coefficients over the advance ratio, from text as it is published.
+"""Propeller test data: thrust and power coefficients over the advance ratio, from published text files.
 
-The columns J, CT and CP (or CQ), under a line that names them, with commas, semicolons or blanks between: as of
+The columns J, CT and CP (or CQ) have a header line and are separated by commas, semicolons or blanks, as on
 J. Brandt and M. Selig's UIUC Propeller Data Site. A column `angle` [deg], of the air against the rotor's flow, makes a
 grid.
 """

@@ -1,4 +1,4 @@
-"""Sums over every rotor of a vehicle, whatever their number, as straight-line code."""
+"""Sums over all rotors of a vehicle, as straight-line code for any number."""
 
 from lapwing.dynamics.effects._types import Loads, PerRotor
 from lapwing.dynamics.vector import add, pair

@@ -15,9 +15,9 @@ from lapwing.kernels.codegen import map_tuple
 
 KIND = "turbulence"
 FOOT = 0.3048  # [m]
-LOWEST, HIGHEST = 10.0 * FOOT, 1000.0 * FOOT  # [m] within which the model is stated
-SLOWEST = 0.1  # [m/s] a vehicle that goes with the wind is not passed by it at all
-LONG_AGO = 50.0  # correlation times before the first exchange at which the filters were started
+LOWEST, HIGHEST = 10.0 * FOOT, 1000.0 * FOOT  # [m] range of altitudes of the model
+SLOWEST = 0.1  # [m/s] lower limit: gusts do not pass a vehicle that moves with the wind
+LONG_AGO = 50.0  # correlation times from the start of the filters to the first exchange
 
 
 class Settings(NamedTuple):
@@ -41,7 +41,7 @@ class Conditions(NamedTuple):
 
 
 class Part(NamedTuple):
-    """A Dryden turbulence of which a turbulence is the sum."""
+    """One of the Dryden turbulences whose sum is a turbulence."""
 
     ratio: float  # scale of the whole over that of the part
     share: float  # of the deviation

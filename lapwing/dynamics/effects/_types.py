@@ -41,7 +41,7 @@ class FullMassProperties(NamedTuple):
 
 
 class OffsetMassProperties(NamedTuple):
-    """Mass properties of a body whose centre of mass is not where the motion's position is."""
+    """Mass properties of a body whose centre of mass is not at the motion's position."""
 
     mass: float  # [kg]
     inverse_mass: float  # [1/kg]
@@ -128,17 +128,17 @@ class WakeSlopes(NamedTuple):
     """
 
     thrust: tuple[PerRotor, ...] = ()  # of each rotor
-    torque: tuple[PerRotor, ...] = ()  # [m] what each rotor's torque gains
+    torque: tuple[PerRotor, ...] = ()  # [m] gain of each rotor's torque
 
 
 class Rotors(NamedTuple):
-    """All that is known of the rotors once the motors have been evaluated."""
+    """State of the rotors after the evaluation of the motors."""
 
     thrust: PerRotor  # [N]
     torque: PerRotor  # [N m]
     acceleration: PerRotor  # [rad/s^2]
     current: PerRotor  # [A] of each motor
-    voltage: PerRotor  # [V] asked of each controller
+    voltage: PerRotor  # [V] commanded for each controller
     power: PerRotor  # [W] taken by each motor and its controller
 
 
@@ -151,4 +151,4 @@ class EffectInputs(NamedTuple):
     body: Any  # AnyMassProperties
     layout: Any  # RotorLayout, see lapwing/dynamics/vehicles/multirotor_equations.py
     air: Air
-    air_rate_body: Vec3  # [rad/s] at which the air turns, body coordinates
+    air_rate_body: Vec3  # [rad/s] rotation of the air, body coordinates

@@ -28,8 +28,8 @@ class NeighbourState(NamedTuple):
     radius: float = 0.0  # [m] of the sphere that others touch; 0: they pass through
     restitution: float = 0.0  # speed after a collision over that before
     disc_radius: float = 0.0  # [m] of one disc as large as all rotors' together; 0: no wash
-    hook_body: Vec3 = ZERO  # [m] where its cable is fastened
-    hook_world: Vec3 = ZERO  # [m] the same in the world
+    hook_body: Vec3 = ZERO  # [m] attachment of its cable
+    hook_world: Vec3 = ZERO  # [m] attachment of its cable, world
     hook_velocity: Vec3 = ZERO  # [m/s] world
     hook_acceleration: Vec3 = ZERO  # [m/s^2] world
     wind_world: Vec3 = ZERO  # [m/s]

@@ -9,7 +9,7 @@ from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.kernels import always_inline, python_function
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 

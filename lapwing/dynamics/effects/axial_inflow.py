@@ -1,4 +1,4 @@
-"""Correction of the rotors' thrust and torque for air that comes along their axis."""
+"""Change of the rotors' thrust and torque by air speed along their axes."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -11,14 +11,14 @@ from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coeffi
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "flow through the rotors"
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [propeller] says it all."""
+    """No keys: the parameters are in the airframe's [propeller]."""
 
 
 class AxialInflow(NamedTuple):

@@ -1,4 +1,4 @@
-"""A battery that empties and sags under load."""
+"""A battery with charge, and voltage sag under load."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -11,7 +11,7 @@ from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "battery model"
@@ -21,15 +21,17 @@ class Settings(NamedTuple):
     """Scene table."""
 
     initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
-    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] per cell; the motors stop for good below it
+    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = (
+        3.0  # [V] per cell, below which the motors stop for the rest of the run
+    )
 
 
 class Battery(NamedTuple):
     """Lithium-polymer cells in series: open-circuit voltage by charge, less a resistance (theory.md, eq. (2.10)).
 
-    The motors get the voltage they ask for as long as the battery has it. Charge and voltage are brought up to date
-    once a communication step. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
-    curve; one ohmic resistance, the transient ones left out. Valid at room temperature, charge above a few per cent.
+    The motors get their commanded voltage up to that of the battery. Charge and voltage are updated once per
+    communication step. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
+    curve; one ohmic resistance, without transient ones. Valid at room temperature, charge above a few per cent.
     """
 
     cells: float

@@ -1,4 +1,4 @@
-"""A battery that also recovers slowly after a load, warms up, and is switched on again once it has recovered."""
+"""A battery with transient voltages and temperature, whose motors restart after recovery."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -15,7 +15,7 @@ from lapwing.dynamics.environment import Environment
 from lapwing.kernels import math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "BatteryThevenin", "Settings"]
@@ -49,7 +49,7 @@ class BatteryThevenin(NamedTuple):
     Resistances fall as the pack warms by its own losses. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
     (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one lump of heat.
     Currents above 1 C take more charge by Peukert's law, if its exponent is given. The activation temperature, 20
-    kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to 60 degC. Brought up to date once a
+    kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to 60 degC. Updated once per
     communication step, exactly for a constant current.
     """
 
@@ -69,7 +69,7 @@ class BatteryThevenin(NamedTuple):
     temperature: float = REFERENCE  # [K] at the start
     peukert_exponent: float = 1.0
     air_temperature: float = REFERENCE  # [K]
-    given_temperature: bool = False  # whether the scene says that at the start
+    given_temperature: bool = False  # True if the scene defines the initial temperature
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
@@ -136,7 +136,7 @@ def discharge(e, memory, s, rotors, key, tick, interval):
     fast = fast_kept * fast + (1.0 - fast_kept) * warmth * e.fast * current
     slow = slow_kept * slow + (1.0 - slow_kept) * warmth * e.slow * current
     cooled = math.exp(-interval / e.cooling_time)
-    # the transients' heat is taken for that of the current through them: in the mean of a load it is
+    # the heat of the transients is that of the current through them, which is exact in the mean of a load
     settled = e.air_temperature + (ohmic + fast + slow) * current * e.cooling_time / e.heat_capacity
     temperature = settled + cooled * (temperature - settled)
     drain = current

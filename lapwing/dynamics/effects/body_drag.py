@@ -8,7 +8,7 @@ from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(100)]

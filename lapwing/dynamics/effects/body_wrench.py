@@ -8,7 +8,7 @@ from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import Vec3
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Force = Annotated[float, Ge(-1e4), Le(1e4)]
@@ -25,7 +25,7 @@ class Settings(NamedTuple):
 class BodyWrench(NamedTuple):
     """A constant force and torque in body axes: the trim of a real vehicle (theory.md, eq. (2.65)).
 
-    It stands for what is constant over seconds and no other effect explains: a shifted centre of mass, unequal motors,
+    It represents loads that are constant over seconds and that no other effect explains: a shifted centre of mass, unequal motors,
     a bent arm. Source: the output bias of output-error estimation, Jategaonkar, Flight Vehicle System Identification
     (2015), section 4. Valid while these causes are constant in the body.
     """

@@ -12,11 +12,11 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coeff
 from lapwing.kernels import always_inline, math, noinline
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-LOWEST = 0.25  # radii: nearer to the ceiling the law no longer holds, and the distance is taken as this
-FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.2 %, is faded out
+LOWEST = 0.25  # radii: lower limit of the distance in the law
+FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which the remaining effect, below 0.2 %, is faded out
 UNBOUNDED = 1e9  # [m]
 
 Length = Annotated[float, Gt(0), Le(1e6)]
@@ -47,7 +47,7 @@ class CeilingEffect(NamedTuple):
     asymmetry: float
     pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed; above 1
     induced: float  # induced part of the static torque
-    reach: float  # [m] from the centre of mass within which the ceiling is felt
+    reach: float  # [m] distance of the centre of mass from the ceiling within which it has an effect
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CeilingEffect":

@@ -1,4 +1,4 @@
-"""Rotors that stand in the wake of another one above them."""
+"""Rotors in the wake of another rotor above them."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -16,18 +16,18 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 CONTRACTED = math.sqrt(0.5)  # radius of the wake over that of the disc
-ASIDE = 1.0 - CONTRACTED  # radii that discs may be apart across their axis for the whole wake to meet the lower one
+ASIDE = 1.0 - CONTRACTED  # radii between the axes up to which the whole wake meets the lower disc
 FARTHEST = 2.0  # radii between discs that count as coaxial
 PARALLEL = 0.99  # least cosine between their axes
 NOT_BESIDE = ("rotor_quadratic", "rotor_table", "dynamic_inflow")
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [propeller] and [rotors] say it all."""
+    """No keys: the parameters are in the airframe's [propeller] and [rotors]."""
 
 
 class CoaxialInterference(NamedTuple):
@@ -42,7 +42,7 @@ class CoaxialInterference(NamedTuple):
     pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed
     flow: float  # [m/rad] induced velocity in hover over the rotor's speed
     radius: float  # [m]
-    above: tuple[PerRotor, ...]  # for each rotor: 1 for the one whose wake it stands in, 0 for the others
+    above: tuple[PerRotor, ...]  # for each rotor: 1 for the rotor in whose wake it lies, 0 for the others
     distance: PerRotor  # [m] of that one along the axis
 
     @classmethod
@@ -147,10 +147,10 @@ def _change(e, both, place):
     """Return (change of thrust [N], change of torque [N m]) at a density of 1."""
     speed, wash = both
     (axial, across), distance = place
-    along = axial + wash  # [m/s] at which the wake comes down
+    along = axial + wash  # [m/s] speed of the wake
     if wash <= 0.0 or along <= 0.0 or speed <= 0.0:
         return 0.0, 0.0
-    drift = distance * across / (along * e.radius)  # [radii] by which it is carried aside on its way
+    drift = distance * across / (along * e.radius)  # [radii] sideways drift of the wake on its way
     share = min(max((1.0 + CONTRACTED - drift) / (2.0 * CONTRACTED), 0.0), 1.0)
     thrust = inflow.thrust_in_wake(e.pitch, share * wash / (e.flow * speed))
     through = e.pitch - thrust * (e.pitch - 1.0)

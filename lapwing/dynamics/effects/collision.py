@@ -1,4 +1,4 @@
-"""Vehicles of a fleet that touch one another."""
+"""Collisions between vehicles of a fleet."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -22,27 +22,27 @@ from lapwing.dynamics.vector import (
 )
 from lapwing.kernels import always_inline, math
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-PUSH = 0.05  # of the depth that spheres are in one another, taken back in each communication step
+PUSH = 0.05  # share of the penetration that is corrected in each communication step
 
 
 class Settings(NamedTuple):
     """Scene table."""
 
     radius: Annotated[float, Gt(0), Le(100)] | None = None  # [m] about the centre of mass; to the rotors' tips
-    restitution: Annotated[float, Ge(0), Le(1)] = 0.3  # speed of parting over that of approach; of two the lower
-    friction: Annotated[float, Ge(0), Le(2)] = 0.0  # coefficient of friction; of two the lower
+    restitution: Annotated[float, Ge(0), Le(1)] = 0.3  # coefficient of restitution; of two vehicles the lower applies
+    friction: Annotated[float, Ge(0), Le(2)] = 0.0  # coefficient of friction; of two vehicles the lower applies
 
 
 class Collision(NamedTuple):
-    """Spheres that bounce off one another and rub (theory.md, eq. (2.60), (2.61), (2.77)).
+    """Spheres with elastic impact and friction (theory.md, eq. (2.60), (2.61), (2.77)).
 
-    An impulse along the line of centres and one of friction against the slip, given as a force and a torque over one
-    communication step and to both alike, so that momentum and angular momentum are kept. Source: Newton's law of
-    impact, Coulomb's of friction (Walton, 1993); depth taken back after Baumgarte. Valid while a vehicle moves by
-    little of its radius in a communication step; vehicles do not break by it.
+    An impulse along the line of centres and a friction impulse against the slip act on both vehicles as a force and a
+    torque over one communication step, so that momentum and angular momentum are conserved. Source: Newton's law of
+    impact, Coulomb's of friction (Walton, 1993); Baumgarte's correction of the depth. Valid while a vehicle moves by a
+    small part of its radius in a communication step; collisions cause no damage.
     """
 
     radius: float  # [m]
@@ -97,7 +97,7 @@ def touch(e, memory, own, others, interval):
         rough = min(own.friction, other.friction)
         if rough == 0.0:
             continue
-        # the contact divides the distance in proportion to the radii, so that angular momentum is kept
+        # the contact divides the distance in proportion to the radii, so that angular momentum is conserved
         arm = own.radius * distance / (own.radius + other.radius)
         reach = other.radius * distance / (own.radius + other.radius)
         turning = add(scale(arm, own.omega_world), scale(reach, other.omega_world))

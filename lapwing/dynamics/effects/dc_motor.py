@@ -15,7 +15,7 @@ from lapwing.kernels import always_inline
 from lapwing.kernels import math as exact
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "motor model"
@@ -25,7 +25,9 @@ LARGEST = 0.9  # of the inductance at which speed and current oscillate
 class Settings(NamedTuple):
     """Scene table; the rest is in the airframe's [motor] and [rotors]."""
 
-    braking_current: Annotated[float, Ge(0), Le(1e4)] = 0.0  # [A] up to which the controller brakes; 0: it does not
+    braking_current: Annotated[float, Ge(0), Le(1e4)] = (
+        0.0  # [A] limit of the braking current; 0: the controller does not brake
+    )
     inductance: Annotated[float, Ge(0), Le(1)] = 0.0  # [H] of the winding, between two leads
 
 
@@ -34,14 +36,13 @@ class DcMotor(NamedTuple):
 
     The resistance is that of motor and controller, the inertia that of the rotor and, through the belt, of the motor.
     The controller keeps the current between minus its braking current and the lowest of its own limit, the motor's peak
-    current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. Then it
-    gives less voltage than it is asked for, and takes the power of that, over its efficiency; while it brakes, it gives
-    power back. Source: the usual steady model of a brushless motor, from its speed constant, resistance and idle
+    current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. At a limit it
+    applies less than the commanded voltage, and takes that power over its efficiency; while it brakes, it returns power. Source: the usual steady model of a brushless motor, from its speed constant, resistance and idle
     current; with an inductance L I' = V - K w - R I, exactly for constant voltage and torque. Valid for changes slower
     than about 1 ms.
     """
 
-    motor_constant: float  # [N m/A] = [V s/rad] K at the rotor, behind the belt
+    motor_constant: float  # [N m/A] = [V s/rad] K at the rotor, after the belt
     inverse_resistance: float  # [1/ohm]
     no_load_current: float  # [A]
     least_current: float  # [A] not positive: minus the braking current
@@ -181,7 +182,7 @@ def _all_with_lag(arguments):
 
 @always_inline
 def _transient_after_step(c, both, more):
-    """Return (transient [A], voltage [V]) of a rotor whose current goes on from a step of the voltage."""
+    """Return (transient [A], voltage [V]) of a rotor after a step of the voltage."""
     e, decay = c
     speed, torque = both
     voltage, (transient, before) = more

@@ -1,4 +1,4 @@
-"""The air that vehicles of a fleet blow down on those below."""
+"""Downwash of the vehicles of a fleet on those below."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -11,33 +11,32 @@ from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import ZERO, add, dot, norm, scale, subtract
 from lapwing.kernels import math
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
     """Scene table."""
 
-    spread: Annotated[float, Ge(0), Le(1)] = 0.113  # m of the jet's radius, where it is e times slower, a metre of way
-    core: Annotated[float, Ge(0), Le(20)] = 0.0  # way before the jet spreads, over the distance of opposite rotors
+    spread: Annotated[float, Ge(0), Le(1)] = 0.113  # growth of the jet's 1/e radius per distance
+    core: Annotated[float, Ge(0), Le(20)] = 0.0  # distance before the jet spreads, over that of opposite rotors
 
 
 class Downwash(NamedTuple):
     """The jet of each other vehicle that names it, as a wind (theory.md, eq. (2.62) to (2.64)).
 
-    One jet for all rotors of a vehicle, against their thrust: twice the induced velocity of momentum theory once it
-    has developed, a Gauss profile whose width grows with the way and whose momentum is the thrust. It acts through the
+    One jet for all rotors of a vehicle, against their thrust: the developed jet has twice the induced velocity of
+    momentum theory, a Gauss profile whose width grows with the distance, and the momentum of the thrust. It acts through the
     effects that know the air's speed (body_drag, axial_inflow, dynamic_inflow). Source: Leishman, Principles of
     Helicopter Aerodynamics, on the wake in hover; Pope, Turbulent Flows, section 5.1, on the round jet, whose half
-    width grows by 0.094 m a metre; Bauersfeld et al., IEEE Robotics and Automation Letters 10 (2025), who measured a
+    width grows by 0.094 m per metre; Bauersfeld et al., IEEE Robotics and Automation Letters 10 (2025), who measured a
     jet from 2.5 distances of opposite rotors below a quadrotor on (`core`). Valid near hover, below by more than the
-    distance between rotors, where their jets have joined; no wind carries the jet away, the ground does not turn it,
-    and it is there at once.
+    distance between rotors, where their jets have merged; wind and ground do not deflect the jet, and it has no delay.
     """
 
-    disc_radius: float  # [m] of one disc as large as all rotors' together
+    disc_radius: float  # [m] radius of a disc with the area of all rotors
     spread: float
-    core: float  # [m] of way before the jet spreads
+    core: float  # [m] distance before the jet spreads
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":

@@ -1,4 +1,4 @@
-"""Thrust and torque of rotors whose own flow grows and fades: climb, descent, and translational lift."""
+"""Rotors with the induced velocity as a state: climb, descent, and translational lift."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,18 +13,18 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "DynamicInflow", "Settings"]
 
 APPARENT_MASS = 0.637  # of the sphere of air around the disc
-SLOWEST = 1e-3  # [m/s] least induced velocity that others are compared with
-LARGEST_SHARE = 0.9  # of the pitch speed that the induced velocity in hover may be
+SLOWEST = 1e-3  # [m/s] lower limit of the induced velocity in ratios
+LARGEST_SHARE = 0.9  # limit of the induced velocity in hover over the pitch speed
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [propeller] says it all."""
+    """No keys: the parameters are in the airframe's [propeller]."""
 
 
 class DynamicInflow(NamedTuple):
@@ -34,7 +34,7 @@ class DynamicInflow(NamedTuple):
     forward flight (Glauert), its fit to measurements in descent, times the propeller's induced power factor. Sources:
     Leishman, Principles of Helicopter Aerodynamics, section 2.13; time constant of the flow: Carpenter and Fridovich,
     NACA TN 3044 (1953). Valid for blades that do not stall; updated once per communication step. In the vortex ring
-    state it is the mean of a rough flow; `vortex_ring` adds the rest.
+    state it is the mean flow; `vortex_ring` adds loss and fluctuation.
     """
 
     slope: float  # [m^3/rad] -dT / (density speed dV)
@@ -72,14 +72,14 @@ class DynamicInflow(NamedTuple):
 
 @always_inline
 def _through(e, axial, speed, induced):
-    """Return the air speed through the disc [m/s], clamped to where blades neither stall nor brake hard."""
+    """Return the air speed through the disc [m/s], clamped to the range without stall and strong braking."""
     blades = e.pitch * speed
     return min(max(axial + induced, -0.5 * blades), 1.5 * blades)
 
 
 @kernel
 def _advance_inflow(c, induced, both):
-    """Return the induced velocity an interval later, on its way to that of momentum theory for the present thrust."""
+    """Return the induced velocity an interval later; it approaches that of momentum theory for the present thrust."""
     e, interval = c
     speed, (axial, across) = both
     square = 0.5 * e.slope / e.area * speed * (e.pitch * speed - _through(e, axial, speed, induced))

@@ -7,7 +7,7 @@ from lapwing.dynamics.effects._hooks import field, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "gravity"
@@ -33,7 +33,7 @@ class Gravity(NamedTuple):
         return cls()
 
     def in_environment(self, environment: Environment) -> "Gravity":
-        """Return the gravity at the scene's place."""
+        """Return the gravity at the scene's location."""
         return Gravity(environment.gravity)
 
     @property

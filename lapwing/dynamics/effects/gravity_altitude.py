@@ -9,7 +9,7 @@ from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
 from lapwing.kernels import always_inline
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "gravity"
@@ -22,8 +22,8 @@ class Settings(NamedTuple):
 class GravityAltitude(NamedTuple):
     """Weight m g (R / (R + h))^2 down (theory.md, eq. (2.2)).
 
-    Source: Newton's law with the radius of the U.S. Standard Atmosphere 1976; brought up to date once an exchange
-    interval. Valid wherever there is air.
+    Source: Newton's law with the radius of the U.S. Standard Atmosphere 1976; updated once per exchange interval. Valid
+    within the atmosphere.
     """
 
     acceleration: float = STANDARD_GRAVITY  # [m/s^2] at sea level
@@ -36,7 +36,7 @@ class GravityAltitude(NamedTuple):
         return cls()
 
     def in_environment(self, environment: Environment) -> "GravityAltitude":
-        """Return the gravity at the scene's place."""
+        """Return the gravity at the scene's location."""
         return GravityAltitude(environment.gravity, environment.home.height)
 
     @property

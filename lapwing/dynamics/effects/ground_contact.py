@@ -27,12 +27,12 @@ from lapwing.kernels.simd import any_above, deinterleave, interleave, select, se
 from lapwing.kernels.simd_chunks import chunk4, unchunk4
 from lapwing.kernels.state_tree import largest
 
-RELAXED = 1e-13  # [m] deflection of friction elements that may as well be zero
+RELAXED = 1e-13  # [m] deflection of friction elements that counts as zero
 
 
 @always_inline
 def _far(e, motion, h):
-    """Can no foot reach the ground within a step, whatever happens in it?"""
+    """Return True if no foot can reach the ground within a step."""
     velocity = motion.velocity_world
     approach = max(-over_plane(e.terrain, velocity), 0.0)
     over = over_plane(e.terrain, motion.position_world) - summit(e.terrain)
@@ -73,7 +73,7 @@ def _friction(e, memory, foot):
 
 @always_inline
 def _push(e, stance, feet_body, memory):
-    """(force, torque) of four feet, in world coordinates, in lanes; zero where a foot is in the air."""
+    """Return (force, torque) of four feet in world coordinates, in lanes; zero where a foot is in the air."""
     foot = contact_of_feet(e, stance, feet_body)
     force = add(scale(foot.press, foot.normal), _friction(e, memory, foot))
     pressing = select(in_reach(stance, feet_body), foot.press, 0.0)
@@ -82,7 +82,7 @@ def _push(e, stance, feet_body, memory):
 
 @always_inline
 def _in_turn(start, four):
-    """`start` plus the four lanes' vectors, added in the order of the feet."""
+    """Return `start` plus the vectors of the four lanes, added in the order of the feet."""
     a, b, c, d = deinterleave(four)
     return add(add(add(add(start, a), b), c), d)
 
@@ -147,7 +147,7 @@ def _load_four_feet(c, feet, memory):
     relaxing = scale(-e.tangential_stiffness / e.tangential_damping, deflection)
     reached = in_reach(stance, feet_body)
     if not any_above(reached):
-        return reached, feet_body, feet_body, deinterleave(relaxing)  # no loads, `_add_four_feet` leaves them out
+        return reached, feet_body, feet_body, deinterleave(relaxing)  # no loads: `_add_four_feet` skips them
     foot = contact_of_feet(e, stance, feet_body)
     friction, rate = _element(e, deflection, foot)
     force = add(scale(foot.press, foot.normal), friction)
@@ -171,7 +171,7 @@ def _rates_of(_, four, __):
 
 @wrench_and_rate(GroundContact)
 def loads_and_stretching(e, memory, motion):
-    """Return the wrench of `ground_contact` and the rate [m/s] at which the elements stretch; in the air they relax."""
+    """Return the wrench of `ground_contact` and the deflection rates [m/s] of the elements, which relax in the air."""
     R_world_body = rotation_matrix(motion.attitude)
     stance = stance_of(e, motion, R_world_body)
     feet, deflections = chunk4(e.feet, NO_FOOT), chunk4(memory, memory[0])

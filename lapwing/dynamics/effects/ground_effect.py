@@ -1,4 +1,4 @@
-"""More thrust close to the ground."""
+"""Ground effect of single rotors."""
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -10,27 +10,27 @@ from lapwing.dynamics.terrain import LEVEL, over_plane, summit, surface, upright
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "ground effect model"
-LOWEST = 0.5  # radii: nearer to the ground the law no longer holds, and the factor is kept
-FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which what is left of the law, below 0.4 %, is faded out
+LOWEST = 0.5  # radii: lower limit of the height in the law
+FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which the remaining effect, below 0.4 %, is faded out
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [propeller] says it all."""
+    """No keys: the parameters are in the airframe's [propeller]."""
 
 
 class GroundEffect(NamedTuple):
     """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z over the ground under it (theory.md, eq. (2.25)).
 
-    Source: Cheeseman and Bennett, ARC R&M 3021 (1955), hovering, each rotor by itself. Valid for
-    heights above half a radius, over ground that is flat for some radii around.
+    Source: Cheeseman and Bennett, ARC R&M 3021 (1955), for an isolated rotor in hover. Valid
+    for heights above half a radius, over ground that is flat for some radii around.
     """
 
     inverse_radius: float  # [1/m]
-    highest: float  # [m] of the centre of mass over the slope, above which no rotor feels the ground
+    highest: float  # [m] height of the centre of mass over the slope above which the effect is zero
     terrain: Any = LEVEL  # Level or Relief
 
     @classmethod
@@ -50,7 +50,7 @@ class GroundEffect(NamedTuple):
 
 @always_inline
 def gain(height):
-    """Return the thrust over that far from the ground, at a height in radii."""
+    """Return the thrust over that out of ground effect, at a height in radii."""
     z = max(height, LOWEST)
     square = 0.0625 / (z * z)
     fade = min(max((z - FADE_FROM) * (1.0 / (FADE_TO - FADE_FROM)), 0.0), 1.0)

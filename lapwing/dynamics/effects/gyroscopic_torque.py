@@ -1,4 +1,4 @@
-"""Gyroscopic torque of the spinning rotors on the turning body."""
+"""Gyroscopic torque of the rotors on the rotating body."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,19 +10,19 @@ from lapwing.dynamics.vector import cross, product, scale, subtract
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [rotors] says it all."""
+    """No keys: the parameters are in the airframe's [rotors]."""
 
 
 class GyroscopicTorque(NamedTuple):
     """Gyroscopic torque and spin-up reaction of the rotors (theory.md, eq. (2.6)).
 
     Source: Euler's equations of a body with rotors that spin about axes fixed in it; the propeller's inertia is
-    averaged over a turn. Valid while the rotors turn many times faster than the body.
+    averaged over a revolution. Valid while the rotors spin much faster than the body.
     """
 
     inertia: float  # [kg m^2] of one rotor about its axis
@@ -38,7 +38,7 @@ class GyroscopicTorque(NamedTuple):
 def _along_z(arguments):
     e, s, rotors = arguments
     sign, omega = s.layout.reaction_sign, s.motion.omega_body
-    # a rotor that pushes the body to +z turns about -z itself
+    # a rotor that accelerates the body about +z spins about -z
     momentum = -e.inertia * total(map_tuple(product, 0.0, sign, s.motion.rotor_speed))  # along body z
     spin_up = e.inertia * total(map_tuple(product, 0.0, sign, rotors.acceleration))
     return (-omega[1] * momentum, omega[0] * momentum, spin_up)

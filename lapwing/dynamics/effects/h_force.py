@@ -1,4 +1,4 @@
-"""H-force: drag of the turning rotors in their plane."""
+"""H-force: drag of the rotors in their plane."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -13,7 +13,7 @@ from lapwing.dynamics.vehicles.propeller import h_force_coefficient
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 
@@ -33,7 +33,7 @@ class HForce(NamedTuple):
     """
 
     coefficient: float  # [m^3/rad]
-    height: float  # [m] of all rotors over the centre of mass; not used where rotors have axes of their own
+    height: float  # [m] height of all rotors over the centre of mass; not used for tilted rotors
     square_arm: tuple[float, ...]  # [m^2] squared distance of each rotor from the body z axis
 
     @classmethod

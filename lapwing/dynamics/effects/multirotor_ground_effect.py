@@ -1,4 +1,4 @@
-"""More thrust of all rotors together close to the ground, or to a part of it."""
+"""Ground effect of all rotors together, also over a part of their area."""
 
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -16,17 +16,17 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, math, noinline
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "MultirotorGroundEffect", "Settings"]
 
-LOWEST = 0.5  # radii: nearer to the ground the law no longer holds, and the height is taken as this
-FADE_FROM, FADE_TO = 8.0, 12.0  # radii over which what is left of the law, about 1 %, is faded out
-MOST = 0.5  # share of a rotor's flow that images may cancel
+LOWEST = 0.5  # radii: lower limit of the height in the law
+FADE_FROM, FADE_TO = 8.0, 12.0  # radii over which the remaining effect, about 1 %, is faded out
+MOST = 0.5  # limit of the share of a rotor's flow that images cancel
 INNER, OUTER = 0.5, math.sqrt(0.75)  # radii of rings that halve a disc's area, over its radius
 SLANT = math.sqrt(0.5)
-# places on a disc, over its radius, that stand for equal areas
+# points of a disc, over its radius, that represent equal areas
 SPREAD = tuple((INNER * x, INNER * y) for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))) + tuple(
     (OUTER * SLANT * x, OUTER * SLANT * y) for x, y in ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
 )
@@ -36,7 +36,7 @@ CENTRE: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
 class Settings(NamedTuple):
     """Scene table."""
 
-    fountain: Annotated[float, Ge(0), Le(4)] = 2.0  # K_b of the air that returns between the rotors
+    fountain: Annotated[float, Ge(0), Le(4)] = 2.0  # K_b, coefficient of the fountain between the rotors
 
 
 class MultirotorGroundEffect(NamedTuple):
@@ -55,8 +55,8 @@ class MultirotorGroundEffect(NamedTuple):
     fountain: float  # [m^2] 2 R^2 K_b
     diagonal: float  # [m^2] square of the largest distance between rotors
     pairs: tuple[tuple[tuple[float, float], ...], ...]  # for each rotor and other: squared distance [m^2], share of b
-    highest: float  # [m] of the centre of mass over the slope, above which no rotor feels the ground
-    spread: tuple[tuple[float, float], ...] = CENTRE  # [m] places on a disc under which the ground is looked at
+    highest: float  # [m] height of the centre of mass over the slope above which the effect is zero
+    spread: tuple[tuple[float, float], ...] = CENTRE  # [m] points of a disc below which the ground's height is sampled
     terrain: Any = LEVEL  # Level or Relief
 
     @classmethod

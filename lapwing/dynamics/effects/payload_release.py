@@ -10,7 +10,7 @@ from lapwing.dynamics.effects._from_scene import reject, validate_table
 from lapwing.dynamics.effects._hooks import break_time, mass_properties, timed_update
 from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Length = Annotated[float, Gt(0), Le(10)]

@@ -14,7 +14,7 @@ from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
 from lapwing.kernels import always_inline
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Speed = Annotated[float, Ge(-60), Le(60)]

@@ -8,7 +8,7 @@ from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.vector import Vec3, multiply, scale, subtract
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(1e3)]

@@ -11,7 +11,7 @@ from lapwing.dynamics.effects._types import Factors, PerRotor
 from lapwing.dynamics.vector import product
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 

@@ -14,7 +14,7 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 FASTEST = 0.5  # advance ratio above which the tilt grows no more

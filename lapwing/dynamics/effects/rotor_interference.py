@@ -16,24 +16,24 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, kernel, math, noinline
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 NEAREST = 0.5  # radii between axes; nearer rotors are coaxial
-SAME = 1e-6  # [m] distances that differ by less share a table
-SLOWEST = 1e-3  # [m/s] least induced velocity that speeds are compared with
+SAME = 1e-6  # [m] tolerance within which distances share a table
+SLOWEST = 1e-3  # [m/s] lower limit of the induced velocity in ratios
 NOT_BESIDE = ("coaxial_interference", "rotor_quadratic", "rotor_table")
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [propeller] and [rotors] say it all."""
+    """No keys: the parameters are in the airframe's [propeller] and [rotors]."""
 
 
 class RotorInterference(NamedTuple):
     """Change of static loads by the flow that the other rotors induce (theory.md, eq. (2.73) to (2.75)).
 
     Source: skewed cylinder of vortex rings of Castles and De Leeuw, NACA TR 1184 (1954), its mean over each disc; flow
-    of each rotor by Glauert; blades of one pitch as in `dynamic_inflow`. None in hover. Valid for rotors in one plane,
+    of each rotor by Glauert; blades of one pitch as in `dynamic_inflow`. Zero in hover. Valid for rotors in one plane,
     uniform discs, and wakes that neither roll up nor bend each other.
     """
 
@@ -42,7 +42,9 @@ class RotorInterference(NamedTuple):
     flow: float  # [m/rad] induced velocity in hover over the rotor's speed
     area: float  # [m^2] of the disc
     numbers: tuple[int, ...]  # of the rotors
-    pairs: tuple[tuple[tuple[float, float, int], ...], ...]  # each rotor seen from each: unit vector, table; -1: itself
+    pairs: tuple[
+        tuple[tuple[float, float, int], ...], ...
+    ]  # for each pair of rotors: unit vector, table; -1: the rotor itself
     wash: np.ndarray  # mean flow at a disc over that at the inducing one, shape (tables, skews, offsets)
 
     @classmethod

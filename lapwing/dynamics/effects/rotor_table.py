@@ -1,4 +1,4 @@
-"""Rotors whose thrust and torque are measured: coefficients over the advance ratio, and over the angle of the air."""
+"""Measured thrust and torque of the rotors: coefficients over the advance ratio and the angle of the air."""
 
 import itertools
 from collections.abc import Mapping
@@ -19,12 +19,12 @@ from lapwing.dynamics.vector import pair
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 INSTEAD_OF = ("rotor_thrust", "rotor_quadratic", "axial_inflow", "dynamic_inflow")
 WIDEST = 0.25  # of J between two rows
-LEAST_TURNS = 1e-6  # [1/s] below which the advance ratio is that of this speed
+LEAST_TURNS = 1e-6  # [1/s] lower limit of the speed in the advance ratio
 
 Ratio = Annotated[float, Ge(-5), Le(5)]
 Coefficient = Annotated[float, Ge(-1), Le(1)]
@@ -46,7 +46,7 @@ class RotorTable(NamedTuple):
     """T = C_T rho n^2 D^4, Q = C_P rho n^2 D^5 / (2 pi) with coefficients by a table (theory.md, eq. (2.37)).
 
     Linear between its rows, held beyond. With one angle the advance ratio is that of the air along the axis, with
-    several that of all the air, and its angle counts. Source: the measurements. Valid within the table.
+    several it is that of the whole air speed, with its angle. Source: the measurements. Valid within the table.
     """
 
     advance: np.ndarray  # (n,)

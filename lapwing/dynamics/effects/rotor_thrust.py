@@ -9,14 +9,14 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coeff
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "rotor thrust model"
 
 
 class Settings(NamedTuple):
-    """No keys: the airframe's [propeller] says it all."""
+    """No keys: the parameters are in the airframe's [propeller]."""
 
 
 class RotorThrust(NamedTuple):

@@ -1,4 +1,4 @@
-"""A load that vehicles of a fleet carry together, each by a cable."""
+"""A load that several vehicles of a fleet carry by cables."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -14,7 +14,7 @@ from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable, cable_slackens
 from lapwing.kernels import always_inline, math
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 Offset = Annotated[float, Ge(-100), Le(100)]
@@ -23,19 +23,19 @@ Offset = Annotated[float, Ge(-100), Le(100)]
 class Settings(NamedTuple):
     """Scene table."""
 
-    mass: Annotated[float, Gt(0), Le(1e4)]  # [kg] of the load, no part of any vehicle's; the same for all
+    mass: Annotated[float, Gt(0), Le(1e4)]  # [kg] of the load, not part of a vehicle's mass; the same for all
     length: Annotated[float, Gt(0), Le(1e3)]  # [m] of the vehicle's cable without tension
     stiffness: Annotated[float, Gt(0), Le(1e7)] = 2000.0  # [N/m] of the cable
     damping_ratio: Annotated[float, Ge(0), Lt(2)] = 0.1  # ratio, of the load on the taut cable
     hook: tuple[Offset, Offset, Offset] = (0.0, 0.0, 0.0)  # [m] body, where it is fastened
-    drag_area: Annotated[float, Ge(0), Le(1e3)] = 0.0  # [m^2] of the load, its coefficient times area; also the same
+    drag_area: Annotated[float, Ge(0), Le(1e3)] = 0.0  # [m^2] drag coefficient of the load times area; the same for all
 
 
 class SharedSlungLoad(NamedTuple):
-    """The pull of the cable to the one load of all vehicles that name it (theory.md, eq. (1.20), (1.23)).
+    """Force of the cable to the load that the vehicles share (theory.md, eq. (1.20), (1.23)).
 
-    Source: Newton's laws, Hooke's and a damper for a cable that can pull and not push. The load moves beside the
-    vehicles, and each looks ahead from where the other was at the beginning of the communication step, at its
+    Source: Newton's laws, Hooke's and a damper for a cable that only pulls. Load and vehicles are
+    integrated separately; each extrapolates the other from the beginning of the communication step with its
     acceleration then. Valid while the frequency of the cable times the communication step is below 0.5.
     """
 

@@ -1,4 +1,4 @@
-"""Loss and unsteadiness of the thrust of rotors that descend into their own flow."""
+"""Vortex ring state: loss and fluctuation of the thrust in descent."""
 
 import zlib
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -15,24 +15,26 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 LANE = zlib.crc32(b"vortex_ring")
 # descent over the induced velocity in hover where the ring begins, is strongest, and ends (windmill brake state)
 BEGINS, STRONGEST, ENDS = 0.4, 1.25, 2.0
-SHORTEST, LONGEST = 20.0, 50.0  # revolutions between two rings that leave the rotor
-# rates over the rotor's speed: of the oscillation, and at which it forgets its phase
+SHORTEST, LONGEST = 20.0, 50.0  # revolutions between two shed rings
+# over the rotor's speed: rate of the oscillation, and of the decay of its correlation
 TURNING = 1.0 / math.sqrt(SHORTEST * LONGEST)
 FADING = 0.25 * (1.0 / SHORTEST - 1.0 / LONGEST)
-SLOWEST = 1e-3  # [m/s] least induced velocity that speeds are compared with
+SLOWEST = 1e-3  # [m/s] lower limit of the induced velocity in ratios
 
 
 class Settings(NamedTuple):
     """Scene table."""
 
-    loss: Annotated[float, Ge(0), Le(0.6)] = 0.2  # of the mean thrust where the ring is strongest
-    unsteadiness: Annotated[float, Ge(0), Le(0.4)] = 0.13  # standard deviation over the thrust without a ring, there
+    loss: Annotated[float, Ge(0), Le(0.6)] = 0.2  # share of the mean thrust that is lost in the strongest ring
+    unsteadiness: Annotated[float, Ge(0), Le(0.4)] = (
+        0.13  # standard deviation over the thrust without a ring, in the strongest ring
+    )
 
 
 class VortexRing(NamedTuple):
@@ -42,8 +44,8 @@ class VortexRing(NamedTuple):
     Sources: losses and fluctuations are largest at 1.2 to 1.3 times the induced velocity in hover: Veismann, Dougherty
     and Gharib, Flow 3 (2023) E7; fluctuations of up to 95 % of the mean from peak to peak, every 20 to 50 revolutions:
     Stack, Caradonna and Savas, J. American Helicopter Society 50 (2005). The size of the mean loss is chosen. Valid for
-    descent along the rotors' axes; a wind across as fast as the flow in hover blows the ring away. The mean of
-    `dynamic_inflow` is a gain, on which the loss comes. Drawn exactly once a communication step.
+    descent along the rotors' axes; a transverse wind as fast as the induced velocity in hover removes the ring. The
+    loss applies to the mean thrust of `dynamic_inflow`. Sampled exactly once per communication step.
     """
 
     flow: float  # [m/rad] induced velocity in hover over the rotor's speed
@@ -64,7 +66,7 @@ class VortexRing(NamedTuple):
         return cls(flow, settings.loss, settings.unsteadiness, lanes, ((0.0, 0.0),) * count)
 
     def initial_discrete_state(self) -> tuple[tuple[float, float], ...]:
-        """Return the oscillation of each rotor, in phase and a quarter of a period behind, of unit deviation later."""
+        """Return the oscillation of each rotor, in phase and in quadrature; its stationary deviation is 1."""
         return self.calm
 
 

@@ -19,7 +19,7 @@ class WindConstant(NamedTuple):
     Valid well above the ground's boundary layer.
     """
 
-    velocity: tuple[Speed, Speed, Speed]  # [m/s] world: where the air goes to
+    velocity: tuple[Speed, Speed, Speed]  # [m/s] velocity of the air, world
 
     def with_inputs(self) -> "ExternalWindConstant":
         """Return the wind with named inputs."""

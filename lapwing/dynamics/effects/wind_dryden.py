@@ -8,7 +8,7 @@ from lapwing.dynamics.effects._turbulence import KIND, Conditions, Part, Setting
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.vector import Vec3
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "Settings", "WindDryden"]
@@ -21,8 +21,8 @@ class WindDryden(NamedTuple):
     """Gusts along, across and vertical to the mean wind with the Dryden spectra (theory.md, eq. (2.20) to (2.24)).
 
     Source: MIL-F-8785C, low-altitude model (the spectra of MIL-HDBK-1797 are the same, written with halved lateral and
-    vertical scales). Valid from 10 to 1000 feet above the ground; below and above it is as there. Sampled exactly at
-    each exchange for the height and the airspeed there, held over the interval.
+    vertical scales). Valid from 10 to 1000 feet above the ground; beyond, the values at the limits apply. Sampled exactly
+    at each exchange for height and airspeed then, held over the interval.
     """
 
     conditions: Conditions

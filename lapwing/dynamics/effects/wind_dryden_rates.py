@@ -1,4 +1,4 @@
-"""Dryden turbulence at low altitude whose air also turns: angular gusts."""
+"""Dryden turbulence at low altitude with angular gusts."""
 
 import zlib
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -27,7 +27,7 @@ from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed, scale
 from lapwing.kernels import always_inline, math
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "Settings", "WindDrydenRates"]
@@ -45,14 +45,14 @@ class Settings(NamedTuple):
     airspeed: Annotated[float, Gt(0), Le(60)] | None = None  # [m/s] at which gusts pass; if left out, the vehicle's
     altitude: Annotated[float, Ge(3.048), Le(304.8)] | None = None  # [m] above the ground; if left out, the vehicle's
     direction_to: Annotated[float, Ge(-2.0 * math.pi), Le(2.0 * math.pi)] = 0.0  # [rad] of the mean wind, 0 to the east
-    span: Annotated[float, Ge(0.05), Le(20)] | None = None  # [m] of the vehicle, smaller gusts turn it no more
+    span: Annotated[float, Ge(0.05), Le(20)] | None = None  # [m] of the vehicle; smaller gusts do not rotate it
 
 
 class WindDrydenRates(NamedTuple):
     """The gusts of `wind_dryden`, bit-for-bit, and rates of the air with their spectra (theory.md, eq. (2.39)).
 
-    Rotors feel the air's rate at their hubs. Source: MIL-F-8785C, section 3.7.5: p by a filter of its own, q and r from
-    the gusts across as they pass. Valid as `wind_dryden`. Sampled exactly at each exchange, held over the interval.
+    Rotors feel the air's rate at their hubs. Source: MIL-F-8785C, section 3.7.5: p has its own filter, q and r follow
+    from the passing transverse gusts. Valid as `wind_dryden`. Sampled exactly at each exchange, held over the interval.
     """
 
     conditions: Conditions
@@ -96,7 +96,7 @@ def low_pass(x1, x2, z, beta, theta, n1, n2, n3):
     i0 = (decay - low) / k
     i1 = (theta * decay - i0) / k
     a, b = beta * (ROOT3 * i0 + (1.0 - ROOT3) * i1), beta * (1.0 - ROOT3) * i0  # of x1, of x2
-    # covariances when all is stationary, and what of them is new after that time
+    # stationary covariances, and their increments after that time
     p13 = beta * (0.5 * ROOT3 + 0.25 * (1.0 - ROOT3)) / (1.0 + beta)
     p23 = (p13 + 0.25 * beta) / (1.0 + beta)
     p33 = ROOT3 * p13 + (1.0 - ROOT3) * p23

@@ -13,7 +13,7 @@ Speed = Annotated[float, Ge(-60), Le(60)]
 
 
 class WindGust(NamedTuple):
-    """A gust that rises to its peak and falls again as one minus a cosine (theory.md, eq. (2.19)).
+    """A gust with the shape of one minus a cosine (theory.md, eq. (2.19)).
 
     Source: the discrete gust of CS-25.341, in time instead of distance; its first half is that of MIL-F-8785C. Valid
     for vehicles much smaller than the gust.
@@ -21,7 +21,7 @@ class WindGust(NamedTuple):
 
     peak: tuple[Speed, Speed, Speed]  # [m/s] world
     start: Annotated[float, Ge(0)]  # [s] simulation time
-    duration: Annotated[float, Gt(0)]  # [s] from nothing to nothing
+    duration: Annotated[float, Gt(0)]  # [s] duration
 
 
 FEWEST = 16.0  # steps in a gust
@@ -29,7 +29,7 @@ FEWEST = 16.0  # steps in a gust
 
 @break_time(WindGust)
 def edges(e, memory, t, h, value):
-    """Return the next edge of the gust; of one that is short beside a step the next end of a part."""
+    """Return the next edge of the gust; for a gust shorter than a few steps, the next edge of its parts."""
     parts = FEWEST if e.duration < FEWEST * h else 1.0
     part = e.duration / parts
     number = max(math.floor((t - e.start) / part) + 1.0, 0.0)

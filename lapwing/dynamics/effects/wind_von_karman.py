@@ -8,7 +8,7 @@ from lapwing.dynamics.effects._turbulence import KIND, Conditions, Part, Setting
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.vector import Vec3
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "PARTS", "Settings", "WindVonKarman"]
@@ -24,7 +24,7 @@ class WindVonKarman(NamedTuple):
 
     Source: MIL-F-8785C, low-altitude model. A sum of four independent Dryden turbulences of falling scale, whose
     spectra are within 2.1 % of von Karman's up to 300 times the corner frequency. Valid from 10 to 1000 feet above the
-    ground; below and above it is as there. Sampled exactly at each exchange for the height and the airspeed there, held
+    ground; beyond, the values at the limits apply. Sampled exactly at each exchange for height and airspeed then, held
     over the interval.
     """
 

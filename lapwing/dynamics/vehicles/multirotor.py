@@ -27,7 +27,7 @@ from lapwing.dynamics.vehicles.multirotor_stepper import begin, parts, steps, wi
 from lapwing.kernels import kernel
 from lapwing.kernels.codegen import map_tuple
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 CONTACT_TOLERANCE = 1e-6  # error of a part of a step in contact where nobody says otherwise

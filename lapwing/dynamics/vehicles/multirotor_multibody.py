@@ -17,7 +17,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import Assembly
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 FEEDBACK = 50.0  # [1/s] of Baumgarte's stabilisation

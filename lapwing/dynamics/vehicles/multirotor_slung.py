@@ -25,7 +25,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import always_inline, kernel
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 GROUND_FREQUENCY, GROUND_DAMPING = 100.0, 0.7  # [rad/s], ratio of the load on the ground

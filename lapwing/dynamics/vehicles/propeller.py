@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from lapwing.kernels import math
 
-if TYPE_CHECKING:  # a process that flies has no need of pydantic
+if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe_tables import Propeller
 
 
