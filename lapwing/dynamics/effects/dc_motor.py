@@ -36,8 +36,9 @@ class DcMotor(NamedTuple):
 
     The resistance is that of motor and controller, the inertia that of the rotor and, through the belt, of the motor.
     The controller keeps the current between minus its braking current and the lowest of its own limit, the motor's peak
-    current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. At a limit it
-    applies less than the commanded voltage, and takes that power over its efficiency; while it brakes, it returns power. Source: the usual steady model of a brushless motor, from its speed constant, resistance and idle
+    current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. At a
+    limit it applies less than the commanded voltage, and takes that power over its efficiency; while it brakes, it
+    returns power. Source: the usual steady model of a brushless motor, from its speed constant, resistance and idle
     current; with an inductance L I' = V - K w - R I, exactly for constant voltage and torque. Valid for changes slower
     than about 1 ms.
     """

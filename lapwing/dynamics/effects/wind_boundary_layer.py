@@ -27,8 +27,8 @@ class Settings(NamedTuple):
 class WindBoundaryLayer(NamedTuple):
     """A steady wind with the logarithmic profile of the neutral surface layer (theory.md, eq. (2.32)).
 
-    Source: Stull, An Introduction to Boundary Layer Meteorology (1988), section 9.7. Valid to about 100 m over ground of
-    uniform roughness, not between obstacles.
+    Source: Stull, An Introduction to Boundary Layer Meteorology (1988), section 9.7. Valid to about 100 m over ground
+    of uniform roughness, not between obstacles.
     """
 
     along: tuple[float, float]  # [m/s] world x and y of the wind, a factor e over the roughness length
