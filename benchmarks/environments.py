@@ -88,10 +88,10 @@ def main(*vehicles: int) -> list[Row]:
     print(f"{'steps/s':28}{'best round':>12}{'median':>12}{'ticks/s, best':>16}")
     for name, each in rounds.items():
         print(f"{name:28}{max(each):12,.0f}{median(each):12,.0f}{max(each) * TICKS:16,.0f}")
-    found = {name: max(each) for name, each in rounds.items()}
-    rows = [Row("gymnasium.make, steps", found["gymnasium.make"], "1/s", SINGLE, True)]
+    result = {name: max(each) for name, each in rounds.items()}
+    rows = [Row("gymnasium.make, steps", result["gymnasium.make"], "1/s", SINGLE, True)]
     for n in many:
-        share = found[f"gymnasium.make_vec, {n}"] / found[f"BatchSimulator, {n}"]
+        share = result[f"gymnasium.make_vec, {n}"] / result[f"BatchSimulator, {n}"]
         rows.append(Row(f"gymnasium.make_vec to BatchSimulator, {n} vehicles", share, "1", SHARE, True))
     return show(rows)
 

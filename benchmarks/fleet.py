@@ -74,9 +74,9 @@ def scene(n, path):
     return path
 
 
-def per_second(flown):
-    """Processor time [s] for each simulated second; `flown` flies for a duration [s] and says what that took."""
-    return (flown(LONG) - flown(BRIEF)) / (LONG - BRIEF)
+def per_second(flight):
+    """Processor time [s] for each simulated second; `fly` flies for a duration [s] and says what that took."""
+    return (flight(LONG) - flight(BRIEF)) / (LONG - BRIEF)
 
 
 def alone(path, log, duration):

@@ -73,8 +73,8 @@ def main(steps=STEPS):
             rate, cost, took, before, after = alone.submit(measure, name, steps).result()
         print(f"{name}: {rate:.0f} environment steps a second, {1e6 * cost:.1f} us of processor time each, alone")
         print(f"  learning {steps} of them: {took[0]:.0f} s, {took[1]:.0f} s of processor time")
-        for when, (total, away, flown) in (("before", before), ("after", after)):
-            print(f"  {when:6} return {total:6.1f}, {away:.2f} m from the target at the end, after {flown:.0f} actions")
+        for when, (total, away, flight) in (("before", before), ("after", after)):
+            print(f"  {when:6} return {total:6.1f}, {away:.2f} m from the target after {flight:.0f} actions")
 
 
 def measure(name, steps):

@@ -83,10 +83,10 @@ def real_time(folder):
                 arrived.append(time.perf_counter())
         elapsed = time.monotonic() - began
         share = (adapter_ticks(run) - used) / elapsed
-        said, _ = run.communicate(timeout=120)
+        output, _ = run.communicate(timeout=120)
     station.close()
     jitter = [1e3 * abs(b - a - 0.02) for a, b in pairwise(arrived)]
-    report = next((line for line in said.splitlines() if "telemetry" in line), "")
+    report = next((line for line in output.splitlines() if "telemetry" in line), "")
     return share, (median(jitter), percentile(jitter, 0.99), max(jitter)), count / elapsed, report
 
 
@@ -109,7 +109,7 @@ def soak(folder):
         "--set",
         f"run.duration={SOAK:g}",
     ]
-    gaps, last, flights, airborne, sent, now, asked = [0.0], None, 0, False, 0.0, 0.0, -1e9
+    gaps, last, flights, airborne, sent, now, requested = [0.0], None, 0, False, 0.0, 0.0, -1e9
     with start("lapwing/scenes/hover.toml", folder, "--mavlink", f"udpout:127.0.0.1:{port}", *more) as run:
         began = None
         while run.poll() is None:
@@ -126,8 +126,8 @@ def soak(folder):
                 began = began or time.monotonic()
                 gaps += [now - last] if last is not None else []
                 last = now
-            if kind == "EXTENDED_SYS_STATE" and now - asked > 5.0:
-                asked, landed = now, message.landed_state == 1
+            if kind == "EXTENDED_SYS_STATE" and now - requested > 5.0:
+                requested, landed = now, message.landed_state == 1
                 flights += airborne and landed
                 airborne = not landed
                 orders = [(400, 1.0), (22,)] if landed else [(21,)]

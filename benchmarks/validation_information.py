@@ -24,7 +24,7 @@ def main(mapping: str, *paths: str) -> None:
     starts = [window_starts(flight, LONGEST, STRIDE) for flight in flights]
     used = [(f, s) for f, s in zip(flights, starts, strict=True) if len(s)]
     known = [_regressors(f, s, LONGEST) for f, s in used]
-    wanted = [_targets(f, s, (LONGEST,))[:, 6:] for f, s in used]
+    desired = [_targets(f, s, (LONGEST,))[:, 6:] for f, s in used]
     rotors = used[0][0].rotors
     columns = {"start state": 0, "commands before the window, too": PAST}
     columns |= {f"commands of the first {k * SLICE} samples, too": PAST + k for k in (5, 7, LONGEST // SLICE)}
@@ -33,11 +33,11 @@ def main(mapping: str, *paths: str) -> None:
         errors = []
         for k in range(len(used)):
             x = np.concatenate([r[:, chosen] for j, r in enumerate(known) if j != k])
-            y = np.concatenate([t for j, t in enumerate(wanted) if j != k])
+            y = np.concatenate([t for j, t in enumerate(desired) if j != k])
             scale = np.maximum(x.std(axis=0), 1e-6)
             x, scale[-1] = x / np.r_[scale[:-1], 1.0], 1.0
             gain = np.linalg.solve(x.T @ x + RIDGE * len(x) * np.eye(x.shape[1]), x.T @ y)
-            errors.append(wanted[k] - known[k][:, chosen] / scale @ gain)
+            errors.append(desired[k] - known[k][:, chosen] / scale @ gain)
         error = np.concatenate(errors)
         angle = np.linalg.norm(error[:, :3], axis=1).mean()
         print(f"{name}: rate {np.abs(error[:, 3:]).mean():.4f} rad/s, attitude {angle:.4f} rad", flush=True)

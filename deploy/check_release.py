@@ -37,6 +37,6 @@ def check(python: str, wheel: Path) -> None:
 
 
 if __name__ == "__main__":
-    found = [path for name in PYTHONS if (path := shutil.which(name))]
-    for python in found or [sys.executable]:
+    result = [path for name in PYTHONS if (path := shutil.which(name))]
+    for python in result or [sys.executable]:
         check(python, Path(sys.argv[1]).resolve())

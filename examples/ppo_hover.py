@@ -108,15 +108,15 @@ def judged(agent, environments, way=way, seed=10**6):
     """Return mean return, final distance [m] and final actions of one episode of each vehicle with the mean actions."""
     observed, _ = environments.reset(seed=seed)
     n = environments.num_envs
-    total, away, flown, over = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, bool)
+    total, away, flight, over = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, bool)
     while not over.all():
         _, outputs = agent.policy.act({"observations": jnp.asarray(observed)}, role="policy")
         observed, reward, terminated, truncated, _ = environments.step(np.asarray(outputs["mean_actions"]))
         total += np.where(over, 0.0, reward)
         away = np.where(over, away, np.linalg.norm(way(observed), axis=1))
-        flown += ~over
+        flight += ~over
         over |= terminated | truncated
-    return total.mean(), away.mean(), flown.mean()
+    return total.mean(), away.mean(), flight.mean()
 
 
 def main(steps=2000, seed=1):

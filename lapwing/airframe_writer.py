@@ -35,12 +35,12 @@ def airframe_of(v: Values) -> Airframe:
         ValueError: figures that do not go together.
     """
     try:
-        return Airframe.model_validate(tomllib.loads(written("new", v, set(v))))
+        return Airframe.model_validate(tomllib.loads(airframe_text("new", v, set(v))))
     except ValidationError as error:
         raise fault(error, Airframe) from None
 
 
-def written(name: str, v: Values, known: set[str]) -> str:
+def airframe_text(name: str, v: Values, known: set[str]) -> str:
     """Return the text of the airframe file; figures that are not `known` are marked as guessed."""
     count = int(v["rotors"])
     geometry = {"diameter": v["diameter"], "pitch": v["pitch"], "blades": int(v["blades"]), **FAMILY}

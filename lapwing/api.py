@@ -14,7 +14,7 @@ from lapwing.runs.compile_notice import notify_on_compile
 from lapwing.runs.solver import with_solver
 from lapwing.runs.work_progress import WorkProgress
 from lapwing.services import scene_resolver
-from lapwing.services.common.user_code import registered
+from lapwing.services.common.user_code import register
 from lapwing.services.scene_resolver import reseed, resolve
 from lapwing.studies import simulate
 from lapwing.studies.campaign.distributions import Distribution
@@ -71,7 +71,7 @@ def fly(
         own: dict[str, Any] = {} if seed is None else {"run.seed": seed}
         for key, (code, options) in user_code.items():
             if code is not None:
-                own[f"autopilot.{key}"] = stack.enter_context(registered(code, folder))
+                own[f"autopilot.{key}"] = stack.enter_context(register(code, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
         base = with_solver(scene_resolver.load_one(scene, overrides))

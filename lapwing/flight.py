@@ -110,9 +110,12 @@ class Flight(studied.FlightData):
         Raises:
             ValueError: the picture cannot be written.
         """
-        from lapwing.studies.report.matplotlib_figure import figure, styled  # matplotlib takes half a second to import
+        from lapwing.studies.report.matplotlib_figure import (  # matplotlib takes half a second to import
+            figure,
+            plot_style,
+        )
 
-        with styled():
+        with plot_style():
             plot_figure = figure(overview(self))
             if path is not None:
                 try:

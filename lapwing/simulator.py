@@ -51,7 +51,7 @@ class UserCommandBlock:
         return NEVER
 
 
-def _checked_setpoint(setpoint: Setpoint) -> Setpoint:
+def _validate_setpoint(setpoint: Setpoint) -> Setpoint:
     """Return a valid setpoint; raise ValueError if a field is not a number."""
     try:
         result = Setpoint(*(tuple(map(float, v)) if hasattr(v, "__len__") else v for v in setpoint))  # type: ignore[arg-type]
@@ -130,7 +130,7 @@ class Simulator:
             raise ValueError(f"step: expected {self._kind} as before; call reset() to change to {kind}")
         graph = self._graph
         if setpoint is not None:
-            graph.put(ORDER, graph.tick, ControllerInput(False, _checked_setpoint(setpoint), armed=True))
+            graph.put(ORDER, graph.tick, ControllerInput(False, _validate_setpoint(setpoint), armed=True))
         voltages = () if motor_voltages is None else self._voltages(motor_voltages)
         stop = min(graph.tick + ticks, self._setup.last_tick + 1)
         if stop - graph.tick > LOOK:

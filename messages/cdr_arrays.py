@@ -108,10 +108,10 @@ class Record:
         payloads[:] = np.frombuffer(self.template, np.uint8)
         records = payloads.view(self.dtype).reshape(n)
         for name, column in columns.items():
-            records[name] = self._fitted(n, name, np.asarray(column() if callable(column) else column))
+            records[name] = self._fit(n, name, np.asarray(column() if callable(column) else column))
         return records
 
-    def _fitted(self, n: int, name: str, column: np.ndarray) -> np.ndarray:
+    def _fit(self, n: int, name: str, column: np.ndarray) -> np.ndarray:
         """Return a column in the field's type, with a shape that broadcasts to the field's."""
         if name not in number_fields(self.dtype):
             raise ValueError(f"{self.message.type_name}: {unknown_field(name, number_fields(self.dtype))}")

@@ -88,7 +88,7 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
 
-    setup, encoded = spec.setup, process_table.encoded_service(spec.name)
+    setup, encoded = spec.setup, process_table.service_of_encoder(spec.name)
     entry = process_table.entry(encoded or spec.name)
     participants = PublisherIds(spec.key_prefix, spec.secret, tuple(spec.external or ()))
     listen, connect = mesh(spec.name, spec.peers)
@@ -139,7 +139,7 @@ def import_ahead(names: Iterable[str]) -> None:
     from lapwing.services import process_table
 
     for name in names:
-        process_table.entry(process_table.encoded_service(name) or name).service()
+        process_table.entry(process_table.service_of_encoder(name) or name).service()
 
 
 def _operator_commands(process: Any) -> dict[str, Any]:

@@ -163,7 +163,7 @@ def always_required() -> list[str]:
 
 def certificate_name(name: str) -> str:
     """Return the name in the certificate of a participant; the FMUs of all scenes share one."""
-    service = encoded_service(name) or name
+    service = service_of_encoder(name) or name
     return (FMU if service.endswith(FMU_SUFFIX) else service) + name.removeprefix(service)
 
 
@@ -177,7 +177,7 @@ def foreign_firmware(setup: RunConfig) -> str:
     return ", ".join(p.name for p in PROCESSES if p.foreign and p.name in setup.services)
 
 
-def encoded_service(name: str) -> str:
+def service_of_encoder(name: str) -> str:
     """Return the service whose messages an encoder process encodes, "" for any other process."""
     return name.removesuffix(ENCODER) if name.endswith(ENCODER) else ""
 

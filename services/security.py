@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from lapwing.cosim.access.certificates import tls
-from lapwing.cosim.access.zenoh_access import by_certificate, door, withholding
+from lapwing.cosim.access.zenoh_access import by_certificate, door, without_viewers
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.transport.bus_keys import ENCODER
@@ -39,7 +39,7 @@ def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[st
         ValueError: the certificate cannot be used.
     """
     if not keys:
-        return withholding(key_prefix) if name == ROUTER else {}
+        return without_viewers(key_prefix) if name == ROUTER else {}
     return {**tls(Path(keys), certificate_name(name)), **by_certificate(key_prefix, says(setup, key_prefix))}
 
 

@@ -32,10 +32,10 @@ ROOT = Path(__file__).parent.parent
 SET = {"SCENE": "lapwing/scenes/groundstation.toml", "SPEED": "2"}
 
 
-def compose(**given):
+def compose(**inputs):
     """The services of the file, its variables set."""
     text = (ROOT / "docker-compose.yml").read_text()
-    text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: (SET | given).get(m[1], m[2]), text)
+    text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: (SET | inputs).get(m[1], m[2]), text)
     return yaml.safe_load(text)["services"]
 
 
@@ -195,8 +195,8 @@ def test_cluster_flies_campaign(tmp_path):
     with ended_after(60) as helpers:
         helpers.append(begun("scheduler"))
         helpers.append(begun("worker"))
-        flown = begun("campaign", "--set", "run.duration=1", "--runs", "4")
-        assert flown.wait(timeout=300) == 0, (tmp_path / "campaign.txt").read_text()
+        flights = begun("campaign", "--set", "run.duration=1", "--runs", "4")
+        assert flights.wait(timeout=300) == 0, (tmp_path / "campaign.txt").read_text()
         assert "4 runs" in (tmp_path / "campaign.txt").read_text()
         assert (tmp_path / "campaign" / "report.html").exists()
         assert "Register worker" in (tmp_path / "scheduler.txt").read_text()

@@ -9,7 +9,7 @@ from benchmarks.other_simulators import accuracy, installed
 from lapwing.studies.accuracy.systems import problems
 from lapwing.studies.accuracy.work_precision import Point, measure
 from lapwing.studies.accuracy.work_precision_plot import COLOURS, MARKERS
-from lapwing.studies.report.matplotlib_figure import styled
+from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import DPI
 
 CASES = ("free_rigid_body", "heavy_top", "gyrostat_steady")
@@ -49,13 +49,13 @@ def table(title: str, points: list[Point]) -> None:
         print(line)
 
 
-def draw(found: dict[str, list[Point]]) -> None:
+def draw(results: dict[str, list[Point]]) -> None:
     """Plot the fastest method of each simulator at every error."""
-    with styled():
+    with plot_style():
         figure = Figure(figsize=(13.0, 4.6), layout="constrained")
-        all_axes = figure.subplots(1, len(found), sharey=True)
-        names = list(dict.fromkeys(simulator(p) for points in found.values() for p in points))
-        for axes, (title, points) in zip(all_axes, found.items(), strict=True):
+        all_axes = figure.subplots(1, len(results), sharey=True)
+        names = list(dict.fromkeys(simulator(p) for points in results.values() for p in points))
+        for axes, (title, points) in zip(all_axes, results.items(), strict=True):
             for index, name in enumerate(names):
                 reached = [best([p for p in points if simulator(p) == name], level) for level in LEVELS]
                 kept = [(level, p) for level, p in zip(LEVELS, reached, strict=True) if p]

@@ -31,7 +31,7 @@ def federate(name, cycles, port):
     helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
     fed = helics.helicsCreateValueFederate(name, info)
     raw = helics.HELICS_DATA_TYPE_RAW
-    given = [
+    value = [
         (helics.helicsFederateRegisterGlobalPublication(fed, p.name, raw, ""), bytes(WIDTH[p.name])) for p in outputs
     ]
     taken = [(helics.helicsFederateRegisterSubscription(fed, i.port, ""), WIDTH[i.port]) for i in inputs]
@@ -42,7 +42,7 @@ def federate(name, cycles, port):
         for subscription, size in taken:
             result = helics.helicsInputGetBytes(subscription)
             assert tick < 3 or len(result) == size
-        for publication, payload in given:
+        for publication, payload in value:
             helics.helicsPublicationPublishBytes(publication, payload)
         stamps.append(time.perf_counter())
     helics.helicsFederateDisconnect(fed)

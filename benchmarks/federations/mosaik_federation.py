@@ -53,8 +53,8 @@ def scenario(cycles, port):
         source = {p.name: (name, p) for name, (_, outputs) in PARTS.items() for p in outputs}
         for name, (inputs, _) in PARTS.items():
             for i in inputs:
-                giver, given = source[i.port]
-                first = {"time_shifted": True, "initial_data": {i.port: pack_row(given.like).tolist()}}
+                giver, value = source[i.port]
+                first = {"time_shifted": True, "initial_data": {i.port: pack_row(value.like).tolist()}}
                 world.connect(entities[giver], entities[name], i.port, **(first if name in LATER else {}))
         world.run(until=cycles, print_progress=False)
 

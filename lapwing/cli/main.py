@@ -27,7 +27,7 @@ from lapwing.cli import (  # noqa: F401 (they register themselves)
 )
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import USER_ERROR, fail, user_errors
-from lapwing.cli.stdout_guard import checked_output
+from lapwing.cli.stdout_guard import check_output
 
 # Raised for unknown options and missing arguments; not every version of typer exports the class.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
@@ -82,7 +82,7 @@ def options(
 
 def main() -> None:
     """Run the command of the command line."""
-    with user_errors(), checked_output():
+    with user_errors(), check_output():
         _check_working_directory()
         _check_encoding()
         _check_open_files()

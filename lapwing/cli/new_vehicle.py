@@ -66,7 +66,7 @@ def write_vehicle(
     Raises:
         ValueError: an invalid or used name, an impossible value, or a vehicle that cannot hover.
     """
-    from lapwing.airframe_writer import airframe_of, written
+    from lapwing.airframe_writer import airframe_of, airframe_text
     from lapwing.dynamics.vehicles.performance import thrust_over_weight
     from lapwing.services.common.run_schema import SHIPPED
     from lapwing.vehicle_measurements import FIGURES
@@ -97,7 +97,7 @@ def write_vehicle(
     except ValueError as error:  # a remark about a unit may name the cause
         raise ValueError("; ".join([str(error), *remarks])) from None
     path.parent.mkdir(exist_ok=True)
-    path.write_text(written(name, values, known), encoding="utf-8")
+    path.write_text(airframe_text(name, values, known), encoding="utf-8")
     warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"
     return path, [*remarks, warning] if thrust_to_weight < WEAK else remarks
 

@@ -24,7 +24,7 @@ from lapwing.cli.output_paths import (
 )
 from lapwing.cli.preflight import check_firmware_program, warn_of_gains, with_solver_selected
 from lapwing.cli.run_options import MULTI_PROCESS, SINGLE_PROCESS, RunOptions
-from lapwing.cosim.processes.child_process import Child, started_early
+from lapwing.cosim.processes.child_process import Child, start_early
 
 if TYPE_CHECKING:
     from lapwing.cosim.scene import Scene
@@ -42,7 +42,7 @@ def run(options: RunOptions) -> None:
     """
     from lapwing.services.common import foreign_code
 
-    with user_errors(), foreign_code.permission(options.allow_code), _started_early(options) as early:
+    with user_errors(), foreign_code.permission(options.allow_code), _start_early(options) as early:
         options.validate()
         scene = _load(options)
         options = _with_ros2_of_scene(options, scene)
@@ -57,7 +57,7 @@ def run(options: RunOptions) -> None:
 
 
 @contextmanager
-def _started_early(options: RunOptions) -> Iterator[dict[str, Child]]:
+def _start_early(options: RunOptions) -> Iterator[dict[str, Child]]:
     """Start the processes of a run before the scene is read, so that they import their modules at the same time."""
     if options.mode != MULTI_PROCESS or options.endpoints is not None:
         yield {}
@@ -73,7 +73,7 @@ def _started_early(options: RunOptions) -> Iterator[dict[str, Child]]:
     }
     names = always_required()
     import_ahead(names)
-    with started_early([*names, *(name for name, requested in optional.items() if requested)]) as early:
+    with start_early([*names, *(name for name, requested in optional.items() if requested)]) as early:
         yield early
 
 

@@ -15,7 +15,7 @@ from lapwing.studies import terminal
 from lapwing.studies.flight_data import SHOWN
 from lapwing.studies.json_file import write_json
 from lapwing.studies.separation import Separation, nearest
-from lapwing.studies.tracking import shown
+from lapwing.studies.tracking import unit_and_factor
 
 if TYPE_CHECKING:
     from lapwing.runs.observer import Elapsed
@@ -147,7 +147,7 @@ def _errors(console: Console, published: Published, rmse: dict[str, float]) -> N
     if published.rmse:
         table.add_column(published.source, justify="right")
     for axis, value in rmse.items():
-        unit, scale = shown(axis)
+        unit, scale = unit_and_factor(axis)
         row = [f"{axis} [{unit}]", f"{scale * value:.4f}"]
         if published.rmse:
             row.append(f"{scale * published.rmse[axis]:.4f}" if axis in published.rmse else "")

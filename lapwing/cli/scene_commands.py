@@ -164,7 +164,7 @@ def parameters(
     from lapwing.cosim.log import LogReader
     from lapwing.runs.resimulate import recorded_commands, recorded_setup
     from lapwing.services.common import parameter_file
-    from lapwing.services.common.autopilot_parameters import changed
+    from lapwing.services.common.autopilot_parameters import apply_commands
     from lapwing.services.scene_resolver import resolve
 
     with user_errors():
@@ -180,7 +180,7 @@ def parameters(
         if "autopilot" not in setup.services:
             raise ValueError(f"{file}: no autopilot; expected a scene with [autopilot], or its log")
         known = {p.name: p for p in setup.services["autopilot"].parameters.parameters}
-        values = changed(known, commands)
+        values = apply_commands(known, commands)
         if save:
             parameter_file.write(save, known.values(), values)
         for p in known.values():

@@ -61,7 +61,7 @@ def service(options: ServiceOptions) -> None:
     with user_errors():
         check_key_prefix(options.key_prefix)
         table = parse_endpoints(options.endpoints)
-        entry = process_table.entry(process_table.encoded_service(name) or name)
+        entry = process_table.entry(process_table.service_of_encoder(name) or name)
         if name not in table:
             raise ValueError(f"--endpoints: no endpoint for {name} itself")
         check_endpoints("--endpoints", table.values(), options.keys, options.insecure)

@@ -34,7 +34,7 @@ class _Raw(io.FileIO):
 
 
 @contextmanager
-def checked_output() -> Iterator[None]:
+def check_output() -> Iterator[None]:
     """Let standard output raise `OutputError` if it cannot be written, at the latest at the end of the context."""
     before = sys.stdout
     try:

@@ -55,7 +55,7 @@ def _study(
 
 
 @contextmanager
-def _compiling(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator[None]:
+def _announce_compilation(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator[None]:
     """Announce the compilation of the scene's closed loop with its estimated time, if there is one."""
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.services.scene_resolver import resolve
@@ -214,7 +214,7 @@ def tune(
             def say(text: str) -> None:
                 progress.console.print(text, soft_wrap=True)
 
-            with _compiling(loaded, progress, task):
+            with _announce_compilation(loaded, progress, task):
                 result = procedure.tune(
                     loaded, target, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
                 )

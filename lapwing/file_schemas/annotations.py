@@ -26,17 +26,17 @@ def table_schema(cls: type, leave_out: Iterable[str] = ()) -> Schema:
     """Return the schema of a table that a class declares, without some of its keys."""
     result = [key for key in keys(cls) if key.name not in leave_out]
     return {
-        **closed({key.name: key_schema(key) for key in result}),
-        **required([key.name for key in result if key.default is REQUIRED]),
+        **closed_table({key.name: key_schema(key) for key in result}),
+        **required_keys([key.name for key in result if key.default is REQUIRED]),
     }
 
 
-def closed(properties: Mapping[str, Schema]) -> Schema:
+def closed_table(properties: Mapping[str, Schema]) -> Schema:
     """Return the schema of a table with these keys and no others."""
     return {"type": "object", "properties": dict(properties), "additionalProperties": False}
 
 
-def required(names: list[str]) -> Schema:
+def required_keys(names: list[str]) -> Schema:
     """Return the part of a table's schema with its required keys."""
     return {"required": names} if names else {}
 
@@ -65,7 +65,7 @@ def schema_of(hint: Any) -> Schema:
     """Return the schema of an annotation; None in a union marks an optional key."""
     origin, arguments = get_origin(hint), get_args(hint)
     if origin is Annotated:
-        return _bounded(schema_of(arguments[0]), arguments[1:])
+        return _add_bounds(schema_of(arguments[0]), arguments[1:])
     if origin in (Union, types.UnionType):
         members = [schema_of(member) for member in arguments if member is not type(None)]
         return members[0] if len(members) == 1 else {"anyOf": members}
@@ -80,7 +80,7 @@ def schema_of(hint: Any) -> Schema:
     return {"type": PLAIN[hint]}
 
 
-def _bounded(schema: Schema, metadata: Iterable[Any]) -> Schema:
+def _add_bounds(schema: Schema, metadata: Iterable[Any]) -> Schema:
     flat = [part for m in metadata for part in (m.metadata if isinstance(m, FieldInfo) else [m])]
     for part in flat:
         for attribute, word in BOUNDS.items():
@@ -93,7 +93,7 @@ def _bounded(schema: Schema, metadata: Iterable[Any]) -> Schema:
 
 def _mapping(name: Any, value: Any) -> Schema:
     if get_origin(name) is Literal:
-        return closed({choice: schema_of(value) for choice in get_args(name)})
+        return closed_table({choice: schema_of(value) for choice in get_args(name)})
     return {"type": "object", "additionalProperties": schema_of(value)}
 
 

@@ -9,7 +9,7 @@ from lapwing.cosim.scene import SceneTable
 from lapwing.cosim.scene.vehicle_scenes import MAX_VEHICLES
 from lapwing.dynamics import effects, integrators
 from lapwing.dynamics.vehicles.airframe import Airframe
-from lapwing.file_schemas.annotations import Schema, closed, required, table_schema
+from lapwing.file_schemas.annotations import Schema, closed_table, required_keys, table_schema
 from lapwing.services.autopilot import gains
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common import autopilot_parameters
@@ -90,7 +90,7 @@ def scene_schema() -> Schema:
         }
     tables["vehicle"] = {"anyOf": [tables["vehicle"], _fleet(tables, sections)]}
     needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
-    result = {**_head("Lapwing scene"), **closed(tables), **required(needed)}
+    result = {**_head("Lapwing scene"), **closed_table(tables), **required_keys(needed)}
     return {**result, "definitions": {"segment": {"anyOf": [*map(_segment, KINDS), USER_SEGMENT]}}}
 
 
@@ -125,7 +125,7 @@ def _fleet(tables: Schema, sections: dict[str, type[SceneTable]]) -> Schema:
     own = {name: _partial(tables[name], f"#/properties/{name}") for name in names}
     properties = dict(tables["vehicle"]["properties"])
     properties["airframe"] = {"anyOf": [properties["airframe"], own.pop("airframe")]}
-    items = closed({**properties, **own})
+    items = closed_table({**properties, **own})
     text = "several vehicles: the tables of each override those of the scene"
     return {"type": "array", "minItems": 1, "maxItems": MAX_VEHICLES, "items": items, "description": text}
 
@@ -143,26 +143,26 @@ def _partial(schema: Schema, place: str) -> Schema:
 
 def _or_own(tables: dict[str, Schema]) -> Schema:
     """Return the schema of these tables and of user-defined ones, which name a module."""
-    return {**closed(tables), "additionalProperties": OWN}
+    return {**closed_table(tables), "additionalProperties": OWN}
 
 
 def _sensor(module: Any, cls: type) -> Schema:
     """Return the schema of a sensor: a preset, keys that differ from it, and faults where it has channels."""
     preset = {"enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
     if not hasattr(module, "CHANNELS"):
-        return closed({"preset": preset, **table_schema(cls)["properties"]})
+        return closed_table({"preset": preset, **table_schema(cls)["properties"]})
     fault = table_schema(FaultTable)
     fault["properties"]["channel"] = {"enum": ["all", *module.CHANNELS], "default": "all"}
     faults = {"type": "array", "items": fault, "maxItems": SLOTS, "description": "by schedule"}
     table = table_schema(cls, leave_out=["faults"])
-    return closed({"preset": preset, **table["properties"], "faults": faults})
+    return closed_table({"preset": preset, **table["properties"], "faults": faults})
 
 
 def _parameters() -> Schema:
     """Return the schema of the autopilot's parameters: values by name, or the name of a file."""
     fixed, by_gains = flight_parameters()
     properties = {p.name: _parameter(p) for p in fixed} | {p.name: {"type": "number"} for p in by_gains}
-    return {"description": "values by name, or the name of a file of them", "anyOf": [closed(properties), TEXT]}
+    return {"description": "values by name, or the name of a file of them", "anyOf": [closed_table(properties), TEXT]}
 
 
 def _parameter(p: Parameter) -> Schema:

@@ -4,7 +4,7 @@ import re
 from collections.abc import Sequence
 
 from lapwing.fmi.exported_part import BoundaryPort, ExportedPart
-from lapwing.fmi.variables import structured
+from lapwing.fmi.variables import structured_name
 from lapwing.kernels.row_packing import row_width
 from lapwing.services.common.field_units import field_unit
 
@@ -175,7 +175,7 @@ class {cls} {{
 
 def identifier(port: BoundaryPort) -> str:
     """Return the name of a port as a C identifier: "left/truth" becomes "left_truth"."""
-    return re.sub(r"\W", "_", structured(port.port.name))
+    return re.sub(r"\W", "_", structured_name(port.port.name))
 
 
 def _period(port: BoundaryPort) -> str:

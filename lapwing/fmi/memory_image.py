@@ -165,7 +165,7 @@ class _Walk:
 
     def finish(self, roots: Sequence[Any], rows: Mapping[str, np.ndarray]) -> MemoryImage:
         """Lay the regions out and copy them."""
-        regions = [*self._cells.values(), *(Region(a, b - a, False) for a, b in _merged(self._arrays))]
+        regions = [*self._cells.values(), *(Region(a, b - a, False) for a, b in _merge(self._arrays))]
         end = 0
         for region in regions:
             start = -(-end // ALIGNMENT) * ALIGNMENT
@@ -235,7 +235,7 @@ def _bytes(at: int, kind: types.Type) -> bytes:
     return ctypes.string_at(at, _size(kind))
 
 
-def _merged(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
+def _merge(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """Overlapping spans joined."""
     result: list[tuple[int, int]] = []
     for first, end in sorted(spans):

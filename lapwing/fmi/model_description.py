@@ -135,7 +135,7 @@ def _common(reference: int, v: Variable) -> dict[str, str]:
     return attributes
 
 
-def _typed(v: Variable) -> dict[str, str]:
+def _type_attributes(v: Variable) -> dict[str, str]:
     attributes = {}
     if v.unit in QUANTITIES:
         attributes["declaredType"] = QUANTITIES[v.unit]
@@ -156,11 +156,11 @@ def _text(v: Variable) -> str:
 
 
 def _variable3(listed: Xml.Element, reference: int, v: Variable) -> None:
-    Xml.SubElement(listed, _FMI3[v.type], _common(reference, v) | _typed(v))
+    Xml.SubElement(listed, _FMI3[v.type], _common(reference, v) | _type_attributes(v))
 
 
 def _variable2(listed: Xml.Element, reference: int, v: Variable) -> None:
-    Xml.SubElement(Xml.SubElement(listed, "ScalarVariable", _common(reference, v)), _FMI2[v.type], _typed(v))
+    Xml.SubElement(Xml.SubElement(listed, "ScalarVariable", _common(reference, v)), _FMI2[v.type], _type_attributes(v))
 
 
 def _structure(root: Xml.Element, part: ExportedPart, variables: Sequence[Variable], version: int) -> None:

@@ -38,7 +38,12 @@ class BuildFolder:
     def compile(self, source: Path, *flags: str) -> Path:
         """Compile a C file against the tables. Return the object file."""
         out = self.path / f"{source.stem}.o"
-        _run([*compiler(), *FLAGS, *_renamed(self.prefix), *flags, f"-I{self.path}", f"-I{NATIVE}"], source, out, "-c")
+        _run(
+            [*compiler(), *FLAGS, *_symbol_names(self.prefix), *flags, f"-I{self.path}", f"-I{NATIVE}"],
+            source,
+            out,
+            "-c",
+        )
         return out
 
     def link(self, objects: Sequence[Path], out: Path, exported: str) -> None:
@@ -57,7 +62,7 @@ _SYMBOLS = (
 )  # fmt: skip
 
 
-def _renamed(prefix: str) -> list[str]:
+def _symbol_names(prefix: str) -> list[str]:
     return [f"-DLAPWING_PREFIX={prefix}", *(f"-D{name}={prefix}_{name}" for name in _SYMBOLS)]
 
 

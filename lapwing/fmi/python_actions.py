@@ -58,7 +58,7 @@ def record_actions(
     actions: list[Action] = []
     planned: dict[str, int] = {}  # tick of the next run of each block
 
-    def observed(block: Any, tick: int) -> int:
+    def observe(block: Any, tick: int) -> int:
         if block.name not in own:
             return block.on_tick(tick)
         before = [_words(each) for each in watched]
@@ -69,7 +69,7 @@ def record_actions(
             actions.append(Action(tick, block.name, tuple(writes)))
         return following
 
-    whole.advance(min(setup.last_tick, round(LONGEST * setup.rate)) + 1, observed)
+    whole.advance(min(setup.last_tick, round(LONGEST * setup.rate)) + 1, observe)
     return actions
 
 

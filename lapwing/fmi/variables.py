@@ -42,12 +42,12 @@ def variables_of(part: ExportedPart) -> list[Variable]:
         (start,) = struct.unpack_from("<d", part.image.data, leaf.offset)
         unit = field_unit(leaf.owner, leaf.field)
         prefix, causality = ("parameters", PARAMETER) if kind == "parameters" else ("state", STATE)
-        name = _indices(".".join(filter(None, (prefix, structured(block), rest))))
+        name = _indices(".".join(filter(None, (prefix, structured_name(block), rest))))
         result.append(Variable(name, causality, REAL, unit, start, 0, leaf.offset))
     return result
 
 
-def structured(name: str) -> str:
+def structured_name(name: str) -> str:
     """Return the name of a port or block in FMI's structured naming: "left/truth" becomes "left.truth"."""
     return name.replace("/", ".")
 
@@ -75,5 +75,5 @@ def _columns(port: BoundaryPort, causality: str, index: int, first: int) -> list
         unit = field_unit(owner, field) if kind == REAL else ""
         result.append(Variable(_indices(name), causality, kind, unit, start, index, first + len(result)))
 
-    walk(port.port.like, structured(port.port.name), None, "")
+    walk(port.port.like, structured_name(port.port.name), None, "")
     return result

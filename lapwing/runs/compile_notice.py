@@ -64,7 +64,7 @@ class Stopwatch:
         """Note that everything is compiled, and store the measured time."""
         if self._started:
             mean = 0.5 * (self._slowness + slowness())
-            known, seconds = _known(), round((time.monotonic() - self._started) / mean, 1)
+            known, seconds = _stored_seconds(), round((time.monotonic() - self._started) / mean, 1)
             _store({**known, self._key: max(seconds, known.get(self._key, 0.0))})
             self._started = 0.0
 
@@ -108,7 +108,7 @@ def slowness() -> float:
 
 
 def _estimate(setup: RunConfig, mode: str, slow: float) -> Compilation:
-    seconds = _known().get(_key(mode, setup), EACH * len(setup.services))
+    seconds = _stored_seconds().get(_key(mode, setup), EACH * len(setup.services))
     return Compilation(setup.scene, tuple(setup.services), slow * seconds)
 
 
@@ -121,7 +121,7 @@ def _file() -> Path | None:
     return folder / FILE if folder else None
 
 
-def _known() -> dict[str, float]:
+def _stored_seconds() -> dict[str, float]:
     """Return seconds by kind of run; entries that cannot be read are omitted."""
     path = _file()
     with contextlib.suppress(OSError, ValueError, TypeError):

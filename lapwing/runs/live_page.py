@@ -19,7 +19,7 @@ from lapwing.studies.report.style import COLOURS, FLOWN
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.view3d.bodies import LEVEL
 from lapwing.studies.view3d.live_trail import LiveTrail
-from lapwing.studies.view3d.local_server import serving
+from lapwing.studies.view3d.local_server import run_server
 from lapwing.studies.view3d.recording import with_bridge
 from lapwing.studies.view3d.samples import Samples, sample
 from lapwing.studies.view3d.scans import BUDGET
@@ -46,7 +46,7 @@ class LivePage:
         facts = {"names": names, "colours": colours, "size": SIZE, "start": 0.0, "error": ERROR, "live": True}
         self._colours = colours
         self._stack = ExitStack()
-        self._server = self._stack.enter_context(serving(token, lambda html: with_bridge(html, facts)))
+        self._server = self._stack.enter_context(run_server(token, lambda html: with_bridge(html, facts)))
         self.address = f"http://127.0.0.1:{self._server.get_port()}/{token}/"
         add_surroundings(self._server.scene, _before_start(members(setup)[0]))
         add_shaders(self._server.scene)

@@ -45,7 +45,7 @@ def fly_processes(
     clock = Clock(observer, setup)
     external = spec.external or {}
     names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if spec.open else [])]
-    core = shared_core(setup)
+    core = core_of_services(setup)
 
     def send_spec(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
         own_spec = spec._replace(
@@ -102,7 +102,7 @@ class Clock:
         return False
 
 
-def shared_core(setup: RunConfig) -> int | None:
+def core_of_services(setup: RunConfig) -> int | None:
     """Return the core for all services of a sequential lock step, which work one at a time; None for any core."""
     if setup.coupling != "gauss_seidel" or not hasattr(os, "sched_getaffinity"):
         return None

@@ -32,7 +32,7 @@ from lapwing.messages.topics import (
 )
 from lapwing.services.common import ports
 from lapwing.studies import tracking
-from lapwing.studies.flight_events import IMU_SELECTION, Event, events, imu_failures, ordered, slack
+from lapwing.studies.flight_events import IMU_SELECTION, Event, events, imu_failures, in_order, slack
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.flight_topics import FlightTopics
 from lapwing.studies.mission import Mission, mission_of
@@ -91,7 +91,7 @@ class FlightData(FlightTopics):
                 raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/ground_truth)")
             others = {topic.key(name) for name in fleet for topic in OF_OTHERS}
             own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
-            return cls._of_log(log, str(path), log.histories(_selected_names(own, only, fleet)), named, fleet)
+            return cls._of_log(log, str(path), log.histories(_select_names(own, only, fleet)), named, fleet)
 
     @classmethod
     def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
@@ -109,7 +109,7 @@ class FlightData(FlightTopics):
             fleet = _vehicles(known, log.metadata)
             if not fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /NAME/ground_truth)")
-            histories = log.histories(_selected_names(known, only, fleet))
+            histories = log.histories(_select_names(known, only, fleet))
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
     @classmethod
@@ -139,8 +139,8 @@ class FlightData(FlightTopics):
             failure: reason of an early end.
             diverged: True if the reason is a non-finite state.
         """
-        said = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
-        return cls(said, Origin.of_setup(graph.setup), failure, diverged)
+        text = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
+        return cls(text, Origin.of_setup(graph.setup), failure, diverged)
 
     @classmethod
     def of_each(
@@ -149,10 +149,10 @@ class FlightData(FlightTopics):
         """Return the flights of all vehicles of a run. See `of` for arguments."""
         if graph.setup.vehicle:
             return [cls.of(graph, only, failure, diverged)]
-        said = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
+        text = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
         result = []
         for own in members(graph.setup):
-            views = {_short(template_topic(topic)): view for topic, view in said if topic.vehicle in ("", own.vehicle)}
+            views = {_short(template_topic(topic)): view for topic, view in text if topic.vehicle in ("", own.vehicle)}
             result.append(cls(views, Origin.of_setup(own), failure, diverged))
         truths = {flight.vehicle: flight.truth for flight in result if flight.has("ground_truth")}
         for flight in result:
@@ -160,8 +160,8 @@ class FlightData(FlightTopics):
         return result
 
     def __repr__(self) -> str:
-        said = str(self.outcome) if len(self.truth) else "nothing was flown"
-        return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {said}>"
+        text = str(self.outcome) if len(self.truth) else "nothing was flown"
+        return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {text}>"
 
     @cached_property
     def reference(self) -> np.ndarray:
@@ -248,12 +248,12 @@ class FlightData(FlightTopics):
     def events(self) -> list[Event]:
         """Events in order of time."""
         if self.has("events"):
-            said = self.topic("events")
-            return [Event(*event) for event in zip(said.times.tolist(), said.name, said.msg, strict=True)]
+            text = self.topic("events")
+            return [Event(*event) for event in zip(text.times.tolist(), text.name, text.msg, strict=True)]
         status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
         result = events(self.truth, status, setpoint, self.armed, self.origin.scene)
         if self.has(IMU_SELECTION):
-            result = ordered([*result, *imu_failures(self.topic(IMU_SELECTION))])
+            result = in_order([*result, *imu_failures(self.topic(IMU_SELECTION))])
         load = self.origin.scene.get("cooperative_load")
         if (
             load and self.has("body_states") and self.has("rotor_wrench")
@@ -267,7 +267,7 @@ class FlightData(FlightTopics):
         return self.outcome.kind in LANDED
 
 
-def _selected_names(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
+def _select_names(names: list[str], only: Collection[Topic] | None, fleet: list[str]) -> list[str]:
     """Return the names in a log that belong to the requested topics."""
     if only is None:
         return names
@@ -278,8 +278,8 @@ def _selected_names(names: list[str], only: Collection[Topic] | None, fleet: lis
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
     """Return the vehicles whose truth is among the topics of a log, in the order of its scene."""
     result = [name.split("/")[1] for name in topics if name.endswith("/ground_truth")]
-    said = metadata.get("vehicle", "").split(", ")
-    return sorted(result, key=lambda name: said.index(name) if name in said else len(said))
+    text = metadata.get("vehicle", "").split(", ")
+    return sorted(result, key=lambda name: text.index(name) if name in text else len(text))
 
 
 def _short(topic: Topic) -> str:

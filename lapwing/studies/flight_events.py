@@ -52,10 +52,10 @@ def events(
         phases = changes(setpoint.times, setpoint.phase)
         result += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
     result = [event._replace(time=round(event.time, 9)) for event in result]  # nanoseconds, as the log counts
-    return ordered(result)
+    return in_order(result)
 
 
-def ordered(events: Iterable[Event]) -> list[Event]:
+def in_order(events: Iterable[Event]) -> list[Event]:
     """Return events in order of time; simultaneous ones in the order of their kinds."""
     return sorted(events, key=lambda event: (event.time, ORDER.index(event.kind)))
 

@@ -41,13 +41,13 @@ class LiveFlight:
         None without new ground truth.
         """
         views: dict[str, TopicView] = {}
-        for topic, said in self._said.items():
-            now = [message for message in said if message[0] <= until_ns]
+        for topic, text in self._said.items():
+            now = [message for message in text if message[0] <= until_ns]
             if now:
                 times, payloads = zip(*now, strict=True)
                 columns = history(topic.message, payloads)
                 views[topic.name.removeprefix("{vehicle}/")] = TopicView(np.array(times, np.int64), columns)
-                del said[: len(now) - 1]  # the newest begins the next step
+                del text[: len(now) - 1]  # the newest begins the next step
         if "ground_truth" not in views or len(views["ground_truth"]) < 2:
             return None
         return FlightData(views, Origin.of_setup(self._setup))

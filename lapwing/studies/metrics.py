@@ -14,7 +14,7 @@ from lapwing.studies.consistency import SOURCES, consistency
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.saturation import limits, saturation
-from lapwing.studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided, total
+from lapwing.studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided_view, total
 
 SIGMAS = 3.0  # standard deviations of the estimate
 
@@ -90,7 +90,7 @@ def compile_ahead() -> None:
     reach(rows, rows, armed)
     total(rows)
     limits(rows, armed, 1.0)
-    _within_3sigma(strided(rows), strided(rows), strided(rows), plain(armed, bool))
+    _within_3sigma(strided_view(rows), strided_view(rows), strided_view(rows), plain(armed, bool))
 
 
 def _tilt(cosine: float) -> float:
@@ -104,7 +104,11 @@ def _of_estimate(flight: FlightData, armed: np.ndarray) -> dict[str, float]:
     if not flight.has("estimate") or len(flight.estimate) < n:
         return {}
     estimate, truth = flight.estimate, flight.truth
-    places = strided(estimate.position[:n]), strided(truth.position[:n]), strided(estimate.position_std[:n])
+    places = (
+        strided_view(estimate.position[:n]),
+        strided_view(truth.position[:n]),
+        strided_view(estimate.position_std[:n]),
+    )
     return {
         **{f"rmse_estimate.{axis}": value for axis, value in flight.rmse_of(estimate).items()},
         **{

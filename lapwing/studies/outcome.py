@@ -100,7 +100,7 @@ def classify(
         completion = "no mission" if mission is None else mission.completion(status)
         if completion and not failsafe:
             return outcome("completed", end, completion)
-        return outcome("timed out", end, _unfinished(status, failsafe), failsafe)
+        return outcome("timed out", end, _unfinished_outcome(status, failsafe), failsafe)
     if mission is not None and contacts and contacts[0].stop - contacts[0].start == len(truth.times):
         return outcome("timed out", end, "never took off" + _failsafe_text(failsafe), failsafe)
     if fault := _not_resting(truth, status, cosine):
@@ -172,7 +172,7 @@ def _not_resting(truth: TopicView, status: TopicView, cosine: np.ndarray) -> str
     return f"not at rest on its feet after the mission: {', '.join(faults)}" if faults else ""
 
 
-def _unfinished(status: TopicView, failsafe: tuple[float, str] | None) -> str:
+def _unfinished_outcome(status: TopicView, failsafe: tuple[float, str] | None) -> str:
     if not ("armed" in status.fields and status.armed.any()):
         return "mission not finished, motors never armed"
     mode = " ".join(filter(None, (str(status.mode[-1]), f"({status.phase[-1]})" if status.phase[-1] else "")))

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.kernels import kernel
 from lapwing.studies.topic_view import TopicView
-from lapwing.studies.tracking import plain, strided
+from lapwing.studies.tracking import plain, strided_view
 
 NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
 GAP = 1.0  # [s] shorter gaps do not separate two intervals
@@ -55,7 +55,7 @@ def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturatio
 def limits(voltage: np.ndarray, flying: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the motors at 0 and those at the `highest` voltage [V], shapes (n, motors), in rows that are `flying`."""
     low, high = np.empty(voltage.shape, bool), np.empty(voltage.shape, bool)
-    _limits(low, high, strided(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
+    _limits(low, high, strided_view(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
     return low, high
 
 

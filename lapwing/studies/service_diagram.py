@@ -37,7 +37,7 @@ class Arrow(NamedTuple):
     both_ways: bool = False
 
 
-def handed(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
+def ports_by_pair(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
     """Return the ports of each pair (producer, consumer); "*" marks delayed ones."""
     result: dict[tuple[str, str], list[str]] = {}
     producers = setup.producers
@@ -61,7 +61,7 @@ def places(setup: RunConfig) -> dict[str, Point]:
 
 def arrows(setup: RunConfig) -> list[Arrow]:
     """Return an arrow per topic between services, and those of auxiliary processes."""
-    at, pairs, result = places(setup), handed(setup), []
+    at, pairs, result = places(setup), ports_by_pair(setup), []
     for one, other in dict.fromkeys((min(pair), max(pair)) for pair in pairs):
         ways = [(one, other, text) for text in pairs.get((one, other), ())]
         ways += [(other, one, text) for text in pairs.get((other, one), ())]

@@ -39,7 +39,7 @@ def fly(
         rows: memory of the flight, for many that are looked at one after the other: the next one writes over it.
         observe: called with the tick that is reached: when everything is compiled, and then every LOOK ticks.
     """
-    return kind.of(*_flown(run, only, operator, rows, observe))
+    return kind.of(*_fly(run, only, operator, rows, observe))
 
 
 def fly_each(
@@ -49,7 +49,7 @@ def fly_each(
     observe: Callable[[int], None] | None = None,
 ) -> list[FlightData]:
     """Return the flights of all vehicles of a run. See `fly` for arguments."""
-    return FlightData.of_each(*_flown(setup, only, no_operator, rows, observe))
+    return FlightData.of_each(*_fly(setup, only, no_operator, rows, observe))
 
 
 def fly_with_ports(
@@ -59,11 +59,11 @@ def fly_with_ports(
 
     See `fly` for arguments.
     """
-    graph, _, failure, diverged = _flown(setup, only, no_operator, None, observe, every_port=True)
+    graph, _, failure, diverged = _fly(setup, only, no_operator, None, observe, every_port=True)
     return FlightData.of_each(graph, only, failure, diverged), graph
 
 
-def _flown(
+def _fly(
     run: RunConfig | Scene,
     only: Collection[Topic] | None,
     operator: Operator,

@@ -13,7 +13,7 @@ AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad
 DEGREE = np.pi / 180.0  # [rad]
 
 
-def shown(axis: str) -> tuple[str, float]:
+def unit_and_factor(axis: str) -> tuple[str, float]:
     """Return the display unit of an axis, and its factor from m or rad: angles in degrees."""
     return ("°", 1.0 / DEGREE) if AXES[axis] == "rad" else ("m", 1.0)
 
@@ -61,7 +61,7 @@ def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
     return np.require(values, kind, ("C", "W"))
 
 
-def strided(values: np.ndarray) -> np.ndarray:
+def strided_view(values: np.ndarray) -> np.ndarray:
     """Return a read-only view with gaps between rows, as rows of ports have them, so that one
     compiled version serves all; a copy where they lie otherwise."""
     result = np.asarray(values, float)
@@ -101,8 +101,8 @@ class Reference(NamedTuple):
 
 def rmse(reference: Reference, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> dict[str, float]:
     """Return the root-mean-square error of each axis [m], [rad] while armed, or NaN. See `errors` for arguments."""
-    desired = Reference(*(strided(values) for values in reference))
-    result = _mean_squares(*desired, strided(position), plain(np.transpose(attitude)), plain(armed, bool))
+    desired = Reference(*(strided_view(values) for values in reference))
+    result = _mean_squares(*desired, strided_view(position), plain(np.transpose(attitude)), plain(armed, bool))
     return dict(zip(AXES, map(math.sqrt, result), strict=True))
 
 
@@ -128,7 +128,7 @@ def _mean_squares(
 def reach(desired: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
     """Return the largest distance of armed positions from their reference [m], and the overshoot beyond the
     extremes of those along any axis [m], below 0 where they never come as far. Shapes (n, 3), (n, 3), (n,)."""
-    return _reach(strided(desired), strided(position), plain(armed, bool))
+    return _reach(strided_view(desired), strided_view(position), plain(armed, bool))
 
 
 @kernel
@@ -141,9 +141,9 @@ def _reach(desired: Any, position: Any, armed: Any) -> tuple[float, float]:
             z = desired[row, 2] - position[row, 2]
             square = x * x + y * y + z * z
             squares, away = squares + square, _greater(away, square)
-            along_x = _extended(along_x, position[row, 0], desired[row, 0])
-            along_y = _extended(along_y, position[row, 1], desired[row, 1])
-            along_z = _extended(along_z, position[row, 2], desired[row, 2])
+            along_x = _extend(along_x, position[row, 0], desired[row, 0])
+            along_y = _extend(along_y, position[row, 1], desired[row, 1])
+            along_z = _extend(along_z, position[row, 2], desired[row, 2])
     if squares != squares:  # what a comparison would leave out
         return np.nan, np.nan
     return np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z)))
@@ -153,7 +153,7 @@ Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown
 
 
 @always_inline
-def _extended(known: Extremes, actual: float, desired: float) -> Extremes:
+def _extend(known: Extremes, actual: float, desired: float) -> Extremes:
     """Return the extremes extended by another x."""
     return (
         _greater(known[0], actual), _greater(known[1], -actual),
@@ -175,7 +175,7 @@ def _greater(a: float, b: float) -> float:
 
 def total(values: np.ndarray) -> float:
     """Return the sum of all numbers (n, k)."""
-    return _total(strided(values))
+    return _total(strided_view(values))
 
 
 @kernel

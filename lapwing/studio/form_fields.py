@@ -132,7 +132,7 @@ class _Reader:
             resolved = value if isinstance(value, list) and len(value) == len(written) else [{}] * len(written)
             for k, (own, full) in enumerate(zip(written[:MOST_ITEMS], resolved, strict=False)):
                 name = str(own.get("name") or own.get("kind") or k + 1)
-                shown = _nested(full, own)
+                shown = _own_values(full, own)
                 groups.append(self.group(f"{key}.{k}", f"{label} {name}", items, own, shown))
             return Group(key, label, meaning, (), tuple(groups))
         known = part.get("properties", {})
@@ -210,7 +210,7 @@ def _is_tables(value: Any) -> bool:
     return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
 
 
-def _nested(full: Any, own: dict[str, Any]) -> dict[str, Any]:
+def _own_values(full: Any, own: dict[str, Any]) -> dict[str, Any]:
     """Return the resolved values of a table; where the file has a table and the resolved a list of one, that."""
     if not isinstance(full, dict):
         return {}

@@ -23,7 +23,7 @@ from lapwing.studies.view3d import available
 from lapwing.studio.form_fields import additions, form
 from lapwing.studio.recent_flights import RecentFlights
 from lapwing.studio.run_processes import StudioRuns
-from lapwing.studio.scene_changes import SPEEDS, command_line, python, shown
+from lapwing.studio.scene_changes import SPEEDS, command_line, python, shell_command
 from lapwing.studio.scene_forms import form_changes, load_named, posted_form, scene_files, schema, tables
 
 HERE = Path(__file__).parent
@@ -64,7 +64,7 @@ class Pages:
             Route("/compare", self.compare, methods=get),
             Route("/compare/report", self.compare_report, methods=get),
         ]
-        handlers: Mapping[Any, Callable[..., Any]] = {HTTPException: self._fault, KeyError: self._missing}
+        handlers: Mapping[Any, Callable[..., Any]] = {HTTPException: self._fault, KeyError: self._not_found}
         self.application = Starlette(routes=[Mount(self._base, routes=routes)], exception_handlers=handlers)
 
     def _page(self, template: str, status: int = 200, **values: Any) -> HTMLResponse:
@@ -75,7 +75,7 @@ class Pages:
         assert isinstance(error, HTTPException)
         return self._page("fault.html", error.status_code, message=error.detail)
 
-    def _missing(self, _: Request, error: Exception) -> Response:
+    def _not_found(self, _: Request, error: Exception) -> Response:
         return self._page("fault.html", 404, message=f"{error.args[0]}: no such scene, run or flight")
 
     def static(self, request: Request) -> Response:
@@ -156,7 +156,9 @@ class Pages:
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
         return JSONResponse(
             {
-                "command": shown(command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")),
+                "command": shell_command(
+                    command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
+                ),
                 "python": python(name, changed),
                 "changed": [change.key for change in changed],
                 "faults": faults,
@@ -194,7 +196,7 @@ class Pages:
             flight=summary,
             previous=others[0] if others else "",
             again=urlencode(again),
-            command=shown(run.command),
+            command=shell_command(run.command),
             python=python(run.scene, run.changed),
             duration=load_named(run.scene, run.changed)[Run].duration if run.running else 0.0,
         )

@@ -49,13 +49,13 @@ def picture(positions: Sequence[np.ndarray]) -> Picture:
     centre = 0.5 * (low + high)
     half = 0.5 * max(float((high - low)[:2].max()), 0.6 * float(high[2] - floor), SMALLEST) * 1.15
     corners = np.array([(centre[0] + a * half, centre[1] + b * half, floor) for a in (-1, 1) for b in (-1, 1)])
-    flat = _projected(np.concatenate([points, corners]))
+    flat = _project(np.concatenate([points, corners]))
     least, most = flat.min(axis=0), flat.max(axis=0)
     scale = float(min((WIDTH - 2 * MARGIN) / (most[0] - least[0]), (HEIGHT - 2 * MARGIN) / (most[1] - least[1])))
     shift = np.array([0.5 * WIDTH, 0.5 * HEIGHT]) - scale * 0.5 * (least + most)
 
     def at(places: np.ndarray) -> np.ndarray:
-        return np.round(scale * _projected(places) + shift, 1)
+        return np.round(scale * _project(places) + shift, 1)
 
     lines = []
     for k, path in enumerate(shown):
@@ -76,7 +76,7 @@ def picture(positions: Sequence[np.ndarray]) -> Picture:
     return Picture(WIDTH, HEIGHT, tuple(lines), tuple(grid))
 
 
-def _projected(points: np.ndarray) -> np.ndarray:
+def _project(points: np.ndarray) -> np.ndarray:
     """Return the picture's x to the right and y downwards of points, without scale."""
     x, y, z = points.T
     right = np.cos(TURN) * x + np.sin(TURN) * y

@@ -55,7 +55,9 @@ class RecentFlights:
     def names(self) -> list[str]:
         """Return the file names of the logs, the newest first; without one that is being written."""
         paths = [path for path in self._folder.glob("*.mcap") if path.is_file()] if self._folder.is_dir() else []
-        dated = [(modified, path.name) for path in paths if (modified := _modified(path)) and not is_locked(path)]
+        dated = [
+            (modified, path.name) for path in paths if (modified := _modification_time(path)) and not is_locked(path)
+        ]
         return [name for _, name in sorted(dated, reverse=True)[:MOST]]
 
     def path(self, name: str) -> Path:
@@ -67,7 +69,7 @@ class RecentFlights:
     def summary(self, name: str) -> FlightSummary:
         """Return the summary of a log. Raise KeyError if there is none of this name."""
         path = self.path(name)
-        key = (name, _modified(path))
+        key = (name, _modification_time(path))
         with self._lock:
             if key not in self._known:
                 self._known[key] = _summary(path)
@@ -87,7 +89,7 @@ class RecentFlights:
     def report(self, *names: str) -> Path:
         """Return the report of one log, or of two laid over each other. Raise KeyError or ValueError."""
         paths = [self.path(name) for name in names]
-        stamp = "_".join(str(_modified(path)) for path in paths)
+        stamp = "_".join(str(_modification_time(path)) for path in paths)
         target = self._reports / f"{'_'.join(path.stem for path in paths)[:120]}_{stamp}.html"
         with self._lock:
             if not target.exists():
@@ -95,7 +97,7 @@ class RecentFlights:
         return target
 
 
-def _modified(path: Path) -> int:
+def _modification_time(path: Path) -> int:
     """Return the time of the last write [ns], 0 if the file is gone."""
     try:
         return path.stat().st_mtime_ns
@@ -104,7 +106,7 @@ def _modified(path: Path) -> int:
 
 
 def _summary(path: Path) -> FlightSummary:
-    recorded = datetime.fromtimestamp(_modified(path) * 1e-9).strftime("%Y-%m-%d %H:%M")
+    recorded = datetime.fromtimestamp(_modification_time(path) * 1e-9).strftime("%Y-%m-%d %H:%M")
     try:
         flights = [flight for flight in Flight.read_all(path, SHOWN) if len(flight.truth)]
         if not flights:

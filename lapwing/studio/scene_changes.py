@@ -61,7 +61,7 @@ def command_line(scene: str, changed: Iterable[Change], speed: str, view: bool) 
     return [*words, *(["--speed", speed] if speed else []), *(["--view"] if view else [])]
 
 
-def shown(words: Iterable[str]) -> str:
+def shell_command(words: Iterable[str]) -> str:
     """Return a command as it is typed in a shell."""
     return shlex.join(words)
 

@@ -20,11 +20,11 @@ from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttl
 from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.datagrams import DatagramSocket
-from lapwing.services.common.firmware.exchange import INVALID, LAST, POLL, SEND, Shared, unused
+from lapwing.services.common.firmware.exchange import INVALID, LAST, POLL, SEND, Shared, empty_ring
 from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
-from lapwing.services.common.firmware.mission import mission_messages, uploaded
+from lapwing.services.common.firmware.mission import mission_items, mission_messages
 from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
@@ -68,9 +68,9 @@ class ArduPilotLink:
         samples = Samples(
             own.gravity_world,
             ring(ports.TRUTH),
-            ring(ports.IMU) if own.imu else unused(ImuReading()),
-            ring(own.range_port) if own.range_port else unused(DistanceReading()),
-            ring(ports.AIRSPEED) if own.airspeed else unused(AirspeedReading()),
+            ring(ports.IMU) if own.imu else empty_ring(ImuReading()),
+            ring(own.range_port) if own.range_port else empty_ring(DistanceReading()),
+            ring(ports.AIRSPEED) if own.airspeed else empty_ring(AirspeedReading()),
             ring(ports.BATTERY),
             own.imu,
             bool(own.range_port),
@@ -83,7 +83,7 @@ class ArduPilotLink:
         self._setup, bound = first_free(self._setup, INSTANCES, _claim)
         self._socket.attach(bound)
         setup = self._setup
-        items = uploaded(setup.plan)
+        items = mission_items(setup.plan)
         parameters = {**PARAMETERS, **setup.parameters} if items else dict(setup.parameters)
         if setup.command:
             text = "".join(f"{name} {value:.9g}\n" for name, value in {**PARAMETERS, **parameters}.items())

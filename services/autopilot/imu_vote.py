@@ -70,14 +70,14 @@ def _read(h: UnitHistory, r: ImuReading) -> UnitHistory:
 
 
 @always_inline
-def _scored(h: UnitHistory, good: bool) -> UnitHistory:
+def _update_score(h: UnitHistory, good: bool) -> UnitHistory:
     score = max(h.score - 1, 0) if good else min(h.score + SCORE_BAD, SCORE_MAX)
     failed = score >= SCORE_FAILED or (h.failed and score > 0)
     return UnitHistory(h.omega, h.force, h.repeats, score, failed)
 
 
 @always_inline
-def _chosen(unit: int, good: tuple[bool, bool, bool], a: UnitHistory, b: UnitHistory, c: UnitHistory) -> int:
+def _choose_unit(unit: int, good: tuple[bool, bool, bool], a: UnitHistory, b: UnitHistory, c: UnitHistory) -> int:
     """Return the unit in use: the one before while it is good, else the first good one."""
     if good[unit - 1]:
         return unit
@@ -99,8 +99,8 @@ def step(p: Vote, s: VoteState, tick: int, inputs: tuple[InputSample, ...]) -> t
     good_z = three and z.valid and c.repeats < p.frozen
     if good_x and good_y and good_z:
         good_x, good_y, good_z = _consistent(x, x, y, z), _consistent(y, x, y, z), _consistent(z, x, y, z)
-    a, b, c = _scored(a, good_x), _scored(b, good_y), _scored(c, good_z or not three)
-    unit = _chosen(s.unit, (good_x, good_y, good_z), a, b, c)
+    a, b, c = _update_score(a, good_x), _update_score(b, good_y), _update_score(c, good_z or not three)
+    unit = _choose_unit(s.unit, (good_x, good_y, good_z), a, b, c)
     reading = x if unit == 1 else (y if unit == 2 else z)
     failed = int(a.failed) + 2 * int(b.failed) + 4 * int(c.failed)
     selection = ImuSelection(unit, failed, unit != s.unit)

@@ -21,14 +21,14 @@ class VirtualControls(NamedTuple):
 
 
 @always_inline
-def _nothing(_: float, share: Share, other: Share) -> float:
+def _zero(_: float, share: Share, other: Share) -> float:
     return 0.0
 
 
 @always_inline
 def at_rest(shares: Shares) -> PerRotor:
     """Return zero thrust [N] for every rotor."""
-    return map_tuple(_nothing, 0.0, shares, shares)
+    return map_tuple(_zero, 0.0, shares, shares)
 
 
 @always_inline
@@ -55,14 +55,14 @@ def clamp(x: float, low: float, high: float) -> float:
 
 
 @always_inline
-def _clamped(highest: float, value: float, _: float) -> float:
+def _clamp_voltage(highest: float, value: float, _: float) -> float:
     return clamp(value, 0.0, highest)
 
 
 @always_inline
 def clamp_to_range(values: PerRotor, highest: float) -> PerRotor:
     """Return the nearest values within 0..highest."""
-    return map_tuple(_clamped, highest, values, values)
+    return map_tuple(_clamp_voltage, highest, values, values)
 
 
 @always_inline

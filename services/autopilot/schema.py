@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 from pydantic import Field
 
 from lapwing.cosim.scene import Files, Scene
-from lapwing.cosim.scene.files import merge_tables, named
+from lapwing.cosim.scene.files import merge_tables, unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import math
 from lapwing.services.autopilot.controller_parameters import Airframe, build, hover_thrust, hover_torque
@@ -47,12 +47,12 @@ class Autopilot(FirmwareKeys):
         if is_foreign(tree):
             cls.embed_parameters(tree, files)
             return
-        if isinstance(name := named(tree, cls.TABLE, "gains", cls.model_fields["gains"].default), str):
+        if isinstance(name := unvalidated_value(tree, cls.TABLE, "gains", cls.model_fields["gains"].default), str):
             path = files.find("autopilot.gains", "gain set", name, "gains", FOLDER)
             content = files.toml(GainSet.TABLE, "autopilot.gains", path)
             tree[GainSet.TABLE] = merge_tables(content, tree.get(GainSet.TABLE, {}))
         for key in ("controller", "estimator"):
-            code, where = named(tree, cls.TABLE, key), f"{cls.TABLE}.{key}"
+            code, where = unvalidated_value(tree, cls.TABLE, key), f"{cls.TABLE}.{key}"
             if key == "estimator" and isinstance(code, str) and ":" not in code:
                 if code not in ESTIMATORS:
                     raise ConfigError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
@@ -60,7 +60,7 @@ class Autopilot(FirmwareKeys):
                 continue
             elif isinstance(code, str) and (module := user_code.split_reference(where, code)[0]) != user_code.MEMORY:
                 user_modules.embed(tree, files, where, module)
-        if isinstance(file := named(tree, cls.TABLE, "parameters"), str):
+        if isinstance(file := unvalidated_value(tree, cls.TABLE, "parameters"), str):
             path = files.folder / file
             text = files.text("autopilot.parameters", "autopilot.parameters", path)
             tree[cls.TABLE]["parameters"] = parse(text, path)

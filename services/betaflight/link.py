@@ -116,11 +116,11 @@ class BetaflightLink:
             self._send(self._sticks)
         else:
             self._send(None)
-        begun = time.monotonic()
+        has_started = time.monotonic()
         if not self._drain(REPLY):
             self.report.missed += 1
             self._repeat(t, waits)
-        self.report.waiting += time.monotonic() - begun
+        self.report.waiting += time.monotonic() - has_started
         self._poll_status(t)
         return self._output()
 

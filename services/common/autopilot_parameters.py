@@ -197,7 +197,7 @@ def _table(scene: "Scene") -> dict[str, Parameter]:
     return known
 
 
-def changed(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, float]:
+def apply_commands(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, float]:
     """Return the values after the accepted parameter commands among `commands`."""
     values = {p.name: p.default for p in table.values()}
     for command in commands:

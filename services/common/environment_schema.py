@@ -153,7 +153,7 @@ class EnvironmentTable(SceneTable):
     def check(self, scene: Scene) -> None:
         """Raise ConfigError if the date or the terrain is invalid."""
         try:
-            _resolved(self)
+            _resolve(self)
         except ConfigError as error:
             raise error.with_prefix(self.TABLE) from None
 
@@ -163,7 +163,7 @@ class EnvironmentTable(SceneTable):
 
 
 @lru_cache(maxsize=16)
-def _resolved(table: EnvironmentTable) -> Environment:
+def _resolve(table: EnvironmentTable) -> Environment:
     """Return the environment in numbers. Raise ConfigError with a key relative to the table."""
     try:
         terrain = table.terrain.ground()
@@ -212,7 +212,7 @@ def _points(grid: Grid, key: str) -> int:
 
 def environment(scene: Scene) -> Environment:
     """Return the environment that all services of the scene share."""
-    return _resolved(scene[EnvironmentTable])
+    return _resolve(scene[EnvironmentTable])
 
 
 def known_magnetic_field(scene: Scene) -> Vec3:

@@ -29,12 +29,12 @@ from lapwing.kernels.row_packing import pack_row, row_width
 from lapwing.services.common.controller_api import VehicleModel
 from lapwing.services.common.ports import StateEstimate
 
-__all__ = ["StateEstimate", "VehicleModel", "checked_estimate"]
+__all__ = ["StateEstimate", "VehicleModel", "validate_estimate"]
 
 WIDTH = row_width(StateEstimate())
 
 
-def checked_estimate(result: Any) -> StateEstimate:
+def validate_estimate(result: Any) -> StateEstimate:
     """Return the estimate that a step returned, with tuples for arrays and lists.
 
     Raises:

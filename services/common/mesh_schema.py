@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import ConfigDict
 
 from lapwing.cosim.scene import Scene, SceneTable
-from lapwing.cosim.scene.files import named
+from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.mesh_file import SUFFIXES, Mesh, read
 
@@ -40,7 +40,7 @@ def embed(tree: dict[str, Any], folder: Path) -> None:
     Raises:
         ConfigError: the file is missing or invalid.
     """
-    if not isinstance(name := named(tree, "airframe", "mesh"), str):
+    if not isinstance(name := unvalidated_value(tree, "airframe", "mesh"), str):
         return
     path = folder / name
     if path.suffix.lower() not in SUFFIXES:

@@ -42,4 +42,4 @@ class NamedTables(SceneTable):
                 key = f"{self.TABLE}.{name}.module"
                 if not isinstance(table["module"], str):
                     raise ConfigError(key, f"got {table['module']!r}", "the name of a module")
-                user_code.loaded(key, table["module"], texts)
+                user_code.load_module(key, table["module"], texts)

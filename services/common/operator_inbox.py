@@ -32,13 +32,13 @@ class OperatorInbox:
     def take(self, vehicle: str, _: int) -> list[Any]:
         """Remove and return the queued commands of a vehicle."""
         while arrived := self._arrived():
-            name, commands = addressed(arrived[1])
+            name, commands = decode_input(arrived[1])
             self._waiting.get(name, self._waiting[self._first]).extend(commands)
         queue, self._waiting[vehicle] = self._waiting[vehicle], []
         return queue
 
 
-def addressed(payload: bytes) -> tuple[str, tuple[Any, ...]]:
+def decode_input(payload: bytes) -> tuple[str, tuple[Any, ...]]:
     """Return vehicle name and commands of an encoded OperatorInput; undecodable bytes become one invalid command."""
     try:
         message = OperatorInput.decode(payload)

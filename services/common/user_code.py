@@ -17,7 +17,7 @@ _lent: dict[str, Any] = {}  # registered objects by name
 
 
 @contextmanager
-def registered(thing: Any, folder: Path) -> Iterator[str]:
+def register(thing: Any, folder: Path) -> Iterator[str]:
     """Register a class, function or object under a name for scenes, within the context.
 
     A definition in a module that the run configuration can store is named "module:Name". Anything else is named
@@ -65,7 +65,7 @@ def split_reference(key: str, text: str) -> tuple[str, str]:
     return module, name
 
 
-def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
+def load_module(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
     """Return a module that the run configuration stores. Raise ConfigError if it cannot be imported."""
     try:
         return user_module.load(module, texts)
@@ -75,7 +75,7 @@ def loaded(key: str, module: str, texts: Mapping[str, str]) -> ModuleType:
         raise ConfigError(key, f"{module}: {type(error).__name__}: {error}") from error
 
 
-def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, Any]:
+def load_object(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, Any]:
     """Return the module of "module:Name" and the object of that name.
 
     Raises:
@@ -88,7 +88,7 @@ def named(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleType, An
             raise ConfigError(key, message, "a class in a module, which the log stores")
         thing = _lent[name]
         return sys.modules[getattr(thing, "__module__", type(thing).__module__)], thing
-    code = loaded(key, module, texts)
+    code = load_module(key, module, texts)
     if not hasattr(code, name):
         own = [n for n, value in vars(code).items() if callable(value) and value.__module__ == code.__name__]
         raise ConfigError.unknown(key, f"name in {module}", name, own)

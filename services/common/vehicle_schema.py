@@ -5,7 +5,7 @@ from typing import Any, ClassVar, NamedTuple
 from pydantic import ConfigDict, Field
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.cosim.scene.files import merge_tables, named
+from lapwing.cosim.scene.files import merge_tables, unvalidated_value
 from lapwing.dynamics import effects
 from lapwing.dynamics.atmosphere import density
 from lapwing.dynamics.config_error import ConfigError
@@ -50,14 +50,14 @@ class Vehicle(SceneTable):
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Read the airframe's file into the table `airframe`, overridden by the scene's values."""
         folder = files.folder
-        if isinstance(name := named(tree, "vehicle", "airframe"), str):
+        if isinstance(name := unvalidated_value(tree, "vehicle", "airframe"), str):
             path = files.find("vehicle.airframe", "airframe", name, "vehicles", SHIPPED / "vehicles")
             content = files.toml(VehicleAirframe.TABLE, "vehicle.airframe", path)
-            if named(tree, VehicleAirframe.TABLE, "mesh") is None:
+            if unvalidated_value(tree, VehicleAirframe.TABLE, "mesh") is None:
                 folder = path.parent
             tree[VehicleAirframe.TABLE] = merge_tables(content, tree.get(VehicleAirframe.TABLE, {}))
         mesh_schema.embed(tree, folder)
-        mass, frame = named(tree, "vehicle", "mass"), tree.get(VehicleAirframe.TABLE)
+        mass, frame = unvalidated_value(tree, "vehicle", "mass"), tree.get(VehicleAirframe.TABLE)
         if mass is not None and isinstance(frame, dict):
             tree[VehicleAirframe.TABLE] = merge_tables(frame, {"mass": {"total": mass}})
 

@@ -168,11 +168,11 @@ def serve(calls: Any, channel: Any) -> tuple[int, int]:
         size = 8 * len(io.request)
         soon_readable(io.poll, io.poll_entry_address, io.looks)  # if not, read sleeps
         while io.received[0] < size:
-            got = io.received[0]
-            n = call_long(io.read, (io.requests, io.request_address + got, size - got))
+            actual = io.received[0]
+            n = call_long(io.read, (io.requests, io.request_address + actual, size - actual))
             if n <= 0:
                 return (CLOSED, 0) if n == 0 else (INTERRUPTED, 0)
-            io.received[0] = got + n
+            io.received[0] = actual + n
         io.received[0] = 0
         result = _step(c, io.request[0], io.request[1])
         if result[0] != DONE:

@@ -52,12 +52,12 @@ class EventLog:
         count = (last - first) % ROUND + 1
         stored = dict(self._kept)
 
-        def missing(number: int) -> Any:
+        def error_message(number: int) -> Any:
             oldest = min(stored, key=lambda sequence: (sequence - number) % ROUND, default=self.sequence)
             return message_class("RESPONSE_EVENT_ERROR")(*address, number, oldest, UNAVAILABLE)
 
         if count > KEPT:
-            yield missing(first)
+            yield error_message(first)
         for k in range(max(0, count - KEPT), count):
             number = (first + k) % ROUND
-            yield stored.get(number) or missing(number)
+            yield stored.get(number) or error_message(number)

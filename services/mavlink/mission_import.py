@@ -1,7 +1,7 @@
 """Items of missions, fences and rally points from MAVLink messages to the autopilot's.
 
 An item that this vehicle has nothing to do for (cameras, gimbals, servos) becomes a delay of no length, so that the
-numbers of the items stay; `skipped` names them.
+numbers of the items stay; `texts_of_skipped_items` names them.
 """
 
 import math
@@ -14,7 +14,7 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink.item_fields import MAKERS, RefusedItemError, idle
 from lapwing.services.mavlink.item_makers import MAX_ITEMS
 
-__all__ = ["MAX_ITEMS", "RefusedItemError", "from_mavlink", "skipped"]
+__all__ = ["MAX_ITEMS", "RefusedItemError", "from_mavlink", "texts_of_skipped_items"]
 
 _IDLE = {  # commands of a mission for parts that this vehicle does not have
     mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
@@ -47,7 +47,7 @@ _IDLE = {  # commands of a mission for parts that this vehicle does not have
 }
 
 
-def skipped(items: Sequence[Any]) -> list[str]:
+def texts_of_skipped_items(items: Sequence[Any]) -> list[str]:
     """Return texts about items that are stored but have no effect."""
     names = mavlink.enums["MAV_CMD"]
     return [

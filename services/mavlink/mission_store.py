@@ -10,7 +10,7 @@ from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.mavlink.clock import Clock
 from lapwing.services.mavlink.command_queue import CommandQueue
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, skipped
+from lapwing.services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, texts_of_skipped_items
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
 from lapwing.services.mavlink.statustext import statustext
 
@@ -166,17 +166,17 @@ class MissionStore:
             return
         upload.complete = True
 
-        def acknowledged(acknowledgement: Any) -> None:
+        def on_acknowledgement(acknowledgement: Any) -> None:
             if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 return
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self.items[upload.kind] = upload.items
-                for text in skipped(upload.items)[:MAX_WARNINGS]:
+                for text in texts_of_skipped_items(upload.items)[:MAX_WARNINGS]:
                     for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
                         upload.endpoint.send(message)
             self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), acknowledged_kind)
 
-        self._commands.put(KINDS[upload.kind], upload.endpoint.name, acknowledged, items=items)
+        self._commands.put(KINDS[upload.kind], upload.endpoint.name, on_acknowledgement, items=items)
 
     def _end(self, upload: Upload, result: int, acknowledged_kind: int | None = None) -> None:
         self._uploads.pop(upload.kind, None)

@@ -107,9 +107,9 @@ class ParameterStore:
         if parameter is None:
             self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
-        requested = _unrounded(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
+        requested = _restore_bound(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
 
-        def acknowledged(acknowledgement: Any) -> None:
+        def on_acknowledgement(acknowledgement: Any) -> None:
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self._change(name, acknowledgement.value)
             else:
@@ -123,7 +123,7 @@ class ParameterStore:
             self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             self._send(endpoint, name)
         else:
-            self._commands.put("parameter", endpoint.name, acknowledged, (requested,), name)
+            self._commands.put("parameter", endpoint.name, on_acknowledgement, (requested,), name)
 
     def _set_fact(self, endpoint: Endpoint, fact: Fact, value: float, trusted: bool) -> None:
         """Set the counterparts of a fact, one after another."""
@@ -149,7 +149,7 @@ class ParameterStore:
             self._announce(fact.name)
             return
 
-        def acknowledged(name: str, acknowledgement: Any) -> None:
+        def on_acknowledgement(name: str, acknowledgement: Any) -> None:
             del waiting[name]
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self._change(name, acknowledgement.value)
@@ -157,7 +157,7 @@ class ParameterStore:
                 self._announce(fact.name)
 
         for name, v in list(waiting.items()):
-            self._commands.put("parameter", endpoint.name, partial(acknowledged, name), (v,), name)
+            self._commands.put("parameter", endpoint.name, partial(on_acknowledgement, name), (v,), name)
 
     def _announce(self, name: str) -> None:
         """Send a changed parameter to every endpoint, and again at the next step."""
@@ -187,6 +187,6 @@ class ParameterStore:
         )
 
 
-def _unrounded(value: float, *bounds: float) -> float:
+def _restore_bound(value: float, *bounds: float) -> float:
     """Return the bound that the field of 32 bits holds as `value`; else the value."""
     return next((bound for bound in bounds if struct.unpack("<f", struct.pack("<f", bound))[0] == value), value)

@@ -25,7 +25,7 @@ class Fact(NamedTuple):
     assign: Callable[[float], Values | None] | None = None
 
 
-def _translated(name: str, counterpart: str, actions: dict[int, int], default: int = 0) -> Fact:
+def _translate_action(name: str, counterpart: str, actions: dict[int, int], default: int = 0) -> Fact:
     """Return a failsafe action of PX4 that is one of the autopilot's; `actions` has the latter by the former."""
     px4_actions = {own: px4 for px4, own in reversed(actions.items())}
 
@@ -71,7 +71,7 @@ def output_function(number: int | str) -> str:
 def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
     """Return the facts of a vehicle."""
 
-    def fitted(sensor: str) -> int:
+    def is_fitted(sensor: str) -> int:
         return int(not d.sensors or sensor in d.sensors)  # without sensors the ground truth replaces all of them
 
     whole = {
@@ -80,14 +80,14 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "MAV_TYPE": vehicle_type(len(d.rotors)),
         "SYS_AUTOSTART": GENERIC_FRAMES.get(len(d.rotors), GENERIC_FRAMES[4]),
         "SYS_HITL": 0,
-        "SYS_HAS_MAG": fitted("magnetometer"),
-        "SYS_HAS_BARO": fitted("barometer"),
-        "SYS_HAS_GPS": fitted("gps"),
+        "SYS_HAS_MAG": is_fitted("magnetometer"),
+        "SYS_HAS_BARO": is_fitted("barometer"),
+        "SYS_HAS_GPS": is_fitted("gps"),
         "SYS_HAS_NUM_ASPD": int("airspeed" in d.sensors),
         "SYS_HAS_NUM_DIST": len({"sonar", "rangefinder"} & set(d.sensors)),
-        "CAL_GYRO0_ID": SIM_IMU * fitted("imu"),
-        "CAL_ACC0_ID": SIM_IMU * fitted("imu"),
-        "CAL_MAG0_ID": SIM_MAG * fitted("magnetometer"),
+        "CAL_GYRO0_ID": SIM_IMU * is_fitted("imu"),
+        "CAL_ACC0_ID": SIM_IMU * is_fitted("imu"),
+        "CAL_MAG0_ID": SIM_MAG * is_fitted("magnetometer"),
         "CAL_MAG1_ID": 0,
         "CAL_MAG2_ID": 0,
         **{f"CAL_MAG{k}_ROT": INTERNAL_COMPASS for k in range(3)},
@@ -115,9 +115,9 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         *(_battery(d.battery) if d.battery else ()),
         *[Fact(f"RC_{switch}_TH", lambda _: THRESHOLD, False) for switch in NO_THRESHOLDS],
         Fact("COM_LOW_BAT_ACT", _low_battery, assign=_assign_battery),
-        _translated("GF_ACTION", "FS_FENCE_ACT", _GEOFENCE, _DESCENT["GF_ACTION"]),
-        _translated("NAV_RCL_ACT", "NAV_DLL_ACT", _LINK_LOSS),  # sticks come over the data link
-        _translated("COM_ACT_FAIL_ACT", "FS_MOTOR_ACT", _MOTOR_LOSS, _DESCENT["COM_ACT_FAIL_ACT"]),
+        _translate_action("GF_ACTION", "FS_FENCE_ACT", _GEOFENCE, _DESCENT["GF_ACTION"]),
+        _translate_action("NAV_RCL_ACT", "NAV_DLL_ACT", _LINK_LOSS),  # sticks come over the data link
+        _translate_action("COM_ACT_FAIL_ACT", "FS_MOTOR_ACT", _MOTOR_LOSS, _DESCENT["COM_ACT_FAIL_ACT"]),
         # Modes that continue without sticks: all modes that need none, whatever the value
         Fact("COM_RCL_EXCEPT", lambda _: 0.0, assign=lambda x: {} if x in range(EXCEPTIONS + 1) else None),
         # VTOL aircraft in forward flight only need an approach to their landing, as in PX4

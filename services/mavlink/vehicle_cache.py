@@ -8,7 +8,7 @@ from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
 from lapwing.messages import Status, nanoseconds
 from lapwing.messages.topics import ESTIMATE, STATUS, TRUTH, Topic
-from lapwing.services.common.mavlink.frames import Quaternion, saturated, swap_attitude
+from lapwing.services.common.mavlink.frames import Quaternion, saturate, swap_attitude
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink import firmware
 from lapwing.services.mavlink.event_log import EventLog
@@ -70,7 +70,7 @@ class VehicleCache:
         latitude, longitude, height = description.home
         # GPS_GLOBAL_ORIGIN for ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height
-        self.origin = saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), saturated(altitude * 1e3, 32)
+        self.origin = saturate(latitude * 1e7, 32), saturate(longitude * 1e7, 32), saturate(altitude * 1e3, 32)
         self.mission: Callable[[], Sequence[Any]] = lambda: ()  # its mission items, as endpoints wrote them
         self.parameter: Callable[[str], float] = lambda name: math.nan  # value of a parameter; NaN if there is none
         self._home_heading, self._armed = 0.0, False

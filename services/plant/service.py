@@ -42,7 +42,7 @@ def create(setup: RunConfig) -> Service:
         state,
         config.inputs,
         config.ports if has_own_bodies else truth_ports,
-        failure=_diverged(setup, plant, state),
+        failure=_divergence_error(setup, plant, state),
     )
     parts: list[Any] = [part]
     if plant.events:
@@ -80,7 +80,7 @@ def _a_tick_ago(*names: str) -> tuple[InputPort, ...]:
     return tuple(InputPort(name, 1) for name in names)
 
 
-def _diverged(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
+def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
     def error(tick: int) -> DivergedError:
         x, t = read(state), tick * setup.interval
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:

@@ -39,10 +39,10 @@ def failsafe_text(number: int, arguments: bytes) -> str:
     if number not in _LAYOUTS:
         return ""
     layout, names = _LAYOUTS[number]
-    given = dict(zip(names, struct.unpack_from(layout, arguments), strict=True))
-    parts = [_name(CAUSES, given.get("cause", 0)), _name(ACTIONS, given["action"])]
+    values = dict(zip(names, struct.unpack_from(layout, arguments), strict=True))
+    parts = [_name(CAUSES, values.get("cause", 0)), _name(ACTIONS, values["action"])]
     result = ": ".join(filter(None, parts))
-    return f"{result} in {given['delay']} s" if "delay" in given else result
+    return f"{result} in {values['delay']} s" if "delay" in values else result
 
 
 def _name(names: tuple[str, ...], number: int) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.exchange import POLL, SEND, Shared, unused
+from lapwing.services.common.firmware.exchange import POLL, SEND, Shared, empty_ring
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
@@ -60,7 +60,7 @@ class Px4Link:
         """Return the parameters of the compiled exchange."""
         self._shared, periods = shared, self._own.periods
         named = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *RARE)
-        airspeed = ring(ports.AIRSPEED) if ports.AIRSPEED in periods else unused(AirspeedReading())
+        airspeed = ring(ports.AIRSPEED) if ports.AIRSPEED in periods else empty_ring(AirspeedReading())
         readings = Readings(
             ring(ports.IMU),
             ring(ports.MAGNETOMETER),

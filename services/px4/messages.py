@@ -7,7 +7,7 @@ import struct
 from typing import NamedTuple
 
 from lapwing.kernels import math
-from lapwing.services.common.mavlink.frames import saturated, swap_world
+from lapwing.services.common.mavlink.frames import saturate, swap_world
 from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, DistanceReading, GpsReading
 from lapwing.services.px4.framing import Layout
 
@@ -40,15 +40,15 @@ def gps_values(time_us: int, r: GpsReading) -> tuple:
     course = round(math.degrees(math.atan2(ve, vn)) * 100.0) % 36000
     return (
         time_us,
-        saturated(r.latitude_deg * 1e7, 32),
-        saturated(r.longitude_deg * 1e7, 32),
-        saturated(r.height * 1e3, 32),
-        saturated(100.0 * math.sqrt(east + north), 16, True, UNKNOWN),
-        saturated(100.0 * math.sqrt(up), 16, True, UNKNOWN),
-        saturated(100.0 * speed, 16, True, UNKNOWN),
-        saturated(100.0 * vn, 16),
-        saturated(100.0 * ve, 16),
-        saturated(100.0 * vd, 16),
+        saturate(r.latitude_deg * 1e7, 32),
+        saturate(r.longitude_deg * 1e7, 32),
+        saturate(r.height * 1e3, 32),
+        saturate(100.0 * math.sqrt(east + north), 16, True, UNKNOWN),
+        saturate(100.0 * math.sqrt(up), 16, True, UNKNOWN),
+        saturate(100.0 * speed, 16, True, UNKNOWN),
+        saturate(100.0 * vn, 16),
+        saturate(100.0 * ve, 16),
+        saturate(100.0 * vd, 16),
         course,
         FIX_TYPES[int(r.fix)],
         int(r.visible) or SATELLITES,
@@ -59,7 +59,7 @@ def gps_values(time_us: int, r: GpsReading) -> tuple:
 
 def distance_values(time_us: int, r: DistanceReading) -> tuple:
     """Return the values of DISTANCE_SENSOR for a sensor that looks down."""
-    distance = saturated(100.0 * r.range, 16, True)
+    distance = saturate(100.0 * r.range, 16, True)
     return (time_us // 1000, 0, UNKNOWN, distance, 0, 0, DOWN, 0, *(0.0,) * 6, 0)
 
 

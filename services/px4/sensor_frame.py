@@ -146,11 +146,11 @@ def read_controls(data: Any, size: int, m: Payload) -> bool:
 
 
 @kernel
-def _written(out: Any, m: Any, sequence: int, time_us: int, s: Any) -> int:
+def _write(out: Any, m: Any, sequence: int, time_us: int, s: Any) -> int:
     return write_sensors(out, m, sequence, time_us, s)
 
 
 def sensor_frame(sequence: int, time_us: int, s: Sensors) -> bytes:
     """Return the frame of HIL_SENSOR; see `write_sensors`."""
     out = np.zeros(_HEAD + _END + 2, np.uint8)
-    return out[: _written(out, payload(), sequence, time_us, s)].tobytes()
+    return out[: _write(out, payload(), sequence, time_us, s)].tobytes()

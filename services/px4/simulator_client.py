@@ -67,13 +67,13 @@ class SimulatorClient:
             FirmwareError: none comes within `timeout` [s]; `at` is the time for the message.
         """
         result: list[Message] = []
-        begun, patience = time.perf_counter(), None
+        started, patience = time.perf_counter(), None
         while True:
             while self._waiting:
                 result.append(self._waiting.popleft())
                 number, values = result[-1]
                 if number == HIL_SENSOR.number and values[15] == 0:
-                    self.report.waiting += time.perf_counter() - begun
+                    self.report.waiting += time.perf_counter() - started
                     return result
             if not self._read():
                 return None

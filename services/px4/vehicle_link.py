@@ -5,7 +5,7 @@ from lapwing.services.common import ports
 from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareOutput, Read
 from lapwing.services.common.firmware.mavlink_transport import UdpTransport
-from lapwing.services.common.firmware.mission import mission_messages, uploaded
+from lapwing.services.common.firmware.mission import mission_items, mission_messages
 from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.px4.modes import CONVENTIONS
@@ -18,7 +18,7 @@ class VehicleLink:
 
     def __init__(self, setup: FirmwareSetup, transport: UdpTransport):
         """Create it before PX4 has sent anything."""
-        items, parameters = uploaded(setup.plan), {} if setup.command else dict(setup.parameters)
+        items, parameters = mission_items(setup.plan), {} if setup.command else dict(setup.parameters)
         self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, setup.own.datum), parameters)
         self._status = FlightStatus("px4", self._client)
         self._battery, self._battery_at = setup.own.battery, 0.0  # [s] of the next message

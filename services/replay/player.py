@@ -56,7 +56,7 @@ def play(
         publishers = {topic: bus.publisher(f"{key_prefix}{topic}") for topic in types}
         subscribers = Subscribers(bus, key_prefix)
         _await_subscriber(bus, [f"{key_prefix}{topic}" for topic in types], stopping)
-        writer = LogWriter(record, _copied_metadata(source.metadata), dict(source.attachments)) if record else None
+        writer = LogWriter(record, _copy_metadata(source.metadata), dict(source.attachments)) if record else None
         count, pace = 0, pace or Pace()
         try:
             while not (stopping() or pace.quit):
@@ -118,7 +118,7 @@ class Subscribers:
             time.sleep(BRIEF)
 
 
-def _copied_metadata(metadata: dict[str, str]) -> dict[str, str]:
+def _copy_metadata(metadata: dict[str, str]) -> dict[str, str]:
     """Return the log's metadata without the recomputed entries."""
     return {key: value for key, value in metadata.items() if key != "digest"}
 

@@ -40,7 +40,7 @@ def new_delay_line(value: Vec3) -> Line:
 
 
 @always_inline
-def _pushed(line: Line, value: Vec3) -> Line:
+def _push(line: Line, value: Vec3) -> Line:
     return (value,) + line[:-1]  # noqa: RUF005 (compiled tuples have no unpacking)
 
 
@@ -63,7 +63,7 @@ def apply_delay_and_faults(
         The line with the value in it, the value that arrives now, and whether one arrives.
     """
     if faults is None:
-        line = _pushed(line, value)
+        line = _push(line, value)
         return line, line[latency], True
     age = latency
     valid = True
@@ -88,5 +88,5 @@ def apply_delay_and_faults(
         elif f.kind == DELAY:
             age = min(age + f.samples, DEPTH - 1)
     if not frozen:
-        line = _pushed(line, value)
+        line = _push(line, value)
     return line, line[age], valid

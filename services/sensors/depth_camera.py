@@ -14,7 +14,7 @@ from lapwing.kernels import kernel, math
 from lapwing.messages import Image, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
-from lapwing.services.sensors.scan import READING, ScanPose, ScanState, blank, posed, scanned
+from lapwing.services.sensors.scan import READING, ScanPose, ScanState, blank, instrument_pose, scan_distances
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 __all__ = ["PRESETS", "READING", "DepthCamera", "blank", "initial", "pixels", "sample", "wires"]
@@ -44,7 +44,7 @@ def initial(p: DepthCamera, key: Key, truth: Truth) -> ScanState:
 @kernel
 def sample(p: DepthCamera, s: ScanState, key: Key, tick: int, truth: Truth) -> tuple[ScanState, ScanPose]:
     """Return the state and the pose of an image. See `imu.sample` for arguments."""
-    return s, posed(p, truth, tick)
+    return s, instrument_pose(p, truth, tick)
 
 
 def pixels(p: DepthCamera) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +69,7 @@ def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     directions, cosines = pixels(p)
 
     def depths(x: ScanPose, time_ns: np.ndarray) -> Fields:
-        depth = (scanned(instrument, terrain, directions, x) * cosines).astype("<f4")
+        depth = (scan_distances(instrument, terrain, directions, x) * cosines).astype("<f4")
         return {**stamp_columns(time_ns), "data": depth.view(np.uint8)}
 
     def image() -> Any:

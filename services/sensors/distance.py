@@ -26,13 +26,13 @@ def blank() -> DistanceState:
 
 
 @always_inline
-def switched_on(p: Any, key: Key, distance: float) -> DistanceState:
+def initial_state(p: Any, key: Key, distance: float) -> DistanceState:
     """Return the state before the first sample, at a true distance [m]; `p`: parameters of the sensor."""
     return DistanceState(1.0 + p.scale_error * normal(key, TURN_ON, 0), new_delay_line((distance, 0.0, 0.0)))
 
 
 @always_inline
-def measured(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> tuple[DistanceState, DistanceReading]:
+def measure(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> tuple[DistanceState, DistanceReading]:
     """Return the next state and the reading of a true distance [m]. See `imu.sample` for other arguments."""
     noise = error_models.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     true = (s.scale * distance + noise, 0.0, 0.0)

@@ -13,7 +13,7 @@ from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GpsReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
-from lapwing.services.sensors.rtk import Rtk, RtkState, check_rtk, ratio, solved
+from lapwing.services.sensors.rtk import Rtk, RtkState, check_rtk, ratio, update_solution
 from lapwing.services.sensors.satellites import (
     NO_ERRORS,
     Constellation,
@@ -126,7 +126,7 @@ def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3, fix: Solutio
 
 
 @kernel
-def _seen(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
+def _antenna_motion(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
     """Return position [m] and velocity [m/s] of the antenna in the world (theory.md, eq. (3.38))."""
     if antenna is None:
         return truth.position_world, truth.velocity_world
@@ -166,7 +166,7 @@ def _fix_now(rtk: Rtk | None, s: RtkState, fix_status: int) -> int:
 
 
 @always_inline
-def _modelled(c: Constellation | None, rtk: Rtk | None) -> bool:
+def _has_satellites(c: Constellation | None, rtk: Rtk | None) -> bool:
     return c is not None or rtk is not None
 
 
@@ -174,7 +174,7 @@ def _modelled(c: Constellation | None, rtk: Rtk | None) -> bool:
 def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
     """Return the state before the first sample: the receiver has run here for its latency."""
     wander = normal3(key, TURN_ON, 0)
-    position, velocity = _seen(p.antenna, truth)
+    position, velocity = _antenna_motion(p.antenna, truth)
     ranges, rtk = first_errors(p.constellation, key, TURN_ON), RtkState(math.inf, 0.0, GPS_RTK)
     s = GpsState(wander, geometry(p.sky), BLANK, BLANK, ranges, rtk, 0)
     fix = _solution(p, s, position, truth, key, TURN_ON)
@@ -193,12 +193,12 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
     v = error_models.white_deviation(p.noise_velocity_m_per_s_per_sqrt_hz, p.rate)
     wander = error_models.walk(s.wander, 1.0, p.correlation_time, p.rate, normal3(key, tick, 0))
     ranges = next_errors(p.constellation, s.ranges, p.correlation_time, p.rate, key, tick)
-    position, velocity = _seen(p.antenna, truth)
+    position, velocity = _antenna_motion(p.antenna, truth)
     time = s.samples / p.rate
     s = GpsState(wander, s.geometry, s.position_line, s.velocity_line, ranges, s.rtk, s.samples)
     kind, fix = _fix_now(p.rtk, s.rtk, p.fix_status), _solution(p, s, position, truth, key, tick)
     on = time >= p.time_to_first_fix and fix.found and _under_sky(p.outages, truth.position_world)
-    rtk = solved(p.rtk, s.rtk, 1.0 / p.rate, time, fix.used, on)
+    rtk = update_solution(p.rtk, s.rtk, 1.0 / p.rate, time, fix.used, on)
     error, variance = _position_error(p, s, wander, normal3(key, tick, 1), fix, ratio(p.rtk, kind))
     position = add(position, error)
     velocity = add(velocity, multiply((v, v, v), normal3(key, tick, 2)))
@@ -218,7 +218,7 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
         v * v,
         p.latency_samples / p.rate,
         seen and moving and on,
-        kind if _modelled(p.constellation, p.rtk) else 0,
+        kind if _has_satellites(p.constellation, p.rtk) else 0,
         fix.used,
         fix.visible,
         math.sqrt(fix.variance[0] + fix.variance[1]),

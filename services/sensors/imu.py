@@ -14,7 +14,7 @@ from lapwing.services.sensors import error_models, imu_motion
 from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.imu_motion import Vibration
 from lapwing.services.sensors.low_pass import LowPass, check_low_pass
-from lapwing.services.sensors.rotor_vibration import AT_REST, Phases, RotorVibration, shaken, started
+from lapwing.services.sensors.rotor_vibration import AT_REST, Phases, RotorVibration, initial_phases, vibration
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 from lapwing.services.sensors.triad import (
     BLANK_TRIAD,
@@ -27,7 +27,7 @@ from lapwing.services.sensors.triad import (
     gyro_units,
     measure,
     new_triad,
-    rectified,
+    rectification_bias,
 )
 
 CHANNELS = ("gyro", "accelerometer")
@@ -94,7 +94,7 @@ def initial(p: Imu, key: Key, truth: Truth) -> ImuState:
         0.0,
         truth.attitude,
         imu_motion.velocity_world(p.position, truth),
-        started(p.rotor_vibration, key),
+        initial_phases(p.rotor_vibration, key),
         force,
     )
 
@@ -121,16 +121,16 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
         late = p.sampling_jitter * normal(key, tick, _JITTER)
         omega = add(omega, scale(late, truth.angular_acceleration_body))
         force = add(force, scale(late * p.rate, subtract(force, s.force)))
-    phase, shake = imu_motion.shaken(p.vibration, p.delta_output, p.rate, s.phase, truth)
+    phase, shake = imu_motion.vibration_at(p.vibration, p.delta_output, p.rate, s.phase, truth)
     force = add(force, shake)
     cold = s.cold * (1.0 - 1.0 / (p.rate * p.warm_up_time))
     g, a = gyro_units(p.gyro), accelerometer_units(p.accelerometer)
-    phases, shake, square = shaken(p.rotor_vibration, p.accelerometer_filter, p, s.phases, key, tick, truth, late)
+    phases, shake, square = vibration(p.rotor_vibration, p.accelerometer_filter, p, s.phases, key, tick, truth, late)
     turned = g_shift(p.cross_coupling, key, force, square)
     gyro, omega, gyro_valid = measure(g, s.gyro, p, p.gyro_filter, cold, 0, key, tick, omega, turned, ZERO)
     accelerometer, force, force_valid = measure(
-        a, s.accelerometer, p, p.accelerometer_filter, cold, 1, key, tick, force, rectified(p.cross_coupling, square),
-        shake,
+        a, s.accelerometer, p, p.accelerometer_filter, cold, 1, key, tick, force,
+        rectification_bias(p.cross_coupling, square), shake,
     )  # fmt: skip
     omega_variance = error_models.sample_variance(g.noise, g.resolution, p.rate)
     force_variance = error_models.sample_variance(a.noise, a.resolution, p.rate)

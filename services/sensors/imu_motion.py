@@ -60,7 +60,7 @@ def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec
 
 
 @kernel
-def shaken(
+def vibration_at(
     vibration: Vibration | None, delta_output: bool, rate: float, phase: float, truth: Truth
 ) -> tuple[float, Vec3]:
     """Return the phase [rad] of the vibration and its specific force [m/s^2] (theory.md, eq. (3.44))."""

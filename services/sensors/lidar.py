@@ -15,7 +15,7 @@ from lapwing.kernels import kernel, math
 from lapwing.messages import LaserScan, PointCloud2, PointField, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
-from lapwing.services.sensors.scan import READING, ScanPose, ScanState, blank, posed, scanned
+from lapwing.services.sensors.scan import READING, ScanPose, ScanState, blank, instrument_pose, scan_distances
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 __all__ = ["PRESETS", "READING", "Lidar", "blank", "check", "initial", "rays", "sample", "wires"]
@@ -56,7 +56,7 @@ def initial(p: Lidar, key: Key, truth: Truth) -> ScanState:
 @kernel
 def sample(p: Lidar, s: ScanState, key: Key, tick: int, truth: Truth) -> tuple[ScanState, ScanPose]:
     """Return the state and the pose of a scan. See `imu.sample` for arguments."""
-    return s, posed(p, truth, tick)
+    return s, instrument_pose(p, truth, tick)
 
 
 def azimuths(p: Lidar) -> np.ndarray:
@@ -85,10 +85,10 @@ def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     terrain, directions = as_relief(instrument.around.terrain), rays(p)
 
     def ranges(x: ScanPose, time_ns: np.ndarray) -> Fields:
-        return {**stamp_columns(time_ns), "ranges": scanned(instrument, terrain, directions, x).astype("<f4")}
+        return {**stamp_columns(time_ns), "ranges": scan_distances(instrument, terrain, directions, x).astype("<f4")}
 
     def points(x: ScanPose, time_ns: np.ndarray) -> Fields:
-        distance = scanned(instrument, terrain, directions, x)
+        distance = scan_distances(instrument, terrain, directions, x)
         distance[~np.isfinite(distance)] = np.nan
         xyz = (distance[:, :, None] * directions + np.array(p.position)).astype("<f4")
         return {**stamp_columns(time_ns), "data": xyz.reshape(len(xyz), -1).view(np.uint8)}

@@ -53,13 +53,13 @@ def check_low_pass(f: LowPass | None, rate: float) -> None:
 
 
 @kernel
-def started(value: Vec3) -> LowPassState:
+def state_at_rest(value: Vec3) -> LowPassState:
     """Return the state of a filter at rest with this input."""
     return LowPassState(value, ZERO, value, value)
 
 
 @kernel
-def filtered(f: LowPass, s: LowPassState, rate: float, value: Vec3) -> LowPassState:
+def update(f: LowPass, s: LowPassState, rate: float, value: Vec3) -> LowPassState:
     """Return the state one sample later, exact for an input that is linear in between."""
     delayed = subtract(value, scale(further_delay(f) * rate, subtract(value, s.raw)))
     beta = 2.0 * math.pi * f.bandwidth_hz / _SQRT_2  # [rad/s] real and imaginary part of the poles

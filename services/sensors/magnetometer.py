@@ -59,7 +59,7 @@ def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
 
 
 @always_inline
-def softened(deviation: float, along: Vec3, across: Vec3) -> Mat3:
+def soft_iron_matrix(deviation: float, along: Vec3, across: Vec3) -> Mat3:
     """Return the symmetric matrix by which magnetised material distorts the field (theory.md, eq. (3.51))."""
     x, y, z = scale(deviation, along)
     a, b, c = scale(deviation, across)
@@ -73,7 +73,7 @@ def initial(p: Magnetometer, key: Key, truth: Truth) -> MagnetometerState:
         p.scale_error, math.radians(p.misalignment_deg), normal3(key, TURN_ON, 0), normal3(key, TURN_ON, 1)
     )
     if p.soft_iron > 0.0:
-        matrix = matmul(softened(p.soft_iron, normal3(key, TURN_ON, 4), normal3(key, TURN_ON, 5)), matrix)
+        matrix = matmul(soft_iron_matrix(p.soft_iron, normal3(key, TURN_ON, 4), normal3(key, TURN_ON, 5)), matrix)
     hard_iron = scale(p.hard_iron_nt * _NANO, normal3(key, TURN_ON, 2))
     walk = scale(error_models.walk_deviation(p.bias_instability_nt * _NANO), normal3(key, TURN_ON, 3))
     true = _true_field(p, truth)

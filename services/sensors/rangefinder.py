@@ -19,7 +19,7 @@ from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors.delay_line import DEPTH, Fault
-from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
+from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, initial_state, measure
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 __all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", "sample", "to_ground", "wires"]
@@ -75,7 +75,7 @@ def _distance(p: Rangefinder, truth: Truth) -> float:
 @kernel
 def initial(p: Rangefinder, key: Key, truth: Truth) -> DistanceState:
     """Return the state before the first sample."""
-    return switched_on(p, key, _distance(p, truth))
+    return initial_state(p, key, _distance(p, truth))
 
 
 @kernel
@@ -83,7 +83,7 @@ def sample(
     p: Rangefinder, s: DistanceState, key: Key, tick: int, truth: Truth
 ) -> tuple[DistanceState, DistanceReading]:
     """Return the next state and the reading. See `imu.sample` for arguments."""
-    return measured(p, s, key, tick, _distance(p, truth))
+    return measure(p, s, key, tick, _distance(p, truth))
 
 
 def _fields(r: DistanceReading, time_ns: np.ndarray) -> Fields:

@@ -65,7 +65,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
     faults: Sequence[Mapping[str, Any]] = values.pop("faults", ())
     kind: Any = type(preset)
     try:
-        p = _adapter(kind).validate_python(_merged(preset, values))
+        p = _adapter(kind).validate_python(_merge(preset, values))
         _check_limits(p)
         if hasattr(module, "check"):
             module.check(p)
@@ -100,10 +100,10 @@ def _check_limits(p: Any) -> None:
         raise ConfigError("range_min", f"got {least:g}", f"less than range_max = {most:g} m")
 
 
-def _merged(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:
+def _merge(preset: Any, table: Mapping[str, Any]) -> dict[str, Any]:
     """Return the preset's values as nested dictionaries, overridden by the table."""
     merged = dict(preset._asdict())
     for key, value in table.items():
         inner = merged.get(key)
-        merged[key] = _merged(inner, value) if hasattr(inner, "_asdict") and isinstance(value, Mapping) else value
-    return {k: _merged(v, {}) if hasattr(v, "_asdict") else v for k, v in merged.items()}
+        merged[key] = _merge(inner, value) if hasattr(inner, "_asdict") and isinstance(value, Mapping) else value
+    return {k: _merge(v, {}) if hasattr(v, "_asdict") else v for k, v in merged.items()}

@@ -94,10 +94,10 @@ def reseed(config: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
 
 
 def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
-    return tried(name, table, p) if "module" in table else module_of(name, table).READING
+    return trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
 
 
-def tried(name: str, table: Mapping[str, Any], p: Any) -> Any:
+def trial_reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
     """Return the reading of a custom sensor after a trial sample.
 
     Args:

@@ -36,7 +36,7 @@ class RotorVibration(NamedTuple):
 
 
 @kernel
-def _damaged(damage: Damage | None, tick: int, i: int) -> float:
+def _lost_thrust(damage: Damage | None, tick: int, i: int) -> float:
     """Return the fraction of the thrust that a rotor has lost."""
     if damage is None:
         return 0.0
@@ -47,7 +47,7 @@ def _damaged(damage: Damage | None, tick: int, i: int) -> float:
 def _imbalance(v: RotorVibration, key: Key, tick: int, i: int) -> float:
     """Return the amplitude [mg] of a rotor at the reference speed."""
     drawn = v.imbalance_mg * abs(normal3(key, TURN_ON, _LANE + i)[0])
-    return drawn + v.damage_mg * _damaged(v.damage, tick, i)
+    return drawn + v.damage_mg * _lost_thrust(v.damage, tick, i)
 
 
 @kernel
@@ -64,12 +64,12 @@ def _wave(low_pass: LowPass | None, averaged: bool, rate: float, omega: float, p
 
 
 @kernel
-def _advanced(phases: Phases, truth: Truth, rate: float, i: int) -> float:
+def _next_phase(phases: Phases, truth: Truth, rate: float, i: int) -> float:
     return (phases[i] + truth.rotor_speeds[i] / rate) % (2.0 * math.pi)
 
 
 @kernel
-def started(v: RotorVibration | None, key: Key) -> Phases:
+def initial_phases(v: RotorVibration | None, key: Key) -> Phases:
     """Return the phases at the start."""
     if v is None:
         return AT_REST
@@ -80,7 +80,7 @@ def started(v: RotorVibration | None, key: Key) -> Phases:
 
 
 @kernel
-def shaken(
+def vibration(
     v: RotorVibration | None, low_pass: LowPass | None, p: Any, phases: Phases, key: Key, tick: int, truth: Truth,
     late: float,
 ) -> tuple[Phases, Vec3, Vec3]:  # fmt: skip
@@ -99,9 +99,10 @@ def shaken(
     if v is None:
         return phases, ZERO, ZERO
     phases = (
-        _advanced(phases, truth, p.rate, 0), _advanced(phases, truth, p.rate, 1), _advanced(phases, truth, p.rate, 2),
-        _advanced(phases, truth, p.rate, 3), _advanced(phases, truth, p.rate, 4), _advanced(phases, truth, p.rate, 5),
-        _advanced(phases, truth, p.rate, 6), _advanced(phases, truth, p.rate, 7),
+        _next_phase(phases, truth, p.rate, 0), _next_phase(phases, truth, p.rate, 1),
+        _next_phase(phases, truth, p.rate, 2), _next_phase(phases, truth, p.rate, 3),
+        _next_phase(phases, truth, p.rate, 4), _next_phase(phases, truth, p.rate, 5),
+        _next_phase(phases, truth, p.rate, 6), _next_phase(phases, truth, p.rate, 7),
     )  # fmt: skip
     x = y = z = across = along = 0.0
     for i in range(ROTORS):

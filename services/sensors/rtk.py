@@ -54,7 +54,7 @@ def _lost(gaps: tuple[Gap, ...] | None, time: float) -> bool:
 
 
 @kernel
-def solved(r: Rtk | None, s: RtkState, interval: float, time: float, used: int, has_fix: bool) -> RtkState:
+def update_solution(r: Rtk | None, s: RtkState, interval: float, time: float, used: int, has_fix: bool) -> RtkState:
     """Return the state of the solution at a sample.
 
     Args:

@@ -38,7 +38,7 @@ def blank() -> ScanState:
 
 
 @kernel
-def posed(p: Any, truth: Truth, tick: int) -> ScanPose:
+def instrument_pose(p: Any, truth: Truth, tick: int) -> ScanPose:
     """Return the pose of an instrument at `p.position` of the body."""
     return ScanPose(add(truth.position_world, rotate(truth.attitude, p.position)), truth.attitude, tick)
 
@@ -78,7 +78,7 @@ def scan(
         out[k] = math.inf if distance > most else -math.inf if distance < least else distance
 
 
-def scanned(instrument: Any, terrain: Any, rays: np.ndarray, x: ScanPose) -> np.ndarray:
+def scan_distances(instrument: Any, terrain: Any, rays: np.ndarray, x: ScanPose) -> np.ndarray:
     """Return the distances (m, n) [m] of m scans of n rays."""
     p = instrument.sensor
     position, attitude, ticks = (np.asarray(part, float) for part in x)

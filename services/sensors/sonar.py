@@ -14,7 +14,7 @@ from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import generic
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors.delay_line import DEPTH, Fault
-from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, measured, switched_on
+from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, initial_state, measure
 from lapwing.services.sensors.sensor_inputs import Truth
 
 __all__ = ["CHANNELS", "PRESETS", "Sonar", "blank", "initial", "sample"]
@@ -79,13 +79,13 @@ def _over_relief(p: Sonar, truth: Truth) -> float:
 @kernel
 def initial(p: Sonar, key: Key, truth: Truth) -> DistanceState:
     """Return the state before the first sample."""
-    return switched_on(p, key, _distance(p, truth))
+    return initial_state(p, key, _distance(p, truth))
 
 
 @kernel
 def sample(p: Sonar, s: DistanceState, key: Key, tick: int, truth: Truth) -> tuple[DistanceState, DistanceReading]:
     """Return the next state and the reading. See `imu.sample` for arguments."""
-    s, r = measured(p, s, key, tick, _distance(p, truth))
+    s, r = measure(p, s, key, tick, _distance(p, truth))
     return s, DistanceReading(float(np.float32(r.range)), float(np.float32(r.variance)), r.valid)
 
 

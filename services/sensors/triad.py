@@ -10,7 +10,7 @@ from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, dot, matmul, s
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, Line, apply_delay_and_faults, new_delay_line
-from lapwing.services.sensors.low_pass import REST, LowPass, LowPassState, filtered, started
+from lapwing.services.sensors.low_pass import REST, LowPass, LowPassState, state_at_rest, update
 
 _DPS = math.radians(1.0)  # [rad/s] in one degree per second
 MG = 1e-3 * error_models.STANDARD_GRAVITY  # [m/s^2] in one mg
@@ -123,7 +123,7 @@ def accelerometer_units(a: Accelerometer) -> Units:
 
 
 @kernel
-def coupled(c: CrossCoupling | None, key: Key, lane: int, drawn: Mat3) -> Mat3:
+def skewed_matrix(c: CrossCoupling | None, key: Key, lane: int, drawn: Mat3) -> Mat3:
     """Return the matrix of a triad with its skewed axes (theory.md, eq. (3.50)); lane 0: gyroscopes."""
     if c is None:
         return drawn
@@ -147,7 +147,7 @@ def g_shift(c: CrossCoupling | None, key: Key, force: Vec3, square: Vec3) -> Vec
 
 
 @kernel
-def rectified(c: CrossCoupling | None, square: Vec3) -> Vec3:
+def rectification_bias(c: CrossCoupling | None, square: Vec3) -> Vec3:
     """Return the bias of the accelerometers [m/s^2] by vibration, its mean square [g^2]."""
     return ZERO if c is None else scale(c.rectification_mg_per_g2 * MG, square)
 
@@ -158,26 +158,26 @@ def new_triad(u: Units, c: CrossCoupling | None, key: Key, lane: int, cold: floa
     drawn = error_models.scale_and_misalignment(
         u.scale_error, u.misalignment, normal3(key, TURN_ON, lane), normal3(key, TURN_ON, lane + 1)
     )
-    matrix = coupled(c, key, lane, drawn)
+    matrix = skewed_matrix(c, key, lane, drawn)
     turn_on_bias = scale(u.turn_on_bias, normal3(key, TURN_ON, lane + 2))
     temperature = scale(u.temperature, normal3(key, TURN_ON, lane + 3))
     walk = scale(error_models.walk_deviation(u.instability), normal3(key, TURN_ON, lane + 4))
     bias = add(add(turn_on_bias, walk), scale(-cold, temperature))
     return Triad(matrix, turn_on_bias, temperature, walk, new_delay_line(add(apply(matrix, value), bias)),
-                 started(add(apply(matrix, value), bias)), ZERO)  # fmt: skip
+                 state_at_rest(add(apply(matrix, value), bias)), ZERO)  # fmt: skip
 
 
 @kernel
-def _passed(f: LowPass | None, s: LowPassState, rate: float, value: Vec3) -> tuple[LowPassState, Vec3]:
+def _filter(f: LowPass | None, s: LowPassState, rate: float, value: Vec3) -> tuple[LowPassState, Vec3]:
     """Return state and output of the internal filter; without one, the input."""
     if f is None:
         return s, value
-    after = filtered(f, s, rate, value)
+    after = update(f, s, rate, value)
     return after, after.output
 
 
 @always_inline
-def _railed(left: float, value: float, limit: float, samples: float) -> float:
+def _samples_at_limit(left: float, value: float, limit: float, samples: float) -> float:
     """Return the samples that an axis stays at its limit, with the limit's sign."""
     if abs(value) > limit:
         return math.copysign(samples, value)
@@ -219,16 +219,16 @@ def measure(
     )
     bias = add(add(add(t.turn_on_bias, walk), scale(-cold, t.temperature)), shift)
     noise = scale(error_models.white_deviation(u.noise, p.rate), normal3(key, tick, 2 * channel + 1))
-    low_pass, analogue = _passed(f, t.low_pass, p.rate, add(add(apply(t.matrix, value), bias), noise))
+    low_pass, analogue = _filter(f, t.low_pass, p.rate, add(add(apply(t.matrix, value), bias), noise))
     analogue = add(analogue, shake)
     measured = error_models.digitise(analogue, u.range, u.resolution)
     railed = t.railed
     if p.saturation_recovery > 0.0:
         samples = np.floor(p.saturation_recovery * p.rate + 0.5) + 1.0
         railed = (
-            _railed(railed[0], analogue[0], u.range, samples),
-            _railed(railed[1], analogue[1], u.range, samples),
-            _railed(railed[2], analogue[2], u.range, samples),
+            _samples_at_limit(railed[0], analogue[0], u.range, samples),
+            _samples_at_limit(railed[1], analogue[1], u.range, samples),
+            _samples_at_limit(railed[2], analogue[2], u.range, samples),
         )
         measured = (
             _held(railed[0], measured[0], u.range),

@@ -19,7 +19,7 @@ class FollowedPath(NamedTuple):
 
 
 @always_inline
-def turned(heading: Vec3, offset: Setpoint) -> tuple[Vec3, Vec3, Vec3]:
+def rotate_setpoint(heading: Vec3, offset: Setpoint) -> tuple[Vec3, Vec3, Vec3]:
     """Return world position, velocity and acceleration of a setpoint in a frame rotated about z.
 
     `heading` has angle, rate and acceleration of the frame [rad], [rad/s], [rad/s^2].
@@ -48,7 +48,7 @@ def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) ->
     leader = polynomial_piece.evaluate(p.leader.path, t, p.leader.final)
     offset = polynomial_piece.evaluate(p.relative.path, t, p.relative.final)
     heading = polynomial_piece.channel_at(p.leader.path.yaw, t) if p.heading else (0.0, 0.0, 0.0)
-    position, velocity, acceleration = turned(heading, offset)
+    position, velocity, acceleration = rotate_setpoint(heading, offset)
     return (
         s,
         (

@@ -17,7 +17,7 @@ from lapwing.services.common.vehicle_schema import start_place
 from lapwing.services.trajectory.block import TrajectoryPath
 from lapwing.services.trajectory.leader_follower import FollowedPath
 from lapwing.services.trajectory.polynomial_piece import Parameters
-from lapwing.services.trajectory.schema import Trajectory, compiled
+from lapwing.services.trajectory.schema import Trajectory, compile_trajectory
 from lapwing.services.trajectory.service import TrajectorySetup
 
 LEAD = 0.2  # [s] maximum lead of the references over the plant
@@ -28,7 +28,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if not follows_trajectory(scene):
         return None
     exchange = scene[Communication]
-    trajectory, result = scene[Trajectory], compiled(scene)
+    trajectory, result = scene[Trajectory], compile_trajectory(scene)
     path = result.parameters._replace(origin_world=start_place(scene))
     core = TrajectoryPath(path, result.final, exchange.interval)
     lead_ticks = max(1, round(LEAD * exchange.rate))
@@ -54,11 +54,11 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
     Raises:
         ConfigError: a leader does not exist or follows another vehicle.
     """
-    return {name: _following(name, shares, keys[name]) if share.parameters.leader else share
+    return {name: _followed_service(name, shares, keys[name]) if share.parameters.leader else share
             for name, share in shares.items()}  # fmt: skip
 
 
-def _following(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
+def _followed_service(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
     own = shares[name].parameters
     others = [other for other, share in shares.items() if other != name and not share.parameters.leader]
     if own.leader not in others:

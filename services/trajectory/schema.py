@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from typing import Any, ClassVar, Literal
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.cosim.scene.files import named
+from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common import user_modules
 from lapwing.services.trajectory import user_segment
@@ -41,7 +41,7 @@ class Trajectory(Phases, SceneTable):
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Store the modules of user segments, and read the CSV file of a segment of kind "table" into its points."""
-        phases = named(tree, cls.TABLE, "phase")
+        phases = unvalidated_value(tree, cls.TABLE, "phase")
         for i, phase in enumerate(phases if isinstance(phases, list) else ()):
             for channel in CHANNELS if isinstance(phase, dict) else ():
                 segments = phase.get(channel, ())
@@ -58,12 +58,12 @@ class Trajectory(Phases, SceneTable):
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless the segments join, phases are long enough, and a frame has a leader."""
-        compiled(scene)
+        compile_trajectory(scene)
         if self.frame and not self.leader:
             raise ConfigError("trajectory.frame", "has no leader", "trajectory.leader, or no frame")
 
 
-def compiled(scene: Scene) -> CompiledTrajectory:
+def compile_trajectory(scene: Scene) -> CompiledTrajectory:
     """Return the scene's trajectory about the origin. See `compile` for errors."""
     return scene.cached(_compile)
 

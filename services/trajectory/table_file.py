@@ -34,5 +34,5 @@ def parse(text: str, path: Path) -> list[list[float]]:
     return points
 
 
-def _wrong(path: Path, line: int, got: str, expected: str) -> SceneError:
-    return SceneError("", f"got {got!r}", expected, KeyOrigin(path, line))
+def _wrong(path: Path, line: int, actual: str, expected: str) -> SceneError:
+    return SceneError("", f"got {actual!r}", expected, KeyOrigin(path, line))

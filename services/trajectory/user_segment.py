@@ -68,4 +68,4 @@ def load(scene: Scene, segments: Iterator[tuple[str, Segment]]) -> None:
     texts = user_modules.texts(scene)
     for key, segment in segments:
         if isinstance(segment, UserSegment):
-            user_code.loaded(f"{key}.module", segment.module, texts)
+            user_code.load_module(f"{key}.module", segment.module, texts)

@@ -61,29 +61,29 @@ def test_no_part_makes_arrays(scene, monkeypatch):
 def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_mission.toml"
     published = load(scene)[Published].rmse
-    flown = fly(scene, tmp_path)
-    assert flown["landed"]
+    flight = fly(scene, tmp_path)
+    assert flight["landed"]
     for axis, value in published.items():
-        assert flown["rmse"][axis] < value, axis
+        assert flight["rmse"][axis] < value, axis
 
 
 def test_paper_gains_on_truth_repeat_table_7_in_translation(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_paper.toml"
     published = load(scene)[Published].rmse
-    flown = fly(scene, tmp_path)
-    assert flown["landed"]
+    flight = fly(scene, tmp_path)
+    assert flight["landed"]
     for axis in "xyz":
-        assert flown["rmse"][axis] == pytest.approx(published[axis], rel=0.25), axis
+        assert flight["rmse"][axis] == pytest.approx(published[axis], rel=0.25), axis
 
 
 def test_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_full.toml"
     published = load(scene)[Published].rmse
-    flown = fly(scene, tmp_path)
-    assert flown["landed"]
-    assert flown["sim_time_s"] > 120.0
+    flight = fly(scene, tmp_path)
+    assert flight["landed"]
+    assert flight["sim_time_s"] > 120.0
     for axis, value in published.items():
-        assert flown["rmse"][axis] < value, axis
+        assert flight["rmse"][axis] < value, axis
     with LogReader(tmp_path / "log.mcap") as log:
         times_ns, truth = log.history("/drone1/ground_truth")
     t, height, thrust = times_ns * 1e-9, truth["pose.position.z"], truth["rotor_thrust"].sum(axis=1)

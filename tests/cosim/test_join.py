@@ -93,7 +93,7 @@ def test_participant_cannot_publish_for_others(tmp_path):
         ZenohBus(connect=[end], gid=run.gid("sensors"), security={**tls(keys, "sensors"), **rules}) as sensors,
     ):
         pairs = (("plant", plant, "sensors"), ("sensors", sensors, "plant"))
-        heard = {name: bus.receive(run.senders(STEP_KEY, [other, "autopilot"])) for name, bus, other in pairs}
+        received = {name: bus.receive(run.senders(STEP_KEY, [other, "autopilot"])) for name, bus, other in pairs}
         for name, bus, _ in pairs:
             bus.declare_liveliness(f"test-access/{ALIVE_KEY}/{name}")
         for _, bus, other in pairs:
@@ -105,7 +105,7 @@ def test_participant_cannot_publish_for_others(tmp_path):
             bus.publisher(f"test-access/{STEP_KEY}/{name}")(b"own", 0)
         for name, bus, other in pairs:
             messages = []
-            while (message := heard[name].get_with_key(timeout=1.0)) is not None:
+            while (message := received[name].get_with_key(timeout=1.0)) is not None:
                 messages.append(message)
             # what a session publishes itself comes back to it unfiltered
             assert sorted(messages) == [
@@ -126,7 +126,7 @@ def test_viewer_reads_only_and_needs_certificate(tmp_path):
         ZenohBus(connect=[end], mode="client", gid=run.gid(MAVLINK), security=tls(keys, VIEWER)) as viewer,
     ):
         withheld = viewer.subscribe(f"test-viewer/{STEP_KEY}/*")
-        heard, read = autopilot.subscribe("test-viewer/**"), viewer.subscribe(topic)
+        received, read = autopilot.subscribe("test-viewer/**"), viewer.subscribe(topic)
         publish, step = autopilot.publisher(topic), autopilot.publisher(bundles)
         while (message := read.get(timeout=0.1)) is None:  # until the subscriptions have come
             step(b"bundle", 0)
@@ -139,7 +139,7 @@ def test_viewer_reads_only_and_needs_certificate(tmp_path):
             viewer._session.delete(f"test-viewer/{key}")
         viewer.declare_liveliness(f"test-viewer/{ALIVE_KEY}/plant")
         assert autopilot.wait_for_liveliness([f"test-viewer/{ALIVE_KEY}/plant"], 1.0)  # is not there
-        while (message := heard.get_with_key(timeout=1.0)) is not None:
+        while (message := received.get_with_key(timeout=1.0)) is not None:
             assert message in ((topic, 0, b"status"), (bundles, 0, b"bundle"))  # its own
         with pytest.raises(BusError):
             ZenohBus(connect=[end], mode="client").close()

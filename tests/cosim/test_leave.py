@@ -25,7 +25,7 @@ SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "gauss_seidel", "drone1", {}, {}
 def joined(monkeypatch, external=()):
     """A process that has joined, and the session of the only other participant."""
     monkeypatch.setattr(lapwing.cosim.executors.stop_request.signal, "signal", lambda *_: None)
-    monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda told: None)
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda messages: None)
     with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
         process = Participant("plant", SETUP, bus, PublisherIds(PREFIX, external=external), ["plant", "other"])
         with ZenohBus(connect=[endpoints["plant"]]) as other:
@@ -44,17 +44,17 @@ def test_missing_confirmation_is_named(monkeypatch):
 
 
 def test_last_message_is_repeated_until_confirmed(monkeypatch):
-    output, heard = Counter(), threading.Event()
+    output, received = Counter(), threading.Event()
     with joined(monkeypatch) as (process, other):
 
         def repeat():
             output["end"] += 1
             if output["end"] == 3:
                 other.declare_liveliness(f"{PREFIX}/{HEARD_KEY}/other")
-                heard.set()
+                received.set()
 
         process.leave(repeat)
-    assert heard.is_set()
+    assert received.is_set()
 
 
 def test_participant_that_has_left_is_not_awaited(monkeypatch):

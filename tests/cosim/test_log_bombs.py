@@ -15,9 +15,9 @@ from mcap.writer import MCAP0_MAGIC
 
 import lapwing
 from lapwing.cosim.log import LogReader, mcap_contents
-from lapwing.cosim.log.mcap_writer import encoded
+from lapwing.cosim.log.mcap_writer import encode
 
-MESSAGE = encoded(Message(channel_id=1, data=b"hello", log_time=5, publish_time=5, sequence=0))
+MESSAGE = encode(Message(channel_id=1, data=b"hello", log_time=5, publish_time=5, sequence=0))
 LARGEST = 1 << 20  # [bytes] instead of 256 times as much
 BOMB = bytes(64 * LARGEST)
 
@@ -40,7 +40,7 @@ def write(path, compression, packed, size, crc=0):
     )
     schema = Schema(data=b"", encoding="", id=1, name="Any")
     channel = Channel(id=1, topic="/any", message_encoding="", metadata={}, schema_id=1)
-    path.write_bytes(MCAP0_MAGIC + b"".join(map(encoded, (schema, channel, chunk))))
+    path.write_bytes(MCAP0_MAGIC + b"".join(map(encode, (schema, channel, chunk))))
     return path
 
 
@@ -51,11 +51,11 @@ def test_packed_chunks_are_read(name, pack, tmp_path):
         assert list(log.messages()) == [("/any", "Any", 5, b"hello")]
 
 
-@pytest.mark.parametrize("said", [100, len(BOMB)], ids=["small", "large"])
+@pytest.mark.parametrize("printed", [100, len(BOMB)], ids=["small", "large"])
 @pytest.mark.parametrize(("name", "pack"), [("lz4", lz4_of), ("zstd", zstd_of), ("zstd", zstd_of_unknown_size)])
-def test_decompression_bombs_are_rejected_early(name, pack, said, monkeypatch, tmp_path):
+def test_decompression_bombs_are_rejected_early(name, pack, printed, monkeypatch, tmp_path):
     monkeypatch.setattr(mcap_contents, "LARGEST", LARGEST)
-    path = write(tmp_path / "log.mcap", name, pack(BOMB), said)
+    path = write(tmp_path / "log.mcap", name, pack(BOMB), printed)
     tracemalloc.start()
     try:
         with pytest.raises(ValueError, match=r"damaged chunk|its chunks unpack to over"):
@@ -68,7 +68,7 @@ def test_decompression_bombs_are_rejected_early(name, pack, said, monkeypatch, t
 def write_many(path, count, size):
     """Write a log of chunks that unpack to `size` zero bytes each, from a few bytes in the file."""
     packed = zstandard.compress(bytes(size))
-    chunk = encoded(
+    chunk = encode(
         Chunk("zstd", packed, message_start_time=5, message_end_time=5, uncompressed_crc=0, uncompressed_size=size)
     )
     path.write_bytes(MCAP0_MAGIC + count * chunk)

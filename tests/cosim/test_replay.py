@@ -132,7 +132,7 @@ def test_signal_ends_loop_at_once(log):
         (["LOG", "--listen", "nonsense"], "nonsense"),
     ],
 )
-def test_unreplayable_log_is_rejected_in_single_line(log, arguments, said):
+def test_unreplayable_log_is_rejected_in_single_line(log, arguments, output):
     arguments = [str(log) if a == "LOG" else a for a in arguments]
     (endpoint,) = loopback_endpoints(["a"]).values()
     values = [] if "--listen" in arguments else ["--listen", endpoint]
@@ -146,7 +146,7 @@ def test_unreplayable_log_is_rejected_in_single_line(log, arguments, said):
     assert result.returncode == 2
     assert result.stderr.startswith("lapwing: ")
     assert result.stderr.count("\n") == 1
-    assert said in result.stderr
+    assert output in result.stderr
 
 
 def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkeypatch):
@@ -173,12 +173,12 @@ def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkey
 def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
     monkeypatch.setattr(player, "SUBSCRIBER_TIMEOUT", 0.0)
     (endpoint,) = loopback_endpoints(["a"]).values()
-    heard, record = [], tmp_path / "a.mcap"
-    say = lambda topic, time_ns, payload: heard.append((topic, time_ns))  # noqa: E731
+    received, record = [], tmp_path / "a.mcap"
+    say = lambda topic, time_ns, payload: received.append((topic, time_ns))  # noqa: E731
     count = player.play(
         log, "test-topics", endpoint, Cut(0, None), None, False, record, lambda: False, say, topics=["/other"]
     )
-    assert (count, heard) == (1, [("/other", 200 * TICK)])
+    assert (count, received) == (1, [("/other", 200 * TICK)])
     with LogReader(record) as read:
         assert list(read.topics()) == ["/other"]
 

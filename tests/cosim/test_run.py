@@ -235,13 +235,13 @@ def test_killed_recorder_loses_half_second_at_most(started):
         run = started(prefix, "--listen", door, "--insecure")
         with ZenohBus(connect=[door], mode="client") as bus:
             clock = bus.subscribe(f"{prefix}/clock")
-            heard = clock.get(STARTED)[0]
-            while newer := clock.get(0.0 if heard > 3_000_000_000 else STARTED):
-                heard = newer[0]
+            received = clock.get(STARTED)[0]
+            while newer := clock.get(0.0 if received > 3_000_000_000 else STARTED):
+                received = newer[0]
             os.kill(run.children["recorder"], signal.SIGKILL)
         assert run.end()[0] == 1
         result = recover(run.log, run.log.with_suffix(".recovered.mcap"))
-        lost.append((heard - result.end_ns) * 1e-9)
+        lost.append((received - result.end_ns) * 1e-9)
         with LogReader(run.log.with_suffix(".recovered.mcap")) as log:
             assert log.complete
     assert min(lost) <= 0.5

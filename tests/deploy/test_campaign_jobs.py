@@ -43,9 +43,9 @@ def test_slurm_submits_parts_and_then_table(tmp_path):
     assert array[:4] == ["sbatch", "--parsable", "--export=ALL", "--array=1-3"]
     assert last[:4] == ["sbatch", "--export=ALL", "--dependency=afterany:77", "--wrap"]
     for part in (1, 2, 3):
-        (flown,) = calls(tmp_path, *array[4:], **values, SLURM_ARRAY_TASK_ID=str(part))
+        (flight,) = calls(tmp_path, *array[4:], **values, SLURM_ARRAY_TASK_ID=str(part))
         expected = ["--out", values["DIR"], "--shard", f"{part}/3", "--workers", "1"]
-        assert flown == ["lapwing", "campaign", *WORDS, *expected]
+        assert flight == ["lapwing", "campaign", *WORDS, *expected]
     assert calls(tmp_path, "sh", "-c", last[4]) == [["lapwing", "campaign", *WORDS, "--out", values["DIR"]]]
 
 
@@ -55,6 +55,6 @@ def test_kubernetes_flies_each_part_once(tmp_path):
     command = [*container["command"], *container["args"]]
     shards = set()
     for index in range(job["completions"]):
-        (flown,) = calls(tmp_path, *command, JOB_COMPLETION_INDEX=str(index))
-        shards.add(flown[flown.index("--shard") + 1])
+        (flight,) = calls(tmp_path, *command, JOB_COMPLETION_INDEX=str(index))
+        shards.add(flight[flight.index("--shard") + 1])
     assert shards == {f"{k}/{job['completions']}" for k in range(1, job["completions"] + 1)}

@@ -134,7 +134,7 @@ def test_empty_terrain_is_level_ground():
         ({"steps": [(2.0, 0.1), (1.0, 0.1)]}, "steps.distance: expected growing distances above 0 m, got [2.0, 1.0]"),
     ],
 )
-def test_refused(table, said):
+def test_refused(table, text):
     with pytest.raises(ConfigError) as error:
         relief(**table)
-    assert said in str(error.value)
+    assert text in str(error.value)

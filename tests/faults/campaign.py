@@ -56,32 +56,32 @@ def fly(
     environment = {**os.environ, "TMPDIR": str(own), **({"LAPWING_CACHE": str(kernels)} if kernels else {})}
     command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", str(out)]
     with (folder / "said").open("w+") as output:
-        begun = subprocess.Popen(
+        started = subprocess.Popen(
             command, stdout=subprocess.DEVNULL, stderr=output, env=environment, cwd=ROOT, start_new_session=True
         )
-        while kind == WORKER and begun.poll() is None and not _workers(folder):
+        while kind == WORKER and started.poll() is None and not _workers(folder):
             time.sleep(0.02)
         time.sleep(SHARE[kind] * delay)
         workers = _workers(folder)
         victim = "worker" if kind == WORKER else "all" if kind == INTERRUPT and place >= 0.5 else "command"
-        over = begun.poll() is not None
+        over = started.poll() is not None
         taken = leak_checks.ports(leak_checks.of_trial(folder))
         struck = time.monotonic()
         with suppress(ProcessLookupError):
             if victim == "worker" and workers:
                 os.kill(workers[min(int(place * len(workers)), len(workers) - 1)], signal.SIGKILL)
             elif victim == "all":
-                os.killpg(begun.pid, signal.SIGINT)
+                os.killpg(started.pid, signal.SIGINT)
             elif victim == "command" and not over:
-                os.kill(begun.pid, signal.SIGINT if kind == INTERRUPT else signal.SIGKILL)
-        wrong = leak_checks.ended(begun, "command", timeout)
+                os.kill(started.pid, signal.SIGINT if kind == INTERRUPT else signal.SIGKILL)
+        wrong = leak_checks.ended(started, "command", timeout)
         wrong += leak_checks.left(folder, taken, kernels, timeout)
         seconds = time.monotonic() - struck
         for process in leak_checks.of_trial(folder):
             with suppress(ProcessLookupError):
                 os.kill(process, signal.SIGKILL)
         output.seek(0)
-        code, text = begun.returncode, output.read()
+        code, text = started.returncode, output.read()
     if not KINDS[kind](code, text) and (code, text) != (0, ""):
         wrong.append(f"exit code {code}: {text!r}")
     if kind != KILL and (result := [path.name for place in (own, out) for path in place.glob("*/.*")]):
@@ -103,8 +103,8 @@ def undisturbed() -> str:
     """The digest of a campaign to which nothing is done."""
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", f"{folder}/out"]
-        flown = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=LONGEST)
-        return _digest(flown.stdout)
+        flight = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=LONGEST)
+        return _digest(flight.stdout)
 
 
 def _digest(said: str) -> str:

@@ -97,8 +97,8 @@ def trial(runs: int, at_once: int, load: int) -> Iterator[Result]:
         expected = {kind: reference(kind, folder) for kind in KINDS}
         kinds = [list(KINDS)[k % len(KINDS)] for k in range(runs)]
         with busy(load), ThreadPoolExecutor(at_once) as pool:
-            flown = [pool.submit(fly, kind, expected[kind], folder, k) for k, kind in enumerate(kinds)]
-            for run in flown:
+            flight = [pool.submit(fly, kind, expected[kind], folder, k) for k, kind in enumerate(kinds)]
+            for run in flight:
                 yield run.result()
 
 
@@ -109,17 +109,15 @@ def main() -> None:
     parser.add_argument("--at-once", type=int, default=6)
     parser.add_argument("--load", type=int, default=0, help="processes that keep a processor busy")
     values = parser.parse_args()
-    flown, wrong, longest = Counter[str](), Counter[str](), Counter[str]()
+    flight, wrong, longest = Counter[str](), Counter[str](), Counter[str]()
     for number, (kind, seconds, fault) in enumerate(trial(values.runs, values.at_once, values.load)):
-        flown[kind] += 1
+        flight[kind] += 1
         longest[kind] = max(longest[kind], seconds)
         if fault:
             wrong[kind] += 1
             print(f"run {number} ({kind}): {fault}", flush=True)
-    for kind in flown:
-        print(
-            f"{kind}: {flown[kind] - wrong[kind]} of {flown[kind]} as they should be, the longest {longest[kind]:.0f} s"
-        )
+    for kind in flight:
+        print(f"{kind}: {flight[kind] - wrong[kind]} of {flight[kind]} right, the longest {longest[kind]:.0f} s")
     raise SystemExit(bool(wrong))
 
 

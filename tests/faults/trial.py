@@ -153,17 +153,17 @@ def _wrong_end(trial: Trial, victim: str, code: int, said: str, late: bool) -> l
 def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> list[str]:
     """The log opens, and holds what was flown up to shortly before the fault."""
     _, _, stated = said.partition("at t = ")
-    flown = float(stated.split()[0].rstrip(":;,")) if stated else 0.0
+    flight = float(stated.split()[0].rstrip(":;,")) if stated else 0.0
     if victim == "recorder":  # the others fly on until somebody waits, and the time is theirs
-        flown = min(flown, RECOVERED)
-    if flown < RECOVERED and not (trial.kind == INTERRUPT and log.exists()):
+        flight = min(flight, RECOVERED)
+    if flight < RECOVERED and not (trial.kind == INTERRUPT and log.exists()):
         return []  # there may be none
     try:
         with LogReader(log) as read:
             last = max((time_ns for _, _, time_ns, _ in read.messages()), default=0) * 1e-9
     except ValueError as error:
         return [str(error)]
-    return [] if last >= flown - RECOVERED else [f"the log ends at {last:.3f} s, struck at {flown:.3f} s"]
+    return [] if last >= flight - RECOVERED else [f"the log ends at {last:.3f} s, struck at {flight:.3f} s"]
 
 
 @cache

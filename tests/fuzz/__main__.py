@@ -31,9 +31,9 @@ def main() -> None:
             target.read(seed)
         refused, slowest = 0, 0.0
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        begun = started = time.process_time()
+        has_started = started = time.process_time()
         number = 0
-        while (time.process_time() - begun < values.seconds) if values.seconds else number < values.inputs:
+        while (time.process_time() - has_started < values.seconds) if values.seconds else number < values.inputs:
             number += 1
             data = mutated(chance, target.seeds)
             try:
@@ -46,7 +46,7 @@ def main() -> None:
             slowest, started = max(slowest, (now := time.process_time()) - started), now
         grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024
         wrong += slowest > SLOW
-        rate = number / (started - begun)
+        rate = number / (started - has_started)
         shares = f"{refused} refused, {number - refused} taken"
         print(f"{name}: {number} inputs, {shares}, slowest {1e3 * slowest:.0f} ms, +{grown:.0f} MB, {rate:.0f}/s")
     raise SystemExit(wrong > 0)

@@ -167,9 +167,9 @@ SLOW = "from plant.slow import slow; values['slow'] = slow(2.0)"
 @pytest.fixture
 def compiling(package):
     """A process in the midst of compiling `slow`."""
-    begun = package.folder / "begun"
-    process = package.start(SLOW, BEGUN=str(begun))
-    while not begun.exists():
+    started = package.folder / "begun"
+    process = package.start(SLOW, BEGUN=str(started))
+    while not started.exists():
         assert process.poll() is None
         time.sleep(0.01)
     yield process

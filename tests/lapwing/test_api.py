@@ -102,12 +102,12 @@ class Faulty(NamedTuple):
         ("nowhere", "expected \"module:Name\", got 'nowhere'"),
     ],
 )
-def test_invalid_controller_is_one_line_scene_error(controller, said):
+def test_invalid_controller_is_one_line_scene_error(controller, text):
     with pytest.raises(lapwing.SceneError) as caught:
         lapwing.fly("hover", controller=controller)
     line = str(caught.value)
     assert line.startswith("--set autopilot.controller: ")
-    assert said in line
+    assert text in line
     assert "\n" not in line
 
 
@@ -154,10 +154,10 @@ def test_campaign_varies_loaded_scene_by_seed_and_run():
         (lambda: lapwing.Simulator("gyrostat_chaotic"), "autopilot: the scene has no autopilot"),
     ],
 )
-def test_mistakes_are_scene_errors_of_one_line(wrong, said):
+def test_mistakes_are_scene_errors_of_one_line(wrong, text):
     with pytest.raises(lapwing.SceneError) as caught:
         wrong()
-    assert said in str(caught.value)
+    assert text in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

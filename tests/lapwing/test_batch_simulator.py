@@ -152,8 +152,8 @@ def test_elements_that_fill_last_block_repeat_last_member():
         (lambda b: b.reset([1], speed=1.0), "speed: unknown; expected one of position_world, attitude"),
     ],
 )
-def test_batch_errors_are_one_line(batch, wrong, said):
-    with pytest.raises(ValueError, match=said):
+def test_batch_errors_are_one_line(batch, wrong, text):
+    with pytest.raises(ValueError, match=text):
         wrong(batch)
 
 

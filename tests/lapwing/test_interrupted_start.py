@@ -22,10 +22,10 @@ main()
 """
 
 
-def struck(module, number, said=subprocess.PIPE):
+def struck(module, number, output=subprocess.PIPE):
     """The command, which gets a signal as it is about to import `module`."""
     code = textwrap.dedent(STRIKE).replace("MODULE", module).replace("NUMBER", number.name)
-    return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=said, text=True, check=False)
+    return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=output, text=True, check=False)
 
 
 @pytest.mark.parametrize(

@@ -289,12 +289,12 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
         (["export", "whole.mcap", "--csv", "text.mcap"], "text.mcap: cannot be written"),
     ],
 )
-def test_bad_input_is_one_line(lapwing, tmp_path, foreign, arguments, said):
+def test_bad_input_is_one_line(lapwing, tmp_path, foreign, arguments, output):
     whole = write(tmp_path / "whole.mcap", ticks=10).read_bytes()
     (tmp_path / "cut.mcap").write_bytes(whole[:-100])
     (tmp_path / "text.mcap").write_text("no log")
     before = sorted(os.listdir())
     code, _, err = lapwing(*arguments)
     assert (code, err.count("\n")) == (2, 1)
-    assert said in err
+    assert output in err
     assert sorted(os.listdir()) == before

@@ -32,22 +32,22 @@ def test_of_several_those_that_are_named_are_operated():
     ]
 
 
-@pytest.mark.parametrize("given", [[PLAN], [f"nobody={PLAN}"], [f"left={PLAN}", f"left={PLAN}"]])
-def test_plan_of_unknown_vehicle_is_rejected(given):
+@pytest.mark.parametrize("inputs", [[PLAN], [f"nobody={PLAN}"], [f"left={PLAN}", f"left={PLAN}"]])
+def test_plan_of_unknown_vehicle_is_rejected(inputs):
     with pytest.raises(ValueError, match=r"the scene has several vehicles; expected NAME=FILE, .*left, right, scout"):
-        plan_options.files(given, load("fleet"))
+        plan_options.files(inputs, load("fleet"))
 
 
 @pytest.mark.long
 def test_plan_of_one_vehicle_does_not_change_others():
     values, only = [f"right={PLAN}"], ["run.duration=8.0"]
     scene = load("fleet", [*only, *plan_options.overrides(values, Path("fleet"), only)])
-    flown = fly(resolve(scene, plan_options.commands(values, scene)))
-    assert flown.messages("right/status")[-1].mode == "mission"
-    assert flown.view("right/ground_truth").position[-1, 2] > 1.0
+    flight = fly(resolve(scene, plan_options.commands(values, scene)))
+    assert flight.messages("right/status")[-1].mode == "mission"
+    assert flight.view("right/ground_truth").position[-1, 2] > 1.0
     without = fly(resolve(load("fleet", only)))
     for name in ("left", "scout"):
-        assert (flown.view(f"{name}/ground_truth").position == without.view(f"{name}/ground_truth").position).all()
+        assert (flight.view(f"{name}/ground_truth").position == without.view(f"{name}/ground_truth").position).all()
 
 
 @pytest.mark.long

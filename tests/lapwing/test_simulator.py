@@ -54,9 +54,9 @@ def test_invalid_simulator_arguments_are_rejected():
         ({"setpoint": lapwing.Setpoint(), "ticks": 0}, "step: expected ticks = 1, 2, ..., got 0"),
     ],
 )
-def test_non_finite_command_is_rejected(given, said):
-    with pytest.raises(ValueError, match=re.escape(said)):
-        lapwing.Simulator("hover").step(**given)
+def test_non_finite_command_is_rejected(values, text):
+    with pytest.raises(ValueError, match=re.escape(text)):
+        lapwing.Simulator("hover").step(**values)
 
 
 def test_positions_may_be_arrays_and_scene_may_be_loaded():

@@ -44,6 +44,6 @@ def test_nested_types_may_have_any_order():
         ("float64 air_density", "wide<=3 air_density", "has a definition that cannot be read"),
     ],
 )
-def test_first_type_difference_is_named(there, here, said):
+def test_first_type_difference_is_named(there, here, output):
     assert there in TEXT
-    assert first_type_difference(STATE, TEXT.replace(there, here)).startswith(said)
+    assert first_type_difference(STATE, TEXT.replace(there, here)).startswith(output)

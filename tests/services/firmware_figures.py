@@ -82,8 +82,8 @@ def figures(log: Path, summary: Path, full: float) -> dict:
     off = distance_from_square(away[aloft])
 
     def count(name: str) -> float:
-        found = re.search(rf"{name} ([\d.e+-]+)", report)
-        return float(found[1]) if found else math.nan
+        matches = re.search(rf"{name} ([\d.e+-]+)", report)
+        return float(matches[1]) if matches else math.nan
 
     cpu = re.search(r"CPU ([\d.e+-]+) s of Lapwing and ([\d.e+-]+) s", report)
     steps = int(re.search(r"(\d+) steps", report)[1])
@@ -125,20 +125,20 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=1)
     parser.add_argument("--set", action="append", default=[])
     parser.add_argument("--out", type=Path)
-    given = parser.parse_args()
-    if given.scripted and given.firmware not in SCRIPTED:
+    inputs = parser.parse_args()
+    if inputs.scripted and inputs.firmware not in SCRIPTED:
         parser.error(f"--scripted: expected {' or '.join(SCRIPTED)}")
-    program = "" if given.scripted else os.environ[VARIABLES[given.firmware]]
-    folder = given.out or Path(tempfile.mkdtemp(prefix="lapwing_figures_"))
+    program = "" if inputs.scripted else os.environ[VARIABLES[inputs.firmware]]
+    folder = inputs.out or Path(tempfile.mkdtemp(prefix="lapwing_figures_"))
     folder.mkdir(parents=True, exist_ok=True)
-    options = [part for value in given.set for part in ("--set", value)]
+    options = [part for value in inputs.set for part in ("--set", value)]
     results = []
-    for k in range(given.starts):
-        results.append(fly(given.firmware, program, folder, f"flight_{k}", *options))
+    for k in range(inputs.starts):
+        results.append(fly(inputs.firmware, program, folder, f"flight_{k}", *options))
         print(json.dumps(results[-1]), flush=True)
     landed = [r for r in results if r["outcome"] == "landed"]
-    flown = [r for r in results if r["outcome"] != "failed"] if given.scripted else landed
-    print(f"{len(landed)} of {len(results)} landed; hover by the airframe {hover_duty(f'{given.firmware}_quad'):.4f}")
+    flown = [r for r in results if r["outcome"] != "failed"] if inputs.scripted else landed
+    print(f"{len(landed)} of {len(results)} landed; hover by the airframe {hover_duty(f'{inputs.firmware}_quad'):.4f}")
     for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share",
                  "own_us", "firmware_us", "load"):  # fmt: skip
         values = [r[name] for r in flown]

@@ -26,11 +26,11 @@ def test_output_in_hover_balances_weight():
 @pytest.mark.parametrize(("firmware", "rate"), [("px4", 250), ("ardupilot", 1000)])
 def test_scripted_flight_counts_every_exchange(firmware, rate, tmp_path):
     command = [sys.executable, "-m", "tests.services.firmware_figures", firmware, "--scripted", "--out", str(tmp_path)]
-    flown = subprocess.run([*command, "--set", "run.duration=2"], capture_output=True, text=True, check=True)
-    figures = json.loads(flown.stdout.splitlines()[0])
+    flight = subprocess.run([*command, "--set", "run.duration=2"], capture_output=True, text=True, check=True)
+    figures = json.loads(flight.stdout.splitlines()[0])
     assert figures["steps"] == 2 * rate + 1
     assert figures["outcome"] != "failed"
     assert [figures[name] for name in ("skew", "rejected")] == [0, 0]
     assert figures["share"] == pytest.approx(figures["own_us"] / figures["firmware_us"])
     assert (tmp_path / "flight_0.mcap").exists()
-    assert "0 of 1 landed" in flown.stdout
+    assert "0 of 1 landed" in flight.stdout

@@ -28,8 +28,8 @@ PREFIX = "test-router"
 def visit(command, door, **security):
     """Return the client's messages during a run and the run's output; the client also publishes."""
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as run:
-        heard = None
-        while heard is None and run.poll() is None:
+        received = None
+        while received is None and run.poll() is None:
             try:
                 with ZenohBus(connect=[door], mode="client", **security) as bus:
                     pose = bus.subscribe(f"{PREFIX}/drone1/pose")
@@ -38,12 +38,12 @@ def visit(command, door, **security):
                             bus.publisher(f"{PREFIX}/{key}")(b"hello", 0)
                             bus._session.put(f"{PREFIX}/{key}", b"hello")
                         time.sleep(0.02)
-                    heard = pose.get(timeout=2.0)
+                    received = pose.get(timeout=2.0)
             except BusError:  # nobody listens yet
                 time.sleep(0.1)
         output = run.communicate(timeout=200)[0]
         assert run.returncode == 0, output
-    return heard, output
+    return received, output
 
 
 def command(tmp_path, door, *more):
@@ -57,8 +57,8 @@ def test_viewer_is_read_only_and_authenticated(tmp_path):
     make(keys, [ROUTER, VIEWER], 1)
     make(foreign, [VIEWER], 1)
     security = tls(keys, VIEWER)
-    heard, output = visit(command(tmp_path, door, "--keys", str(keys)), door, security=security)
-    assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
+    received, output = visit(command(tmp_path, door, "--keys", str(keys)), door, security=security)
+    assert PoseStamped.decode(received[1]).pose.position.z > 0.3
     assert "rejected" not in output  # the door itself lets nothing in
 
     with ZenohBus([door], security=tls(keys, ROUTER)):
@@ -72,8 +72,8 @@ def test_viewer_is_read_only_and_authenticated(tmp_path):
 
 def test_door_without_certificates_is_for_reading_too(tmp_path):
     (door,) = loopback_endpoints(["door"]).values()
-    heard, output = visit(command(tmp_path, door, "--insecure"), door)
-    assert PoseStamped.decode(heard[1]).pose.position.z > 0.3
+    received, output = visit(command(tmp_path, door, "--insecure"), door)
+    assert PoseStamped.decode(received[1]).pose.position.z > 0.3
     assert "rejected" not in output
 
 

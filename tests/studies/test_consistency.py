@@ -48,8 +48,8 @@ def test_rotation_vector_equals_scipy():
     before = Rotation.random(50, random_state=3)
     turn = random.normal(size=(50, 3)) * np.logspace(-9, 0, 50)[:, None]
     after = Rotation.from_rotvec(turn) * before
-    found = consistency._rotation_vector(after.as_quat(), before.as_quat())
-    np.testing.assert_allclose(found, turn, rtol=1e-6, atol=1e-15)
+    result = consistency._rotation_vector(after.as_quat(), before.as_quat())
+    np.testing.assert_allclose(result, turn, rtol=1e-6, atol=1e-15)
 
 
 def vertical_speed_sigmas(flight):

@@ -9,7 +9,7 @@ from lapwing.services.common.success_criteria import Success, holds
 from lapwing.services.scene_resolver import load
 from lapwing.studies.metrics import METRICS, check_success, metrics
 from lapwing.studies.outcome import KINDS
-from lapwing.studies.tracking import AXES, Reference, reach, rmse, roll_pitch_yaw, strided, total
+from lapwing.studies.tracking import AXES, Reference, reach, rmse, roll_pitch_yaw, strided_view, total
 
 N = 400
 
@@ -174,7 +174,7 @@ def test_missing_number_stays_none(made):
 @pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
 def test_layout_of_numbers_is_no_matter(made, laid):
     values = laid(made[1])
-    assert np.array_equal(strided(values), values)
+    assert np.array_equal(strided_view(values), values)
     assert total(values) == pytest.approx(values.sum(), rel=1e-12)
     assert rmse(made[0], values, *made[2:]) == rmse(*made)
     assert reach(made[0].position, values, made[3]) == reach(made[0].position, *made[1::2])

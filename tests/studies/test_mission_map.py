@@ -28,8 +28,8 @@ def flight(terrain=None):
     return result
 
 
-def named(name, given=None):
-    return [mark for mark in mission_map.draw(given or flight()).panels[0].marks if mark.name.startswith(name)]
+def named(name, values=None):
+    return [mark for mark in mission_map.draw(values or flight()).panels[0].marks if mark.name.startswith(name)]
 
 
 def test_all_vehicles_of_fleet_are_on_map_by_name():

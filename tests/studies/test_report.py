@@ -235,9 +235,11 @@ def test_narrow_page_has_one_column_without_overlap(page):
 def test_arrays_keep_gaps_and_axis_resolution(log_axis):
     inputs = np.geomspace(1e-6, 1e3, 300)
     inputs[7] = np.nan
-    got = values(plotly_traces._array(inputs, log=log_axis))
-    assert np.isnan(got[7])
-    assert got == pytest.approx(inputs, nan_ok=True, **({"rel": 1e-6} if log_axis else {"rel": 0, "abs": 1e3 / 65534}))
+    actual = values(plotly_traces._array(inputs, log=log_axis))
+    assert np.isnan(actual[7])
+    assert actual == pytest.approx(
+        inputs, nan_ok=True, **({"rel": 1e-6} if log_axis else {"rel": 0, "abs": 1e3 / 65534})
+    )
 
 
 def test_array_beyond_its_axis_keeps_resolution_of_axis():
@@ -246,15 +248,15 @@ def test_array_beyond_its_axis_keeps_resolution_of_axis():
 
 
 def test_reduced_script_keeps_registered_kinds_of_traces():
-    reduced = plotly_script.reduced(plotly_script.script())
+    reduced = plotly_script.remove_unused_traces(plotly_script.script())
     kinds = set(re.findall(r'moduleType:"trace",name:"(\w+)"', reduced))
     assert {"scatter", "bar"} <= kinds
     assert not kinds & {"scatter3d", "scattermap", "pie", "heatmap"}
-    assert len(plotly_script.compressed(reduced)) < 700_000
+    assert len(plotly_script.gzip_base64(reduced)) < 700_000
 
 
 def test_script_of_another_build_stays_whole():
-    assert plotly_script.reduced("Plotly = {}") == "Plotly = {}"
+    assert plotly_script.remove_unused_traces("Plotly = {}") == "Plotly = {}"
 
 
 def test_timeline_lists_service_event_and_time(page):
@@ -316,7 +318,7 @@ def test_paper_has_outcome_errors_facts_and_every_plot(log, page, monkeypatch, t
 
 def test_pages_hold_plots_in_order_within_their_height():
     plots = [paper.Titled(str(k), Plot((), "", height)) for k, height in enumerate((5.0, 5.0, 5.0, 30.0, 1.0))]
-    pages = paper._packed(plots)
+    pages = paper._paginate(plots)
     assert [titled for page in pages for titled in page] == plots
     assert all(len(page) == 1 or sum(map(paper._height, page)) <= paper.INNER[1] for page in pages)
 
@@ -333,8 +335,8 @@ def test_own_controller_lists_no_gains(log):
     assert flight_header.facts(flights[0])["controller"] == "cascaded PID"
     assert flight_header.facts(flights[1])["controller"] == "mine:Lee"
     assert "gains" not in flight_header.facts(flights[1])
-    found = flight_header.differences(*(flight.origin.scene for flight in flights))
-    assert list(found) == ["autopilot.controller"]
+    results = flight_header.differences(*(flight.origin.scene for flight in flights))
+    assert list(results) == ["autopilot.controller"]
 
 
 def test_turbulence_is_drawn_as_mean_and_range():

@@ -12,7 +12,7 @@ def mission():
 
 
 def test_diagram_shows_ports(mission):
-    result = service_diagram.handed(mission)
+    result = service_diagram.ports_by_pair(mission)
     assert result["plant", "sensors"] == ["truth"]
     assert result["autopilot", "plant"] == ["actuators*", "status*"]
     assert "imu" in result["sensors", "autopilot"]
@@ -28,7 +28,7 @@ def test_diagram_shows_listeners(mission):
 def test_every_topic_has_its_arrow(mission):
     result = service_diagram.arrows(mission)
     reported = [arrow.text for arrow in result]
-    handed = [text for texts in service_diagram.handed(mission).values() for text in texts]
+    handed = [text for texts in service_diagram.ports_by_pair(mission).values() for text in texts]
     beside = ["every recorded topic", *["every topic"] * 3, "telemetry", "commands", "MAVLink 2"]
     assert sorted(reported) == sorted([*handed, *beside])
     assert len({(arrow.start, arrow.end) for arrow in result}) == len(result)  # none lies on another

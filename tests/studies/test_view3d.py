@@ -21,7 +21,7 @@ from lapwing.studies.view3d import headless as chromium
 from lapwing.studies.view3d import sampling, solids, vehicle_bodies
 from lapwing.studies.view3d.coloured_mesh import coloured_mesh
 from lapwing.studies.view3d.live_trail import LINES, POINTS, LiveTrail
-from lapwing.studies.view3d.local_server import serving
+from lapwing.studies.view3d.local_server import run_server
 from lapwing.studies.view3d.recording import page as view_page
 from lapwing.studies.view3d.rotors import Rotors
 from lapwing.studies.view3d.samples import sample
@@ -470,7 +470,7 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
 
 
 def test_message_that_viser_prints_late_is_dropped(capsys):
-    with serving():
+    with run_server():
         pass
     rich.print("[bold](viser)[/bold] Server stopped")
     rich.print("another message")

@@ -7,8 +7,8 @@ from flights_in_space import TICKS, Recorder, T, flight
 
 from lapwing.studies.view3d.ghosts import FULL, HIDDEN, OPACITY
 from lapwing.studies.view3d.samples import sample
-from lapwing.studies.view3d.sampling import from_angles, rotated
-from lapwing.studies.view3d.solids import concatenated
+from lapwing.studies.view3d.sampling import from_angles, rotate
+from lapwing.studies.view3d.solids import join_meshes
 from lapwing.studies.view3d.stage import Vehicle
 
 TIMES = np.array([0.0, 1.0, 2.0, 3.0])
@@ -43,7 +43,7 @@ def test_quaternion_of_angles_turns_about_z_y_x(angles):
     x = np.array([[1, 0, 0], [0, np.cos(a), -np.sin(a)], [0, np.sin(a), np.cos(a)]])
     y = np.array([[np.cos(b), 0, np.sin(b)], [0, 1, 0], [-np.sin(b), 0, np.cos(b)]])
     z = np.array([[np.cos(c), -np.sin(c), 0], [np.sin(c), np.cos(c), 0], [0, 0, 1]])
-    assert rotated(from_angles(np.array([angles]))[0], vector) == pytest.approx(z @ y @ x @ vector, abs=5e-3)
+    assert rotate(from_angles(np.array([angles]))[0], vector) == pytest.approx(z @ y @ x @ vector, abs=5e-3)
 
 
 def test_ghosts_stand_where_reference_and_estimate_are():
@@ -60,7 +60,7 @@ def test_ghost_is_one_mesh_in_shape_of_vehicle():
     scene, vehicle, result = shown(AHEAD, PATH)
     (body,) = vehicle.motion.bodies
     vertices, faces = result[0]["reference"]["arguments"]
-    own, _ = concatenated(body.solids)
+    own, _ = join_meshes(body.solids)
     assert np.abs(vertices[: len(own)] - own).max() < 1e-6
     assert np.linalg.norm(vertices, axis=1).max() >= np.hypot(0.3, 0.3) + 0.24  # with the discs of its rotors
     assert faces.max() == len(vertices) - 1

@@ -9,7 +9,7 @@ from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.common.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 from lapwing.studio.form_fields import additions, form, toml
-from lapwing.studio.scene_changes import Change, changes, command_line, python, shown
+from lapwing.studio.scene_changes import Change, changes, command_line, python, shell_command
 
 
 @pytest.fixture(scope="module")
@@ -45,11 +45,11 @@ def test_segments_of_phases_have_fields_of_their_kind(schema):
 def test_every_field_is_key_that_its_scene_takes(scene, schema):
     known = fields(scene, schema)
     assert len(known) > 20
-    shown = {key: field for key, field in known.items() if field.text}
-    empty = {key: field._replace(text="") for key, field in shown.items()}
-    changed, faults = changes(empty.values(), {key: field.text for key, field in shown.items()}, ())
+    shell_command = {key: field for key, field in known.items() if field.text}
+    empty = {key: field._replace(text="") for key, field in shell_command.items()}
+    changed, faults = changes(empty.values(), {key: field.text for key, field in shell_command.items()}, ())
     assert faults == {}
-    assert len(changed) == len(shown)
+    assert len(changed) == len(shell_command)
     load(scene, [change.override for change in changed])
 
 
@@ -112,7 +112,7 @@ def test_text_of_another_kind_is_fault(schema, key, text, message):
 def test_command_line_and_python_fly_same():
     changed = [Change("run.seed", 3), Change("vehicle.airframe", "my drone.toml"), Change("effects.battery", {})]
     words = command_line("hover", changed, "2", True)
-    assert shlex.split(shown(words)) == words
+    assert shlex.split(shell_command(words)) == words
     overrides = [words[k + 1] for k, word in enumerate(words) if word == "--set"]
     with pytest.raises(SceneError, match=r"my drone\.toml"):
         load("hover", overrides)
@@ -120,17 +120,17 @@ def test_command_line_and_python_fly_same():
         "hover", {change.key: change.value for change in changed if "airframe" not in change.key}
     )
     code = python("hover", changed)
-    given = {}
+    inputs = {}
     exec(
         code.replace("import lapwing\n", "").replace("print(flight.outcome)\nflight.report()\n", ""),
-        {"lapwing": Spy(given)},
+        {"lapwing": Spy(inputs)},
     )
-    assert given == {"scene": "hover", "overrides": dict(changed)}
+    assert inputs == {"scene": "hover", "overrides": dict(changed)}
 
 
 class Spy:
-    def __init__(self, given):
-        self._given = given
+    def __init__(self, inputs):
+        self._given = inputs
 
     def fly(self, scene, overrides=()):
         self._given.update(scene=scene, overrides=overrides)

@@ -47,9 +47,9 @@ def ways(case: str) -> list[SolverMethod]:
             keys = {"method": method, "rtol": max(tolerance, 3e-14), "atol": tolerance, "args": numbers}
             return lambda: solve_ivp(rate, (0.0, module.DURATION), start, **keys)
 
-        def read(tolerance: float, found: Any) -> Any:
-            end = found.y[:, -1]
-            return outcome(module.DURATION, matrix(end[:4]), end[4:], found.nfev) if found.success else None
+        def read(tolerance: float, result: Any) -> Any:
+            end = result.y[:, -1]
+            return outcome(module.DURATION, matrix(end[:4]), end[4:], result.nfev) if result.success else None
 
         return SolverMethod(f"SciPy {method}", METHODS[method], "tol", TOLERANCES, prepare, read, lambda: None)
 

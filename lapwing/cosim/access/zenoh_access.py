@@ -48,7 +48,7 @@ def door(key_prefix: str, certificates: bool) -> dict[str, Any]:
     return _settings([*rules, _withheld(key_prefix)], [inside, outside], [*policies, _VIEWING])
 
 
-def withholding(key_prefix: str) -> dict[str, Any]:
+def without_viewers(key_prefix: str) -> dict[str, Any]:
     """Return the Zenoh settings for a router that cannot authenticate viewers; participants are linked without it."""
     policies = [{"rules": ["withhold"], "subjects": ["any"]}]
     return _settings([_withheld(key_prefix)], [{"id": "any"}], policies, default="allow")

@@ -71,7 +71,7 @@ def present_tables(tree: Mapping[str, Any]) -> dict[str, Any]:
         if name == "vehicle" and isinstance(value, list):
             present[name] = [present_tables(entry) for entry in value]
         else:
-            present[name] = _renamed(value, *(names[kind].get(name, {}) for kind in ("keys", "values", "removed")))
+            present[name] = _rename(value, *(names[kind].get(name, {}) for kind in ("keys", "values", "removed")))
     barometer = present.get("sensors", {}).get("barometer", {})
     if "airspeed_error" in barometer:
         barometer["static_pressure_error"] = dict.fromkeys(DIRECTIONS, barometer.pop("airspeed_error"))
@@ -98,15 +98,15 @@ def _criterion(text: str) -> str:
     return text
 
 
-def _renamed(value: Any, keys: Mapping[str, str], values: Mapping[str, Mapping[str, str]], removed: list[str]) -> Any:
+def _rename(value: Any, keys: Mapping[str, str], values: Mapping[str, Mapping[str, str]], removed: list[str]) -> Any:
     if isinstance(value, list):
-        return [_renamed(item, keys, values, removed) for item in value]
+        return [_rename(item, keys, values, removed) for item in value]
     if not isinstance(value, dict):
         return value
     present = {}
     for former, item in value.items():
         name = keys.get(former, former)
         if name not in removed:
-            item = _renamed(item, keys, values, removed)
+            item = _rename(item, keys, values, removed)
             present[name] = values.get(name, {}).get(item, item) if isinstance(item, str) else item
     return present

@@ -53,18 +53,18 @@ def attachments(setup: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes
 
 def package_version() -> str:
     """Return the version of the installed package, "unknown" where it is not installed."""
-    return _installed("lapwing")
+    return _installed_version("lapwing")
 
 
 def machine() -> dict[str, str]:
     """Return the versions and the processor that this process runs with, by the keys of `MACHINE`."""
-    packages = " ".join(f"{name} {_installed(name)}" for name in ("numba", "llvmlite", "numpy"))
+    packages = " ".join(f"{name} {_installed_version(name)}" for name in ("numba", "llvmlite", "numpy"))
     library, release = platform.libc_ver()
     values = (platform.python_version(), packages, f"{platform.system()} {library} {release}".strip(), _processor())
     return dict(zip(MACHINE, values, strict=True))
 
 
-def _installed(package: str) -> str:
+def _installed_version(package: str) -> str:
     try:
         return version(package)
     except PackageNotFoundError:

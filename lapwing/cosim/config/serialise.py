@@ -41,7 +41,7 @@ def to_json(tree: Any) -> str:
     Raises:
         ValueError: a value of another type, or a class that cannot be imported by its name; names its path.
     """
-    return json.dumps(_encoded(tree, ""), sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return json.dumps(_encode(tree, ""), sort_keys=True, separators=(",", ":"), allow_nan=False)
 
 
 def from_json(text: str, modules: Collection[str] = ()) -> Any:
@@ -55,7 +55,7 @@ def from_json(text: str, modules: Collection[str] = ()) -> Any:
         ValueError: not JSON, an unknown tag, or a class that is missing, not declared, or has other fields now.
     """
     try:
-        return _decoded(json.loads(text), modules)
+        return _decode(json.loads(text), modules)
     except RecursionError:
         raise ValueError("not a tree of values: nested too deeply") from None
 
@@ -133,59 +133,59 @@ def _children(value: Any) -> dict[Any, Any] | None:
     return None
 
 
-def _encoded(value: Any, path: str) -> Any:
+def _encode(value: Any, path: str) -> Any:
     kind = type(value)
     if value is None or kind in (bool, int, str):
         return value
     if kind is float:
         return value if math.isfinite(value) else {TAG: "float", "of": repr(value)}
     if kind is list:
-        return [_encoded(item, f"{path}.{i}") for i, item in enumerate(value)]
+        return [_encode(item, f"{path}.{i}") for i, item in enumerate(value)]
     if kind is tuple:
-        return {TAG: "tuple", "of": [_encoded(item, f"{path}.{i}") for i, item in enumerate(value)]}
+        return {TAG: "tuple", "of": [_encode(item, f"{path}.{i}") for i, item in enumerate(value)]}
     if kind is dict:
         for key in value:
             if type(key) is not str:
                 raise ValueError(f"{path or 'tree'}: key {key!r}: expected a text")
-        inner = {key: _encoded(item, f"{path}.{key}") for key, item in value.items()}
+        inner = {key: _encode(item, f"{path}.{key}") for key, item in value.items()}
         return {TAG: "dict", "of": inner} if TAG in value else inner
     if _is_record(kind):
-        return {TAG: _name_of(kind), **{f: _encoded(getattr(value, f), f"{path}.{f}") for f in _fields(kind)}}
+        return {TAG: _name_of(kind), **{f: _encode(getattr(value, f), f"{path}.{f}") for f in _fields(kind)}}
     if isinstance(value, np.ndarray) and value.dtype.name in DTYPES:
-        flat = [_encoded(item, path) for item in value.ravel().tolist()]
+        flat = [_encode(item, path) for item in value.ravel().tolist()]
         return {TAG: "array", "dtype": value.dtype.name, "shape": list(value.shape), "of": flat}
     if isinstance(value, np.generic) and value.dtype.name in SCALARS:
-        return {TAG: "scalar", "dtype": value.dtype.name, "of": _encoded(value.item(), path)}
+        return {TAG: "scalar", "dtype": value.dtype.name, "of": _encode(value.item(), path)}
     raise ValueError(f"{path.lstrip('.') or 'tree'}: a {kind.__module__}.{kind.__qualname__} cannot be serialised")
 
 
-def _decoded(value: Any, modules: Collection[str]) -> Any:
+def _decode(value: Any, modules: Collection[str]) -> Any:
     if isinstance(value, list):
-        return [_decoded(item, modules) for item in value]
+        return [_decode(item, modules) for item in value]
     if not isinstance(value, dict):
         return value
     if TAG not in value:
-        return {key: _decoded(item, modules) for key, item in value.items()}
+        return {key: _decode(item, modules) for key, item in value.items()}
     tag = value[TAG]
     try:
         if tag == "float":
             return float(value["of"])
         if tag == "tuple":
-            return tuple(_decoded(item, modules) for item in value["of"])
+            return tuple(_decode(item, modules) for item in value["of"])
         if tag == "dict":
-            return {key: _decoded(item, modules) for key, item in value["of"].items()}
+            return {key: _decode(item, modules) for key, item in value["of"].items()}
         if tag == "scalar":
-            return np.dtype(_listed(value["dtype"], SCALARS)).type(_decoded(value["of"], modules))
+            return np.dtype(_allowed_dtype(value["dtype"], SCALARS)).type(_decode(value["of"], modules))
         if tag == "array":
-            flat = [_decoded(item, modules) for item in value["of"]]
-            return np.array(flat, dtype=_listed(value["dtype"], DTYPES)).reshape(value["shape"])
+            flat = [_decode(item, modules) for item in value["of"]]
+            return np.array(flat, dtype=_allowed_dtype(value["dtype"], DTYPES)).reshape(value["shape"])
     except (KeyError, TypeError, OverflowError) as error:
         raise ValueError(f"damaged {tag!r}: {error!r}") from None
-    members = {key: _decoded(item, modules) for key, item in value.items() if key != TAG}
+    members = {key: _decode(item, modules) for key, item in value.items() if key != TAG}
     return _record(_class_of(str(tag), modules), str(tag), members)
 
 
-def _listed(dtype: Any, allowed: Collection[str]) -> str:
+def _allowed_dtype(dtype: Any, allowed: Collection[str]) -> str:
     """Return the name of an allowed type: another, such as a text of 10^9 characters, could exhaust the memory."""
     if not isinstance(dtype, str) or dtype not in allowed:
         raise TypeError(f"dtype {dtype!r}; expected one of {', '.join(allowed)}")

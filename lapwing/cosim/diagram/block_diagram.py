@@ -188,7 +188,7 @@ class BlockDiagram:
 
     def _failure(self, part: int, tick: int) -> Exception:
         self._set_tick(tick)
-        return (self._parts[part].failure or _diverged(self._parts[part].name))(tick)
+        return (self._parts[part].failure or _divergence_error(self._parts[part].name))(tick)
 
     def _set_tick(self, tick: int) -> None:
         if len(self._groups) == 1:
@@ -296,5 +296,5 @@ def _tick(message: tuple[Topic, int, bytes]) -> int:
     return message[1]
 
 
-def _diverged(name: str) -> Any:
+def _divergence_error(name: str) -> Any:
     return lambda tick: DivergedError(f"{name}: non-finite or invalid state at tick {tick}")

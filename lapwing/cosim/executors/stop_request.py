@@ -62,8 +62,8 @@ class StopRequest:
     def stop_when_gone(self, bus: ZenohBus, key: str) -> None:
         """Stop when the participant with this liveliness key has left the run."""
 
-        def changed(_: str, alive: bool) -> None:
+        def on_change(_: str, alive: bool) -> None:
             if not (alive or self.stopping):
                 self.abandoned, self.stopping = key.rpartition("/")[2], True
 
-        bus.watch_liveliness(key, changed)
+        bus.watch_liveliness(key, on_change)

@@ -58,7 +58,7 @@ class Container:
         """Begin a file that is empty, unbuffered and open for writing."""
         self._begin(file)
         self._write(MCAP0_MAGIC)
-        self._write(encoded(Header(profile="ros2", library="lapwing")))
+        self._write(encode(Header(profile="ros2", library="lapwing")))
 
     @classmethod
     def resume(cls, file: FileIO, summary: Summary, offset: int) -> Self:
@@ -68,7 +68,7 @@ class Container:
         self._offset = offset
         self._schemas, self._channels = list(summary.schemas.values()), list(summary.channels.values())
         for index in summary.chunk_indexes:
-            self._chunks.add(encoded(index), index.message_start_time, index.message_end_time)
+            self._chunks.add(encode(index), index.message_start_time, index.message_end_time)
         self._attachments, self._metadata = summary.attachment_indexes, summary.metadata_indexes
         self._counts = dict(summary.statistics.channel_message_counts) if summary.statistics else {}
         file.seek(offset)
@@ -90,7 +90,7 @@ class Container:
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment; its media type follows from the file name."""
         kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
-        record = encoded(Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data))
+        record = encode(Attachment(create_time=0, log_time=0, name=name, media_type=kind, data=data))
         self._attachments.append(
             AttachmentIndex(
                 offset=self._offset,
@@ -107,7 +107,7 @@ class Container:
     def add_metadata(self, name: str, metadata: dict[str, str]) -> None:
         """Write a metadata record."""
         self._drop_tail()
-        record = encoded(Metadata(metadata=metadata, name=name))
+        record = encode(Metadata(metadata=metadata, name=name))
         self._metadata.append(MetadataIndex(length=len(record), name=name, offset=self._offset))
         self._write(record)
 
@@ -126,7 +126,7 @@ class Container:
             messages: at least one message.
         """
         self._drop_tail()
-        head = b"".join(map(encoded, declarations))
+        head = b"".join(map(encode, declarations))
         data = head + messages.data
         is_small = len(messages.data) < SMALL
         stored = data if is_small else self._compressor.compress(data)
@@ -138,7 +138,7 @@ class Container:
             uncompressed_crc=zlib.crc32(data),
             uncompressed_size=len(data),
         )
-        records = [encoded(chunk)]
+        records = [encode(chunk)]
         offset = end = self._offset
         length = len(records[0])
         index_offsets: dict[int, int] = {}
@@ -159,7 +159,7 @@ class Container:
             message_index_length=len(record) - length,
         )
         before = self._chunks.extent
-        self._chunks.add(encoded(index), messages.start_ns, messages.end_ns)
+        self._chunks.add(encode(index), messages.start_ns, messages.end_ns)
         try:
             self._write(record)
         except OSError:
@@ -176,27 +176,27 @@ class Container:
     def finish(self) -> None:
         """Write the summary and the end."""
         self._drop_tail()
-        self._write(encoded(DataEnd(data_section_crc=0)))
+        self._write(encode(DataEnd(data_section_crc=0)))
         start = self._offset
         groups = [
-            (Opcode.SCHEMA, _joined(self._schemas)),
-            (Opcode.CHANNEL, _joined(self._channels)),
-            (Opcode.STATISTICS, encoded(self._statistics())),
+            (Opcode.SCHEMA, _join(self._schemas)),
+            (Opcode.CHANNEL, _join(self._channels)),
+            (Opcode.STATISTICS, encode(self._statistics())),
             (Opcode.CHUNK_INDEX, self._chunks.records()),
-            (Opcode.ATTACHMENT_INDEX, _joined(self._attachments)),
-            (Opcode.METADATA_INDEX, _joined(self._metadata)),
+            (Opcode.ATTACHMENT_INDEX, _join(self._attachments)),
+            (Opcode.METADATA_INDEX, _join(self._metadata)),
         ]
         summary = b""
         offsets = b""
         for opcode, data in groups:
-            offsets += encoded(
+            offsets += encode(
                 SummaryOffset(group_length=len(data), group_opcode=opcode, group_start=start + len(summary))
             )
             summary += data
         footer = Footer(summary_start=start, summary_offset_start=start + len(summary), summary_crc=0)
         summary += offsets
-        footer.summary_crc = zlib.crc32(summary + encoded(footer)[:-_CRC])
-        self._write(summary + encoded(footer) + MCAP0_MAGIC)
+        footer.summary_crc = zlib.crc32(summary + encode(footer)[:-_CRC])
+        self._write(summary + encode(footer) + MCAP0_MAGIC)
         self._cut()
 
     def close(self) -> None:
@@ -248,11 +248,11 @@ class Container:
         self._offset += len(data)
 
 
-def _joined(records: Sequence[McapRecord]) -> bytes:
-    return b"".join(map(encoded, records))
+def _join(records: Sequence[McapRecord]) -> bytes:
+    return b"".join(map(encode, records))
 
 
-def encoded(record: McapRecord) -> bytes:
+def encode(record: McapRecord) -> bytes:
     """Return the bytes of a record."""
     builder = RecordBuilder()
     record.write(builder)

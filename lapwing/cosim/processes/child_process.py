@@ -56,7 +56,7 @@ def _fork(name: str) -> Child:
 
 
 @contextmanager
-def started_early(names: Iterable[str]) -> Iterator[dict[str, Child]]:
+def start_early(names: Iterable[str]) -> Iterator[dict[str, Child]]:
     """Start participants, forked if possible, for `launch` to take; end those that are left."""
     begin = _fork if _may_fork() else start
     children = {name: begin(name) for name in names}

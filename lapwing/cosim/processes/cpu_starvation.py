@@ -10,7 +10,7 @@ from pathlib import Path
 QUIET = 0.5  # [s] without news from which on it is measured
 
 
-def waited(pid: int) -> float:
+def starved_time(pid: int) -> float:
     """Return the time [s] that the threads of a process have waited for a processor; 0 if the system has no count."""
     total = 0
     try:
@@ -34,8 +34,10 @@ class Starvation:
         if silence < QUIET:
             self._before = {}
         elif not self._before:
-            self._before = {name: waited(pid) for name, pid in pids.items()}
+            self._before = {name: starved_time(pid) for name, pid in pids.items()}
 
     def of(self, names: Iterable[str]) -> float:
         """Return the total time [s] that the named processes have waited since then."""
-        return sum(max(0.0, waited(self._pids[name]) - self._before[name]) for name in names if name in self._before)
+        return sum(
+            max(0.0, starved_time(self._pids[name]) - self._before[name]) for name in names if name in self._before
+        )

@@ -9,7 +9,7 @@ from typing import IO
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, start, terminate_unused
-from lapwing.cosim.processes.cpu_starvation import waited
+from lapwing.cosim.processes.cpu_starvation import starved_time
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, RunMonitor
 from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunSupervisor, reason
 from lapwing.cosim.run_errors import END_SIGNAL
@@ -39,7 +39,7 @@ def launch(
         observe: called about five times a second; the run is ended when it returns True.
         optional: names of the processes without which the run continues.
         external: endpoints of the required participants that are started elsewhere; all others connect to them.
-        started: processes that run already (`started_early`); those that the run does not need are ended.
+        started: processes that run already (`start_early`); those that the run does not need are ended.
         services: services that publish log packets.
 
     Raises:
@@ -102,10 +102,10 @@ def _request_end(children: Iterable[Child]) -> None:
 def _wait(children: list[Child], seconds: float) -> None:
     """Wait until all have exited, at most `seconds` without the time in which they got no CPU."""
     start = time.monotonic()
-    starved_before = {child.process.pid: waited(child.process.pid) for child in children}
+    starved_before = {child.process.pid: starved_time(child.process.pid) for child in children}
     while running := [child.process.pid for child in children if child.process.poll() is None]:
         elapsed = time.monotonic() - start
-        starved = sum(max(0.0, waited(pid) - starved_before[pid]) for pid in running)
+        starved = sum(max(0.0, starved_time(pid) - starved_before[pid]) for pid in running)
         if elapsed > LONGEST or elapsed - starved > seconds:
             return
         time.sleep(BRIEF)

@@ -77,7 +77,7 @@ class Files:
 def parse_toml(text: str, path: Path) -> dict[str, Any]:
     """Return the tables of a TOML text. Raise SceneError with the file for invalid TOML."""
     try:
-        return copied(_tables(text))
+        return deep_copy(_tables(text))
     except tomllib.TOMLDecodeError as error:
         raise SceneError("", f"not valid TOML: {error}", source=KeyOrigin(path)) from None
     except RecursionError:
@@ -90,11 +90,11 @@ def _tables(text: str) -> dict[str, Any]:
     return tomllib.loads(text)
 
 
-def copied(value: Any) -> Any:
+def deep_copy(value: Any) -> Any:
     """Return a deep copy of tables and lists, in a third of the time of `copy.deepcopy`."""
     if isinstance(value, dict):
-        return {key: copied(item) for key, item in value.items()}
-    return [copied(item) for item in value] if isinstance(value, list) else value
+        return {key: deep_copy(item) for key, item in value.items()}
+    return [deep_copy(item) for item in value] if isinstance(value, list) else value
 
 
 def merge_tables(content: dict[str, Any], override: Any) -> Any:
@@ -110,7 +110,7 @@ def merge_tables(content: dict[str, Any], override: Any) -> Any:
     return merged
 
 
-def named(tree: dict[str, Any], table: str, key: str, default: Any = None) -> Any:
+def unvalidated_value(tree: dict[str, Any], table: str, key: str, default: Any = None) -> Any:
     """Return the value of a key in data that is not validated yet; None without such a table."""
     result = tree.get(table)
     return result.get(key, default) if isinstance(result, dict) else None

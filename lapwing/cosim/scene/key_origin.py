@@ -45,7 +45,7 @@ def line_of(text: str, key: str) -> tuple[int | None, int]:
     best, result = 0, None
     for number, line in enumerate(text.splitlines(), 1):
         if header := re.match(r"\s*(\[\[?)\s*([\w.]+)\s*\]", line):
-            table = _numbered(header[2], entries, last=header[1] == "[")
+            table = _numbered_name(header[2], entries, last=header[1] == "[")
             if header[1] == "[[":
                 entries[table] = entries.get(table, -1) + 1
                 table = f"{table}.{entries[table]}"
@@ -59,7 +59,7 @@ def line_of(text: str, key: str) -> tuple[int | None, int]:
     return result, best
 
 
-def _numbered(table: str, entries: dict[str, int], last: bool) -> str:
+def _numbered_name(table: str, entries: dict[str, int], last: bool) -> str:
     """Return a table's name with the number of the newest entry after each array of tables, the last if `last`."""
     *parents, name = table.split(".")
     full = ""

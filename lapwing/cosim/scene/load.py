@@ -10,9 +10,9 @@ from pydantic import ValidationError
 
 from lapwing.cosim.config.former_names import present_tables
 from lapwing.cosim.scene import vehicle_scenes
-from lapwing.cosim.scene.files import Files, copied, parse_toml
+from lapwing.cosim.scene.files import Files, deep_copy, parse_toml
 from lapwing.cosim.scene.key_origin import line_of, source_of
-from lapwing.cosim.scene.overrides import Override, Overrides, apply, is_below_file_name, parsed
+from lapwing.cosim.scene.overrides import Override, Overrides, apply, is_below_file_name, parse_all
 from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
@@ -40,7 +40,7 @@ def load(scene: str | Path, overrides: Overrides, vocabulary: Vocabulary, shippe
 
 def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
     """Load a scene from text; `path` determines its name and the folder of its files. See `load` for errors."""
-    return _parse(path, text, parsed(overrides), vocabulary)
+    return _parse(path, text, parse_all(overrides), vocabulary)
 
 
 def with_overrides(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
@@ -53,7 +53,7 @@ def with_overrides(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -
     if scene.file_overrides is None or SCENE_FILE not in scene.sources:
         raise ValueError(f"{scene.path}: was not read from a file; load it from a file to override keys")
     return _parse(
-        scene.path, scene.sources[SCENE_FILE].decode(), [*scene.file_overrides, *parsed(overrides)], vocabulary
+        scene.path, scene.sources[SCENE_FILE].decode(), [*scene.file_overrides, *parse_all(overrides)], vocabulary
     )
 
 
@@ -192,7 +192,7 @@ def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[SceneT
         if not isinstance(raw, dict):
             raise ConfigError(name, f"got {raw!r}", f"a table [{name}]")
         try:
-            tables[section] = section.model_validate(copied(raw))
+            tables[section] = section.model_validate(deep_copy(raw))
         except ValidationError as error:
             raise fault(error, section).with_prefix(name) from None
     return tables

@@ -20,7 +20,7 @@ class Override(NamedTuple):
     text: str  # text of the user
 
 
-def parsed(overrides: Overrides) -> list[Override]:
+def parse_all(overrides: Overrides) -> list[Override]:
     """Parse the overrides. Raise SceneError for one that is not KEY=VALUE."""
     if isinstance(overrides, str):
         raise SceneError("", f"got {overrides!r}", 'overrides as a dictionary or a list: ["KEY=VALUE"]')
@@ -28,10 +28,10 @@ def parsed(overrides: Overrides) -> list[Override]:
         if invalid := [key for key in overrides if not isinstance(key, str)]:
             raise SceneError("", f"got {invalid[0]!r}", "the keys of overrides as texts")
         return [Override(key, _plain(value), f"{key}={value!r}") for key, value in overrides.items()]
-    return [_parsed(text) for text in overrides]
+    return [_parse(text) for text in overrides]
 
 
-def _parsed(text: str) -> Override:
+def _parse(text: str) -> Override:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not key or not value:
         expected = "KEY=VALUE, for example solver.step=0.001"
@@ -76,7 +76,7 @@ def is_below_file_name(tree: Any, key: str) -> bool:
 def with_values(tree: dict[str, Any], overrides: Overrides) -> dict[str, Any]:
     """Return the tables of a resolved scene with overrides. See `apply` for errors."""
     result = copy.deepcopy(tree)
-    for override in parsed(overrides):
+    for override in parse_all(overrides):
         apply(result, override)
     return result
 

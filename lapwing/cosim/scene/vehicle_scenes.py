@@ -7,7 +7,7 @@ The keys of an entry's table override those of the shared table. Keys of an entr
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from lapwing.cosim.scene.files import copied, merge_tables
+from lapwing.cosim.scene.files import deep_copy, merge_tables
 from lapwing.cosim.scene.overrides import Override
 from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
@@ -49,7 +49,7 @@ def member(tree: Mapping[str, Any], i: int, vocabulary: Vocabulary) -> dict[str,
         else:
             own[VEHICLE][name] = value
     defaults = {name: keys for name, section in vocabulary.sections.items() if (keys := section.defaults_of(i))}
-    return copied(merge_tables(defaults, merge_tables(common, own)))
+    return deep_copy(merge_tables(defaults, merge_tables(common, own)))
 
 
 def overrides_of(overrides: Iterable[Override], i: int, vehicles: int, vocabulary: Vocabulary) -> list[Override]:

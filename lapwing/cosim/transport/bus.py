@@ -70,7 +70,7 @@ class ZenohBus:
         _opened = True
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_configured({**session_settings(listen, connect, mode, awaits), **security}))
+            self._session = zenoh.open(_zenoh_config({**session_settings(listen, connect, mode, awaits), **security}))
         except zenoh.ZError as error:
             tried = connect if mode == "client" else listen
             endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)
@@ -225,7 +225,7 @@ class ZenohBus:
         self.close()
 
 
-def _configured(settings: Mapping[str, Any]) -> zenoh.Config:
+def _zenoh_config(settings: Mapping[str, Any]) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))

@@ -52,7 +52,7 @@ class Subscription:
         try:
             while True:
                 item = self._arrived.get(timeout=timeout)
-                if item is None or not self._deferred or (item := self._accepted(item)) is not None:
+                if item is None or not self._deferred or (item := self._accept(item)) is not None:
                     return item
         except queue.Empty:
             return None
@@ -62,11 +62,11 @@ class Subscription:
         self._arrived.put(None)
 
     def _arrive(self, sample: Any) -> None:
-        message = self._accepted(sample)
+        message = self._accept(sample)
         if message is not None:
             self._arrived.put(message)
 
-    def _accepted(self, sample: Any) -> tuple[str, int, bytes] | None:
+    def _accept(self, sample: Any) -> tuple[str, int, bytes] | None:
         """Return key, simulation time [ns] and payload of a sample. Return None if it is rejected."""
         message = self._read(sample)
         key = self._only_key or str(sample.key_expr)

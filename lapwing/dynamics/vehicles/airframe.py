@@ -55,9 +55,11 @@ class Airframe(Section):
         gyration = math.sqrt(min(self.mass.inertia) / self.mass.total)
         reach = max(dist(self.mass.centre, place) for place in self.rotors.position)
         if gyration < LEAST_GYRATION * reach:
-            got = f"got {list(self.mass.inertia)} with {self.mass.total:g} kg: a radius of gyration of {gyration:.2g} m"
+            actual = (
+                f"got {list(self.mass.inertia)} with {self.mass.total:g} kg: a radius of gyration of {gyration:.2g} m"
+            )
             expected = f"at least {LEAST_GYRATION * reach:.2g} m, a fiftieth of the distance to the rotors; in kg m^2"
-            raise ConfigError("mass.inertia", got, expected)
+            raise ConfigError("mass.inertia", actual, expected)
         return self
 
     @property

@@ -18,7 +18,7 @@ def show(console: Console, result: FlightAccuracy) -> None:
         f"{result.integrator}, step {1e3 * result.step:g} ms, against steps of {1e3 * result.reference_step:g} ms; "
         f"{result.duration:g} s, errors relative to 1 + size",
         _table(result),
-        *_meaning(result),
+        *_column_legend(result),
         _verdict(result),
         *_closed_loop(result),
         *_remedy(result),
@@ -44,7 +44,7 @@ def _table(result: FlightAccuracy) -> Table:
     return table
 
 
-def _meaning(result: FlightAccuracy) -> list[str]:
+def _column_legend(result: FlightAccuracy) -> list[str]:
     """Return the meaning of the columns, in a table that has both errors."""
     if result.closed_loop is None:
         return []

@@ -20,29 +20,29 @@ HALVINGS = 18
 TOLERANCES = tuple(10.0**-k for k in range(1, 14))
 
 
-def counted(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, rows: np.ndarray) -> float:
+def count_evaluations(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, rows: np.ndarray) -> float:
     """Return the mean evaluations in a step of h, counted at each of these times and states (uncompiled)."""
     calls = 0
 
-    def counting(p: Any, t: float, state: Any) -> Any:
+    def count_and_evaluate(p: Any, t: float, state: Any) -> Any:
         nonlocal calls
         calls += 1
         return rate(p, t, state)
 
     for t, row in zip(times, rows, strict=True):
-        python_function(method.step)(counting, p, float(t), unflatten(x, tuple(map(float, row))), h)
+        python_function(method.step)(count_and_evaluate, p, float(t), unflatten(x, tuple(map(float, row))), h)
     return calls / len(times)
 
 
 # kernels of this file, so that their cache names no class but those of systems that every user of the study can import
 @kernel
-def sampled(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
+def sample_states(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
     """Integrate from time 0 in steps of h; store each `every`-th state in a row of `out`. Return the finite rows."""
     return record(method, p, 0.0, x, h, every, out)
 
 
 @kernel
-def adapted(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray) -> Any:
+def adapt_step(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndarray) -> Any:
     """Write the states at `times` into the rows of `out`; see `integrate_adaptive`."""
     return integrate_adaptive(p, x, times, tolerance, out)
 
@@ -56,16 +56,16 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
         duration: duration of the run.
         coarsest: steps of the coarsest run; a multiple of SAMPLES.
     """
-    fixed = fixed_ways(p, x, duration, coarsest)
+    fixed = fixed_step_methods(p, x, duration, coarsest)
     return [_adaptive(p, x, duration) if way.name == ADAPTIVE else way for way in fixed]
 
 
-def fixed_ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
+def fixed_step_methods(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
     """Return a solver method per integrator, all by steps."""
-    return [_fixed(name, p, x, duration, coarsest) for name in integrators.compatible_methods(p, x)]
+    return [_fixed_step_method(name, p, x, duration, coarsest) for name in integrators.compatible_methods(p, x)]
 
 
-def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> SolverMethod:
+def _fixed_step_method(name: str, p: Any, x: Any, duration: float, coarsest: int) -> SolverMethod:
     method, width = integrators.get(name), len(flatten(x))
     token = method.Method()
 
@@ -74,21 +74,21 @@ def _fixed(name: str, p: Any, x: Any, duration: float, coarsest: int) -> SolverM
 
     def prepare(h: float) -> Callable[[], Any]:
         out, every = np.empty((SAMPLES + 1, width)), steps(h) // SAMPLES
-        return lambda: (sampled(token, p, x, duration / steps(h), every, out), out)
+        return lambda: (sample_states(token, p, x, duration / steps(h), every, out), out)
 
     def read(h: float, result: Any) -> SolverRun | None:
         rows, out = result
         if rows < len(out):
             return None
         times = np.linspace(0.0, duration, SAMPLES + 1)
-        each = getattr(method, "EVALUATIONS", None) or counted(method, p, x, h, times[:-1], out[:-1])
+        each = getattr(method, "EVALUATIONS", None) or count_evaluations(method, p, x, h, times[:-1], out[:-1])
         evaluations = round(steps(h) * each)
         return SolverRun(times, coordinates(x, out), defect(x, out[-1]), evaluations)
 
     settings = [duration / (coarsest * 2**k) for k in range(HALVINGS)]
     start = np.empty((1, width))
     return SolverMethod(
-        name, method.ORDER, "s", settings, prepare, read, lambda: sampled(token, p, x, duration, 1, start),
+        name, method.ORDER, "s", settings, prepare, read, lambda: sample_states(token, p, x, duration, 1, start),
         lambda h: end_in_extended_precision(method, p, x, duration / steps(h), steps(h)),
     )  # fmt: skip
 
@@ -98,7 +98,7 @@ def _adaptive(p: Any, x: Any, duration: float) -> SolverMethod:
 
     def prepare(tolerance: float) -> Callable[[], Any]:
         out = np.empty((2, len(flatten(x))))
-        return lambda: (adapted(p, x, ends, tolerance, out), out)
+        return lambda: (adapt_step(p, x, ends, tolerance, out), out)
 
     def read(tolerance: float, result: Any) -> SolverRun | None:
         (status, _, _, steps, rejected), out = result
@@ -110,5 +110,5 @@ def _adaptive(p: Any, x: Any, duration: float) -> SolverMethod:
 
     start = np.empty((1, len(flatten(x))))
     return SolverMethod(
-        ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapted(p, x, ends[:1], 1.0, start)
+        ADAPTIVE, method.ORDER, "tol", TOLERANCES, prepare, read, lambda: adapt_step(p, x, ends[:1], 1.0, start)
     )

@@ -37,16 +37,16 @@ class _Plant(NamedTuple):
     service: Service
 
 
-def inputs_of_plant(flown: BlockDiagram) -> list[str]:
+def inputs_of_plant(flight: BlockDiagram) -> list[str]:
     """Return the ports that the plant reads from other services."""
-    plant = next(service for service in flown.services if service.name == CLOCK_OWNER)
+    plant = next(service for service in flight.services if service.name == CLOCK_OWNER)
     own = {port.name for part in plant.parts for port in part.outputs}
     names = dict.fromkeys(i.port for part in plant.parts for i in getattr(part, "inputs", ()))
-    return [name for name in names if name not in own and flown.ports[name].period != LATCHED]
+    return [name for name in names if name not in own and flight.ports[name].period != LATCHED]
 
 
 def fly_parts(
-    flown: BlockDiagram, finer: RunConfig, topics: tuple[Topic, ...], observe: Callable[[int], None]
+    flight: BlockDiagram, finer: RunConfig, topics: tuple[Topic, ...], observe: Callable[[int], None]
 ) -> tuple[Parts, Parts]:
     """Fly a run again in parts, from its own states and under its own commands.
 
@@ -59,12 +59,12 @@ def fly_parts(
     Returns:
         Two series of parts, whose spans together are the whole run.
     """
-    recorded, *replicas = (_plant(flown, setup) for setup in (flown.setup, finer, finer))
-    interval = flown.setup.interval
+    recorded, *replicas = (_plant(flight, setup) for setup in (flight.setup, finer, finer))
+    interval = flight.setup.interval
     half = max(1, round(0.5 * PART / interval))
     spans: tuple[list[tuple[float, float]], ...] = ([], [])
-    for number, start in enumerate(range(0, flown.tick, half)):
-        stop = min(start + half, flown.tick)
+    for number, start in enumerate(range(0, flight.tick, half)):
+        stop = min(start + half, flight.tick)
         observe(start)
         _restart(replicas[number % 2], recorded, start)
         for plant in (recorded, *replicas):
@@ -76,15 +76,15 @@ def fly_parts(
     return one, other
 
 
-def _plant(flown: BlockDiagram, setup: RunConfig) -> _Plant:
+def _plant(flight: BlockDiagram, setup: RunConfig) -> _Plant:
     """Return the plant of `setup` at tick 0, with the inputs that it had in a finished run."""
     service = create(setup, CLOCK_OWNER)
-    inputs = inputs_of_plant(flown)
+    inputs = inputs_of_plant(flight)
     whole = {port.name for part in service.parts for port in part.outputs} | set(inputs)
     graph = BlockDiagram(setup, [service], 1, whole)
     for name in inputs:
-        history = flown.history(name, flown.ports[name].period)
-        graph.put_rows(name, np.arange(len(history)) * flown.ports[name].period, history)
+        history = flight.history(name, flight.ports[name].period)
+        graph.put_rows(name, np.arange(len(history)) * flight.ports[name].period, history)
     return _Plant(graph, service)
 
 

@@ -24,7 +24,7 @@ from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.integrate import SAMPLES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
-from lapwing.studies.accuracy.round_off import Number, extended, extended_coordinates, in_extended_precision
+from lapwing.studies.accuracy.round_off import Number, coordinates_in_extended_numbers, extend, in_extended_precision
 
 DURATION = 2.0  # [s], about
 HEIGHT = 20.0  # [m] clear of the ground
@@ -146,18 +146,18 @@ def problem(scene: Scene, manoeuvre: Voltages = waves) -> Problem:
             times = np.linspace(0.0, duration, SAMPLES + 1)
             return SolverRun(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
 
-        def extended_flight(step: float) -> np.ndarray:
+        def fly_in_extended_numbers(step: float) -> np.ndarray:
             count = round(exchange.interval / step)
-            fly, h = extended(advance), Number(exchange.interval / count)
+            fly, h = extend(advance), Number(exchange.interval / count)
             x, numbers = in_extended_precision(state), in_extended_precision(p)
             for tick, voltage in enumerate(map(tuple, voltages.tolist()), TICK):
                 x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)
-            return extended_coordinates(motion, extended(motion_of)(numbers.layout, x.motion))
+            return coordinates_in_extended_numbers(motion, extend(motion_of)(numbers.layout, x.motion))
 
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return SolverMethod(
             name, method.ORDER, "s", settings, lambda h: flight_of(method, round(exchange.interval / h)), read,
-            flight_of(method, 1, rows=1), extended_flight if form in EXTENDED else None,
+            flight_of(method, 1, rows=1), fly_in_extended_numbers if form in EXTENDED else None,
         )  # fmt: skip
 
     return Problem(

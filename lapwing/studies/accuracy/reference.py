@@ -17,7 +17,7 @@ def dop853(rate: Callable[[float, np.ndarray], np.ndarray], start: np.ndarray, d
     return result.y[:, -1]
 
 
-def turning(R: np.ndarray, omega_body: np.ndarray) -> np.ndarray:
+def attitude_rate(R: np.ndarray, omega_body: np.ndarray) -> np.ndarray:
     """Return R' = R hat(omega) of a matrix in row order, shape (9,)."""
     x, y, z = omega_body
     return (R.reshape(3, 3) @ np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])).ravel()

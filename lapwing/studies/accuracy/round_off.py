@@ -77,14 +77,14 @@ def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, step
     Raises:
         TypeError: part of the system does not compute in extended precision.
     """
-    step, rate = extended(method.step), extended(RATES[type(p)])
+    step, rate = extend(method.step), extend(RATES[type(p)])
     state, p = in_extended_precision(x), in_extended_precision(p)
     for n in range(steps):
         state = step(rate, p, Number(n * h), state, Number(h))
-    return extended_coordinates(x, state)
+    return coordinates_in_extended_numbers(x, state)
 
 
-def extended_coordinates(x: Any, state: Any) -> np.ndarray:
+def coordinates_in_extended_numbers(x: Any, state: Any) -> np.ndarray:
     """Return the coordinates of a state in extended numbers, shape (n,).
 
     Args:
@@ -102,15 +102,15 @@ def extended_coordinates(x: Any, state: Any) -> np.ndarray:
 
 def in_extended_precision(tree: Any) -> Any:
     """Return a tree with its doubles as extended numbers."""
-    return _mapped(float, Number, tree)
+    return _map_leaves(float, Number, tree)
 
 
-def extended(function: Any) -> Callable[..., Any]:
+def extend(function: Any) -> Callable[..., Any]:
     """Return the Python function of a kernel, in which all that it calls computes with extended numbers."""
-    return _extended(function, {})
+    return _extend(function, {})
 
 
-def _extended(function: Any, known: dict[int, Any]) -> Any:
+def _extend(function: Any, known: dict[int, Any]) -> Any:
     if function is math:
         return _MATH
     if isinstance(function, ModuleType) and function.__name__.startswith("lapwing"):
@@ -123,9 +123,9 @@ def _extended(function: Any, known: dict[int, Any]) -> Any:
     if id(python) in known:
         return known[id(python)]
     if python.__module__ == noise.__name__:
-        return lambda *values: in_extended_precision(function(*_mapped(Number, float, values)))
+        return lambda *values: in_extended_precision(function(*_map_leaves(Number, float, values)))
     if generate is not None:
-        result: Any = _generated(generate, known)
+        result: Any = _extend_generator(generate, known)
         known[id(python)] = result
         return result
     names = dict(python.__globals__)
@@ -133,8 +133,8 @@ def _extended(function: Any, known: dict[int, Any]) -> Any:
     result = FunctionType(python.__code__, names, python.__name__, python.__defaults__, cells)
     known[id(python)] = result
     for cell, original in zip(cells or (), python.__closure__ or (), strict=True):
-        cell.cell_contents = _extended(original.cell_contents, known)
-    names |= {name: _extended(names[name], known) for name in python.__code__.co_names if name in names}
+        cell.cell_contents = _extend(original.cell_contents, known)
+    names |= {name: _extend(names[name], known) for name in python.__code__.co_names if name in names}
     return result
 
 
@@ -145,7 +145,7 @@ class _Module:
         self._module, self._known = module, known
 
     def __getattr__(self, name: str) -> Any:
-        return _extended(getattr(self._module, name), self._known)
+        return _extend(getattr(self._module, name), self._known)
 
 
 def _generator(function: Any) -> Callable[..., Any] | None:
@@ -157,14 +157,14 @@ def _generator(function: Any) -> Callable[..., Any] | None:
     return GENERATORS.get(function) if is_generated else None
 
 
-def _generated(generate: Callable[..., Any], known: dict[int, Any]) -> Callable[..., Any]:
+def _extend_generator(generate: Callable[..., Any], known: dict[int, Any]) -> Callable[..., Any]:
     variants: dict[Any, Any] = {}
 
     def call(*values: Any) -> Any:
         key = tuple(map(_shape, values))
         if key not in variants:
-            variants[key] = _extended(
-                generate(*(numba.typeof(_mapped(Number, float, value)) for value in values)), known
+            variants[key] = _extend(
+                generate(*(numba.typeof(_map_leaves(Number, float, value)) for value in values)), known
             )
         return variants[key](*values)
 
@@ -175,11 +175,11 @@ def _shape(value: Any) -> Any:
     return (type(value), *map(_shape, value)) if isinstance(value, tuple) else type(value)
 
 
-def _mapped(source: type, target: Callable[[Any], Any], tree: Any) -> Any:
+def _map_leaves(source: type, target: Callable[[Any], Any], tree: Any) -> Any:
     """Return a tree with `target(leaf)` in place of each leaf of type `source`."""
     if not isinstance(tree, tuple):
         return target(tree) if isinstance(tree, source) else tree
-    items = [_mapped(source, target, item) for item in tree]
+    items = [_map_leaves(source, target, item) for item in tree]
     return type(tree)(*items) if hasattr(tree, "_fields") else tuple(items)
 
 

@@ -13,7 +13,7 @@ from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.accuracy import plant
 from lapwing.studies.accuracy.coordinates import coordinates
-from lapwing.studies.accuracy.integrate import SAMPLES, fixed_ways, sampled
+from lapwing.studies.accuracy.integrate import SAMPLES, fixed_step_methods, sample_states
 from lapwing.studies.accuracy.problem import Problem
 
 FINEST = 64  # steps in an exchange interval, of the reference
@@ -36,7 +36,7 @@ def manoeuvres(scene: Scene) -> list[Problem]:
     """
     if hasattr(plant.model(scene), "described"):
         return [plant.problem(scene), plant.problem(scene, plant.jumps)]
-    return [_marched(scene, *physics(scene))]
+    return [_fixed_step_problem(scene, *physics(scene))]
 
 
 def physics(scene: Scene) -> tuple[Any, Any]:
@@ -54,28 +54,28 @@ def physics(scene: Scene) -> tuple[Any, Any]:
     return model.system(scene)
 
 
-def _marched(scene: Scene, p: Any, x: Any) -> Problem:
+def _fixed_step_problem(scene: Scene, p: Any, x: Any) -> Problem:
     interval = scene[Communication].interval
     ticks = SAMPLES * max(1, round(scene[Run].duration / interval / SAMPLES))
-    p = lifted(p)
+    p = with_lift(p)
 
     def reference() -> np.ndarray:
         out = np.empty((2, len(flatten(x))))
-        sampled(get("rkmk54").Method(), p, x, interval / FINEST, FINEST * ticks, out)
+        sample_states(get("rkmk54").Method(), p, x, interval / FINEST, FINEST * ticks, out)
         return coordinates(x, out)[-1]
 
     return Problem(
         f"{scene.name}: its plant",
         "s",
         ticks * interval,
-        fixed_ways(p, x, ticks * interval, ticks),
+        fixed_step_methods(p, x, ticks * interval, ticks),
         reference,
         f"rkmk54 with {FINEST} steps in an exchange interval",
         {},
     )
 
 
-def lifted(p: Any) -> Any:
+def with_lift(p: Any) -> Any:
     """Return the parameters; those of a shared load with thrusts that balance the weight, and some rotation."""
     if not isinstance(p, CooperativeLoadParameters):
         return p

@@ -38,26 +38,24 @@ def with_start_shifted(setup: RunConfig, apart: float) -> RunConfig:
     plant = setup.services[CLOCK_OWNER]
     if isinstance(plant.parameters, PerVehicle):
         vehicles, configs = plant.parameters
-        plant = plant._replace(
-            parameters=PerVehicle(vehicles, tuple(_shifted_service(each, apart) for each in configs))
-        )
+        plant = plant._replace(parameters=PerVehicle(vehicles, tuple(_shift_start(each, apart) for each in configs)))
     else:
-        plant = _shifted_service(plant, apart)
+        plant = _shift_start(plant, apart)
     return setup._replace(services={**setup.services, CLOCK_OWNER: plant})
 
 
-def _shifted_service(service: ServiceConfig, apart: float) -> ServiceConfig:
+def _shift_start(service: ServiceConfig, apart: float) -> ServiceConfig:
     start = service.parameters.start
     if isinstance(start, MultirotorPlantState):
-        shifted = start._replace(vehicle=start.vehicle._replace(motion=_shifted(start.vehicle.motion, apart)))
+        shifted = start._replace(vehicle=start.vehicle._replace(motion=_shift(start.vehicle.motion, apart)))
     else:
-        shifted = _shifted(start, apart)
+        shifted = _shift(start, apart)
     return service._replace(parameters=service.parameters._replace(start=shifted))
 
 
-def _shifted(tree: Any, apart: float) -> Any:
+def _shift(tree: Any, apart: float) -> Any:
     if isinstance(tree, tuple):
-        items = [_shifted(item, apart) for item in tree]
+        items = [_shift(item, apart) for item in tree]
         return type(tree)(*items) if hasattr(tree, "_fields") else tuple(items)
     return tree + apart * (1.0 + abs(tree)) if isinstance(tree, float) else tree
 
@@ -76,19 +74,19 @@ def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | Non
             if service.name == CLOCK_OWNER or port.period == LATCHED:
                 continue
             pair = [columns(port.like, graph.history(port.name, port.period)) for graph in (a, b)]
-            for name, one, other in _paired(port.name, *pair):
+            for name, one, other in _pair_columns(port.name, *pair):
                 signal = _first(name, one, other, limit, port.period * a.setup.interval)
                 if signal and (first is None or signal.time < first.time):
                     first = signal
     return first
 
 
-def _paired(name: str, a: Any, b: Any) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+def _pair_columns(name: str, a: Any, b: Any) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Yield the name and the columns of each number in two trees."""
     if isinstance(a, tuple):
         names = [f".{field}" for field in a._fields] if hasattr(a, "_fields") else [f"[{i}]" for i in range(len(a))]
         for suffix, one, other in zip(names, a, b, strict=True):
-            yield from _paired(name + suffix, one, other)
+            yield from _pair_columns(name + suffix, one, other)
     else:
         n = min(len(a), len(b))
         yield name, a[:n].reshape(n, -1), b[:n].reshape(n, -1)

@@ -46,7 +46,7 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     )
     share = _share(scene, gentle, solver.accuracy) / solver.accuracy
     try:
-        chosen = cheapest(_expected(gentle, share, jumping), solver.accuracy)
+        chosen = cheapest(_expected_errors(gentle, share, jumping), solver.accuracy)
     except ConfigError as error:
         message = f"{solver.accuracy:g}: {error.message}"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
@@ -54,7 +54,7 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
 
 
-def _expected(gentle: list[Point], share: float, jumping: list[list[Point]]) -> list[Point]:
+def _expected_errors(gentle: list[Point], share: float, jumping: list[list[Point]]) -> list[Point]:
     """Return the points of gentle flight with the largest error to expect of a flight."""
     errors = {(p.way, p.setting): p.error / share for p in gentle}
     for points in jumping:

@@ -52,12 +52,12 @@ def _refine(problem: Problem, way: SolverMethod, exact: np.ndarray, longest: flo
             net = max(seconds - idle, 1e-7)
             drifts = drift(problem, outcome)
             points.append(Point(way.name, way.order, way.unit, setting, off, net, outcome.evaluations, drifts))
-        if seconds > longest or _exhausted([p.error for p in points]):
+        if seconds > longest or _refinement_is_useless([p.error for p in points]):
             break
     return points
 
 
-def _exhausted(errors: list[float]) -> bool:
+def _refinement_is_useless(errors: list[float]) -> bool:
     """Return True if further refinement is useless."""
     if not errors:
         return False

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from lapwing.studies.accuracy.error_budget import Part
 from lapwing.studies.accuracy.work_precision import Point
-from lapwing.studies.report.matplotlib_figure import styled
+from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import DPI
 
 # Okabe and Ito's palette, then the same again with other markers and dashes
@@ -19,7 +19,7 @@ SMALLEST = 1e-14  # errors below are drawn there
 
 def draw(path: Path, title: str, points: list[Point], parts: Sequence[Part] = ()) -> None:
     """Write the picture in the format of the file's ending; beside it, of a scene, its three errors."""
-    with styled():
+    with plot_style():
         figure = Figure(figsize=(14.0 if parts else 8.6, 5.6), layout="constrained")
         axes = figure.subplots(1, 2 if parts else 1, squeeze=False, width_ratios=(1.6, 1.0) if parts else None)[0]
         on_axes(axes[0], points)

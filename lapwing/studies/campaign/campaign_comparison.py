@@ -7,7 +7,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from lapwing.studies.campaign.campaign_plots import shown
+from lapwing.studies.campaign.campaign_plots import label_and_factor
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, interval, paired_difference
@@ -92,7 +92,7 @@ def show(console: Console, comparison: Comparison) -> None:
     for head in ("first", "second", "change", "from", "to"):
         table.add_column(head, justify="right", no_wrap=True)
     for d in comparison.differences:
-        label, scale = ("success [%]", 100.0) if d.figure == "success" else shown(d.figure)
+        label, scale = ("success [%]", 100.0) if d.figure == "success" else label_and_factor(d.figure)
         means = (f"{scale * mean:.4g}" for mean in (d.one, d.other))
         changes = (f"{scale * change:+.3g}" for change in d.difference)
         table.add_row(f"{label}{' *' if d.sure else ''}", *means, *changes)

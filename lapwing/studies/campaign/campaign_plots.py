@@ -24,7 +24,7 @@ ENOUGH, MOST = 50, 10_000  # runs for Sobol indices: at least, and as many as ar
 _LIMIT = re.compile(r"([\w.]+)\s*(?:<=?|>=?)\s*([-+\d.eE]+)")
 
 
-def shown(name: str) -> tuple[str, float]:
+def label_and_factor(name: str) -> tuple[str, float]:
     """Return label and unit factor of a metric as shown: angles in degrees, energies in W h, fractions in per cent."""
     unit = METRICS[name]
     if unit == "J":
@@ -34,7 +34,7 @@ def shown(name: str) -> tuple[str, float]:
     return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
 
 
-def required(results: Results) -> dict[str, float]:
+def required_limits(results: Results) -> dict[str, float]:
     """Return the limits of metrics in the scene's `[success]`."""
     texts = results.folder.about["success"]
     return {match[1]: float(match[2]) for text in texts if (match := _LIMIT.fullmatch(text.strip()))}
@@ -55,9 +55,9 @@ def others(results: Results) -> Plot:
 def _distributions(results: Results, names: list[str], caption: str) -> Plot:
     if not names:
         raise NotRecordedError("every run has the same")
-    limits, panels = required(results), []
+    limits, panels = required_limits(results), []
     for k, name in enumerate(names):
-        label, scale = shown(name)
+        label, scale = label_and_factor(name)
         marks: list[Mark] = []
         for legend, column, colour in _each(results, name):
             values = scale * np.sort(column[np.isfinite(column)])
@@ -192,7 +192,7 @@ def parallel(results: Results) -> Plot:
     for name in names:
         values, (label, scale) = (
             results.number(name),
-            shown(name) if name in METRICS else (_with_unit(results, name), 1.0),
+            label_and_factor(name) if name in METRICS else (_with_unit(results, name), 1.0),
         )
         low, high = np.nanmin(values), np.nanmax(values)
         columns.append((values - low) / (high - low if high > low else 1.0))

@@ -11,7 +11,7 @@ from lapwing.studies.report.page import render
 from lapwing.studies.report.paper import Cover, Titled, write_pdf
 from lapwing.studies.report.plot import NotRecordedError, Plot
 from lapwing.studies.report.sections import Section
-from lapwing.studies.tracking import AXES, shown
+from lapwing.studies.tracking import AXES, unit_and_factor
 
 WORST = 10  # runs that are listed
 PLOTS: dict[str, Callable[[Results], Plot]] = {
@@ -74,8 +74,8 @@ def _cover(results: Results) -> Cover:
     spreads = {axis: results.spread(f"rmse.{axis}") for axis in AXES}
     rows = [
         (
-            f"{axis} [{shown(axis)[0]}]",
-            *(console_output.digits(shown(axis)[1] * v) for v in (s.median, s.high, s.worst)),
+            f"{axis} [{unit_and_factor(axis)[0]}]",
+            *(console_output.digits(unit_and_factor(axis)[1] * v) for v in (s.median, s.high, s.worst)),
         )
         for axis, s in spreads.items()
         if s is not None
@@ -92,7 +92,7 @@ def _title(results: Results) -> str:
 
 def _page(results: Results, sections: list[Section]) -> str:
     plan = results.folder.plan
-    heads = [campaign_plots.shown(name) for name in LISTED]
+    heads = [campaign_plots.label_and_factor(name) for name in LISTED]
     worst = [
         {
             "run": int(row["run"]),

@@ -12,7 +12,7 @@ from lapwing.studies import json_file
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.consistency import JOINT, SOURCES, bounds
-from lapwing.studies.tracking import AXES, shown
+from lapwing.studies.tracking import AXES, unit_and_factor
 
 VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
 VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touch-down [m/s]", "success")
@@ -120,7 +120,7 @@ def _table(console: Console, title: str, kind: str, results: Results) -> None:
         table.add_column(results.source, justify="right")
         table.add_column("worst / that", justify="right")
     for axis in AXES:
-        s, (unit, scale) = results.spread(f"{kind}.{axis}"), shown(axis)
+        s, (unit, scale) = results.spread(f"{kind}.{axis}"), unit_and_factor(axis)
         if s is None:
             continue
         row = [f"{axis} [{unit}]", *(digits(scale * v) for v in (s.low, s.median, s.high, s.worst)), str(s.run)]

@@ -40,7 +40,7 @@ def normal(mean: float, deviation: float) -> Distribution:
     Raises:
         ValueError: the deviation is below 0.
     """
-    return _checked("normal", mean, deviation, sound=deviation >= 0.0, expected="a deviation of at least 0")
+    return _validate("normal", mean, deviation, sound=deviation >= 0.0, expected="a deviation of at least 0")
 
 
 def uniform(low: float, high: float) -> Distribution:
@@ -49,7 +49,7 @@ def uniform(low: float, high: float) -> Distribution:
     Raises:
         ValueError: high is below low.
     """
-    return _checked("uniform", low, high, sound=high >= low, expected="low <= high")
+    return _validate("uniform", low, high, sound=high >= low, expected="low <= high")
 
 
 def loguniform(low: float, high: float) -> Distribution:
@@ -58,7 +58,7 @@ def loguniform(low: float, high: float) -> Distribution:
     Raises:
         ValueError: high is below low, or low is not above 0.
     """
-    return _checked("loguniform", low, high, sound=high >= low > 0.0, expected="0 < low <= high")
+    return _validate("loguniform", low, high, sound=high >= low > 0.0, expected="0 < low <= high")
 
 
 def linspace(low: float, high: float, count: int) -> Distribution:
@@ -69,7 +69,7 @@ def linspace(low: float, high: float, count: int) -> Distribution:
     """
     sound = isinstance(count, int) and 0 < count <= MOST
     expected = f"a whole number of values, up to {MOST}, as third argument"
-    return _checked("linspace", low, high, count, sound=sound, expected=expected)
+    return _validate("linspace", low, high, count, sound=sound, expected=expected)
 
 
 def choice(*values: Any) -> Distribution:
@@ -123,7 +123,7 @@ def _arguments(text: str) -> list[Any]:
         return [value_of(part.strip()) for part in _SPLIT.findall(text)]
 
 
-def _checked(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
+def _validate(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
     if not sound or not all(abs(number) <= sys.float_info.max for number in numbers):
         raise ValueError(f"{name}: expected {expected}, got {', '.join(map(str, numbers))}")
     return Distribution(name, numbers)

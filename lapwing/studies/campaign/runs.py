@@ -155,13 +155,13 @@ def setup_of(plan: Plan, run: int) -> RunConfig:
         SceneError: the drawn values do not fit the scene.
     """
     if not plan.keys:
-        return reseed(_resolved(plan.path, plan.overrides), plan.seed_of(run))
-    with located(plan):
+        return reseed(_resolve(plan.path, plan.overrides), plan.seed_of(run))
+    with name_option_in_errors(plan):
         return campaign_setup(load(scene_of(plan), plan.overrides_of(run)))
 
 
 @contextlib.contextmanager
-def located(plan: Plan) -> Iterator[None]:
+def name_option_in_errors(plan: Plan) -> Iterator[None]:
     """Name the option that varies a key in errors about its value."""
     try:
         yield
@@ -201,7 +201,7 @@ def _scene(scene: str, overrides: tuple[str, ...]) -> Scene:
 
 
 @cache
-def _resolved(scene: str, overrides: tuple[str, ...]) -> RunConfig:
+def _resolve(scene: str, overrides: tuple[str, ...]) -> RunConfig:
     return campaign_setup(_scene(scene, overrides))
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from lapwing.cosim.scene import Scene
 from lapwing.services.scene_resolver import load
 from lapwing.studies.campaign.folder import read
-from lapwing.studies.campaign.runs import REFUSED, located, scene_of, sources
+from lapwing.studies.campaign.runs import REFUSED, name_option_in_errors, scene_of, sources
 
 
 def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
@@ -27,7 +27,7 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
     for name in sorted({*there, *here}):
         if there.get(name) != here.get(name):
             raise ValueError(f"{scene}: {name} is not what {folder} has flown; expected the scene as it was then")
-    with located(plan):
+    with name_option_in_errors(plan):
         return load(scene_of(plan), plan.overrides_of(run))
 
 

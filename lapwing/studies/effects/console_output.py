@@ -11,7 +11,7 @@ from rich.table import Table
 from lapwing.studies import json_file
 from lapwing.studies.effects.influence import Influence
 from lapwing.studies.effects.procedure import Row, Study
-from lapwing.studies.report.matplotlib_figure import styled
+from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
 
 LEAST = 1e-6  # [m] shorter bars are drawn as long as this
@@ -83,7 +83,7 @@ def plot(path: Path, study: Study) -> None:
     """Plot the influence of every effect over the tolerance, and its cost."""
     rows = [r for r in (*_of(study, False)[::-1], *_of(study, True)[::-1]) if r.influence]
     names = [row.name if row.active else f"({row.name})" for row in rows]
-    with styled():
+    with plot_style():
         figure = Figure(figsize=(WIDTH, 1.1 + 0.27 * len(rows)), dpi=DPI, layout="constrained")
         influence, cost = figure.subplots(1, 2, sharey=True)
         ends = [row.influence.trajectory for row in rows if row.influence]

@@ -21,11 +21,11 @@ def influence(reference: FlightData, other: FlightData) -> Influence:
     if other.failure:
         return Influence(np.inf, np.inf, np.inf, other.failure)
     count = max(len(reference.truth), len(other.truth))
-    a, b = (_extended(flight.truth.position, count) for flight in (reference, other))
+    a, b = (_extend(flight.truth.position, count) for flight in (reference, other))
     apart = np.linalg.norm(a - b, axis=1)
     change = (other.energy - reference.energy) / reference.energy if reference.energy else 0.0
     return Influence(float(apart.max()), float(apart[-1]), float(change))
 
 
-def _extended(position: np.ndarray, count: int) -> np.ndarray:
+def _extend(position: np.ndarray, count: int) -> np.ndarray:
     return np.concatenate([position, np.repeat(position[-1:], count - len(position), axis=0)])

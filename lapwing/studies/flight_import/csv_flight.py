@@ -175,7 +175,7 @@ def _on_grid(
 ) -> tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray]:
     """Interpolate linearly onto a uniform grid; a sample is valid where both neighbours are, and near."""
 
-    def moved(values: np.ndarray) -> np.ndarray:
+    def transform(values: np.ndarray) -> np.ndarray:
         if values.ndim == 1:
             return np.interp(grid, time, values)
         return np.column_stack([np.interp(grid, time, column) for column in values.T])
@@ -183,4 +183,4 @@ def _on_grid(
     right = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
     sound = valid[right] & valid[right - 1] & (time[right] - time[right - 1] <= LONGEST_GAP)
     position, attitude, *rest = channels
-    return (moved(position), unit(moved(continuous(attitude))), *map(moved, rest)), sound, moved(power)
+    return (transform(position), unit(transform(continuous(attitude))), *map(transform, rest)), sound, transform(power)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
-from lapwing.studies.flight_import.recording import Recording, Series, converted
+from lapwing.studies.flight_import.recording import Recording, Series, convert
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 FIRST_MOTOR, NINTH_MOTOR = 33, 82  # SERVOn_FUNCTION of motors 1 to 8, and 9 to 12
@@ -52,23 +52,23 @@ def read_dataflash_flight(path: Path) -> Recording:
         return next((s for name, *fields in choices if (s := series(name, *fields)) is not None), None)
 
     quaternion = ("Q1", "Q2", "Q3", "Q4")
-    channels.attitude = converted(first(("XKQ", *quaternion), ("NKQ", *quaternion)), from_ned_frd)
+    channels.attitude = convert(first(("XKQ", *quaternion), ("NKQ", *quaternion)), from_ned_frd)
     if channels.attitude is None:
         euler = series("ATT", "Roll", "Pitch", "Yaw")
-        channels.attitude = converted(euler, lambda v: from_ned_frd(from_euler(np.radians(v))))
+        channels.attitude = convert(euler, lambda v: from_ned_frd(from_euler(np.radians(v))))
     estimators = ("XKF1", "NKF1", "EKF1")
-    channels.position = converted(first(*((name, "PN", "PE", "PD") for name in estimators)), ned_to_enu)
-    channels.velocity = converted(first(*((name, "VN", "VE", "VD") for name in estimators)), ned_to_enu)
-    channels.omega = converted(series("IMU", "GyrX", "GyrY", "GyrZ"), lambda v: v * FLU)
-    channels.specific_force = converted(series("IMU", "AccX", "AccY", "AccZ"), lambda v: v * FLU)
+    channels.position = convert(first(*((name, "PN", "PE", "PD") for name in estimators)), ned_to_enu)
+    channels.velocity = convert(first(*((name, "VN", "VE", "VD") for name in estimators)), ned_to_enu)
+    channels.omega = convert(series("IMU", "GyrX", "GyrY", "GyrZ"), lambda v: v * FLU)
+    channels.specific_force = convert(series("IMU", "AccX", "AccY", "AccZ"), lambda v: v * FLU)
     channels.battery = first(("BAT", "Volt", "Curr"), ("CURR", "Volt", "Curr"))
     channels.duty = _duty(messages, parameters, channels)
     raw = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
     readings = {
-        "imu": converted(series("IMU", *raw), lambda v: v * np.tile(FLU, 2)),
+        "imu": convert(series("IMU", *raw), lambda v: v * np.tile(FLU, 2)),
         "gps": series("GPS", "Lat", "Lng", "Alt"),
         "baro": series("BARO", "Press"),
-        "mag": converted(series("MAG", "MagX", "MagY", "MagZ"), lambda v: v * FLU * MILLIGAUSS),
+        "mag": convert(series("MAG", "MagX", "MagY", "MagZ"), lambda v: v * FLU * MILLIGAUSS),
         "rangefinder": series("RFND", "Dist"),
         "airspeed": first(("ARSP", "DiffPress"), ("ARSP", "Press")),
     }

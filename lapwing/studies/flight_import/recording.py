@@ -55,7 +55,7 @@ class Series:
         return np.asarray(self.time[right] - self.time[right - 1] <= LONGEST_HOLD)
 
 
-def converted(source: Series | None, change: Callable[[np.ndarray], np.ndarray]) -> Series | None:
+def convert(source: Series | None, change: Callable[[np.ndarray], np.ndarray]) -> Series | None:
     """Return a series with converted values, None for None."""
     return source and replace(source, values=change(source.values))
 

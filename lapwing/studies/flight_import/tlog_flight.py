@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
-from lapwing.studies.flight_import.recording import Recording, Series, converted
+from lapwing.studies.flight_import.recording import Recording, Series, convert
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us]
@@ -37,34 +37,34 @@ def read_tlog_flight(path: Path) -> Recording:
             return None
         return Series.of([t for t, _ in rows], [[scale * getattr(m, f) for f in fields] for _, m in rows])
 
-    channels.attitude = converted(series("ATTITUDE_QUATERNION", "q1", "q2", "q3", "q4"), from_ned_frd)
+    channels.attitude = convert(series("ATTITUDE_QUATERNION", "q1", "q2", "q3", "q4"), from_ned_frd)
     if channels.attitude is None:
         euler = series("ATTITUDE", "roll", "pitch", "yaw")
-        channels.attitude = converted(euler, lambda v: from_ned_frd(from_euler(v)))
-    channels.position = converted(series("LOCAL_POSITION_NED", "x", "y", "z"), ned_to_enu)
-    channels.velocity = converted(series("LOCAL_POSITION_NED", "vx", "vy", "vz"), ned_to_enu)
+        channels.attitude = convert(euler, lambda v: from_ned_frd(from_euler(v)))
+    channels.position = convert(series("LOCAL_POSITION_NED", "x", "y", "z"), ned_to_enu)
+    channels.velocity = convert(series("LOCAL_POSITION_NED", "vx", "vy", "vz"), ned_to_enu)
     rates = ("rollspeed", "pitchspeed", "yawspeed")
     omega = (
         series("HIGHRES_IMU", "xgyro", "ygyro", "zgyro")
         or series("ATTITUDE_QUATERNION", *rates)
         or series("ATTITUDE", *rates)
     )
-    channels.omega = converted(omega, lambda v: v * FLU)
+    channels.omega = convert(omega, lambda v: v * FLU)
     milli_g = 1e-3 * STANDARD_GRAVITY
     force = series("HIGHRES_IMU", "xacc", "yacc", "zacc") or series("SCALED_IMU", "xacc", "yacc", "zacc", scale=milli_g)
-    channels.specific_force = converted(
+    channels.specific_force = convert(
         force or series("RAW_IMU", "xacc", "yacc", "zacc", scale=milli_g), lambda v: v * FLU
     )
     battery = series("SYS_STATUS", "voltage_battery", "current_battery")
-    channels.battery = converted(battery, lambda v: v * [1e-3, 1e-2])
+    channels.battery = convert(battery, lambda v: v * [1e-3, 1e-2])
     channels.duty = _duty(messages, channels)
     raw = ("xgyro", "ygyro", "zgyro", "xacc", "yacc", "zacc")
     readings = {
-        "imu": converted(series("HIGHRES_IMU", *raw), lambda v: v * np.tile(FLU, 2)),
-        "gps": converted(series("GPS_RAW_INT", "lat", "lon", "alt"), lambda v: v * [1e-7, 1e-7, 1e-3]),
+        "imu": convert(series("HIGHRES_IMU", *raw), lambda v: v * np.tile(FLU, 2)),
+        "gps": convert(series("GPS_RAW_INT", "lat", "lon", "alt"), lambda v: v * [1e-7, 1e-7, 1e-3]),
         "baro": series("SCALED_PRESSURE", "press_abs", scale=100.0)
         or series("HIGHRES_IMU", "abs_pressure", scale=100.0),
-        "mag": converted(series("HIGHRES_IMU", "xmag", "ymag", "zmag", scale=1e-4), lambda v: v * FLU),
+        "mag": convert(series("HIGHRES_IMU", "xmag", "ymag", "zmag", scale=1e-4), lambda v: v * FLU),
         "rangefinder": series("DISTANCE_SENSOR", "current_distance", scale=1e-2),
     }
     channels.readings = {name: s for name, s in readings.items() if s is not None}

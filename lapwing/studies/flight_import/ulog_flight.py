@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
-from lapwing.studies.flight_import.recording import Recording, Series, converted
+from lapwing.studies.flight_import.recording import Recording, Series, convert
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us] of a PWM output
@@ -64,12 +64,12 @@ def read_ulog_flight(path: Path) -> Recording:
     def three(topic: str, field: str) -> Series | None:
         return series(topic, *(f"{field}[{k}]" for k in range(3)))
 
-    channels.attitude = converted(series("vehicle_attitude", *(f"q[{k}]" for k in range(4))), from_ned_frd)
-    channels.position = converted(series("vehicle_local_position", "x", "y", "z"), ned_to_enu)
-    channels.velocity = converted(series("vehicle_local_position", "vx", "vy", "vz"), ned_to_enu)
+    channels.attitude = convert(series("vehicle_attitude", *(f"q[{k}]" for k in range(4))), from_ned_frd)
+    channels.position = convert(series("vehicle_local_position", "x", "y", "z"), ned_to_enu)
+    channels.velocity = convert(series("vehicle_local_position", "vx", "vy", "vz"), ned_to_enu)
     rates = three("vehicle_angular_velocity", "xyz") or three("sensor_combined", "gyro_rad")
-    channels.omega = converted(rates, lambda v: v * FLU)
-    channels.specific_force = converted(three("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
+    channels.omega = convert(rates, lambda v: v * FLU)
+    channels.specific_force = convert(three("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
     channels.battery = series("battery_status", "voltage_v", "current_a")
     channels.duty = _duty(topics, series, channels)
     channels.setpoint = _setpoint(series, three)
@@ -177,11 +177,11 @@ def _status(series: Any) -> Series | None:
 def _readings(series: Any, three: Any) -> dict[str, Series]:
     """Sensors, each from the topic that the estimator used where there is one, else from the driver's."""
 
-    def scaled(source: Series | None, *factors: float) -> Series | None:
+    def scale(source: Series | None, *factors: float) -> Series | None:
         return source and Series(source.time, source.values * factors)
 
     def gps(topic: str) -> Series | None:  # degrees and metres were integers until PX4 1.14
-        return series(topic, "latitude_deg", "longitude_deg", "altitude_msl_m") or scaled(
+        return series(topic, "latitude_deg", "longitude_deg", "altitude_msl_m") or scale(
             series(topic, "lat", "lon", "alt"), 1e-7, 1e-7, 1e-3
         )
 
@@ -191,16 +191,16 @@ def _readings(series: Any, three: Any) -> dict[str, Series]:
 
     driver = series("sensor_baro", "pressure")
     if driver and np.median(driver.values) < HIGHEST_HPA:  # hPa until PX4 1.13
-        driver = scaled(driver, 100.0)
+        driver = scale(driver, 100.0)
     field = three("vehicle_magnetometer", "magnetometer_ga") or series("sensor_mag", "x", "y", "z")
     field = field or three("sensor_combined", "magnetometer_ga")  # until PX4 1.7
     raw = [f"{name}[{k}]" for name in ("gyro_rad", "accelerometer_m_s2") for k in range(3)]
     result = {
-        "imu": scaled(series("sensor_combined", *raw), *FLU, *FLU),
+        "imu": scale(series("sensor_combined", *raw), *FLU, *FLU),
         "gps": gps("vehicle_gps_position") or gps("sensor_gps"),
         "gps_velocity": gps_velocity("vehicle_gps_position") or gps_velocity("sensor_gps"),
         "baro": series("vehicle_air_data", "baro_pressure_pa") or driver,
-        "mag": scaled(field, *FLU * GAUSS),
+        "mag": scale(field, *FLU * GAUSS),
         "rangefinder": series("distance_sensor", "current_distance"),
         "optical_flow": _optical_flow(series),
         "airspeed": series("differential_pressure", "differential_pressure_pa")

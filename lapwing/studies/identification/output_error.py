@@ -113,9 +113,9 @@ class OutputError:
             self.plant.set_parameters([{self.keys[k]: float(sets[i][k]) for k in own} for i in members])
             states = start_states(self.plant, flights, self.memory)
             spans = [Span(w.flight, w.starts, j) for j in range(len(members)) for w in self.windows]
-            result = predict_all(self.plant, [smoothed(f) for f in flights], spans, states, self.horizons)
+            result = predict_all(self.plant, [smooth_motion(f) for f in flights], spans, states, self.horizons)
             parts = [
-                _stacked(compare(flights[s.flight], s.starts, self.horizons, f))
+                _stack(compare(flights[s.flight], s.starts, self.horizons, f))
                 for s, f in zip(spans, result, strict=True)
             ]
             for j, i in enumerate(members):
@@ -198,7 +198,7 @@ class OutputError:
         )  # fmt: skip
 
 
-def smoothed(flight: Recording) -> Recording:
+def smooth_motion(flight: Recording) -> Recording:
     """Return a flight whose motion is smoothed over neighbouring samples, without delay.
 
     The noise of a start state enters the prediction and its derivatives alike, which biases time constants and inertia.
@@ -214,7 +214,7 @@ def smoothed(flight: Recording) -> Recording:
     )  # fmt: skip
 
 
-def _stacked(e: Errors) -> np.ndarray:
+def _stack(e: Errors) -> np.ndarray:
     """Return the errors of all fields, shape (n, h, 4, 3)."""
     return np.stack([getattr(e, name) for name in FIELDS], axis=2)
 

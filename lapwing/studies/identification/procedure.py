@@ -19,7 +19,7 @@ from lapwing.studies.identification.flight_parameters import apply_flight_parame
 from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import magnitudes, pooled
+from lapwing.studies.validation.prediction_metrics import magnitudes, pool_flights
 from lapwing.studies.validation.procedure import read_flights
 from lapwing.studies.validation.start_states import TrimMemory, start_states
 from lapwing.studies.validation.windows import compare, predict, window_starts
@@ -77,9 +77,9 @@ def identify(
     base = load_one(scene, overrides)
     start = [start_value(base, key) for key in keys]
     flights, skipped = read_flights(paths, mapping, say)
-    flown = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
-    recordings = list(compress(flights, flown))
-    skipped += [f"{r.name}: no valid window in the air" for r, up in zip(flights, flown, strict=True) if not up]
+    run = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
+    recordings = list(compress(flights, run))
+    skipped += [f"{r.name}: no valid window in the air" for r, up in zip(flights, run, strict=True) if not up]
     if not recordings:
         raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
     chosen = _held_out(len(recordings), seed)
@@ -88,7 +88,7 @@ def identify(
     plant = PlantRows(base, recordings[0].interval)
     problem = OutputError(plant, used, keys, start, windows, memory, horizons)
     stamp = _stamp(base, keys, [r.name for r in used], windows, seed, (memory, horizons))
-    begin = _resumed(progress, stamp)
+    begin = _read_progress(progress, stamp)
 
     def store(step: int, values: np.ndarray, cost: float) -> None:
         say(f"loss {cost:.4g}", step, most)
@@ -175,7 +175,7 @@ def _stamp(scene: Scene, keys: Sequence[str], flights: list[str], windows: int, 
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
-def _resumed(progress: Path | None, stamp: str) -> np.ndarray | None:
+def _read_progress(progress: Path | None, stamp: str) -> np.ndarray | None:
     if progress is None or not progress.exists():
         return None
     try:
@@ -196,7 +196,7 @@ def _errors(
         starts = window_starts(flight, HORIZON[-1], 10)
         predicted = predict(plant, flight, starts, state, HORIZON)
         result.append(magnitudes(compare(flight, starts, HORIZON, predicted))[:, 0])
-    return np.array([m.mean for m in pooled([values[:, None] for values in result])[0]])
+    return np.array([m.mean for m in pool_flights([values[:, None] for values in result])[0]])
 
 
 def _put(table: Any, keys: list[str], value: float) -> None:

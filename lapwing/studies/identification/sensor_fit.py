@@ -70,7 +70,7 @@ def fit_sensors(flight: Recording) -> tuple[dict[str, dict[str, Any]], list[str]
     rest = _rest(flight)
     if rest is None:
         notes.append(f"no {SHORTEST_REST:g} s at rest with motors off: noise is measured in flight, with vibration")
-    readings = {"imu": _sampled_imu(flight), **flight.readings}
+    readings = {"imu": _imu_of_samples(flight), **flight.readings}
     series = {name: s for name, s in readings.items() if len(s.time) >= FEWEST}
     located = bool(np.isfinite(flight.position).all(axis=1).any())
     if "imu" in series:
@@ -88,7 +88,7 @@ def fit_sensors(flight: Recording) -> tuple[dict[str, dict[str, Any]], list[str]
     return out, notes
 
 
-def _sampled_imu(flight: Recording) -> Series:
+def _imu_of_samples(flight: Recording) -> Series:
     """Return rate and specific force of the flight's samples: files of columns have the IMU at no rate of its own."""
     values = np.column_stack([flight.omega, flight.specific_force])
     sound = flight.valid & np.isfinite(values).all(axis=1)

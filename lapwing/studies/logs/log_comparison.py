@@ -71,9 +71,9 @@ def _first(a: LogReader, b: LogReader, topics: set[str]) -> Difference | None:
             here, there = next(one, None), next(other, None)
             continue
         time_ns = min(instant[0] for instant in (here, there) if instant)
-        said = [instant[1] if instant and instant[0] == time_ns else {} for instant in (here, there)]
-        for topic in {**said[0], **said[1]}:  # in the order of the log
-            payloads = [s.get(topic, []) for s in said]
+        text = [instant[1] if instant and instant[0] == time_ns else {} for instant in (here, there)]
+        for topic in {**text[0], **text[1]}:  # in the order of the log
+            payloads = [s.get(topic, []) for s in text]
             if payloads[0] != payloads[1]:
                 return _difference(a, b, topic, types[topic], time_ns, *payloads)
     return None
@@ -82,10 +82,10 @@ def _first(a: LogReader, b: LogReader, topics: set[str]) -> Difference | None:
 def _instants(log: LogReader, topics: set[str]) -> Iterator[tuple[int, dict[str, list[bytes]]]]:
     """Yield each time [ns] with the payloads of each topic."""
     for time_ns, group in groupby(log.messages(topics), key=lambda message: message[2]):
-        said: dict[str, list[bytes]] = {}
+        text: dict[str, list[bytes]] = {}
         for topic, _, _, payload in group:
-            said.setdefault(topic, []).append(payload)
-        yield time_ns, said
+            text.setdefault(topic, []).append(payload)
+        yield time_ns, text
 
 
 def _difference(

@@ -45,7 +45,7 @@ _MARKERS = {"": "", "circle": "o", "open": "o", "square": "s", "cross": "X", "di
 
 
 @contextmanager
-def styled() -> Iterator[None]:
+def plot_style() -> Iterator[None]:
     """Draw within this, so that nothing else in the process changes its looks."""
     with matplotlib.rc_context(_PARAMETERS):
         yield
@@ -53,7 +53,7 @@ def styled() -> Iterator[None]:
 
 def write_png(path: Path, plots: Sequence[Plot]) -> None:
     """Write all plots below each other in one image."""
-    with styled():
+    with plot_style():
         pictures = []
         for plot in plots:
             canvas = FigureCanvasAgg(figure(plot))
@@ -66,21 +66,21 @@ class ShownFigure(Figure):
     """Figure that a notebook shows without pyplot, which would have to be imported before it."""
 
     def _repr_png_(self) -> bytes:
-        with styled():
+        with plot_style():
             data = BytesIO()
             self.savefig(data, format="png")
         return data.getvalue()
 
 
 def figure(plot: Plot) -> Figure:
-    """Return the plot as a figure of `WIDTH`; call and save it within `styled`."""
+    """Return the plot as a figure of `WIDTH`; call and save it within `plot_style`."""
     figure = ShownFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
     draw_plot(plot, figure)
     return figure
 
 
 def draw_plot(plot: Plot, figure: Figure | SubFigure) -> None:
-    """Draw a plot into a figure or a part of one; call within `styled`."""
+    """Draw a plot into a figure or a part of one; call within `plot_style`."""
     grid = figure.add_gridspec(
         len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths
     )

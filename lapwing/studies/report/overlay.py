@@ -17,7 +17,7 @@ LANE = 0.32  # [inch] of a timeline
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
     """Return two plots in one; a panel of the first alone is kept, one of the second alone is named but not drawn."""
     others = {_key(panel): panel for panel in second.panels}
-    panels, apart, named = [], _apart(first, second), (_named(first), _named(second))
+    panels, apart, named = [], _apart(first, second), (_colours_in_legend(first), _colours_in_legend(second))
     for panel in first.panels:
         other = others.pop(_key(panel), None)
         panels.append(panel if other is None else _both(panel, other, labels, named, apart))
@@ -39,7 +39,7 @@ def _key(panel: Panel) -> tuple:
     return panel.row, panel.column, panel.y_label
 
 
-def _named(plot: Plot) -> set[str]:
+def _colours_in_legend(plot: Plot) -> set[str]:
     """Return the colours of solid lines that the legend of a plot names."""
     lines = [mark for panel in plot.panels for mark in panel.marks if isinstance(mark, Line)]
     return {line.colour for line in lines if line.name and line.dash == "solid"}

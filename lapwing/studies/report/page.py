@@ -10,10 +10,10 @@ from jinja2 import Environment, FileSystemLoader
 from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report.flight_header import differences, facts
 from lapwing.studies.report.key_numbers import key_numbers, trouble
-from lapwing.studies.report.plotly_script import compressed, reduced, script
+from lapwing.studies.report.plotly_script import gzip_base64, remove_unused_traces, script
 from lapwing.studies.report.sections import Section, labels, long, sections
 from lapwing.studies.report.style import DARK
-from lapwing.studies.tracking import shown
+from lapwing.studies.tracking import unit_and_factor
 
 OPEN = ("timeline", "position")  # sections that are open at first
 LOOKS = {"landed": "good", "completed": "good"}  # by kind of outcome; "bad" for all others
@@ -86,7 +86,7 @@ def render(template: str, sections: Iterable[Section], **values: Any) -> str:
         ValueError: the script is not installed.
     """
     code = (_HERE / "page.js").read_text(encoding="utf-8").replace("DARK_COLOURS", json.dumps(DARK))
-    library = compressed(reduced(script()))
+    library = gzip_base64(remove_unused_traces(script()))
     return _TEMPLATES.get_template(template).render(library=library, code=code, sections=sections, **values)
 
 
@@ -96,7 +96,7 @@ def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list
         return []
     rows = []
     for axis in AXES:
-        unit, scale = shown(axis)
+        unit, scale = unit_and_factor(axis)
         values = [flight.rmse.get(axis) for flight in flights] + ([published.get(axis)] if published else [])
         rows.append(Accuracy(axis, unit, tuple(None if v is None else scale * v for v in values)))
     return rows

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from lapwing.studies.report.matplotlib_figure import draw_plot, styled
+from lapwing.studies.report.matplotlib_figure import draw_plot, plot_style
 from lapwing.studies.report.plot import Plot
 from lapwing.studies.report.style import QUIET, TEXT, WIDTH
 
@@ -44,9 +44,9 @@ class Titled(NamedTuple):
 
 def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
     """Write the cover and as many plots on each page as fit; pages have one size and are numbered."""
-    packed = _packed(plots)
+    packed = _paginate(plots)
     with (
-        styled(),
+        plot_style(),
         rc_context({"font.size": FONT, "axes.titlesize": FONT}),
         PdfPages(path, metadata={"CreationDate": None}) as out,
     ):
@@ -56,7 +56,7 @@ def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
             out.savefig(drawn)
 
 
-def _packed(plots: Iterable[Titled]) -> list[list[Titled]]:
+def _paginate(plots: Iterable[Titled]) -> list[list[Titled]]:
     """Return the plots of each page."""
     pages: list[list[Titled]] = []
     free = 0.0
@@ -72,7 +72,7 @@ def _packed(plots: Iterable[Titled]) -> list[list[Titled]]:
 
 def _height(titled: Titled) -> float:
     """Return the height of a plot on the page with its title and caption [inch]."""
-    return HEADING + titled.plot.height * SCALE + 0.15 + 0.14 * len(_wrapped(titled.plot.caption))
+    return HEADING + titled.plot.height * SCALE + 0.15 + 0.14 * len(_wrap(titled.plot.caption))
 
 
 def _page(plots: Sequence[Titled]) -> Figure:
@@ -85,7 +85,7 @@ def _page(plots: Sequence[Titled]) -> Figure:
     parts: Any = figure.subfigures(len(ratios) + 1, 1, height_ratios=[*ratios, rest])
     for titled, heading, part in zip(plots, parts[0::2], parts[1::2], strict=False):
         heading.text(0.01, 0.1, titled.title, va="bottom", fontsize=10, fontweight="bold", color=TEXT)
-        caption = "\n".join(_wrapped(titled.plot.caption))
+        caption = "\n".join(_wrap(titled.plot.caption))
         part.supxlabel(caption, x=0.01, ha="left", fontsize=7, color="#555555")
         draw_plot(titled.plot, part)
     return figure
@@ -127,5 +127,5 @@ def _cover(cover: Cover) -> Figure:
     return figure
 
 
-def _wrapped(text: str) -> list[str]:
+def _wrap(text: str) -> list[str]:
     return textwrap.wrap(text, int(LETTERS * 8.0 / 7.0))

@@ -111,12 +111,12 @@ def reference(x: np.ndarray, y: np.ndarray, hidden: bool = False, name: str = "r
 def in_hours(plot: Plot) -> Plot:
     """Return the plot with its time in hours instead of seconds."""
 
-    def scaled(mark: Mark) -> Mark:
+    def scale_mark(mark: Mark) -> Mark:
         if isinstance(mark, Stretch):
             return mark._replace(start=mark.start / 3600.0, end=mark.end / 3600.0)
         return mark if isinstance(mark, Level) else mark._replace(x=mark.x / 3600.0)
 
-    panels = tuple(p._replace(marks=tuple(map(scaled, p.marks))) if p.timed else p for p in plot.panels)
+    panels = tuple(p._replace(marks=tuple(map(scale_mark, p.marks))) if p.timed else p for p in plot.panels)
     span = plot.span and (plot.span[0] / 3600.0, plot.span[1] / 3600.0)
     phases = tuple((name, start / 3600.0, end / 3600.0) for name, start, end in plot.phases)
     return plot._replace(panels=panels, span=span, phases=phases, unit="h")

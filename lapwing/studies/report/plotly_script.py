@@ -36,7 +36,7 @@ def script() -> str:
     raise ValueError("the report needs plotly's script, which is not there: pip install plotly")
 
 
-def reduced(text: str, traces: tuple[str, ...] = TRACES) -> str:
+def remove_unused_traces(text: str, traces: tuple[str, ...] = TRACES) -> str:
     """Return plotly.js with these kinds of traces only; unchanged if it is not bundled as described above."""
     starts = [(match.start(1), match[2]) for match in _MODULE.finditer(text)]
     register = _REGISTER.search(text)
@@ -69,6 +69,6 @@ def _kind(name: str, bodies: dict[str, str]) -> str:
     return _kind(alias[1], bodies) if alias else ""
 
 
-def compressed(text: str) -> str:
+def gzip_base64(text: str) -> str:
     """Return a text compressed with gzip, in base64."""
     return base64.b64encode(gzip.compress(text.encode(), mtime=0)).decode("ascii")

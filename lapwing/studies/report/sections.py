@@ -10,7 +10,7 @@ from lapwing.studies.report import plots
 from lapwing.studies.report.overlay import overlay
 from lapwing.studies.report.plot import NotRecordedError, Plot, in_hours
 from lapwing.studies.report.plotly_figure import to_json
-from lapwing.studies.report.plotly_script import compressed
+from lapwing.studies.report.plotly_script import gzip_base64
 
 LONG = 3 * 3600.0  # [s] from which on time is told in hours
 
@@ -26,7 +26,7 @@ class Section(NamedTuple):
     @property
     def packed(self) -> str:
         """The plot for a browser."""
-        return compressed(to_json(self.plot)) if self.plot else ""
+        return gzip_base64(to_json(self.plot)) if self.plot else ""
 
 
 def sections(flights: Sequence[FlightData]) -> Iterator[Section]:

@@ -53,10 +53,10 @@ def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) 
     """
     number = min(len(names), os.cpu_count() or 1)
     if number == 1:
-        return [_reported(one(name, sweep), progress) for name in names]
+        return [_report(one(name, sweep), progress) for name in names]
     with workers(number) as pool:
         jobs = {pool.submit(one, name, sweep): name for name in names}
-        done = {jobs[job]: _reported(job.result(), progress) for job in as_completed(jobs)}
+        done = {jobs[job]: _report(job.result(), progress) for job in as_completed(jobs)}
     return [done[name] for name in names]
 
 
@@ -74,6 +74,6 @@ def one(name: str, sweep: bool) -> Result:
     return Result(name, module.HARD, result, walked, time.perf_counter() - started)
 
 
-def _reported(result: Result, progress: Callable[[str], None]) -> Result:
+def _report(result: Result, progress: Callable[[str], None]) -> Result:
     progress(result.case)
     return result

@@ -50,13 +50,13 @@ def table(console: Console, results: Sequence[Result]) -> None:
         for row in result.figures.rows:
             shown.add_row(
                 row.name, escape(row.invariant), escape(row.method), figure(row.bound), figure(row.measured),
-                distance(row.bound, row.measured), _coloured(row.passes), escape(row.baseline),
-                f"{figure(row.baseline_measured)} {_coloured(row.baseline_passes, not row.baseline_passes)}",
+                distance(row.bound, row.measured), _colour(row.passes), escape(row.baseline),
+                f"{figure(row.baseline_measured)} {_colour(row.baseline_passes, not row.baseline_passes)}",
             )  # fmt: skip
         console.print(shown)
 
 
-def _coloured(passes: bool, expected: bool | None = None) -> str:
+def _colour(passes: bool, expected: bool | None = None) -> str:
     colour = "green" if (passes if expected is None else expected) else "red"
     return f"[{colour}]{verdict(passes)}[/{colour}]"
 

@@ -8,7 +8,7 @@ from lapwing.dynamics.multibody.five_bodies import BodyState, machine
 from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.vector import ZERO, Vec3
 
-__all__ = ["PAPER", "delivery_drone", "thrown"]
+__all__ = ["PAPER", "delivery_drone", "spinning_state"]
 
 PAPER: dict[str, Any] = {
     "central_frame": 8.0,
@@ -22,7 +22,7 @@ PAPER: dict[str, Any] = {
 }
 
 
-def thrown(drone: Any, omega: Vec3, speeds: tuple[float, ...]) -> tuple[Any, Any]:
+def spinning_state(drone: Any, omega: Vec3, speeds: tuple[float, ...]) -> tuple[Any, Any]:
     """Return (machine, state) rotating at omega [rad/s] with propellers at these speeds [rad/s], without loads."""
     p = machine(drone, ZERO, speeds=speeds)
     return p, assembled_state(p, BodyState(ZERO, NO_ROTATION, ZERO, omega), (0.1, 0.4, 0.7, 1.0), speeds)

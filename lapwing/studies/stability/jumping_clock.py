@@ -22,7 +22,7 @@ def forward(seconds: float) -> int:
     return AHEAD * int(seconds / RARELY)
 
 
-def jumping(clock: Callable[[], float], scale: int, jump: Callable[[float], int]) -> Callable[[], float]:
+def add_jumps(clock: Callable[[], float], scale: int, jump: Callable[[float], int]) -> Callable[[], float]:
     """Return the clock with these jumps; it counts `scale` per second."""
 
     def read() -> float:
@@ -36,7 +36,7 @@ def install() -> None:
     """Let the clocks of this process jump."""
     for name, jump in (("time", wall), ("monotonic", forward), ("perf_counter", forward)):
         for of, scale in ((name, 1), (f"{name}_ns", 10**9)):
-            setattr(time, of, jumping(getattr(time, of), scale, jump))
+            setattr(time, of, add_jumps(getattr(time, of), scale, jump))
 
 
 if __name__ == "sitecustomize" and sys.orig_argv[-1] == VICTIM:

@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.dynamics import integrators
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.coordinates import coordinates
-from lapwing.studies.accuracy.integrate import sampled
+from lapwing.studies.accuracy.integrate import sample_states
 
 
 def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
@@ -16,12 +16,12 @@ def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int)
     `steps` is a multiple of `samples`. Rows are NaN from the first non-finite one.
     """
     out = np.empty((samples + 1, len(flatten(x))))
-    rows = sampled(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
+    rows = sample_states(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
     out[rows:] = np.nan
     return out
 
 
-def marched(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
+def run_fixed_steps(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
     """Return `rows` with attitudes as matrices, shape (samples + 1, m)."""
     return coordinates(x, rows(method, p, x, duration, steps, samples))
 

@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lapwing.services.autopilot.margins import Margins
-from lapwing.studies.tracking import AXES, shown
+from lapwing.studies.tracking import AXES, unit_and_factor
 from lapwing.studies.tune.corners import failure
 from lapwing.studies.tune.gain_refinement import rmse
 from lapwing.studies.tune.identify import LOOPS
@@ -84,7 +84,7 @@ def _errors(tuning: Tuning) -> Rows:
     title = f"RMSE of {len(p.after)} flights of the scene: as designed and refined ({p.candidates} gain sets flown)"
     rows = Rows(title, "axis", "designed", "refined")
     for axis in AXES:
-        unit, scale = shown(axis)
+        unit, scale = unit_and_factor(axis)
         rows.add(f"{axis} [{unit}]", f"{scale * rmse(p.before, axis):.4f}", f"{scale * rmse(p.after, axis):.4f}")
     return rows
 

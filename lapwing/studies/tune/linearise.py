@@ -80,10 +80,10 @@ def hover(scene: Scene) -> Hover:
         for sign in (-1.0, 1.0)
     ]
 
-    def turning(k: int) -> float:
+    def angular_acceleration_per_thrust(k: int) -> float:
         return slope(turns[k], lambda o: o.angular_acceleration_body[k]) / thrust
 
-    roll, pitch, turn = map(turning, range(3))
+    roll, pitch, turn = map(angular_acceleration_per_thrust, range(3))
     lag = -1.0 / slope(one, lambda o: o.rotor_acceleration[0])
     # Voltages that differ at equal speeds: what the body feels is the reaction to speeding the rotors up, alone.
     yawing, most = turns[2], int(np.argmax(np.abs(turns[2])))

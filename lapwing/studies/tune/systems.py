@@ -31,13 +31,13 @@ def systems(p: Parameters, airframe: Airframe, tick: float, delay: int) -> dict[
     return {name: control.minreal(loop, CANCEL, verbose=False) for name, loop in loops(p, airframe, s, late).items()}
 
 
-def closed_loop(loop: Any) -> Any:
+def close_loop(loop: Any) -> Any:
     """Return the loop closed by unit feedback."""
     return control.minreal(loop / (1.0 + loop), CANCEL, verbose=False)
 
 
 def step(loop: Any, seconds: float = 5.0) -> StepResponse:
     """Step response of the closed loop."""
-    time, value = control.step_response(closed_loop(loop), np.linspace(0.0, seconds, 1001))
+    time, value = control.step_response(close_loop(loop), np.linspace(0.0, seconds, 1001))
     result = control.step_info(value, time, yfinal=1.0)
     return StepResponse(time, value, result["RiseTime"], result["Overshoot"] / 100.0, result["SettlingTime"])

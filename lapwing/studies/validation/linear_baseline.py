@@ -35,7 +35,7 @@ def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tup
         right = whole_product if alone else whole_product - products[k]
         gain = np.linalg.solve(moment + RIDGE * count * np.eye(len(moment)), right)
         change = (regressors[k] @ gain).reshape(len(s), len(horizons), 12)
-        out.append(compare(flight, s, horizons, _applied(flight, s, horizons, change)))
+        out.append(compare(flight, s, horizons, _predict(flight, s, horizons, change)))
     return out
 
 
@@ -63,7 +63,7 @@ def _targets(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...]) -
     return np.column_stack(out)
 
 
-def _applied(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], change: np.ndarray) -> np.ndarray:
+def _predict(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], change: np.ndarray) -> np.ndarray:
     predicted = np.zeros((*change.shape[:2], WIDTH))
     predicted[..., POWER] = np.nan
     start, velocity = flight.attitude[starts][:, None], flight.velocity[starts][:, None]

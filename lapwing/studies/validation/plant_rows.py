@@ -63,7 +63,7 @@ class PlantRows:
         self.interval = interval
         self._base = _with_wrench(load_one(scene, overrides))
         self._rate, self._step = rate, interval / steps
-        first = self._resolved({})
+        first = self._resolve({})
         self._core = first.core
         self.like = simd_batch.member(first.core.vehicle, first.start.vehicle)
         self.motion = row_width(self.like.motion)
@@ -129,8 +129,8 @@ class PlantRows:
         """
         ticks, n, _ = voltage.shape
         count = len(blocks) * LANES
-        commands = _padded(voltage, count)
-        reset = np.zeros((0, 0, 0)) if motions is None else _padded(motions, count)
+        commands = _pad(voltage, count)
+        reset = np.zeros((0, 0, 0)) if motions is None else _pad(motions, count)
         trace = np.empty((ticks, count, MOTION + self.rotors))
         flat, columns = blocks.reshape(-1), blocks.shape[1]
         keys, exchanges = np.zeros((count, 2), np.int64), np.zeros(count, np.int64)
@@ -158,7 +158,7 @@ class PlantRows:
         electrical_power(self.like, blocks.reshape(-1), blocks.shape[1], out, 0, len(blocks))
         return out[:n]
 
-    def _resolved(self, values: Mapping[str, Any]) -> Any:
+    def _resolve(self, values: Mapping[str, Any]) -> Any:
         return _plant(self._scene(values))
 
     def _scene(self, values: Mapping[str, Any]) -> Scene:
@@ -184,7 +184,7 @@ class PlantRows:
         return pack_row(member), mass.total, mass.matrix
 
 
-def _padded(values: np.ndarray, count: int) -> np.ndarray:
+def _pad(values: np.ndarray, count: int) -> np.ndarray:
     """Return values of shape (ticks, n, columns) with the last vehicle repeated up to `count` vehicles."""
     if values.shape[1] == count:
         return np.ascontiguousarray(values)

@@ -32,7 +32,7 @@ def magnitudes(errors: Errors) -> np.ndarray:
     return np.stack([*means, angle, *rest], axis=-1)
 
 
-def pooled(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]:
+def pool_flights(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]:
     """Return the mean over all windows by horizon and field, and its interval by resampling whole flights.
 
     Windows of one flight are not independent; flights are. Intervals of fewer than three flights are NaN.

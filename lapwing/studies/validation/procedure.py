@@ -13,7 +13,7 @@ from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.validation.closed_loop import ClosedLoop, fly_setpoints
 from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pooled
+from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pool_flights
 from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
 from lapwing.studies.validation.windows import Errors, compare, predict, window_starts
 
@@ -115,8 +115,8 @@ def validate(
             loops.append(loop)
     return Validation(
         str(Path(str(getattr(scene, "name", scene))).stem), interval, horizons, memory, tuple(flights), tuple(skipped),
-        pooled([magnitudes(f.plant) for f in flights]),
-        {name: pooled([magnitudes(e) for e in errors]) for name, errors in baselines.items()}, tuple(loops),
+        pool_flights([magnitudes(f.plant) for f in flights]),
+        {name: pool_flights([magnitudes(e) for e in errors]) for name, errors in baselines.items()}, tuple(loops),
     )  # fmt: skip
 
 
@@ -176,7 +176,7 @@ def write_json(path: Path, validation: Validation) -> None:
 
 
 def _flight(validation: Validation, flight: FlightErrors) -> dict:
-    means = _values(pooled([magnitudes(flight.plant)[:, -1:]])[0])
+    means = _values(pool_flights([magnitudes(flight.plant)[:, -1:]])[0])
     return {"windows": len(flight.starts), **means, "faults": flight.recording.faults, "notes": flight.recording.notes}
 
 

@@ -35,7 +35,7 @@ def write(path: Path, validation: Validation) -> None:
     page = render(
         "validation.html", title=f"{validation.scene}: prediction of recorded flights", lead=lead,
         outcome=_outcome(validation), sections=sections,
-        tables=[_errors(validation), _explained(validation), *_loops(validation), _flights(validation)],
+        tables=[_errors(validation), _explained_shares(validation), *_loops(validation), _flights(validation)],
     )  # fmt: skip
     path.write_text(page, encoding="utf-8")
 
@@ -65,7 +65,7 @@ def _errors(validation: Validation) -> Rows:
     return table
 
 
-def _explained(validation: Validation) -> Rows:
+def _explained_shares(validation: Validation) -> Rows:
     table = Rows("Share of the residuals that a missing effect would explain", "regressor", "force [%]", "torque [%]")
     for cause, force, torque in explanations(validation):
         table.add(cause, f"{force:.1f}", f"{torque:.1f}")

@@ -80,7 +80,7 @@ def start_states(plant: PlantRows, flights: list[Recording], memory: TrimMemory)
     out, start = [], 0
     for flight, moved in zip(flights, motion, strict=True):
         span = slice(start, start := start + len(flight))
-        out.append(_trimmed(plant, flight, moved, speed[:, span], after[:, span], memory))
+        out.append(_trim(plant, flight, moved, speed[:, span], after[:, span], memory))
     return out
 
 
@@ -92,7 +92,7 @@ def _without_gaps(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
     return values[np.where(index < 0, np.flatnonzero(valid)[0], index)]
 
 
-def _trimmed(
+def _trim(
     plant: PlantRows, flight: Recording, motion: np.ndarray, speed: np.ndarray, after: np.ndarray, memory: TrimMemory
 ) -> StartStates:
     interval, n = plant.interval, len(flight)

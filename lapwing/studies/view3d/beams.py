@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.messages.topics import RANGEFINDER, SONAR
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d.sampling import along, nearest
-from lapwing.studies.view3d.solids import ball, turned
+from lapwing.studies.view3d.solids import ball, solid_of_revolution
 from lapwing.studies.view3d.surroundings import add_solid
 
 TOPICS = {topic.name.removeprefix("{vehicle}/"): topic for topic in (SONAR, RANGEFINDER)}
@@ -51,7 +51,7 @@ class Beam:
         self._wide, self._shown = float(np.tan(samples.half_angle)), 0.0
         frame = f"{body}/{samples.name}"
         scene.add_frame(frame, show_axes=False, position=samples.origin, wxyz=samples.orientation)
-        cone = turned([(0.0, 0.0), (1.0, 1.0)], COLOUR, 0.22)._replace(open=True)
+        cone = solid_of_revolution([(0.0, 0.0), (1.0, 1.0)], COLOUR, 0.22)._replace(open=True)
         self._cone = add_solid(scene, f"{frame}/cone", cone, visible=False)
         self._point = add_solid(scene, f"{frame}/point", ball((0.0,) * 3, 0.035 * size, POINT), visible=False)
 

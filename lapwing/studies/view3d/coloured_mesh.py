@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from lapwing.studies.view3d.solids import Solid, concatenated
+from lapwing.studies.view3d.solids import Solid, join_meshes
 
 FLOAT, USHORT, UINT = 5126, 5123, 5125  # component types of glTF 2.0, 3.6.2.2
 VERTICES, FACES = 34962, 34963  # targets of buffer views
@@ -13,7 +13,7 @@ VERTICES, FACES = 34962, 34963  # targets of buffer views
 
 def coloured_mesh(solids: Sequence[Solid]) -> bytes:
     """Return a binary glTF 2.0 of solids, with a colour at each vertex; the viewer shades it flat without normals."""
-    vertices, faces = concatenated(solids)
+    vertices, faces = join_meshes(solids)
     place = vertices.astype("<f4")
     colours = np.concatenate([np.tile(linear(solid.colour), (len(solid.vertices), 1)) for solid in solids])
     chunks = [part.tobytes() for part in (place, colours.astype("<u2"), faces.astype("<u4"))]

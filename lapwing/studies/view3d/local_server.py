@@ -15,7 +15,7 @@ _LOCK = threading.Lock()  # one server starts at a time: the guard is put in whi
 
 
 @contextlib.contextmanager
-def serving(token: str = "", changed: Callable[[str], str] | None = None) -> Iterator[Any]:
+def run_server(token: str = "", changed: Callable[[str], str] | None = None) -> Iterator[Any]:
     """Run a viser server until the end of the context.
 
     viser binds a port but has no secret and accepts every origin, so requests pass a guard before they reach it.
@@ -33,11 +33,11 @@ def serving(token: str = "", changed: Callable[[str], str] | None = None) -> Ite
         guard = Guard(token, changed)
         original = sockets.serve
 
-        def guarded(*arguments: Any, **options: Any) -> Any:
+        def add_guard(*arguments: Any, **options: Any) -> Any:
             guard.answer = options["process_request"]
             return original(*arguments, **{**options, "process_request": guard})
 
-        with mock.patch.object(sockets, "serve", guarded), mock.patch("rich.print", _silent):
+        with mock.patch.object(sockets, "serve", add_guard), mock.patch("rich.print", _silent):
             server = viser.ViserServer(host=ADDRESS, port=0, verbose=False)
         guard.hosts = hosts(server.get_port())
     try:

@@ -10,7 +10,7 @@ import numpy as np
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import COLOURS
 from lapwing.studies.view3d import require
-from lapwing.studies.view3d.local_server import serving
+from lapwing.studies.view3d.local_server import run_server
 from lapwing.studies.view3d.samples import sample
 from lapwing.studies.view3d.scans import BUDGET
 from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
@@ -44,7 +44,7 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
         colours = [COLOURS[order.index(name) % len(COLOURS)] for name in titles]
     if times is None:
         times = _frame_times(shown)
-    with serving() as server, server.atomic():  # no client is connected, so nothing has to be sent
+    with run_server() as server, server.atomic():  # no client is connected, so nothing has to be sent
         add_surroundings(server.scene, shown[0])
         vehicles = [
             Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0, named=len(shown) > 1)

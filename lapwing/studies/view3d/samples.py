@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d.beams import BeamSamples, beams
 from lapwing.studies.view3d.bodies import Body, Motion
-from lapwing.studies.view3d.sampling import from_angles, nearest, rounded, rounded_angle
+from lapwing.studies.view3d.sampling import from_angles, nearest, round_angle, round_to_grid
 from lapwing.studies.view3d.scans import Scans, scans
 
 
@@ -58,7 +58,7 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 
         view = flight.topic("estimate")
         own = nearest(view.times, times)
         estimate, std = view.position[own], view.position_std[own]
-        believed = rounded(view.orientation[own][:, [3, 0, 1, 2]])
+        believed = round_to_grid(view.orientation[own][:, [3, 0, 1, 2]])
     contacts = forces = None
     if flight.has("contact_forces"):
         view = flight.topic("contact_forces")
@@ -76,9 +76,11 @@ def _body(body: Body, times: np.ndarray, rows: np.ndarray) -> BodySamples:
     place = np.column_stack([np.interp(times, body.times, along) for along in body.position.T])
     angles = _columns([rotor.angle for rotor in body.rotors], rows)
     thrusts = _columns([rotor.thrust for rotor in body.rotors], rows)
-    angles = None if angles is None else rounded_angle(angles)
+    angles = None if angles is None else round_angle(angles)
     force = body.force[own] if body.force is not None and np.any(body.force) else None
-    return BodySamples(rounded(place), rounded(body.orientation[own][:, [3, 0, 1, 2]]), angles, thrusts, force)
+    return BodySamples(
+        round_to_grid(place), round_to_grid(body.orientation[own][:, [3, 0, 1, 2]]), angles, thrusts, force
+    )
 
 
 def _columns(values: list[np.ndarray | None], rows: np.ndarray) -> np.ndarray | None:

@@ -18,7 +18,7 @@ def from_angles(angles: np.ndarray) -> np.ndarray:
     """Return quaternions w, x, y, z of roll, pitch, yaw [rad], shape (k, 3); shape (k, 4)."""
     (a, b, c), (d, e, f) = np.cos(0.5 * angles.T), np.sin(0.5 * angles.T)
     parts = (a * b * c + d * e * f, d * b * c - a * e * f, a * e * c + d * b * f, a * b * f - d * e * c)
-    return rounded(np.column_stack(parts))
+    return round_to_grid(np.column_stack(parts))
 
 
 def along(direction: np.ndarray) -> np.ndarray:
@@ -28,21 +28,21 @@ def along(direction: np.ndarray) -> np.ndarray:
     w, x, y = 1.0 + unit[:, 2], -unit[:, 1], unit[:, 0]
     down = w < 1e-6
     result = np.column_stack([np.where(down, 0.0, w), np.where(down, 1.0, x), np.where(down, 0.0, y), 0.0 * w])
-    return rounded(result / np.linalg.norm(result, axis=1)[:, None])
+    return round_to_grid(result / np.linalg.norm(result, axis=1)[:, None])
 
 
-def rounded_angle(angle: np.ndarray) -> np.ndarray:
+def round_angle(angle: np.ndarray) -> np.ndarray:
     """Return angles [rad] rounded to a share of a turn."""
     step = 2.0 * np.pi / TURNS
     return np.remainder(np.round(angle / step), TURNS) * step
 
 
-def rounded(values: Any) -> np.ndarray:
+def round_to_grid(values: Any) -> np.ndarray:
     """Return values rounded to 1 / GRID."""
     return np.round(np.asarray(values, float) * GRID) / GRID
 
 
-def rotated(wxyz: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+def rotate(wxyz: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """Return vectors, shape (3,) or (k, 3), rotated by a quaternion w, x, y, z."""
     w, axis = wxyz[0], wxyz[1:]
     twice = 2.0 * np.cross(axis, vectors)

@@ -14,7 +14,7 @@ from lapwing.services.sensors.depth_camera import pixels
 from lapwing.services.sensors.lidar import azimuths
 from lapwing.services.sensors.registry import parameters
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.view3d.sampling import nearest, rotated
+from lapwing.studies.view3d.sampling import nearest, rotate
 
 BUDGET = 150_000  # points of all scans of an instrument in a recording, 6 bytes each
 MOST, FEWEST = 2500, 64  # points of one scan
@@ -56,7 +56,7 @@ def scans(flight: FlightData, times: np.ndarray, budget: int = BUDGET) -> list[S
         period = max(1.0 / p.rate, PERIOD if len(times) > budget // MOST else 0.0)
         most = int(np.clip(budget // min(len(times), round(np.ptp(times) / period) + 1), FEWEST, MOST))
         for topic, in_body in topics.items():
-            known = _selected(_messages(flight, topic), times, period)
+            known = _select(_messages(flight, topic), times, period)
             at = [(time, in_body(p, history(topic.message, [payload]))) for time, payload in known]
             if at:
                 result.append(_in_world(name, flight, times, at, most))
@@ -76,9 +76,7 @@ def _messages(flight: FlightData, topic: Topic) -> Iterator[tuple[float, bytes]]
                 yield from ((1e-9 * time_ns, payload) for _, _, time_ns, payload in log.messages([key]))
 
 
-def _selected(
-    messages: Iterator[tuple[float, bytes]], times: np.ndarray, period: float
-) -> Iterator[tuple[float, bytes]]:
+def _select(messages: Iterator[tuple[float, bytes]], times: np.ndarray, period: float) -> Iterator[tuple[float, bytes]]:
     """Yield the messages that are the latest at one of `times`, at least `period` [s] apart."""
     last = -np.inf
     for (time, payload), (after, _) in pairwise(chain(messages, [(np.inf, b"")])):
@@ -97,7 +95,7 @@ def _in_world(name: str, flight: FlightData, times: np.ndarray, at: list[tuple[f
         hits = body[np.isfinite(body).all(axis=1)]
         if len(hits) > most:
             hits = hits[np.linspace(0, len(hits) - 1, most).astype(int)]
-        points.append(rotated(flight.truth.orientation[row][[3, 0, 1, 2]], hits).astype(np.float32))
+        points.append(rotate(flight.truth.orientation[row][[3, 0, 1, 2]], hits).astype(np.float32))
     latest = np.searchsorted(known, times + 1e-9, side="right") - 1
     return Scans(name, latest, known, flight.truth.position[rows], points)
 

@@ -37,7 +37,7 @@ def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
         return Solid(np.empty((0, 3)), np.empty((0, 3), int), colour, opacity)
-    upright = turned([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)], colour, opacity, sides)
+    upright = solid_of_revolution([(0.0, 0.0), (radius, 0.0), (radius, length), (0.0, length)], colour, opacity, sides)
     z = axis / length
     x = np.cross(z, (0.0, 0.0, 1.0) if abs(z[2]) < 0.9 else (1.0, 0.0, 0.0))
     x /= np.linalg.norm(x)
@@ -48,11 +48,11 @@ def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 
 def ball(centre: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:
     """Return a sphere."""
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, sides // 2 + 1)
-    solid = turned(radius * np.column_stack([np.cos(angle), np.sin(angle)]), colour, opacity, sides)
+    solid = solid_of_revolution(radius * np.column_stack([np.cos(angle), np.sin(angle)]), colour, opacity, sides)
     return solid._replace(vertices=solid.vertices + np.asarray(centre, float))
 
 
-def lifted(point: Point, height: float) -> np.ndarray:
+def raise_point(point: Point, height: float) -> np.ndarray:
     """Return a point that is higher by `height` [m]."""
     return np.asarray(point, float) + np.array([0.0, 0.0, height])
 
@@ -60,10 +60,12 @@ def lifted(point: Point, height: float) -> np.ndarray:
 def arrow(colour: str, radius: float, opacity: float = 1.0) -> Solid:
     """Return an arrow of length 1 from the origin along z."""
     head = 2.5 * radius
-    return turned([(0.0, 0.0), (radius, 0.0), (radius, 0.8), (head, 0.8), (0.0, 1.0)], colour, opacity, THIN)
+    return solid_of_revolution(
+        [(0.0, 0.0), (radius, 0.0), (radius, 0.8), (head, 0.8), (0.0, 1.0)], colour, opacity, THIN
+    )
 
 
-def turned(
+def solid_of_revolution(
     profile: Sequence[Sequence[float]] | np.ndarray, colour: str, opacity: float = 1.0, sides: int = SIDES
 ) -> Solid:
     """Return the solid that a profile makes about z; its rows are distance from z and height [m], from below."""
@@ -82,7 +84,7 @@ def turned(
     return Solid(vertices, np.concatenate(faces), colour, opacity)
 
 
-def merged(solids: Iterable[Solid]) -> list[Solid]:
+def merge(solids: Iterable[Solid]) -> list[Solid]:
     """Join the solids of one colour and opacity, so that each is drawn in one call."""
     groups: dict[tuple[str, float, bool], list[Solid]] = {}
     for solid in solids:
@@ -90,11 +92,11 @@ def merged(solids: Iterable[Solid]) -> list[Solid]:
             groups.setdefault((solid.colour, solid.opacity, solid.open), []).append(solid)
     joined = []
     for (colour, opacity, is_open), group in groups.items():
-        joined.append(Solid(*concatenated(group), colour, opacity, is_open))
+        joined.append(Solid(*join_meshes(group), colour, opacity, is_open))
     return joined
 
 
-def concatenated(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
+def join_meshes(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices and faces of solids as those of one."""
     starts = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])])
     faces = [solid.faces + start for solid, start in zip(solids, starts, strict=True)]

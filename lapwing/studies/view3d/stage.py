@@ -15,9 +15,9 @@ from lapwing.studies.view3d.coloured_mesh import coloured_mesh
 from lapwing.studies.view3d.ghosts import Ghost
 from lapwing.studies.view3d.rotors import BLADE, SHORTEST, Rotors
 from lapwing.studies.view3d.samples import Samples
-from lapwing.studies.view3d.sampling import along, rotated
+from lapwing.studies.view3d.sampling import along, rotate
 from lapwing.studies.view3d.scans import ScanPoints
-from lapwing.studies.view3d.solids import arrow, ball, box, lifted, merged
+from lapwing.studies.view3d.solids import arrow, ball, box, merge, raise_point
 from lapwing.studies.view3d.surroundings import add_solid, rgb
 from lapwing.studies.view3d.vehicle_bodies import motion
 
@@ -65,10 +65,10 @@ class Vehicle:
     def _add_body(self, node: str, body: Body, ghost: bool) -> None:
         self._frames.append(self._scene.add_frame(node, show_axes=False))
         looks = [s._replace(colour=self.colour, opacity=0.45) if ghost else s for s in body.solids]
-        opaque = merged(solid for solid in looks if solid.opacity >= 1.0)
+        opaque = merge(solid for solid in looks if solid.opacity >= 1.0)
         if len(opaque) > 1:
             self._scene.add_glb(f"{node}/body", coloured_mesh(opaque))
-        for k, solid in enumerate(merged(solid for solid in looks if len(opaque) < 2 or solid.opacity < 1.0)):
+        for k, solid in enumerate(merge(solid for solid in looks if len(opaque) < 2 or solid.opacity < 1.0)):
             add_solid(self._scene, f"{node}/solid {k}", solid)
         scale = 0.0 if ghost else self._per_newton
         rotors = Rotors(self._scene, node, body.rotors, self.colour, scale) if body.rotors else None
@@ -103,7 +103,7 @@ class Vehicle:
         place = samples.bodies[0].position[k]
         if samples.wind is not None:
             node = self._node("wind", lambda name: self._arrow(name, WIND, 0.035 * self._size))
-            self._point(node, lifted(place, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
+            self._point(node, raise_point(place, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
         self._show_ghosts(samples, k)
         self._show_forces(samples, k)
         for beam in samples.beams:
@@ -146,7 +146,7 @@ class Vehicle:
 
     def _show_link(self, link: Link, samples: Samples, k: int) -> None:
         first, second = samples.bodies[link.first], samples.bodies[link.second]
-        start = first.position[k] + rotated(first.orientation[k], np.array(link.hook))
+        start = first.position[k] + rotate(first.orientation[k], np.array(link.hook))
         stop = second.position[k]
         is_slack = second.force is None or not np.any(second.force[k])
         points = cable(start, stop, link.length if is_slack else 0.0)

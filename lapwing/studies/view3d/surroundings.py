@@ -11,7 +11,7 @@ from lapwing.services.common.environment_schema import Terrain
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.plan_shapes import fence_shapes, waypoints
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, QUIET
-from lapwing.studies.view3d.solids import Solid, ball, box, merged, rod
+from lapwing.studies.view3d.solids import Solid, ball, box, merge, rod
 
 SKY = ((126, 170, 205), (226, 236, 242))  # red, green, blue at the top and at the horizon
 SOIL, LINE, WIDE_LINE = (214, 219, 215), (190, 197, 193), (160, 168, 164)
@@ -63,7 +63,7 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
         low = float(relief_solid.vertices[:, 2].min()) - 0.05
     add_ground(scene, low)
     solids += [*_fence(flight), *_plan(flight)]
-    for k, solid in enumerate(merged(solids)):
+    for k, solid in enumerate(merge(solids)):
         add_solid(scene, f"/surroundings/{k}", solid)
     if not isinstance(relief, Level):
         lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))

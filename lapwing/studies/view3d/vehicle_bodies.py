@@ -9,7 +9,7 @@ from lapwing.services.common.mesh_schema import Meshes, unpack
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, FLOWN, QUIET
 from lapwing.studies.view3d.bodies import LEVEL, Body, Link, Motion, Rotor, body_of_truth, recorded_bodies
-from lapwing.studies.view3d.solids import THIN, Solid, ball, box, lifted, merged, rod
+from lapwing.studies.view3d.solids import THIN, Solid, ball, box, merge, raise_point, rod
 
 FRAME, MOTOR, LEG, FRONT, PAYLOAD, HULL = "#3A4149", "#14181C", "#6B757E", "#E69F00", "#B9834B", "#C3CAD1"
 DENSITY = 400.0  # [kg/m^3] of a payload or load, which fixes the size of its box
@@ -71,22 +71,22 @@ def _airframe(airframe: dict[str, Any], hubs: np.ndarray, origin: np.ndarray, ra
     nose = centre + np.array([0.3 * reach, 0.0, thick])  # where x points
     solids = [
         rod(centre - plate, centre + plate, 0.3 * reach, FRAME),
-        box(lifted(centre, 1.6 * thick), (0.42 * reach, 0.22 * reach, 2.2 * thick), LEG),  # battery
+        box(raise_point(centre, 1.6 * thick), (0.42 * reach, 0.22 * reach, 2.2 * thick), LEG),  # battery
         box(nose, (0.1 * reach, 0.12 * reach, 1.6 * thick), FRONT),
     ]
     for hub in hubs:
         ahead = hub[0] - centre[0] > 0.3 * front
-        solids.append(rod(centre, lifted(hub, -0.4 * thick), 0.5 * thick, FRONT if ahead else FRAME, sides=THIN))
-        solids.append(rod(lifted(hub, -thick), lifted(hub, 0.2 * thick), 0.14 * radius, MOTOR))
+        solids.append(rod(centre, raise_point(hub, -0.4 * thick), 0.5 * thick, FRONT if ahead else FRAME, sides=THIN))
+        solids.append(rod(raise_point(hub, -thick), raise_point(hub, 0.2 * thick), 0.14 * radius, MOTOR))
     for foot in np.array(airframe.get("contact", {}).get("feet", ())).reshape(-1, 3) - origin:
         top = centre + 0.75 * (np.array([foot[0], foot[1], centre[2]]) - centre)
-        solids.append(rod(top, lifted(foot, 0.3 * thick), 0.25 * thick, LEG, sides=THIN))
+        solids.append(rod(top, raise_point(foot, 0.3 * thick), 0.25 * thick, LEG, sides=THIN))
         solids.append(ball(foot, 0.4 * thick, MOTOR, sides=THIN))
     payload = airframe.get("mass", {}).get("payload", 0.0)
     if payload > 0.0:
         edge = (payload / DENSITY) ** (1.0 / 3.0)
-        solids.append(box(lifted(centre, -GAP - edge / 2.0), (edge, edge, edge), PAYLOAD))
-    return merged(solids)
+        solids.append(box(raise_point(centre, -GAP - edge / 2.0), (edge, edge, edge), PAYLOAD))
+    return merge(solids)
 
 
 def _rotors(flight: FlightData, airframe: dict[str, Any], hubs: np.ndarray, radius: float) -> list[Rotor]:
@@ -108,8 +108,8 @@ def _rotors(flight: FlightData, airframe: dict[str, Any], hubs: np.ndarray, radi
 def _cross(arm: float, hubs: np.ndarray) -> list[Solid]:
     """Return two crossed arms with motors; the first hub is ahead where it lies on x."""
     solids = [rod((0.0,) * 3, hub, 0.03 * arm, FRONT if k == 0 else FRAME) for k, hub in enumerate(hubs)]
-    solids += [rod(lifted(hub, -0.06 * arm), lifted(hub, 0.02 * arm), 0.08 * arm, MOTOR) for hub in hubs]
-    return merged([*solids, box((0.0,) * 3, (0.3 * arm, 0.3 * arm, 0.15 * arm), LEG)])
+    solids += [rod(raise_point(hub, -0.06 * arm), raise_point(hub, 0.02 * arm), 0.08 * arm, MOTOR) for hub in hubs]
+    return merge([*solids, box((0.0,) * 3, (0.3 * arm, 0.3 * arm, 0.15 * arm), LEG)])
 
 
 def _os4(flight: FlightData) -> Motion:
@@ -140,7 +140,7 @@ def _gyrostat(flight: FlightData) -> Motion:
     return Motion((body_of_truth(flight, [box((0.0,) * 3, edges, HULL), *_axes(0.8 * SATELLITE, 0.015)]),))
 
 
-def _unloading(flight: FlightData) -> Motion | None:
+def _unloading_motion(flight: FlightData) -> Motion | None:
     """Return pack, door, rollers and the crate that holds them."""
     if not flight.has("body_states"):
         return None
@@ -163,7 +163,7 @@ def _crate(crate: dict[str, Any], times: np.ndarray) -> Body:
     edges = [(corners[k] + side * across, corners[k + 1] + side * across) for k in (0, 1) for side in (-1.0, 1.0)]
     edges += [(corner - across, corner + across) for corner in corners]
     still, level = np.zeros((len(times), 3)), np.tile(LEVEL, (len(times), 1))
-    return Body("crate", times, still, level, tuple(merged(rod(a, b, 0.01, FRAME) for a, b in edges)))
+    return Body("crate", times, still, level, tuple(merge(rod(a, b, 0.01, FRAME) for a, b in edges)))
 
 
 MODELS: dict[str, Callable[[FlightData], Motion | None]] = {
@@ -173,5 +173,5 @@ MODELS: dict[str, Callable[[FlightData], Motion | None]] = {
     "os4": _os4,
     "cooperative_load": _cooperative_load,
     "gyrostat": _gyrostat,
-    "unloading": _unloading,
+    "unloading": _unloading_motion,
 }

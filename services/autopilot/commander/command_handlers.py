@@ -155,7 +155,7 @@ def parameter(context: Context, command: Any) -> None:
     if known is None:
         raise Denied(f"unknown parameter {command.text}")
     requested = value(command.values, 0)
-    denied_if_wrong(known.check, requested)
+    call_or_deny(known.check, requested)
     parameters = context.state.guidance.parameters
     parameters[known.name] = requested
     context.outbox.parameters = dict(parameters)
@@ -169,7 +169,7 @@ def finish(context: Context, command: Any) -> None:
     context.state.finish_requested = True
 
 
-def denied_if_wrong(function: Callable, argument: Any) -> Any:
+def call_or_deny(function: Callable, argument: Any) -> Any:
     """Return the function's value. Raise Denied instead of its ValueError."""
     try:
         return function(argument)

@@ -45,7 +45,7 @@ class Leg:
     def step(self, guidance: Guidance, yaw: float, dt: float) -> None:
         """Move the setpoint for a tick of dt [s] and turn it to a yaw [rad]; NaN: by MPC_YAW_MODE."""
         smoothing, limits = guidance.smoothing, guidance.limits
-        desired = self._wanted_yaw(guidance) if math.isnan(yaw) else yaw
+        desired = self._desired_yaw(guidance) if math.isnan(yaw) else yaw
         error = abs(wrap_angle(desired - smoothing.yaw))  # NaN compares as aligned
         if guidance.parameters["MPC_YAW_MODE"] == TURN_FIRST and error > guidance.yaw_tolerance:
             smoothing.move_at(ZERO, limits, dt)
@@ -54,7 +54,7 @@ class Leg:
             smoothing.move_at(along, limits, dt)
         smoothing.turn_to(desired, limits, dt)
 
-    def _wanted_yaw(self, guidance: Guidance) -> float:
+    def _desired_yaw(self, guidance: Guidance) -> float:
         course = heading(guidance, self.target)
         self._heading = self._heading if math.isnan(course) else course
         return self._heading

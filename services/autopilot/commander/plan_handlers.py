@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from lapwing.services.autopilot.commander import transitions
-from lapwing.services.autopilot.commander.command_handlers import Denied, denied_if_wrong, handles
+from lapwing.services.autopilot.commander.command_handlers import Denied, call_or_deny, handles
 from lapwing.services.autopilot.commander.fence import Fence, rally_points
 from lapwing.services.autopilot.commander.flight_mode import fill_in, value, vector
 from lapwing.services.autopilot.commander.route import GRAB, Route
@@ -15,7 +15,7 @@ from lapwing.services.autopilot.commander.transitions import Context
 def mission_upload(context: Context, command: Any) -> None:
     """Replace the mission."""
     state = context.state
-    state.guidance.route = denied_if_wrong(Route, command.items)
+    state.guidance.route = call_or_deny(Route, command.items)
     if state.mode_name == "mission" and not state.on_trajectory:
         flies_on = state.guidance.route.items and state.guidance.flying
         transitions.enter(context.constants, state, "mission" if flies_on else "hold")
@@ -34,19 +34,19 @@ def mission_clear(context: Context, command: Any) -> None:
 def mission_current(context: Context, command: Any) -> None:
     """Select the current item."""
     number = value(command.values, 0)
-    denied_if_wrong(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
+    call_or_deny(context.state.guidance.route.select, int(number) if math.isfinite(number) else -1)
 
 
 @handles("fence_upload")
 def fence_upload(context: Context, command: Any) -> None:
     """Replace the fence; without items, remove it."""
-    context.state.guidance.fence = denied_if_wrong(Fence, command.items)
+    context.state.guidance.fence = call_or_deny(Fence, command.items)
 
 
 @handles("rally_upload")
 def rally_upload(context: Context, command: Any) -> None:
     """Replace the rally points; without items, remove them."""
-    context.state.guidance.rally_points = denied_if_wrong(rally_points, command.items)
+    context.state.guidance.rally_points = call_or_deny(rally_points, command.items)
 
 
 @handles("set_home")

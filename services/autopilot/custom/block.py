@@ -62,7 +62,7 @@ def start(p: CustomController) -> CustomState:
 
 
 @always_inline
-def _parsed(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
+def _parse_output(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
     """Return state and parsed output of the user's step."""
     return given[0], parse_controller_output(given[1], none)
 
@@ -80,8 +80,10 @@ def _call_user_step(
     """Call `step` of the user's module, or read the port."""
     if p.instance_class is PythonControllerProxy:
         return lambda p, s, time, estimate, setpoint, by_port, none: (s, by_port[0].value)
-    found = sys.modules[p.instance_class.__module__].step
-    return lambda p, s, time, estimate, setpoint, by_port, none: _parsed(found(p, s, time, estimate, setpoint), none)
+    result = sys.modules[p.instance_class.__module__].step
+    return lambda p, s, time, estimate, setpoint, by_port, none: _parse_output(
+        result(p, s, time, estimate, setpoint), none
+    )
 
 
 @always_inline

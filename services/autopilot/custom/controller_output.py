@@ -91,7 +91,7 @@ def command(
     lift: float,
     moments: Vec3,
     voltage_max: float,
-    asked: ControllerOutput,
+    requested: ControllerOutput,
     yaw: float,
     landed: int,
     failed: int,
@@ -111,13 +111,13 @@ def command(
     if landed != FLYING:
         none = at_rest(law.shares[0])
         return Command(none, none, 0.0, 0.0, yaw, landed == LANDED)
-    if asked.to_motors:
-        volts = clamp_to_range(asked.volts, voltage_max)
+    if requested.to_motors:
+        volts = clamp_to_range(requested.volts, voltage_max)
         thrust = thrusts_at(law.motor, volts)
     else:
-        shares, w = active_allocation(law.shares, failed), asked.wrench
+        shares, w = active_allocation(law.shares, failed), requested.wrench
         part = 1.0 / lift
         demands = VirtualControls(part * w[0], w[1] / moments[0], w[2] / moments[1], w[3] / moments[2])
         thrust = clamp_to_range(mix(shares, saturate(shares, demands, law.thrust_max)), law.thrust_max)
         volts = voltages(law.motor, thrust)
-    return Command(volts, thrust, asked.roll_pitch[0], asked.roll_pitch[1], yaw, False)
+    return Command(volts, thrust, requested.roll_pitch[0], requested.roll_pitch[1], yaw, False)

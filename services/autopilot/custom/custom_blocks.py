@@ -14,9 +14,15 @@ from lapwing.services.autopilot.custom.block import CustomController, PythonCont
 from lapwing.services.autopilot.custom.controller_output import CONTROLLER_OUTPUT
 from lapwing.services.autopilot.custom.python_controller import PythonControllerBlock
 from lapwing.services.autopilot.custom.python_estimator import HELD, HeldEstimate, PythonEstimatorBlock
-from lapwing.services.autopilot.custom.user_code_loader import CONTROLLER, ESTIMATOR, compiled, constructor, is_compiled
+from lapwing.services.autopilot.custom.user_code_loader import (
+    CONTROLLER,
+    ESTIMATOR,
+    compile_controller,
+    constructor,
+    is_compiled,
+)
 from lapwing.services.autopilot.service_config import AutopilotSetup
-from lapwing.services.common.user_code import named
+from lapwing.services.common.user_code import load_object
 
 
 def controller_parts(
@@ -40,10 +46,10 @@ def controller_parts(
     code, vehicle = config.controller, config.vehicle
     assert code is not None
     assert vehicle is not None
-    module, user_code = named(CONTROLLER, code.name, texts)
+    module, user_code = load_object(CONTROLLER, code.name, texts)
     per_demand = lift(config.airframe), moments(config.airframe)
     if is_compiled(user_code):
-        parameters, start = compiled(module, user_code, vehicle, code.options)
+        parameters, start = compile_controller(module, user_code, vehicle, code.options)
         p = CustomController(common, parameters, start, code.every, *per_demand, vehicle.voltage_max)
         return [Block(name, p, Cell(block.start(p)), inputs, outputs, trusted=False)]
     construct = constructor(CONTROLLER, module, user_code, vehicle, code.options)
@@ -75,7 +81,7 @@ def estimator_parts(
     code, vehicle = config.own_estimator, config.vehicle
     assert code is not None
     assert vehicle is not None
-    module, user_code = named(ESTIMATOR, code.name, texts)
+    module, user_code = load_object(ESTIMATOR, code.name, texts)
     python_block = PythonEstimatorBlock(
         code, module, constructor(ESTIMATOR, module, user_code, vehicle, code.options), sensors
     )

@@ -12,7 +12,7 @@ from lapwing.kernels import always_inline
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters, wakeup_due
 from lapwing.services.autopilot.custom.periodic import PeriodicPart
 from lapwing.services.autopilot.service_config import CustomCode
-from lapwing.services.common.estimator_api import checked_estimate
+from lapwing.services.common.estimator_api import validate_estimate
 from lapwing.services.common.ports import StateEstimate
 
 HELD = "held_estimate"  # port within the autopilot
@@ -38,7 +38,7 @@ class PythonEstimatorBlock(PeriodicPart):
         time = tick * self._graph.setup.interval
         try:
             self._estimator = self._estimator or self._construct()
-            estimate = checked_estimate(self._estimator.step(time, readings))
+            estimate = validate_estimate(self._estimator.step(time, readings))
         except FAULTS as error:
             cause = blame(error, self._module)
             raise LockStepError(f"estimator {self._code.name}: {cause} at t = {time:.3f} s") from error

@@ -17,9 +17,9 @@ from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.custom.controller_output import parse_controller_output
 from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments, VehicleModel
-from lapwing.services.common.estimator_api import checked_estimate
+from lapwing.services.common.estimator_api import validate_estimate
 from lapwing.services.common.ports import Setpoint, StateEstimate
-from lapwing.services.common.user_code import named
+from lapwing.services.common.user_code import load_object
 
 CONTROLLER, ESTIMATOR = "autopilot.controller", "autopilot.estimator"
 OUTPUTS = (MotorVoltages, ThrustAndMoments)
@@ -55,7 +55,7 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
     Raises:
         ConfigError: the controller cannot be constructed, has no rate, or its step fails or returns another type.
     """
-    module, user_code = named(CONTROLLER, name, texts)
+    module, user_code = load_object(CONTROLLER, name, texts)
     start = (0.0, 0.0, vehicle.resting_height)
     arguments = (0.0, StateEstimate(position_world=start), Setpoint(position_world=start))
     if not is_compiled(user_code):
@@ -63,7 +63,7 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
         no_voltage = (0.0,) * len(vehicle.spin_directions)
         _try(CONTROLLER, name, module, p, lambda: parse_controller_output(p.step(*arguments), no_voltage))
         return _rate(CONTROLLER, name, p)
-    p, s = compiled(module, user_code, vehicle, options)
+    p, s = compile_controller(module, user_code, vehicle, options)
 
     def trial() -> None:
         output = module.step(p, s, *arguments)
@@ -79,9 +79,9 @@ def controller_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, 
 
 def estimator_rate(name: str, texts: Mapping[str, str], vehicle: VehicleModel, options: Mapping[str, Any]) -> float:
     """Return the rate [Hz] of an estimator after a trial step without readings. See `controller_rate`."""
-    module, user_code = named(ESTIMATOR, name, texts)
+    module, user_code = load_object(ESTIMATOR, name, texts)
     p = constructor(ESTIMATOR, module, user_code, vehicle, options)()
-    _try(ESTIMATOR, name, module, p, lambda: checked_estimate(p.step(0.0, {})))
+    _try(ESTIMATOR, name, module, p, lambda: validate_estimate(p.step(0.0, {})))
     return _rate(ESTIMATOR, name, p)
 
 
@@ -135,7 +135,9 @@ def constructor(
     return construct
 
 
-def compiled(module: ModuleType, user_code: Any, vehicle: VehicleModel, options: Mapping[str, Any]) -> tuple[Any, Any]:
+def compile_controller(
+    module: ModuleType, user_code: Any, vehicle: VehicleModel, options: Mapping[str, Any]
+) -> tuple[Any, Any]:
     """Return parameters and initial state of a compiled controller. Raise ConfigError if they are invalid."""
     try:
         p, s = user_code(vehicle, **options)

@@ -25,7 +25,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
 
 
 @always_inline
-def _transformed(
+def _transformed_rows(
     theta: Any, velocity: Any, position: Any, gyro: Any, accelerometer: Any, f: Vec3, r: Mat3, dt: float
 ) -> tuple[Any, Any, Any]:
     """Return the changed rows (theta, velocity, position) of F c with F = I + A dt; c is a column or SIMD columns."""
@@ -37,7 +37,7 @@ def _transformed(
 
 
 @always_inline
-def _loaded(c: np.ndarray, width: int, i: int, j: int) -> Any:
+def _load(c: np.ndarray, width: int, i: int, j: int) -> Any:
     """Return rows i to i + 2 and columns j to j + 3 of c as SIMD vectors."""
     return load(c, width * i + j), load(c, width * (i + 1) + j), load(c, width * (i + 2) + j)
 
@@ -46,9 +46,9 @@ def _loaded(c: np.ndarray, width: int, i: int, j: int) -> Any:
 def _transform_rows(c: np.ndarray, width: int, f: Vec3, r: Mat3, dt: float) -> None:
     """Compute c <- F c."""
     for j in range(0, width, 4):
-        changed = _transformed(
-            _loaded(c, width, THETA, j), _loaded(c, width, VELOCITY, j), _loaded(c, width, POSITION, j),
-            _loaded(c, width, GYRO, j), _loaded(c, width, ACCELEROMETER, j), f, r, dt,
+        changed = _transformed_rows(
+            _load(c, width, THETA, j), _load(c, width, VELOCITY, j), _load(c, width, POSITION, j),
+            _load(c, width, GYRO, j), _load(c, width, ACCELEROMETER, j), f, r, dt,
         )  # fmt: skip
         for k in range(3):
             store(c, width * (THETA + k) + j, changed[0][k])
@@ -62,7 +62,7 @@ def propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
     _transform_rows(c, SIZE, f, r, dt)
     for i in range(GYRO):  # F changes no row below
         row = c[i]
-        theta, velocity, position = _transformed(
+        theta, velocity, position = _transformed_rows(
             three(row, THETA), three(row, VELOCITY), three(row, POSITION),
             three(row, GYRO), three(row, ACCELEROMETER), f, r, dt,
         )  # fmt: skip
@@ -107,7 +107,7 @@ def _add_half(m: Memory, row: int, column: int, columns: Any) -> None:
 
 
 @always_inline
-def _turned(k: np.ndarray, j: int, turns: Any) -> Any:
+def _gyroscope_row(k: np.ndarray, j: int, turns: Any) -> Any:
     """Return row j of C^T J^T of the gyroscopes as a SIMD vector."""
     row = k[j]
     first = turns[0] * row[0] + turns[1] * row[1] + turns[2] * row[2]
@@ -115,7 +115,7 @@ def _turned(k: np.ndarray, j: int, turns: Any) -> Any:
 
 
 @always_inline
-def _lifted(k: np.ndarray, j: int, lifts: Any) -> Any:
+def _accelerometer_row(k: np.ndarray, j: int, lifts: Any) -> Any:
     """Return row j of C^T J^T of the accelerometers as a SIMD vector."""
     row = k[j]
     return lifts[0] * row[LIFT] + lifts[1] * row[LIFT + 1] + lifts[2] * row[LIFT + 2]
@@ -133,12 +133,12 @@ def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) ->
     _add_half(m, THETA, GYRO_SCALE, turns)
     _add_half(m, VELOCITY, LIFT, lifts)
     for j in range(POSITION, SIZE):
-        store(c, SIZE * j + THETA, load(c, SIZE * j + THETA) + _turned(k, j, turns))
-        store(c, SIZE * j + VELOCITY, load(c, SIZE * j + VELOCITY) + _lifted(k, j, lifts))
+        store(c, SIZE * j + THETA, load(c, SIZE * j + THETA) + _gyroscope_row(k, j, turns))
+        store(c, SIZE * j + VELOCITY, load(c, SIZE * j + VELOCITY) + _accelerometer_row(k, j, lifts))
         for i in range(POSITION):
             c[i, j] = c[j, i]
     for i in range(POSITION):  # rows and columns of both
-        turn, lift = unpack4(_turned(k, i, turns)), unpack4(_lifted(k, i, lifts))
+        turn, lift = unpack4(_gyroscope_row(k, i, turns)), unpack4(_accelerometer_row(k, i, lifts))
         for a in range(3):
             c[i, THETA + a] += turn[a]
             c[i, VELOCITY + a] += lift[a]

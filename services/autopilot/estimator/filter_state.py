@@ -169,7 +169,7 @@ def three(array: np.ndarray, start: int) -> Vec3:
 
 
 @kernel
-def corrected(s: State) -> State:
+def apply_correction(s: State) -> State:
     """Return the state with the pending correction applied (theory.md, eq. (3.25))."""
     n, d = s.nominal, s.memory.correction
     nominal = Nominal(

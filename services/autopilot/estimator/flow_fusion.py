@@ -12,7 +12,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     VELOCITY,
     Memory,
     State,
-    corrected,
+    apply_correction,
 )
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
@@ -79,4 +79,4 @@ def update_flow(
         for axis in range(2):
             fuse(m, passing[axis] - flow_row(m, r, velocity, axis, distance), noise)
     record_gate_result(m, FLOW, accepted, nis)
-    return corrected(s)
+    return apply_correction(s)

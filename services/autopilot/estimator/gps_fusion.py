@@ -12,7 +12,14 @@ from lapwing.services.autopilot.estimator.delayed_measurements import (
     late_velocity_row,
 )
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
-from lapwing.services.autopilot.estimator.filter_state import GPS, GPS_VELOCITY, HISTORY, Memory, State, corrected
+from lapwing.services.autopilot.estimator.filter_state import (
+    GPS,
+    GPS_VELOCITY,
+    HISTORY,
+    Memory,
+    State,
+    apply_correction,
+)
 from lapwing.services.autopilot.estimator.fuse import apply_update
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
@@ -118,7 +125,7 @@ def _fuse(
     elif not accepted:
         m.trend[row, :] = 0.0
         inflate_covariance(p, m, source)
-    return corrected(s)
+    return apply_correction(s)
 
 
 @kernel

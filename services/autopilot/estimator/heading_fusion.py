@@ -14,7 +14,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     ROW,
     THETA,
     State,
-    corrected,
+    apply_correction,
     three,
 )
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
@@ -62,4 +62,4 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
     record_gate_result(m, MAG, accepted, nis)
     if not accepted:
         inflate_covariance(p, m, MAG)
-    return corrected(s)
+    return apply_correction(s)

@@ -6,7 +6,15 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
-from lapwing.services.autopilot.estimator.filter_state import BARO, BAROMETER, POSITION, SCALE, SONAR, State, corrected
+from lapwing.services.autopilot.estimator.filter_state import (
+    BARO,
+    BAROMETER,
+    POSITION,
+    SCALE,
+    SONAR,
+    State,
+    apply_correction,
+)
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
 
@@ -24,7 +32,7 @@ def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: fl
     record_gate_result(m, source, accepted, nis)
     if not accepted:
         inflate_covariance(p, m, source)
-    return corrected(s)
+    return apply_correction(s)
 
 
 @kernel

@@ -3,7 +3,7 @@
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
-from lapwing.services.autopilot.estimator.filter_state import GYRO, HISTORY, VELOCITY, State, corrected
+from lapwing.services.autopilot.estimator.filter_state import GYRO, HISTORY, VELOCITY, State, apply_correction
 from lapwing.services.autopilot.estimator.fuse import acceleration_row, clear, fuse
 
 _VELOCITY_VARIANCE = 0.01 * 0.01  # [(m/s)^2] compliance of the feet
@@ -13,7 +13,7 @@ _SHAKEN = 64  # readings from which the vibration at rest is known
 
 
 @kernel
-def shaking(p: Estimator, s: State, axis: int, specific_force_variance: float) -> float:
+def shake_variance(p: Estimator, s: State, axis: int, specific_force_variance: float) -> float:
     """Return the variance of the acceleration [(m/s^2)^2] along a world axis while wind shakes the vehicle on its feet.
 
     Args:
@@ -58,6 +58,6 @@ def update_standstill(p: Estimator, s: State, omega_variance: float, specific_fo
         clear(m)
         acceleration_row(m, i.force_world, r, axis, 1.0)
         acceleration = i.force_world[axis] - (p.gravity if axis == 2 else 0.0)
-        shaken = max(shaking(p, s, axis, specific_force_variance), _ACCELERATION_VARIANCE)
+        shaken = max(shake_variance(p, s, axis, specific_force_variance), _ACCELERATION_VARIANCE)
         fuse(m, -acceleration, specific_force_variance + shaken)
-    return corrected(s)
+    return apply_correction(s)

@@ -24,7 +24,7 @@ class ImuInjection(NamedTuple):
 
 
 @always_inline
-def _chosen(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: Vec3) -> Vec3:
+def _choose(kind: int, now: Vec3, stuck: Vec3, late: Vec3, wrong: Vec3, random: Vec3) -> Vec3:
     if kind == STUCK:
         return stuck
     if kind == DELAYED:
@@ -40,11 +40,11 @@ def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...])
     r, before, faults = inputs[0].value, inputs[1], p.faults.value
     gyro, accelerometer = faults.gyro[p.unit], faults.accelerometer[p.unit]
     late, turn, push = before.value, r.omega_body, r.specific_force_body
-    omega = _chosen(
+    omega = _choose(
         gyro, turn, s.last.omega_body, late.omega_body, (turn[0] + TURN, turn[1], turn[2]),
         garbage(p.key, tick, _GYRO, FULL_TURN) if gyro == GARBAGE else turn,
     )  # fmt: skip
-    force = _chosen(
+    force = _choose(
         accelerometer, push, s.last.specific_force_body, late.specific_force_body, (push[0], push[1], push[2] + PUSH),
         garbage(p.key, tick, _ACCELEROMETER, FULL_PUSH) if accelerometer == GARBAGE else push,
     )  # fmt: skip

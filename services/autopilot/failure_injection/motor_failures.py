@@ -37,7 +37,7 @@ def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int
 
 
 @always_inline
-def _supplied(_: float, kind: int, volts: float) -> float:
+def _motor_voltage(_: float, kind: int, volts: float) -> float:
     """Return the voltage [V] of a motor."""
     if kind == OFF:
         return 0.0
@@ -50,6 +50,6 @@ def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
     commanded = d.motor_voltage if d.on else c.motor_voltage
     thrust = thrusts_at(p.motor, commanded) if d.on else c.thrust
-    heard = map_index(_heard, commanded, kinds, s.last, commanded, s.readings)
-    volts = map_tuple(_supplied, 0.0, kinds, heard)
-    return Memory(heard, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE
+    received = map_index(_heard, commanded, kinds, s.last, commanded, s.readings)
+    volts = map_tuple(_motor_voltage, 0.0, kinds, received)
+    return Memory(received, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE

@@ -27,7 +27,7 @@ class Parameters(NamedTuple):
 
 
 @always_inline
-def limited_horizontal(x: float, y: float, dx: float, dy: float, limit: float) -> tuple[float, float]:
+def limit_horizontal(x: float, y: float, dx: float, dy: float, limit: float) -> tuple[float, float]:
     """Return (x, y) + (dx, dy) within a circle; (x, y) has priority, and (dx, dy) is shortened first."""
     first = math.sqrt(x * x + y * y)
     if first >= limit:
@@ -45,7 +45,7 @@ def limited_horizontal(x: float, y: float, dx: float, dy: float, limit: float) -
 def velocity_setpoint(p: Parameters, error: Vec3, feed_forward: Vec3) -> Vec3:
     """Return the velocity setpoint [m/s] of a position error [m] and a feed-forward velocity [m/s], world."""
     k = p.position_xy
-    x, y = limited_horizontal(k * error[0], k * error[1], feed_forward[0], feed_forward[1], p.speed_xy)
+    x, y = limit_horizontal(k * error[0], k * error[1], feed_forward[0], feed_forward[1], p.speed_xy)
     return x, y, clamp(p.position_z * error[2] + feed_forward[2], -p.sink, p.climb)
 
 

@@ -102,9 +102,9 @@ class FirmwareBlock:
         if not self._opened:
             self.open(self._waits)
         graph, report = self._graph, self._link.report
-        begun = time.perf_counter()
+        started = time.perf_counter()
         output = self._link.step(tick, lambda port: graph.latest(port, tick), self._waits)
-        report.wall += time.perf_counter() - begun
+        report.wall += time.perf_counter() - started
         report.steps += 1
         if output != self._before:
             graph.put(COMMAND, tick, self._command(tick, output))

@@ -64,7 +64,7 @@ def shared_memory(setup: Any, command: np.ndarray, outputs: int, python: Any) ->
     )  # fmt: skip
 
 
-def unused(like: Any) -> InputRing:
+def empty_ring(like: Any) -> InputRing:
     """Return the ring of a port that the vehicle does not have."""
     return InputRing(like, pack_row(like)[None], LATCHED, 0)
 

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.cosim.scene.files import named
+from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.flight_plan_file import parse
@@ -29,7 +29,7 @@ class MissionKeys(SceneTable):
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Store the content of the mission file."""
-        if isinstance(file := named(tree, cls.TABLE, "mission"), str):
+        if isinstance(file := unvalidated_value(tree, cls.TABLE, "mission"), str):
             key = f"{cls.TABLE}.mission"
             tree[cls.TABLE]["mission_text"] = files.text(key, key, files.folder / file)
 
@@ -50,7 +50,7 @@ def with_mission(scene: Scene, table: type[MissionKeys], config: ServiceConfig) 
     return config._replace(parameters=config.parameters._replace(plan=tuple(commands)))
 
 
-def uploaded(commands: Sequence[Any]) -> tuple[Any, ...]:
+def mission_items(commands: Sequence[Any]) -> tuple[Any, ...]:
     """Return the mission items among operator commands."""
     return next((tuple(command.items) for command in commands if command.kind == UPLOAD), ())
 
@@ -76,8 +76,8 @@ def item_message(items: Sequence[Any], number: int, target: int, seq: int, open_
     else:
         item = items[number]
         frame, command, place = item.frame, item.command, (item.x, item.y, item.z)
-        given = (item.param1, item.param2, item.param3, item.param4)
-        parameters = tuple(open_value if math.isnan(value) else value for value in given)
+        values = (item.param1, item.param2, item.param3, item.param4)
+        parameters = tuple(open_value if math.isnan(value) else value for value in values)
     return mavlink.MAVLink_mission_item_int_message(target, 1, seq, frame, command, 0, 1, *parameters, *place)
 
 

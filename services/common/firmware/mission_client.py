@@ -15,7 +15,7 @@ from lapwing.services.common.firmware.mission import item_message, result_name
 from lapwing.services.common.firmware.parameter_client import ParameterClient
 from lapwing.services.common.firmware.status_texts import StatusTexts
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import saturated
+from lapwing.services.common.mavlink.frames import saturate
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
 RETRY = 1.0  # [s] until an unanswered message is sent again
@@ -135,10 +135,10 @@ class MissionClient:
         """Send the state of the battery [V], [A], fraction, as a battery of the same vehicle does."""
         if not self._target:
             return
-        cells = [saturated(1e3 * voltage, 16, True), *(CELLS_UNKNOWN,) * 9]
+        cells = [saturate(1e3 * voltage, 16, True), *(CELLS_UNKNOWN,) * 9]
         percent = min(max(round(100.0 * charge), 0), 100)
         message = mavlink.MAVLink_battery_status_message(
-            0, 0, 0, TEMPERATURE_UNKNOWN, cells, saturated(100.0 * current, 16), -1, -1, percent
+            0, 0, 0, TEMPERATURE_UNKNOWN, cells, saturate(100.0 * current, 16), -1, -1, percent
         )
         codec = mavlink.MAVLink(None, srcSystem=self._target, srcComponent=mavlink.MAV_COMP_ID_BATTERY)
         self._transport.send(message.pack(codec))

@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable
 
-from lapwing.cosim.processes.cpu_starvation import waited
+from lapwing.cosim.processes.cpu_starvation import starved_time
 from lapwing.kernels import math
 
 LONGEST = 6.0  # times the time-out after which starvation is no excuse
@@ -35,8 +35,8 @@ class Patience:
         """True once the time-out has passed."""
         passed = self._clock() - self._began
         if passed > 0.5 * self._timeout and not self._before:  # reading it costs, and most waits are short
-            self._before = {pid: waited(pid) for pid in self._pids}
+            self._before = {pid: starved_time(pid) for pid in self._pids}
         if passed <= self._timeout:
             return False
-        starved = math.total(max(0.0, waited(pid) - before) for pid, before in self._before.items())
+        starved = math.total(max(0.0, starved_time(pid) - before) for pid, before in self._before.items())
         return passed > LONGEST * self._timeout or passed - starved > self._timeout

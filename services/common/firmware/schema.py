@@ -5,7 +5,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
-from lapwing.cosim.scene.files import named
+from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 
 OWN = "lapwing"
@@ -30,7 +30,7 @@ class FirmwareKeys(SceneTable):
     @classmethod
     def embed_parameters(cls, tree: dict[str, Any], files: Files) -> None:
         """Store the content of a foreign firmware's parameter file."""
-        if isinstance(file := named(tree, TABLE, "parameters"), str):
+        if isinstance(file := unvalidated_value(tree, TABLE, "parameters"), str):
             text = files.text("autopilot.parameters", "autopilot.parameters", files.folder / file)
             tree[TABLE] |= {"parameters": {}, "parameter_text": text}
 
@@ -43,7 +43,7 @@ class FirmwareKeys(SceneTable):
 
 def is_foreign(tree: dict[str, Any]) -> bool:
     """Return True if a scene's data, not yet validated, names a foreign firmware."""
-    return named(tree, TABLE, "firmware", OWN) in FIRMWARES
+    return unvalidated_value(tree, TABLE, "firmware", OWN) in FIRMWARES
 
 
 def firmware_of(scene: Scene) -> str:

@@ -67,7 +67,7 @@ def compass(angle: float) -> int:
     return round(math.degrees(angle) * 100.0) % 36000 if math.isfinite(angle) else 0xFFFF
 
 
-def saturated(value: float, bits: int, unsigned: bool = False, unknown: int | None = None) -> int:
+def saturate(value: float, bits: int, unsigned: bool = False, unknown: int | None = None) -> int:
     """Return the nearest integer that fits an integer field.
 
     Args:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import saturated, swap_yaw
+from lapwing.services.common.mavlink.frames import saturate, swap_yaw
 from lapwing.services.common.mavlink.geo_coordinates import Datum, from_world
 
 GROUND_SPEED, NO_THROTTLE, DEFAULT_SPEED = 1.0, -1.0, -2.0  # parameters of DO_CHANGE_SPEED
@@ -83,4 +83,4 @@ def _place(item: Any, datum: Datum) -> tuple[int, tuple[int, int, float]]:
     if math.isnan(x) or math.isnan(y):
         return frame, (0, 0, z - datum.home_z)
     latitude, longitude, altitude = from_world(datum, (x, y, 0.0 if math.isnan(z) else z))
-    return frame, (saturated(latitude * 1e7, 32), saturated(longitude * 1e7, 32), z if math.isnan(z) else altitude)
+    return frame, (saturate(latitude * 1e7, 32), saturate(longitude * 1e7, 32), z if math.isnan(z) else altitude)

@@ -116,7 +116,7 @@ class ArmingWatch:
 def _report(
     reasons: tuple[str, ...], position_known: bool, health: tuple[tuple[str, bool], ...]
 ) -> Iterator[Occurrence]:
-    failed = [_failed(reason) for reason in reasons]
+    failed = [_failed_check(reason) for reason in reasons]
     wrong = sum({1 << values[1] for _, values in failed})
     can_arm = 0 if failed else _ALL
     can_run = _ALL if position_known else sum(1 << MODES.index(mode) for mode in WITHOUT_POSITION)
@@ -127,7 +127,7 @@ def _report(
     yield HEALTH, (0, present, invalid, 0)
 
 
-def _failed(reason: str) -> tuple:
+def _failed_check(reason: str) -> tuple:
     """Return the event of a failed check and the values of its arguments."""
     if source := _READINGS.get(reason):
         return READINGS, (_ALL, _component(source), SOURCES.index(source))

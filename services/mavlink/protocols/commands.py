@@ -93,12 +93,12 @@ def execute(session: Session, command: Command) -> None:
     def acknowledge(result: int, progress: int = NO_PROGRESS) -> None:
         session.send(mavlink.MAVLink_command_ack_message(command.number, result, progress, 0, *session.address))
 
-    def acknowledged(by_autopilot: Any) -> None:
+    def on_acknowledgement(by_autopilot: Any) -> None:
         progress = round(100.0 * by_autopilot.progress) if by_autopilot.result == IN_PROGRESS else NO_PROGRESS
         acknowledge(by_autopilot.result, progress)
 
     if isinstance(outcome, Request):
-        session.command(outcome.kind, outcome.values, acknowledged)
+        session.command(outcome.kind, outcome.values, on_acknowledgement)
     elif isinstance(outcome, Reply):
         acknowledge(ACCEPTED)
         for message in outcome.messages:

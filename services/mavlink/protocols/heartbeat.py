@@ -5,7 +5,7 @@ from typing import Any
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.handler import handles
 from lapwing.services.mavlink.session import Session
-from lapwing.services.mavlink.telemetry import requested
+from lapwing.services.mavlink.telemetry import answer_request
 
 
 @handles("HEARTBEAT")
@@ -35,7 +35,7 @@ def set_origin(session: Session, m: Any) -> None:
     """Echo the origin as received; the scene's home does not change."""
     if session.trusted:
         session.vehicle.origin = m.latitude, m.longitude, m.altitude
-        for message in requested(session.vehicle, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN) or ():
+        for message in answer_request(session.vehicle, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN) or ():
             session.send(message)
 
 

@@ -5,7 +5,7 @@ import math
 from lapwing.services.common.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Reply, rule
 from lapwing.services.mavlink.session import Session
-from lapwing.services.mavlink.telemetry import requested, streams
+from lapwing.services.mavlink.telemetry import answer_request, streams
 
 
 @rule(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, changes=False)
@@ -54,7 +54,7 @@ def get_home_position(session: Session, c: Command) -> Outcome:
 
 
 def _reply(session: Session, number: int, parameter: float = 0.0) -> Outcome:
-    messages = requested(session.vehicle, number, parameter)
+    messages = answer_request(session.vehicle, number, parameter)
     if messages is None:
         return UNSUPPORTED
     return Reply(messages) if messages else mavlink.MAV_RESULT_TEMPORARILY_REJECTED

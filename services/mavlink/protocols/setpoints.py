@@ -29,13 +29,13 @@ CENTRE = 500.0  # of the throttle stick, which is the only one from 0 to 1000
 _GUIDED = ("hold", "goto", "offboard")  # modes that ArduPilot's GUIDED covers
 
 
-def masked(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
+def apply_mask(mask: int, first_bit: int, x: float, y: float, z: float) -> Vec3:
     """Return three numbers in their NED or FRD axes, with NaN where the mask ignores them."""
     a, b, c = (math.nan if mask >> first_bit + k & 1 else value for k, value in enumerate((x, y, z)))
     return a, b, c
 
 
-def rotated(v: Vec3, heading: float) -> Vec3:
+def rotate(v: Vec3, heading: float) -> Vec3:
     """Rotate forward, right, down to north, east, down; if one of a horizontal pair is NaN it counts as 0."""
     s, c = math.sin(heading), math.cos(heading)
     if math.isnan(v[0]) and math.isnan(v[1]):
@@ -51,14 +51,14 @@ def local_target(session: Session, m: Any) -> None:
     if m.coordinate_frame not in _LOCAL or estimate is None:
         _refuse(session, f"SET_POSITION_TARGET_LOCAL_NED: frame {m.coordinate_frame} unsupported")
         return
-    position = masked(m.type_mask, 0, m.x, m.y, m.z)
-    velocity = masked(m.type_mask, 3, m.vx, m.vy, m.vz)
-    acceleration = masked(m.type_mask, 6, m.afx, m.afy, m.afz)
+    position = apply_mask(m.type_mask, 0, m.x, m.y, m.z)
+    velocity = apply_mask(m.type_mask, 3, m.vx, m.vy, m.vz)
+    acceleration = apply_mask(m.type_mask, 6, m.afx, m.afy, m.afz)
     heading = estimate.angles[2]
     if m.coordinate_frame in _BODY:
-        velocity, acceleration = rotated(velocity, heading), rotated(acceleration, heading)
+        velocity, acceleration = rotate(velocity, heading), rotate(acceleration, heading)
     if m.coordinate_frame in _AHEAD:
-        position = rotated(position, heading)
+        position = rotate(position, heading)
     if m.coordinate_frame in _FROM_HERE:
         n, e, d = estimate.position_ned
         position = position[0] + n, position[1] + e, position[2] + d
@@ -74,7 +74,7 @@ def global_target(session: Session, m: Any) -> None:
     if m.coordinate_frame not in ABOVE_SEA | ABOVE_HOME or estimate is None:
         _refuse(session, f"SET_POSITION_TARGET_GLOBAL_INT: frame {m.coordinate_frame} unsupported")
         return
-    latitude, longitude, altitude = masked(m.type_mask, 0, degrees(m.lat_int), degrees(m.lon_int), m.alt)
+    latitude, longitude, altitude = apply_mask(m.type_mask, 0, degrees(m.lat_int), degrees(m.lon_int), m.alt)
     if math.isnan(latitude) != math.isnan(longitude):
         here = from_world(session.vehicle.datum, estimate.position_world)
         latitude, longitude = (h if math.isnan(v) else v for v, h in zip((latitude, longitude), here[:2], strict=True))
@@ -83,8 +83,8 @@ def global_target(session: Session, m: Any) -> None:
     except ValueError:
         _refuse(session, "SET_POSITION_TARGET_GLOBAL_INT: no place on Earth")
         return
-    velocity = masked(m.type_mask, 3, m.vx, m.vy, m.vz)
-    acceleration = masked(m.type_mask, 6, m.afx, m.afy, m.afz)
+    velocity = apply_mask(m.type_mask, 3, m.vx, m.vy, m.vz)
+    acceleration = apply_mask(m.type_mask, 6, m.afx, m.afy, m.afz)
     _put(session, m, position_world, velocity, acceleration)
 
 
@@ -104,7 +104,7 @@ def _put(
     elif all(map(math.isnan, values)):
         _refuse(session, f"{m.get_type()}: nothing to follow")
     elif session.vehicle.firmware.GUIDED and all(map(math.isnan, (*values[3:9], rate))):
-        if _guided(session, m):  # ArduPilot flies to a place that is sent once
+        if _follows_setpoint(session, m):  # ArduPilot flies to a place that is sent once
             _send(session, m, "goto", (*position_world, yaw))
     else:
         _send(session, m, "offboard_position", values)
@@ -119,7 +119,7 @@ def attitude_target(session: Session, m: Any) -> None:
         _refuse(session, "SET_ATTITUDE_TARGET: no attitude")
         return
     unit = (math.nan,) * 4 if ignored else swap_attitude(tuple(e / norm for e in m.q))  # type: ignore[arg-type]
-    rates = masked(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
+    rates = apply_mask(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
     if ignored and all(map(math.isnan, rates)):
         _refuse(session, "SET_ATTITUDE_TARGET: nothing to follow")
         return
@@ -151,7 +151,7 @@ def _send(session: Session, m: Any, kind: str, values: tuple[float, ...]) -> Non
         _refuse(session, f"{m.get_type()}: not finite")
         return
     guided = session.vehicle.firmware.GUIDED
-    if not session.trusted or (guided and not _guided(session, m)):
+    if not session.trusted or (guided and not _follows_setpoint(session, m)):
         return
     if kind == "goto":
         session.command(kind, values)
@@ -161,7 +161,7 @@ def _send(session: Session, m: Any, kind: str, values: tuple[float, ...]) -> Non
         session.command("offboard")  # ArduPilot's GUIDED follows setpoints immediately
 
 
-def _guided(session: Session, m: Any) -> bool:
+def _follows_setpoint(session: Session, m: Any) -> bool:
     """Return True if ArduPilot's GUIDED mode would follow a setpoint now."""
     status = session.vehicle.status
     if status.mode in _GUIDED and not status.landed:

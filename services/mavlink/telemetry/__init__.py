@@ -7,7 +7,7 @@ from lapwing.dynamics import discovery
 from lapwing.services.mavlink.telemetry.message_stream import ON_REQUEST, STREAMS, Stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-__all__ = ["Stream", "requested", "streams"]
+__all__ = ["Stream", "answer_request", "streams"]
 
 
 @cache
@@ -17,7 +17,7 @@ def streams() -> dict[int, Stream]:
     return STREAMS
 
 
-def requested(vehicle: VehicleCache, number: int, parameter: float = 0.0) -> list[Any] | None:
+def answer_request(vehicle: VehicleCache, number: int, parameter: float = 0.0) -> list[Any] | None:
     """Return the current messages that answer a request.
 
     Args:

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, OPTICAL_FLOW, RANGEFINDER, SONAR
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import Quaternion, from_euler, saturated
+from lapwing.services.common.mavlink.frames import Quaternion, from_euler, saturate
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -76,7 +76,7 @@ def distance_sensors(v: VehicleCache) -> Any:
 def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[int, Quaternion]) -> Any:
     if math.isnan(m.range):
         return None
-    minimum, maximum = (saturated(metres / CENTIMETRE, 16, unsigned=True) for metres in (m.min_range, m.max_range))
+    minimum, maximum = (saturate(metres / CENTIMETRE, 16, unsigned=True) for metres in (m.min_range, m.max_range))
     distance = maximum + 1 if m.range == math.inf else 0 if m.range == -math.inf else round(m.range / CENTIMETRE)
     return mavlink.MAVLink_distance_sensor_message(
         v.boot_ms,
@@ -86,7 +86,7 @@ def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[in
         kind,
         number,
         towards[0],
-        saturated(m.variance / CENTIMETRE**2, 8, unsigned=True),
+        saturate(m.variance / CENTIMETRE**2, 8, unsigned=True),
         m.field_of_view,
         m.field_of_view,
         list(towards[1]),

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.messages.topics import TRUTH
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import saturated, swap_world
+from lapwing.services.common.mavlink.frames import saturate, swap_world
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -19,19 +19,19 @@ def true_state(v: VehicleCache) -> Any:
     if m is None:
         return None
     latitude, longitude, altitude = m.geodetic
-    air_speed = saturated(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
+    air_speed = saturate(100.0 * math.dist(m.velocity_ned, swap_world(tuple(truth.wind))), 16, unsigned=True)
     acceleration = _to_body(m.attitude, swap_world(tuple(truth.acceleration)))
     return mavlink.MAVLink_hil_state_quaternion_message, (
         v.boot_us,
         list(m.attitude),
         *m.omega_frd,
-        saturated(latitude * 1e7, 32),
-        saturated(longitude * 1e7, 32),
-        saturated(altitude * 1e3, 32),
-        *[saturated(u * 1e2, 16) for u in m.velocity_ned],
+        saturate(latitude * 1e7, 32),
+        saturate(longitude * 1e7, 32),
+        saturate(altitude * 1e3, 32),
+        *[saturate(u * 1e2, 16) for u in m.velocity_ned],
         air_speed,
         air_speed,
-        *[saturated(a / MILLI_G, 16) for a in acceleration],
+        *[saturate(a / MILLI_G, 16) for a in acceleration],
     )
 
 

@@ -5,7 +5,7 @@ from typing import Any
 from lapwing.kernels import math
 from lapwing.messages.topics import ESTIMATE
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import saturated
+from lapwing.services.common.mavlink.frames import saturate
 from lapwing.services.common.mavlink.geo_coordinates import enu_to_geodetic, to_local
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -29,9 +29,9 @@ def home_position(v: VehicleCache) -> Any:
     home = v.home_world
     latitude, longitude, height = enu_to_geodetic(v.description.home, home)
     return mavlink.MAVLink_home_position_message(
-        saturated(latitude * 1e7, 32),
-        saturated(longitude * 1e7, 32),
-        saturated(height * 1e3, 32),
+        saturate(latitude * 1e7, 32),
+        saturate(longitude * 1e7, 32),
+        saturate(height * 1e3, 32),
         *to_local(v.description.standing_height, home),
         [math.cos(0.5 * v.home_heading), 0.0, 0.0, math.sin(0.5 * v.home_heading)],
         *(0.0, 0.0, 0.0),

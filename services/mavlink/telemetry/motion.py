@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import compass, saturated
+from lapwing.services.common.mavlink.frames import compass, saturate
 from lapwing.services.mavlink.telemetry.external_sensors import indicated_airspeed
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
@@ -45,11 +45,11 @@ def global_position(v: VehicleCache) -> Any:
     latitude, longitude, altitude = m.geodetic
     return mavlink.MAVLink_global_position_int_message, (
         v.boot_ms,
-        saturated(latitude * 1e7, 32),
-        saturated(longitude * 1e7, 32),
-        saturated(altitude * 1e3, 32),
-        saturated((m.position_world[2] - v.home_world[2]) * 1e3, 32),
-        *[saturated(u * 1e2, 16) for u in m.velocity_ned],
+        saturate(latitude * 1e7, 32),
+        saturate(longitude * 1e7, 32),
+        saturate(altitude * 1e3, 32),
+        saturate((m.position_world[2] - v.home_world[2]) * 1e3, 32),
+        *[saturate(u * 1e2, 16) for u in m.velocity_ned],
         compass(m.angles[2]),
     )
 

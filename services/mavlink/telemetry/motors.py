@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.messages.topics import TRUTH
 from lapwing.services.common.mavlink.dialect import message_class
-from lapwing.services.common.mavlink.frames import saturated
+from lapwing.services.common.mavlink.frames import saturate
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -15,7 +15,7 @@ SERIAL = 1  # ESC_CONNECTION_TYPE_SERIAL
 UNKNOWN_TEMPERATURE = 0x7FFF
 
 
-def _padded(values: Any, nothing: Any) -> list[Any]:
+def _pad(values: Any, nothing: Any) -> list[Any]:
     return [*list(values)[:BATCH], *[nothing] * (BATCH - min(BATCH, len(values)))]
 
 
@@ -25,9 +25,9 @@ def esc_status(v: VehicleCache) -> Any:
     truth = v.get(TRUTH)
     if truth is None or not truth.rotor_speed:
         return None
-    rpm = [saturated(RPM * speed, 32, unknown=0) for speed in truth.rotor_speed]
+    rpm = [saturate(RPM * speed, 32, unknown=0) for speed in truth.rotor_speed]
     return message_class("ESC_STATUS")(
-        0, v.boot_us, _padded(rpm, 0), _padded(truth.motor_voltage, 0.0), _padded(truth.motor_current, 0.0)
+        0, v.boot_us, _pad(rpm, 0), _pad(truth.motor_voltage, 0.0), _pad(truth.motor_current, 0.0)
     )
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.messages.topics import ACTUATORS, BATTERY
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import saturated
+from lapwing.services.common.mavlink.frames import saturate
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -49,9 +49,9 @@ def actuator_outputs(v: VehicleCache) -> Any:
     return mavlink.MAVLink_actuator_output_status_message(v.boot_us, active, padded)
 
 
-def remaining(battery: Any) -> int:
+def remaining_charge(battery: Any) -> int:
     """Return the remaining charge [%]; -1: unknown."""
-    return saturated(100.0 * battery.percentage, 8, unknown=-1)
+    return saturate(100.0 * battery.percentage, 8, unknown=-1)
 
 
 @stream("BATTERY_STATUS", 0.5, 0.5)
@@ -60,7 +60,7 @@ def battery_status(v: VehicleCache) -> Any:
     b = v.get(BATTERY)
     if b is None:
         return None
-    cells = [saturated(1e3 * u, 16, unsigned=True) for u in b.cell_voltage] or [saturated(1e3 * b.voltage, 16, True)]
+    cells = [saturate(1e3 * u, 16, unsigned=True) for u in b.cell_voltage] or [saturate(1e3 * b.voltage, 16, True)]
     first, more = cells[:CELLS], cells[CELLS:][:MORE_CELLS]
     known = math.isfinite(b.percentage)
     used = 1e3 * (b.design_capacity - b.charge)  # [mA h]
@@ -68,12 +68,12 @@ def battery_status(v: VehicleCache) -> Any:
         0,
         mavlink.MAV_BATTERY_FUNCTION_ALL,
         mavlink.MAV_BATTERY_TYPE_LIPO,
-        saturated(1e2 * b.temperature, 16),
+        saturate(1e2 * b.temperature, 16),
         first + [EMPTY] * (CELLS - len(first)),
-        saturated(-1e2 * b.current, 16, unknown=-1),
-        saturated(used, 32, unknown=-1),
+        saturate(-1e2 * b.current, 16, unknown=-1),
+        saturate(used, 32, unknown=-1),
         -1,
-        remaining(b),
+        remaining_charge(b),
         charge_state=_STATES[v.status.battery_warning] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED,
         voltages_ext=more + [0] * (MORE_CELLS - len(more)),
     )
@@ -84,4 +84,4 @@ def power(v: VehicleCache) -> tuple[int, int, int]:
     b = v.get(BATTERY)
     if b is None or not math.isfinite(b.voltage):
         return 0xFFFF, -1, -1
-    return saturated(1e3 * b.voltage, 16, unsigned=True), saturated(-1e2 * b.current, 16, unknown=-1), remaining(b)
+    return saturate(1e3 * b.voltage, 16, unsigned=True), saturate(-1e2 * b.current, 16, unknown=-1), remaining_charge(b)

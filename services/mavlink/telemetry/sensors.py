@@ -9,7 +9,7 @@ from lapwing.messages.topics import BARO, GPS, GPS_DETAILS, GPS_VELOCITY, IMU, M
 from lapwing.services.common.failure_types import FIX_SATELLITES
 from lapwing.services.common.failure_types import SATELLITES as PARAMETER
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import compass, saturated, swap_body
+from lapwing.services.common.mavlink.frames import compass, saturate, swap_body
 from lapwing.services.mavlink.px4_facts import SATELLITES
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -81,9 +81,9 @@ def scaled_imu(v: VehicleCache) -> Any:
     field = swap_body(tuple(v.get(MAG).magnetic_field)) if good_mag(v) else (0.0, 0.0, 0.0)
     return mavlink.MAVLink_scaled_imu_message(
         v.boot_ms,
-        *[saturated(a / MILLI_G, 16) for a in force],
-        *[saturated(1e3 * rate, 16) for rate in omega],
-        *[saturated(1e3 * b / GAUSS, 16) for b in field],
+        *[saturate(a / MILLI_G, 16) for a in force],
+        *[saturate(1e3 * rate, 16) for rate in omega],
+        *[saturate(1e3 * b / GAUSS, 16) for b in field],
     )
 
 
@@ -100,7 +100,7 @@ def scaled_pressure(v: VehicleCache) -> Any:
 def gps_raw(v: VehicleCache) -> Any:
     """Return the receiver's fix; without a receiver, the estimated position."""
     if not v.description.sensors:
-        return _estimated(v)
+        return _estimated_fields(v)
     fix, moving = v.get(GPS), v.get(GPS_VELOCITY)
     if fix is None or moving is None:
         return None
@@ -118,9 +118,7 @@ def gps_raw(v: VehicleCache) -> Any:
     if details is None or details.status.status not in DETAILED_FIX_TYPES:
         return _fix(v, FIX_TYPES[fix.status.status], place, velocity, spread, moving.twist.covariance[0])
     kind = DETAILED_FIX_TYPES[details.status.status]
-    dilution = [
-        saturated(100.0 * d, 16, unsigned=True) if d > 0.0 else UNKNOWN_16 for d in (details.hdop, details.vdop)
-    ]
+    dilution = [saturate(100.0 * d, 16, unsigned=True) if d > 0.0 else UNKNOWN_16 for d in (details.hdop, details.vdop)]
     satellites = details.status.satellites_visible or UNKNOWN_8
     return _fix(v, kind, place, velocity, spread, moving.twist.covariance[0], dilution, satellites)
 
@@ -131,7 +129,7 @@ def _satellites(v: VehicleCache) -> int:
     return SATELLITES if math.isnan(value) else int(value)
 
 
-def _estimated(v: VehicleCache) -> Any:
+def _estimated_fields(v: VehicleCache) -> Any:
     if (m := v.estimate) is None:
         return None
     return _fix(v, mavlink.GPS_FIX_TYPE_3D_FIX, m.geodetic, m.velocity_ned[:2], (0.0, 0.0), 0.0)
@@ -149,20 +147,20 @@ def _fix(
 ) -> Any:
     latitude, longitude, altitude = place
     north, east = moving
-    height = saturated(altitude * 1e3, 32)
+    height = saturate(altitude * 1e3, 32)
     return mavlink.MAVLink_gps_raw_int_message(
         v.boot_us,
         fix_type,
-        saturated(latitude * 1e7, 32),
-        saturated(longitude * 1e7, 32),
+        saturate(latitude * 1e7, 32),
+        saturate(longitude * 1e7, 32),
         height,
         *dilution,
-        saturated(100.0 * math.hypot(north, east), 16, unsigned=True),
+        saturate(100.0 * math.hypot(north, east), 16, unsigned=True),
         compass(math.atan2(east, north)),
         _satellites(v) if satellites is None else satellites,
         height,
-        *[saturated(1e3 * s, 32, unsigned=True) for s in spread],
-        saturated(1e3 * math.sqrt(max(0.0, speed_variance)), 32, unsigned=True),
+        *[saturate(1e3 * s, 32, unsigned=True) for s in spread],
+        saturate(1e3 * math.sqrt(max(0.0, speed_variance)), 32, unsigned=True),
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 from lapwing.dynamics.vector import Vec3
 from lapwing.messages.topics import ACTUATORS, SETPOINT
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.frames import from_euler, saturated, swap_attitude, swap_world, swap_yaw
+from lapwing.services.common.mavlink.frames import from_euler, saturate, swap_attitude, swap_world, swap_yaw
 from lapwing.services.common.mavlink.geo_coordinates import from_world, to_local
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
@@ -55,8 +55,8 @@ def global_target(v: VehicleCache) -> Any:
         v.boot_ms,
         mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
         mask,
-        saturated(latitude * 1e7, 32),
-        saturated(longitude * 1e7, 32),
+        saturate(latitude * 1e7, 32),
+        saturate(longitude * 1e7, 32),
         altitude,
         *rest,
     )

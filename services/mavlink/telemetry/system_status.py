@@ -77,7 +77,7 @@ def healthy(v: VehicleCache) -> bool:
     return e is not None and e.health_flags == 0
 
 
-def _refused(v: VehicleCache, source: str) -> bool:
+def _is_rejected(v: VehicleCache, source: str) -> bool:
     """Return True if the estimator rejected the newest reading of a sensor or has received none."""
     e = v.get(ESTIMATE)
     return e is not None and source in e.rejected_sources
@@ -86,10 +86,10 @@ def _refused(v: VehicleCache, source: str) -> bool:
 def sensor_health(v: VehicleCache) -> Iterator[tuple[str, int, bool]]:
     """Yield name, SYS_STATUS bits and validity of each sensor, or of the true state in its place."""
     for bits, (good, source) in _SENSORS.items():
-        yield source, bits, good(v) and not _refused(v, source) if v.description.sensors else healthy(v)
+        yield source, bits, good(v) and not _is_rejected(v, source) if v.description.sensors else healthy(v)
     for sensors, (bit, good, source) in _OPTIONAL.items():
         if set(sensors) & set(v.description.sensors):
-            yield source, bit, good(v) and not _refused(v, source)
+            yield source, bit, good(v) and not _is_rejected(v, source)
 
 
 @stream("SYS_STATUS", 1.0, 5.0)

@@ -97,7 +97,7 @@ def _switches(p: LoadDrive, t: float, x: LoadMotion, h: float) -> bool:
 
 
 @kernel
-def moved(p: LoadDrive, x: LoadMotion) -> LoadMotion:
+def move_load(p: LoadDrive, x: LoadMotion) -> LoadMotion:
     """Return the motion of the load a communication step later."""
     load = p.load
     for i in range(load.steps):
@@ -122,7 +122,7 @@ def step(
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
         drive = LoadDrive(p, map_tuple(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
-        x = moved(drive, x)
+        x = move_load(drive, x)
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))
     place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)

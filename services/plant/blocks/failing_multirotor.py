@@ -6,7 +6,7 @@ from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics.vehicles.propeller_failures import Failure, advance_through
 from lapwing.kernels import always_inline
 from lapwing.services.common.ports import BatteryReading, TrueState
-from lapwing.services.plant.blocks.multirotor import MultirotorPlant, MultirotorPlantState, commanded, output
+from lapwing.services.plant.blocks.multirotor import MultirotorPlant, MultirotorPlantState, apply_inputs, output
 
 
 class FailingMultirotorPlant(NamedTuple):
@@ -22,7 +22,7 @@ def step(
 ) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:
     """Advance through the failures to `tick`, which is positive. See `multirotor.step` for inputs."""
     core = p.core
-    vehicle, command = commanded(core, s, inputs)
+    vehicle, command = apply_inputs(core, s, inputs)
     vehicle = advance_through(
         core.method, core.vehicle, p.failures, core.key, tick - 1, vehicle, command, core.step, core.steps
     )

@@ -50,14 +50,14 @@ def step(
 
     The inputs are actuators, status, and the named inputs of effects.
     """
-    vehicle, command = commanded(p, s, inputs)
+    vehicle, command = apply_inputs(p, s, inputs)
     if tick > 0:
         vehicle = advance(p.method, p.vehicle, p.key, tick - 1, vehicle, command, p.step, p.steps)
     return output(p, p.vehicle, s, tick, vehicle, command, inputs[1])
 
 
 @always_inline
-def commanded(
+def apply_inputs(
     p: MultirotorPlant, s: MultirotorPlantState, inputs: tuple[InputSample, ...]
 ) -> tuple[MultirotorState, PerRotor]:
     """Return (vehicle with the inputs of its effects, motor voltages [V]). See `step` for arguments."""

@@ -36,7 +36,9 @@ def rate_ticks(scene: Scene, key: str) -> int:
     return ticks(scene, min(getattr(scene[Rates], key), scene[Communication].rate), f"rates.{key}")
 
 
-def wiring(scene: Scene, odometry: bool = False, battery: Any = None, bodies: tuple[str, ...] = ()) -> PlantWiring:
+def message_contents(
+    scene: Scene, odometry: bool = False, battery: Any = None, bodies: tuple[str, ...] = ()
+) -> PlantWiring:
     """Return the contents of the plant's messages besides its state."""
     cells, capacity = (battery.cells, battery.capacity) if battery else (0, math.nan)
     return PlantWiring(rate_ticks(scene, "pose"), odometry, cells, capacity, bodies)
@@ -90,7 +92,7 @@ def autonomous(
     core = AutonomousPlant(p, solver, steps, step, scene[Communication].interval, last_tick(scene))
     outputs = (Port(ports.TRUTH, truth), *([bodies_port(scene, len(names))] if bodies else []))
     return ServiceConfig(
-        PlantSetup(scene[Vehicle].model, core, start, wiring(scene, bodies=names), bodies), (), outputs
+        PlantSetup(scene[Vehicle].model, core, start, message_contents(scene, bodies=names), bodies), (), outputs
     )
 
 
@@ -112,7 +114,7 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     truth = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
     delay, external = exchange.loop_delay, effect_inputs.ports_of(scene, p.effects)
     return ServiceConfig(
-        PlantSetup("rigid_body", core, start, wiring(scene, odometry=True, battery=frame.battery)),
+        PlantSetup("rigid_body", core, start, message_contents(scene, odometry=True, battery=frame.battery)),
         (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay), *(InputPort(i, delay) for i in external)),
         (Port(ports.TRUTH, truth), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
     )

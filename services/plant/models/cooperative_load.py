@@ -12,7 +12,14 @@ from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.ports import LIFT, TRUTH, RotorWrenches, TrueState
 from lapwing.services.common.run_schema import CooperativeLoad
 from lapwing.services.plant.blocks.cooperative_load import CooperativePlant
-from lapwing.services.plant.models._common import bodies_port, can_have, check_system, last_tick, needs, wiring
+from lapwing.services.plant.models._common import (
+    bodies_port,
+    can_have,
+    check_system,
+    last_tick,
+    message_contents,
+    needs,
+)
 from lapwing.services.plant.schema import method
 from lapwing.services.plant.service_config import PlantSetup
 
@@ -40,7 +47,9 @@ def resolve(scene: Scene) -> ServiceConfig:
     names = (LOAD, *[f"quad{i + 1}" for i in range(n)])
     ports = (Port(TRUTH, TrueState()), bodies_port(scene, len(names)))
     inputs = (InputPort(LIFT, scene[Communication].loop_delay),)
-    return ServiceConfig(PlantSetup("cooperative_load", core, start, wiring(scene, bodies=names)), inputs, ports)
+    return ServiceConfig(
+        PlantSetup("cooperative_load", core, start, message_contents(scene, bodies=names)), inputs, ports
+    )
 
 
 def system(scene: Scene) -> tuple[CooperativeLoadParameters, CooperativeLoadState]:

@@ -85,7 +85,7 @@ def longest_step(scene: Scene) -> float:
     return LARGEST_TURN * motor.rotor_constant / motor.max_voltage
 
 
-def described(scene: Scene) -> tuple[ModuleType, Any]:
+def describe(scene: Scene) -> tuple[ModuleType, Any]:
     """Return the module of the state form, and the parameters."""
     s = _settings(scene)
     form = FORM[s.coordinates]
@@ -99,7 +99,7 @@ def _event(scene: Scene, event: Event) -> PlantEvent:
 
 def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of a multirotor of five bodies, with its failures."""
-    form, p = described(scene)
+    form, p = describe(scene)
     result = multirotor_plant(scene, form, p)
     events = tuple(_event(scene, event) for event in sorted(_settings(scene).event, key=lambda event: event.time))
     plant = result.parameters

@@ -21,11 +21,11 @@ def check(scene: Scene) -> None:
     check_integrator(scene, p, multirotor.initial_state(p).motion)
 
 
-def described(scene: Scene) -> tuple[ModuleType, Any]:
+def describe(scene: Scene) -> tuple[ModuleType, Any]:
     """Return the module of the state form, and the parameters."""
     return multirotor, multirotor.parameters(airframe(scene), active(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of a multirotor as one rigid body."""
-    return multirotor_plant(scene, *described(scene))
+    return multirotor_plant(scene, *describe(scene))

@@ -83,14 +83,14 @@ def check(scene: Scene) -> None:
     rigid_body.check(scene)
 
 
-def described(scene: Scene) -> tuple[ModuleType, Any]:
+def describe(scene: Scene) -> tuple[ModuleType, Any]:
     """Return the module of the state form, and the parameters."""
     return multirotor_slung, multirotor_slung.parameters(airframe(scene), _sling(scene), active(scene))
 
 
 def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of a multirotor with its load, which is output as a body."""
-    result = multirotor_plant(scene, *described(scene))
+    result = multirotor_plant(scene, *describe(scene))
     plant = result.parameters
     parameters = plant._replace(
         model=NAME, bodies=SlungLoadView(plant.core.vehicle.layout), wiring=plant.wiring._replace(bodies=("load",))

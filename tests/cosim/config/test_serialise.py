@@ -113,8 +113,8 @@ def test_class_is_named_and_found_again():
         ("{", "Expecting"),
     ],
 )
-def test_invalid_text_is_rejected_with_message(text, said):
-    with pytest.raises(ValueError, match=said):
+def test_invalid_text_is_rejected_with_message(text, output):
+    with pytest.raises(ValueError, match=output):
         from_json(text)
 
 
@@ -122,14 +122,14 @@ def test_unsupported_value_is_rejected_with_path():
     class Local(NamedTuple):
         x: float
 
-    for tree, said in (
+    for tree, output in (
         ({"a": [1, {2}]}, r"a\.1: a builtins\.set cannot"),
         ({"a": Mutable(1.0)}, "a: a .*Mutable cannot"),
         ({1: 2}, "key 1: expected a text"),
         (Local(1.0), "Local: no such class"),
         (np.zeros(2, dtype=np.float32), "ndarray cannot"),
     ):
-        with pytest.raises(ValueError, match=said):
+        with pytest.raises(ValueError, match=output):
             to_json(tree)
 
 

@@ -36,12 +36,12 @@ def test_module_is_found_on_pythons_path(tmp_path, monkeypatch):
         ("a-b", "expected a name that Python can import, got module 'a-b'"),
     ],
 )
-def test_invalid_module_is_rejected(tmp_path, name, said):
+def test_invalid_module_is_rejected(tmp_path, name, output):
     for taken in ("numpy", "math"):
         (tmp_path / f"{taken}.py").write_text("")
     with pytest.raises(ConfigError) as caught:
         find("key", name, tmp_path)
-    assert said in str(caught.value)
+    assert output in str(caught.value)
 
 
 def test_stored_text_is_executed_with_neighbours():

@@ -41,9 +41,9 @@ def test_block_reads_value_that_was_put(number):
     values = expected(1.5, 7, 3)._replace(number=number, good=True, rest=(2**53, -(2**53)))
     graph.put("readings", 0, values)
     graph.advance(1)
-    heard = graph.latest("echo", 0)
-    assert heard == Heard(True, values, 1.0)
-    assert math.copysign(1.0, heard.value.number) == math.copysign(1.0, number)
+    received = graph.latest("echo", 0)
+    assert received == Heard(True, values, 1.0)
+    assert math.copysign(1.0, received.value.number) == math.copysign(1.0, number)
 
 
 def test_nan_is_preserved():
@@ -58,10 +58,10 @@ def test_delayed_message_is_due_after_delay_for_any_page(delay):
     graph = graph_of(readings(), echo(delay=delay), page=2)
     for tick in range(100):
         graph.advance(tick + 1)
-        heard = graph.latest("echo", tick)
-        assert heard.due == (tick >= delay)
-        if heard.due:
-            assert heard.value == expected(2.0, tick - delay, tick - delay + 1)
+        received = graph.latest("echo", tick)
+        assert received.due == (tick >= delay)
+        if received.due:
+            assert received.value == expected(2.0, tick - delay, tick - delay + 1)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 7])
@@ -70,10 +70,10 @@ def test_of_slower_port_message_is_due_at_its_ticks_only(delay):
     graph = graph_of(readings(5, slow), echo(slow, delay), page=4)
     for tick in range(60):
         graph.advance(tick + 1)
-        heard = graph.latest("echo", tick)
-        assert heard.due == (tick >= delay and (tick - delay) % 5 == 0)
-        if heard.due:
-            assert heard.value == expected(2.0, tick - delay, (tick - delay) // 5 + 1)
+        received = graph.latest("echo", tick)
+        assert received.due == (tick >= delay and (tick - delay) % 5 == 0)
+        if received.due:
+            assert received.value == expected(2.0, tick - delay, (tick - delay) // 5 + 1)
 
 
 def test_latched_port_is_due_at_every_tick():

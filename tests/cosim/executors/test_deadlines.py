@@ -25,10 +25,10 @@ def test_ticks_that_are_late_are_counted_and_worst_is_kept():
     assert metadata_entries({}) == {}
 
 
-@pytest.mark.parametrize("told", ["", "1", "[1]", "[1, 2, 3]", '["a", 1]', "null"])
-def test_invalid_lateness_is_rejected(told):
+@pytest.mark.parametrize("messages", ["", "1", "[1]", "[1, 2, 3]", '["a", 1]', "null"])
+def test_invalid_lateness_is_rejected(messages):
     with pytest.raises(ValueError):
-        lateness(told)
+        lateness(messages)
 
 
 @pytest.mark.parametrize(("more", "paced"), [(("--realtime",), True), ((), False)], ids=["real time", "full speed"])

@@ -96,7 +96,7 @@ def test_slow_disk_is_reported_and_one_chunk_is_buffered(tmp_path, monkeypatch):
     go_on, reported = threading.Event(), threading.Event()
     with LogWriter(tmp_path / "log", {}, {}, reported.set) as writer:
         write = writer._container.add_chunk
-        monkeypatch.setattr(writer._container, "add_chunk", lambda *given: (go_on.wait(), write(*given)))
+        monkeypatch.setattr(writer._container, "add_chunk", lambda *values: (go_on.wait(), write(*values)))
 
         def say(time_ns):
             writer.write("/clock", Clock, Clock(stamp(time_ns)).encode(), time_ns)

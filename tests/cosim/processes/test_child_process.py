@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cosim.processes.child_process import started_early
+from lapwing.cosim.processes.child_process import start_early
 from lapwing.cosim.processes.forked_process import Forked
 
 
 def test_unused_early_child_is_terminated():
-    with started_early(["mavlink", "recorder"]) as early:
+    with start_early(["mavlink", "recorder"]) as early:
         taken, left = early.pop("mavlink"), early["recorder"]
         assert taken.process.poll() is None
     assert left.process.poll() is not None

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import pytest
 
 from lapwing.cosim.access.publisher_ids import PublisherIds
-from lapwing.cosim.processes.cpu_starvation import QUIET, Starvation, waited
+from lapwing.cosim.processes.cpu_starvation import QUIET, Starvation, starved_time
 from lapwing.cosim.processes.run_monitor import LONGEST, RunMonitor
 
 pytestmark = pytest.mark.skipif(not os.path.exists("/proc/self/schedstat"), reason="the system does not tell")
@@ -43,9 +43,9 @@ def start():
 
 
 def measured(pid, seconds=1.5):
-    before = waited(pid)
+    before = starved_time(pid)
     time.sleep(seconds)
-    return waited(pid) - before
+    return starved_time(pid) - before
 
 
 @pytest.mark.long
@@ -64,7 +64,7 @@ def test_only_starved_process_extends_wait(start):
 def test_exited_process_has_no_waiting_time():
     child = subprocess.Popen([sys.executable, "-c", ""])
     child.wait()
-    assert waited(child.pid) == 0.0
+    assert starved_time(child.pid) == 0.0
 
 
 def test_starvation_counts_from_last_message(monkeypatch):

@@ -21,7 +21,7 @@ ring = Ring()
 """
 
 
-@pytest.mark.parametrize(("call", "said"), [("", ["at exit", "collected"]), ("relax_gc()", ["at exit"])])
-def test_rings_are_left(call, said):
+@pytest.mark.parametrize(("call", "output"), [("", ["at exit", "collected"]), ("relax_gc()", ["at exit"])])
+def test_rings_are_left(call, output):
     ended = subprocess.run([sys.executable, "-c", END.format(call=call)], capture_output=True, text=True, check=True)
-    assert ended.stdout.splitlines() == said
+    assert ended.stdout.splitlines() == output

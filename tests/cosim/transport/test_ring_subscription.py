@@ -37,9 +37,9 @@ def test_messages_come_in_order(joined):
 def test_empty_inbox_waits_for_timeout(joined):
     _, here, inbox = joined
     for timeout in (0.0, 0.1, 0.3):
-        begun = time.monotonic()
+        started = time.monotonic()
         assert inbox.get(timeout) is None
-        assert time.monotonic() - begun >= timeout
+        assert time.monotonic() - started >= timeout
     here.publisher(KEY)(b"late", 7)
     assert inbox.get(5.0) == (7, b"late")
 

@@ -90,8 +90,8 @@ def test_cutoff_has_hysteresis(drone, situation, rotors):
         ({"temperature": 20.0}, r"temperature: expected a number at least 233.15 and at most 333.15 \[K\], got 20.0"),
     ],
 )
-def test_out_of_range_values_are_rejected(drone, table, said):
-    with pytest.raises(ConfigError, match=said):
+def test_out_of_range_values_are_rejected(drone, table, text):
+    with pytest.raises(ConfigError, match=text):
         make(drone, **table)
 
 

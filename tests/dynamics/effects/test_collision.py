@@ -30,31 +30,31 @@ def bodies(*entries, restitution):
     return result
 
 
-def fly(found, ticks):
+def fly(results, ticks):
     """The states after so many ticks, one tick of all after the other."""
     for tick in range(ticks):
         seen = [
             interaction.presence(p.effects)._replace(
                 position_world=s.motion.position_world, velocity_world=s.motion.velocity_world, mass=p.body.mass
             )
-            for p, s in found
+            for p, s in results
         ]
         following = []
-        for i, (p, s) in enumerate(found):
+        for i, (p, s) in enumerate(results):
             others = tuple(seen[:i] + seen[i + 1 :])
             s = s._replace(memory=(touch(p.effects[0], s.memory[0], seen[i], others, H),))
             off = (0.0,) * len(p.layout.x_body)
             following.append((p, multirotor.advance(METHOD, p, KEY, tick, s, off, H / 4, 4)))
-        found = following
-    return found
+        results = following
+    return results
 
 
-def velocities(found):
-    return np.array([s.motion.velocity_world for _, s in found])
+def velocities(results):
+    return np.array([s.motion.velocity_world for _, s in results])
 
 
-def momentum(found):
-    return sum(p.body.mass * np.array(s.motion.velocity_world) for p, s in found)
+def momentum(results):
+    return sum(p.body.mass * np.array(s.motion.velocity_world) for p, s in results)
 
 
 @pytest.mark.parametrize("restitution", [1.0, 0.5])
@@ -71,12 +71,12 @@ def test_central_impact_follows_newtons_law(restitution):
 def test_impact_keeps_tangential_velocity_and_momentum():
     centres = 0.9 * np.array([0.8, 0.6, 0.0])
     result = bodies((DRONE, (0.0, 0.0, 0.0), (3.0, 0.0, 0.5)), (QUAD, tuple(centres), (0.0, 0.0, 0.0)), restitution=1.0)
-    flown = fly(result, 1)
+    flight = fly(result, 1)
     tangent = np.array([-0.6, 0.8, 0.0])
-    assert velocities(flown) @ tangent == pytest.approx(velocities(result) @ tangent, abs=1e-12)
-    assert velocities(flown)[:, 2] == pytest.approx([0.5, 0.0], abs=1e-12)
-    assert momentum(flown) == pytest.approx(momentum(result), abs=1e-12)
-    assert velocities(flown)[1] @ tangent == pytest.approx(0.0, abs=1e-12)
+    assert velocities(flight) @ tangent == pytest.approx(velocities(result) @ tangent, abs=1e-12)
+    assert velocities(flight)[:, 2] == pytest.approx([0.5, 0.0], abs=1e-12)
+    assert momentum(flight) == pytest.approx(momentum(result), abs=1e-12)
+    assert velocities(flight)[1] @ tangent == pytest.approx(0.0, abs=1e-12)
 
 
 def test_three_that_meet_at_once_keep_their_momentum_and_part():
@@ -86,9 +86,9 @@ def test_three_that_meet_at_once_keep_their_momentum_and_part():
         (DRONE, (0.95, 0.0, 0.1), (-3.0, 0.0, 0.0)),
         restitution=0.3,
     )
-    flown = fly(result, 500)
-    assert momentum(flown) == pytest.approx(momentum(result), abs=1e-11)
-    places = np.array([s.motion.position_world for _, s in flown])
+    flight = fly(result, 500)
+    assert momentum(flight) == pytest.approx(momentum(result), abs=1e-11)
+    places = np.array([s.motion.position_world for _, s in flight])
     for i in range(3):
         for j in range(i):
             assert np.linalg.norm(places[i] - places[j]) > 0.99
@@ -114,8 +114,8 @@ def ball(position, velocity, omega=(0.0, 0.0, 0.0), radius=0.5, mass=2.0, shape=
     """Sphere of the inertia shape m r^2: 2/5 is solid."""
     inverse = 1.0 / (shape * mass * radius**2)
     matrix = (inverse, 0.0, 0.0, 0.0, inverse, 0.0, 0.0, 0.0, inverse)
-    given = {"mass": mass, "radius": radius, "restitution": restitution, "friction": friction}
-    return interaction.NeighbourState(position, velocity, **given, omega_world=omega, inverse_inertia_world=matrix)
+    values = {"mass": mass, "radius": radius, "restitution": restitution, "friction": friction}
+    return interaction.NeighbourState(position, velocity, **values, omega_world=omega, inverse_inertia_world=matrix)
 
 
 def after(one, other):

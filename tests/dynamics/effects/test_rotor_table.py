@@ -76,8 +76,8 @@ def test_hubs_have_their_own_advance_and_rotors_at_rest_no_loads(drone, situatio
         ("", "the file is empty"),
     ],
 )
-def test_table_error_is_one_line(drone, tmp_path, text, said):
-    with pytest.raises(ConfigError, match=said) as caught:
+def test_table_error_is_one_line(drone, tmp_path, text, output):
+    with pytest.raises(ConfigError, match=output) as caught:
         make(drone, tmp_path, text)
     assert "\n" not in str(caught.value)
 

@@ -33,8 +33,8 @@ RATES[RampParameters] = ramp_rate
 def test_local_error_is_curvature_term():
     k, slope = np.array([0.7, -0.4, 0.5]), np.array([-0.3, 0.9, 0.6])
     p, x0, h = RampParameters(tuple(k), tuple(slope)), RampState(NO_ROTATION), 0.005
-    got = integrate_fixed(erk4m.Method(), p, 0.0, x0, h, 1)
+    actual = integrate_fixed(erk4m.Method(), p, 0.0, x0, h, 1)
     exact = integrate_fixed(rkmk54.Method(), p, 0.0, x0, h / 4, 4)
-    error = np.array(log(got.attitude)) - np.array(log(exact.attitude))
+    error = np.array(log(actual.attitude)) - np.array(log(exact.attitude))
     predicted = h**4 / 192 * np.cross(k, np.cross(k, slope))
     assert error == pytest.approx(predicted, rel=0.02, abs=0.02 * abs(predicted).max())

@@ -65,15 +65,15 @@ def test_exp_and_log_to_fifty_digits(size):
         a = mpmath.sqrt(mpmath.fsum(mpmath.mpf(c) ** 2 for c in v))
         ratio = mpmath.sin(a / 2) / a if a else mpmath.mpf(1) / 2
         exact = [mpmath.cos(a / 2), *(ratio * c for c in v)]
-        got = q.exp(v)
-        for g, e in zip(got, exact, strict=True):
+        actual = q.exp(v)
+        for g, e in zip(actual, exact, strict=True):
             assert abs(g - e) <= 2e-16 + 4e-16 * min(size, 1)
         if size < 1e-3:  # relative, where angles are small
-            assert list(got[1:]) == pytest.approx([float(e) for e in exact[1:]], rel=1e-15)
+            assert list(actual[1:]) == pytest.approx([float(e) for e in exact[1:]], rel=1e-15)
         # log of the rounded quaternion, exactly
-        sine = mpmath.sqrt(mpmath.fsum(mpmath.mpf(c) ** 2 for c in got[1:]))
-        k = 2 * mpmath.atan2(sine, abs(mpmath.mpf(got.w))) / sine * (1 if got.w >= 0 else -1) if sine else 2
-        for g, c in zip(q.log(got), got[1:], strict=True):
+        sine = mpmath.sqrt(mpmath.fsum(mpmath.mpf(c) ** 2 for c in actual[1:]))
+        k = 2 * mpmath.atan2(sine, abs(mpmath.mpf(actual.w))) / sine * (1 if actual.w >= 0 else -1) if sine else 2
+        for g, c in zip(q.log(actual), actual[1:], strict=True):
             assert abs(g - k * c) <= 1e-15 * max(abs(k * c), 1e-300) * 4
 
 

@@ -45,8 +45,8 @@ def column(v):
     return mpmath.matrix([*v[0], *v[1]])
 
 
-def worst(got, exact):
-    return max(abs(g - e) for g, e in zip([*got[0], *got[1]], exact, strict=True))
+def worst(actual, exact):
+    return max(abs(g - e) for g, e in zip([*actual[0], *actual[1]], exact, strict=True))
 
 
 @pytest.mark.parametrize("u", elements())

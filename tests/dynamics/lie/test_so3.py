@@ -41,8 +41,8 @@ def dexp_reference(v):
     return in_hat(v, lambda a: 1, lambda a: (1 - mpmath.cos(a)) / a**2, lambda a: (a - mpmath.sin(a)) / a**3)
 
 
-def worst(got, exact):
-    return max(abs(g - e) for g, e in zip(got, exact, strict=True))
+def worst(actual, exact):
+    return max(abs(g - e) for g, e in zip(actual, exact, strict=True))
 
 
 def test_reference_exponential_is_matrix_exponential():
@@ -68,12 +68,12 @@ def test_log_undoes_exp_to_full_relative_accuracy(v):
     turns = 2 * mpmath.pi if a > math.pi * (1 + 1e-15) else 0
     length = mpmath.sqrt(mpmath.fsum(mpmath.mpf(c) ** 2 for c in v))
     exact = [c * (length - turns) / length for c in v]
-    got = so3.log(so3.exp(v))
+    actual = so3.log(so3.exp(v))
     if abs(a - math.pi) < 1e-15:  # both signs of the half turn are right
-        got = [math.copysign(1.0, g * float(e)) * g for g, e in zip(got, exact, strict=True)]
+        actual = [math.copysign(1.0, g * float(e)) * g for g, e in zip(actual, exact, strict=True)]
     # beyond pi the matrix is rounded near the identity, which is what limits the difference
     allowed = 1e-14 * (abs(length - turns) if not turns else 1)
-    assert worst(got, exact) < allowed
+    assert worst(actual, exact) < allowed
 
 
 def test_dexp_is_derivative_of_exp():

@@ -100,8 +100,8 @@ def test_derivatives_of_desired_forces_along_motion():
     _, pairs = forces(p, 0.3, x, tangent.load_velocity, omega_rate)
     h = 1e-5
     ahead, behind = (forces(p, 0.3 + s * h, retract(x, scale(s * h, tangent)))[1] for s in (1, -1))
-    for (_, got), (a, _), (b, _) in zip(pairs, ahead, behind, strict=True):
-        assert got == pytest.approx((np.array(a) - b) / (2 * h), rel=1e-6, abs=1e-6)
+    for (_, actual), (a, _), (b, _) in zip(pairs, ahead, behind, strict=True):
+        assert actual == pytest.approx((np.array(a) - b) / (2 * h), rel=1e-6, abs=1e-6)
 
 
 def test_wanted_attitude_and_its_rate():

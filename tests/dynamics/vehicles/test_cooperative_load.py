@@ -66,13 +66,13 @@ def test_accelerations_are_those_of_constrained_particles(n):
     p = system(n, pushing(n))
     for seed in range(3):
         x = swinging(n, seed)
-        got, exact = rate(p, 0.0, x), constrained_accelerations(p, x)
-        assert got.load_velocity == pytest.approx(exact[0], abs=1e-11)
+        actual, exact = rate(p, 0.0, x), constrained_accelerations(p, x)
+        assert actual.load_velocity == pytest.approx(exact[0], abs=1e-11)
         for i in range(n):
             q, omega = np.array(x.link[i].direction), np.array(x.link[i].omega)
-            _, omega_rate = embed(x.link[i], got.link[i])
+            _, omega_rate = embed(x.link[i], actual.link[i])
             swing = np.cross(omega_rate, q) + np.cross(omega, np.cross(omega, q))
-            assert got.load_velocity - p.link_length[i] * swing == pytest.approx(exact[i + 1], abs=1e-11)
+            assert actual.load_velocity - p.link_length[i] * swing == pytest.approx(exact[i + 1], abs=1e-11)
             assert abs(np.dot(q, omega_rate)) < 1e-14 * (1 + np.linalg.norm(omega_rate))
 
 

@@ -48,9 +48,9 @@ def published(t, o, p):
 )
 def test_rate_is_published_one(p):
     for t, o in ((0.0, (0.1, 0.1, 0.1)), (2.3, (-0.4, 1.2, 0.6))):
-        got = rate(p, t, RigidBody(NO_ROTATION, o))
-        assert got.omega_body == pytest.approx(published(t, o, p), rel=1e-14)
-        assert got.attitude == o
+        actual = rate(p, t, RigidBody(NO_ROTATION, o))
+        assert actual.omega_body == pytest.approx(published(t, o, p), rel=1e-14)
+        assert actual.attitude == o
 
 
 def world_momentum(states, h=ZERO):

@@ -86,8 +86,8 @@ def test_residual_rotor_speed_precesses_body():
     # rotors 2 and 4 only, both one way: a gyroscope, J omega' = Omega_r J_r e3 x omega
     x = start(0, 2155, 0, 2155)._replace(omega_body=(0.2, 0.0, 0.0))
     spin = OS4.rotor_inertia * 2 * 2155 * RPM
-    got = rate(OS4._replace(drag_constant=0.0), 0.0, x)
-    assert got.omega_body == pytest.approx((0.0, spin * 0.2 / 7.5e-3, 0.0), rel=1e-12)
+    actual = rate(OS4._replace(drag_constant=0.0), 0.0, x)
+    assert actual.omega_body == pytest.approx((0.0, spin * 0.2 / 7.5e-3, 0.0), rel=1e-12)
 
 
 def test_free_fall_and_momentum_without_rotors():

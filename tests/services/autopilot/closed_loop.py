@@ -164,7 +164,7 @@ def mission(parameters, plant=NOMINAL, seed=1, noise=TRUTH, spec=MISSION):
 
 def rmse(log):
     """RMSE of x, y, z [m], roll, pitch, yaw [rad] while the motors ran."""
-    flown = log[log[:, 14] != LANDED]
-    difference = flown[:, 7:13] - flown[:, 1:7]
+    flight = log[log[:, 14] != LANDED]
+    difference = flight[:, 7:13] - flight[:, 1:7]
     difference[:, 5] = [wrap(d) for d in difference[:, 5]]
     return np.sqrt(np.mean(difference**2, axis=0))

@@ -61,47 +61,47 @@ def fly_by_sensors(seconds, script, *overrides):
     return memory_log.fly(scene, scripted(UP_BY_SENSORS | script))
 
 
-def error(flown, start):
+def error(flight, start):
     """Largest distance [m] of the estimate from the truth from a time on."""
-    known, true = (flown.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "ground_truth"))
-    times, true_times = flown.times("estimate"), flown.times("ground_truth")
+    known, true = (flight.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "ground_truth"))
+    times, true_times = flight.times("estimate"), flight.times("ground_truth")
     nearest = true[np.searchsorted(true_times, times).clip(0, len(true) - 1)]
     return np.linalg.norm(known - nearest, axis=1)[times >= start].max()
 
 
-def at(flown, topic, t, value):
+def at(flight, topic, t, value):
     """`value` of the last message of a topic at or before t [s]."""
-    times = flown.times(topic)
-    return flown.column(topic, value)[times <= t + 1e-9][-1]
+    times = flight.times(topic)
+    return flight.column(topic, value)[times <= t + 1e-9][-1]
 
 
-def height(flown, t):
+def height(flight, t):
     """True height [m] of the vehicle's origin at t [s]."""
-    return at(flown, "ground_truth", t, lambda m: m.pose.position.z)
+    return at(flight, "ground_truth", t, lambda m: m.pose.position.z)
 
 
-def place(flown, t):
+def place(flight, t):
     """True position [m] at t [s]."""
-    return tuple(at(flown, "ground_truth", t, lambda m: tuple(m.pose.position)))
+    return tuple(at(flight, "ground_truth", t, lambda m: tuple(m.pose.position)))
 
 
-def mode(flown, t):
+def mode(flight, t):
     """Mode at t [s]."""
-    return at(flown, "status", t, lambda m: m.mode)
+    return at(flight, "status", t, lambda m: m.mode)
 
 
-def said(flown):
+def said(flight):
     """Everything that was told to the pilot."""
-    return [text for texts in _all(flown, lambda m: m.text) for text in texts]
+    return [text for texts in _all(flight, lambda m: m.text) for text in texts]
 
 
-def results(flown):
+def results(flight):
     """Results of the answers, by id."""
-    return {a.id: a.result for answers in _all(flown, lambda m: m.acks) for a in answers}
+    return {a.id: a.result for answers in _all(flight, lambda m: m.acks) for a in answers}
 
 
-def _all(flown, value):
-    return [value(m) for m in flown.messages("vehicle_command_ack")]
+def _all(flight, value):
+    return [value(m) for m in flight.messages("vehicle_command_ack")]
 
 
 ACCEPTED, REJECTED, DENIED = CommandAck.ACCEPTED, CommandAck.TEMPORARILY_REJECTED, CommandAck.DENIED

@@ -19,8 +19,8 @@ def motors(*volts):
 
 
 def test_external_voltages_reproduce_controlled_flight():
-    flown = fly(12, {}, operated=False)
-    volts = flown.column("actuators", lambda m: tuple(m.motor_voltage))
+    flight = fly(12, {}, operated=False)
+    volts = flight.column("actuators", lambda m: tuple(m.motor_voltage))
     values = {k: [motors(*v)] for k, v in enumerate(volts)}
     values[0] += START
     scene = load("hover", [*OPERATED, EVERY_TICK, "run.duration=12"])
@@ -28,12 +28,12 @@ def test_external_voltages_reproduce_controlled_flight():
     assert volts.max() > 5.0
     count = len(volts)
     for name in ("ground_truth", "actuators"):
-        one, other = (f.payloads(name)[:count] for f in (flown, again))
+        one, other = (f.payloads(name)[:count] for f in (flight, again))
         assert len(one) == len(other) == count
         if name == "ground_truth":
             assert one == other
     assert np.array_equal(again.column("actuators", lambda m: tuple(m.motor_voltage))[:count], volts)
-    thrust = [f.column("actuators", lambda m: tuple(m.thrust))[:count] for f in (flown, again)]
+    thrust = [f.column("actuators", lambda m: tuple(m.thrust))[:count] for f in (flight, again)]
     assert thrust[1] == pytest.approx(thrust[0], rel=1e-9, abs=1e-9)
 
 
@@ -56,27 +56,27 @@ def test_direct_voltages_hold_are_limited_and_time_out(tmp_path):
 
 
 def test_missing_voltages_trigger_failsafe():
-    flown = fly(8, UP | {(3.0, 3.5): [motors(*[9.0] * 4)], 3.2: [command("offboard")]})
-    assert "the offboard setpoints are lost: hold" in said(flown)
+    flight = fly(8, UP | {(3.0, 3.5): [motors(*[9.0] * 4)], 3.2: [command("offboard")]})
+    assert "the offboard setpoints are lost: hold" in said(flight)
 
 
 def test_vehicle_at_rest_with_motors_off_has_landed():
     script = {0.0: [motors(*[3.0] * 4), *START], 0.5: [motors(*[0.0] * 4)], (0.6, 2.4): [motors(*[0.0] * 4)]}
-    flown = fly(3, script | {2.5: [command("disarm", id=9)]})
-    assert results(flown)[9] == ACCEPTED
+    flight = fly(3, script | {2.5: [command("disarm", id=9)]})
+    assert results(flight)[9] == ACCEPTED
 
 
 @pytest.mark.parametrize("volts", [(5.0,), (5.0,) * 6, (5.0, 5.0, 5.0, float("nan"))])
 def test_invalid_voltages_are_rejected(volts):
-    flown = fly(1, {0.1: [motors(*volts)], 0.2: [command("offboard", id=3)]})
-    assert results(flown)[3] == REJECTED
-    assert any("the last was rejected: expected 4 voltages, got [5.0" in text for text in said(flown))
+    flight = fly(1, {0.1: [motors(*volts)], 0.2: [command("offboard", id=3)]})
+    assert results(flight)[3] == REJECTED
+    assert any("the last was rejected: expected 4 voltages, got [5.0" in text for text in said(flight))
 
 
 @pytest.mark.long
 def test_six_motors_take_six():
     sets = [*OPERATED, "run.duration=1", "autopilot.estimator=ground_truth"]
     script = {0.0: [motors(*range(1, 7)), *START], (0.1, 1.0): [motors(*range(1, 7))]}
-    flown = memory_log.fly(load("hexacopter", sets), scripted(script))
-    last = flown.column("actuators", lambda m: tuple(m.motor_voltage))[-1]
+    flight = memory_log.fly(load("hexacopter", sets), scripted(script))
+    last = flight.column("actuators", lambda m: tuple(m.motor_voltage))[-1]
     assert last == pytest.approx([1, 2, 3, 4, 5, 6])

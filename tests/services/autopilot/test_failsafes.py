@@ -21,8 +21,8 @@ def airframe(tmp_path, capacity):
     return f"vehicle.airframe={path}"
 
 
-def warnings(flown):
-    return [int(w) for w in flown.column("status", lambda m: m.battery_warning)]
+def warnings(flight):
+    return [int(w) for w in flight.column("status", lambda m: m.battery_warning)]
 
 
 def test_emptying_battery_warns_then_returns_then_lands(tmp_path):
@@ -32,56 +32,56 @@ def test_emptying_battery_warns_then_returns_then_lands(tmp_path):
         "effects.battery.initial_charge=0.2",
         "autopilot.parameters.RTL_RETURN_ALT=3.0",
     ]
-    flown = fly(80, script, *small)
-    reported = said(flown)
+    flight = fly(80, script, *small)
+    reported = said(flight)
     order = [reported.index(t) for t in ("the battery is low", "the battery is critical: return", "landed")]
     assert order == sorted(order)
-    charge = flown.column("battery", lambda m: m.percentage)
+    charge = flight.column("battery", lambda m: m.percentage)
     assert charge[0] == pytest.approx(0.2, abs=1e-3)
     assert np.all(np.diff(charge) <= 0.0)
-    assert sorted(set(warnings(flown)))[:3] == [0, 1, 2]
-    assert place(flown, 80.0)[:2] == pytest.approx((0.0, 0.0), abs=0.1)
-    assert not at(flown, "status", 80.0, lambda m: m.armed)
+    assert sorted(set(warnings(flight)))[:3] == [0, 1, 2]
+    assert place(flight, 80.0)[:2] == pytest.approx((0.0, 0.0), abs=0.1)
+    assert not at(flight, "status", 80.0, lambda m: m.armed)
 
 
 def test_nearly_empty_battery_lands_immediately(tmp_path):
     script = UP | {6: [command("goto", 30.0, 0.0, 3.0)]}
     low = [airframe(tmp_path, 4000.0), "effects.battery.initial_charge=0.18", "autopilot.parameters.FS_BAT_CRIT_ACT=0"]
-    flown = fly(40, script, *low)
-    assert "the battery is nearly empty: land" in said(flown)
-    assert place(flown, 40.0)[0] > 5.0
-    assert height(flown, 40.0) == pytest.approx(0.35, abs=0.05)
+    flight = fly(40, script, *low)
+    assert "the battery is nearly empty: land" in said(flight)
+    assert place(flight, 40.0)[0] > 5.0
+    assert height(flight, 40.0) == pytest.approx(0.35, abs=0.05)
 
 
 def test_critical_battery_prevents_arming():
     script = {0.04: [command("arm", id=1)]}
-    flown = fly(0.5, script, "effects.battery.initial_charge=0.06")
-    assert results(flown)[1] == REJECTED
-    assert "arming refused: the battery is low: 6%" in said(flown)
-    flown = fly(0.5, script)
-    assert np.all(np.isnan(flown.column("battery", lambda m: m.percentage)))
-    assert results(flown)[1] == 0
+    flight = fly(0.5, script, "effects.battery.initial_charge=0.06")
+    assert results(flight)[1] == REJECTED
+    assert "arming refused: the battery is low: 6%" in said(flight)
+    flight = fly(0.5, script)
+    assert np.all(np.isnan(flight.column("battery", lambda m: m.percentage)))
+    assert results(flight)[1] == 0
 
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 def test_damaged_rotor_is_named_and_vehicle_lands(rotor):
     damage = [f"effects.rotor_damage.rotor={rotor}", "effects.rotor_damage.time=8.0"]
     damage += ["effects.rotor_damage.remaining_thrust=0.55", "effects.rotor_damage.remaining_torque=0.55"]
-    flown = fly(20, UP, *damage)
-    assert "a motor has failed: land" in said(flown)
-    failed = flown.column("status", lambda m: m.failed_motor)
-    times = flown.times("status")
+    flight = fly(20, UP, *damage)
+    assert "a motor has failed: land" in said(flight)
+    failed = flight.column("status", lambda m: m.failed_motor)
+    times = flight.times("status")
     assert set(failed[times < 8.0]) == {0}
     assert failed[times > 8.6][0] == rotor
-    assert not at(flown, "status", 20.0, lambda m: m.armed)
+    assert not at(flight, "status", 20.0, lambda m: m.armed)
 
 
 def test_lost_rotor_is_noticed_before_vehicle_has_fallen():
     damage = ["effects.rotor_damage.rotor=3", "effects.rotor_damage.time=8.0"]
-    flown = fly(9, {0.04: [command("takeoff", 10.0), command("arm")]}, *damage)
-    failed, times = flown.column("status", lambda m: m.failed_motor), flown.times("status")
+    flight = fly(9, {0.04: [command("takeoff", 10.0), command("arm")]}, *damage)
+    failed, times = flight.column("status", lambda m: m.failed_motor), flight.times("status")
     assert failed[times >= 8.3 - 1e-6][0] == 3
-    assert height(flown, 8.3) > 4.0
+    assert height(flight, 8.3) > 4.0
 
 
 GPS_LOST = 'sensors.gps.faults=[{kind="dropout", start=%g, stop=%g}]'
@@ -92,37 +92,37 @@ SENSORS = [
 
 
 def test_lost_position_warns_then_descends():
-    flown = fly(30, UP | {1.0: [command("takeoff", 3.0), command("arm")]}, *SENSORS, GPS_LOST % (10.0, 1e9))
-    assert "the position is lost: descend in 2 s" in said(flown)
-    assert "the position is lost: descend" in said(flown)
-    assert mode(flown, 11.5) == "hold"
-    assert mode(flown, 15.5) == "descend"
-    assert height(flown, 30.0) == pytest.approx(0.35, abs=0.05)
-    assert np.hypot(*place(flown, 30.0)[:2]) < 2.0
+    flight = fly(30, UP | {1.0: [command("takeoff", 3.0), command("arm")]}, *SENSORS, GPS_LOST % (10.0, 1e9))
+    assert "the position is lost: descend in 2 s" in said(flight)
+    assert "the position is lost: descend" in said(flight)
+    assert mode(flight, 11.5) == "hold"
+    assert mode(flight, 15.5) == "descend"
+    assert height(flight, 30.0) == pytest.approx(0.35, abs=0.05)
+    assert np.hypot(*place(flight, 30.0)[:2]) < 2.0
 
 
 def test_position_loss_hands_over_to_manual_control():
     sticks = {(9.0, 20.0): [command("manual", 0.3, 0.0, 0.0, 0.0)], 16.0: [command("goto", 5.0, 0.0, 3.0, id=1)]}
     script = UP | {1.0: [command("takeoff", 3.0), command("arm")]} | sticks
-    flown = fly(26, script, *SENSORS, GPS_LOST % (10.0, 24.0))
-    assert "the position is lost: altitude_control" in said(flown)
-    assert mode(flown, 18.0) == "altitude_control"
-    assert height(flown, 18.0) == pytest.approx(3.0, abs=0.3)
-    assert results(flown)[1] == REJECTED
-    assert "goto: the position is lost" in said(flown)
-    assert place(flown, 20.0)[0] > 2.0  # forward
-    assert mode(flown, 23.0) == "descend"  # the sticks were let go of
-    assert mode(flown, 26.0) == "hold"  # there is a position again, and an operator
+    flight = fly(26, script, *SENSORS, GPS_LOST % (10.0, 24.0))
+    assert "the position is lost: altitude_control" in said(flight)
+    assert mode(flight, 18.0) == "altitude_control"
+    assert height(flight, 18.0) == pytest.approx(3.0, abs=0.3)
+    assert results(flight)[1] == REJECTED
+    assert "goto: the position is lost" in said(flight)
+    assert place(flight, 20.0)[0] > 2.0  # forward
+    assert mode(flight, 23.0) == "descend"  # the sticks were let go of
+    assert mode(flight, 26.0) == "hold"  # there is a position again, and an operator
 
 
 def test_trajectory_ends_when_position_returns_without_operator():
     soon = "autopilot.parameters.COM_POS_FS_DELAY=0.5"
-    flown = fly(20, {}, *SENSORS, GPS_LOST % (3.0, 4.3), soon, operated=False)
-    modes = [name for name, _ in groupby(flown.column("status", lambda m: m.mode))]
+    flight = fly(20, {}, *SENSORS, GPS_LOST % (3.0, 4.3), soon, operated=False)
+    modes = [name for name, _ in groupby(flight.column("status", lambda m: m.mode))]
     assert modes == ["mission", "descend", "land", "hold"]
-    assert height(flown, 20.0) == pytest.approx(0.35, abs=0.05)
-    assert flown.landed
-    assert at(flown, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # what it follows, not the trajectory
+    assert height(flight, 20.0) == pytest.approx(0.35, abs=0.05)
+    assert flight.landed
+    assert at(flight, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # what it follows, not the trajectory
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -134,7 +134,7 @@ def test_delivery_mission_raises_no_motor_alarm(seed, wind):
         f"effects.random_wind_force.mean=[{mean}, 1.0, 0.0]",
         f"effects.random_wind_force.sigma={sigma}",
     ]
-    flown = memory_log.fly(load("delivery_mission", sets))
-    assert set(flown.column("status", lambda m: m.failed_motor)) == {0}
-    assert set(flown.column("status", lambda m: m.mode)) == {"mission"}
-    assert flown.landed
+    flight = memory_log.fly(load("delivery_mission", sets))
+    assert set(flight.column("status", lambda m: m.failed_motor)) == {0}
+    assert set(flight.column("status", lambda m: m.mode)) == {"mission"}
+    assert flight.landed

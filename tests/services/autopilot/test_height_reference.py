@@ -23,10 +23,10 @@ AHEAD = {0.04: [command("takeoff", 3.0), command("arm", NAN, 10.0)], 8: [command
 def test_height_source_follows_parameter(reference, least, most):
     up = {0.04: [command("takeoff", 15.0), command("arm", NAN, 10.0)]}  # beyond the sonar's reach
     sets = [f"EKF2_HGT_REF={reference}", "MPC_TKO_SPEED=3"]
-    flown = fly_by_sensors(20, up, *[f"autopilot.parameters.{each}" for each in sets])
-    spread = flown.column("estimate", lambda m: m.position_std.z)[flown.times("estimate") > 17.0].mean()
+    flight = fly_by_sensors(20, up, *[f"autopilot.parameters.{each}" for each in sets])
+    spread = flight.column("estimate", lambda m: m.position_std.z)[flight.times("estimate") > 17.0].mean()
     assert least < spread < most  # the barometer knows less, and carries on where the sonar ends
-    assert error(flown, 15.0) < 0.3
+    assert error(flight, 15.0) < 0.3
 
 
 def test_ground_moves_height_and_leaves_barometers_sum_alone():
@@ -55,8 +55,8 @@ def test_downward_rangefinder_replaces_sonar():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.position=[0,0,-0.2]"]
     slope = "environment.terrain={slope=[0.1,0.0]}"
-    flown = fly(17, AHEAD, SONAR, "autopilot.estimator=kalman", *sensors, *laser, slope, *EFFECTS, *WIND)
-    x, _, z = place(flown, 17.0)
+    flight = fly(17, AHEAD, SONAR, "autopilot.estimator=kalman", *sensors, *laser, slope, *EFFECTS, *WIND)
+    x, _, z = place(flight, 17.0)
     assert x == pytest.approx(14.0, abs=0.2)
     assert z - 0.1 * x == pytest.approx(3.0, abs=0.15)
 
@@ -64,8 +64,8 @@ def test_downward_rangefinder_replaces_sonar():
 @pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope=[0.1,0.0]", "steps={distance=[4.0],rise=[0.6]}"])
 def test_sonar_keeps_height_over_rising_ground(ground):
-    flown = fly_by_sensors(17, AHEAD, SONAR, f"environment.terrain={{{ground}}}")
-    x, _, z = place(flown, 17.0)
+    flight = fly_by_sensors(17, AHEAD, SONAR, f"environment.terrain={{{ground}}}")
+    x, _, z = place(flight, 17.0)
     assert x == pytest.approx(14.0, abs=0.2)
     rise = 0.1 * x if "slope" in ground else 0.6
     assert z - rise == pytest.approx(3.0, abs=0.15)
@@ -75,8 +75,8 @@ def test_sonar_keeps_height_over_rising_ground(ground):
 @pytest.mark.parametrize("unit", ["barometer", "distance_sensor"])
 def test_other_height_sensor_replaces_failed_sensor(unit):
     kind = WRONG if unit == "barometer" else OFF
-    flown = fly_by_sensors(14, {8: [inject(unit, kind)]}, SONAR, ENABLED)
-    assert height(flown, 14.0) == pytest.approx(height(flown, 8.0), abs=0.2)
+    flight = fly_by_sensors(14, {8: [inject(unit, kind)]}, SONAR, ENABLED)
+    assert height(flight, 14.0) == pytest.approx(height(flight, 8.0), abs=0.2)
 
 
 def test_missing_reference_is_rejected():

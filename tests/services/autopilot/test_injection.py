@@ -51,9 +51,9 @@ SENSORS = ("imu", "magnetometer", "gps", "barometer", "sonar", "optical_flow", "
 LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33"]  # what the scene does not carry
 
 
-def rejected(flown, start, source):
+def rejected(flight, start, source):
     """Share of the estimates from a time on in which a source was refused or missing."""
-    result = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
+    result = flight.column("estimate", lambda m: source in m.rejected_sources)[flight.times("estimate") >= start]
     return float(np.mean(result))
 
 
@@ -69,11 +69,11 @@ def test_injection_needs_parameter_and_present_unit():
     motor = UNITS.index("motor")
     script[0.24] += [command("inject_failure", motor, OFF, math.nan, bits, id=k) for k, bits in ((11, 5.0), (12, 16.0))]
     script[0.4] = [inject("motor", OFF, id=8)]
-    flown = fly(0.6, script, "autopilot.parameters.SYS_FAILURE_EN=0")
+    flight = fly(0.6, script, "autopilot.parameters.SYS_FAILURE_EN=0")
     refused = dict.fromkeys((1, 4, 5, 8, 9, 10, 12), DENIED)
     expected = dict.fromkeys((2, 3, 6, 7, 11), ACCEPTED) | refused
-    assert {k: v for k, v in results(flown).items() if k} == expected
-    assert said(flown)[:8] == [
+    assert {k: v for k, v in results(flight).items() if k} == expected
+    assert said(flight)[:8] == [
         "inject failure: SYS_FAILURE_EN is 0; set it to 1 first", "injected: motor off",
         "inject failure: there is no gps", "inject failure: battery can be sound, off, stuck, wrong",
         "inject failure: motor can be sound, off, stuck, wrong, slow",
@@ -109,17 +109,17 @@ VALID = {"gps": 11}
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT], ids=KINDS[1:])
 def test_received_reading_follows_failure_type(kind):
-    for name, late, first, sent, got in received(kind):
-        assert np.array_equal(sent[: first - 1], got[: first - 1])  # sound before
-        there, numbers = got[first:, VALID.get(name, -1)] > 0.0, slice(0, VALUES[name])
-        sent_then, got_then = sent[first:, numbers], got[first:, numbers]
+    for name, late, first, sent, actual in received(kind):
+        assert np.array_equal(sent[: first - 1], actual[: first - 1])  # sound before
+        there, numbers = actual[first:, VALID.get(name, -1)] > 0.0, slice(0, VALUES[name])
+        sent_then, got_then = sent[first:, numbers], actual[first:, numbers]
         if kind == OFF:
             assert not there.any()
         elif kind == STUCK:
             assert there.all()
             assert (got_then == sent[first - 1, numbers]).all()
         elif kind == DELAYED:
-            assert np.array_equal(got[first:], sent[first - late : len(sent) - late])
+            assert np.array_equal(actual[first:], sent[first - late : len(sent) - late])
         elif kind == SLOW:
             assert there.sum() == pytest.approx(len(there) / SLOWED, abs=1.0)
             assert np.array_equal(got_then[there], sent_then[there])
@@ -136,56 +136,56 @@ def test_received_reading_follows_failure_type(kind):
 
 
 def test_battery_off_failure_reads_empty_and_lands():
-    flown = fly(8, UP | {6: [inject("battery", OFF)]}, ENABLED)
-    assert "the battery is nearly empty: land" in said(flown)
-    assert at(flown, "status", 8.0, lambda m: m.battery_warning) == 3
+    flight = fly(8, UP | {6: [inject("battery", OFF)]}, ENABLED)
+    assert "the battery is nearly empty: land" in said(flight)
+    assert at(flight, "status", 8.0, lambda m: m.battery_warning) == 3
 
 
 def test_motor_off_failure_is_detected():
-    flown = fly(6.6, UP | {6: [inject("motor", OFF, 3)]}, ENABLED)
-    assert at(flown, "status", 6.5, lambda m: m.failed_motor) == 3
-    assert any("a motor has failed" in text for text in said(flown))
-    volts = voltages(flown, 6.1)
+    flight = fly(6.6, UP | {6: [inject("motor", OFF, 3)]}, ENABLED)
+    assert at(flight, "status", 6.5, lambda m: m.failed_motor) == 3
+    assert any("a motor has failed" in text for text in said(flight))
+    volts = voltages(flight, 6.1)
     assert set(volts[:, 2]) == {0.0}
     assert volts[:, 0].max() > 1.0
 
 
-def voltages(flown, start):
+def voltages(flight, start):
     """Return the motor voltages [V] from a time on."""
-    return flown.column("actuators", lambda m: tuple(m.motor_voltage))[flown.times("actuators") > start]
+    return flight.column("actuators", lambda m: tuple(m.motor_voltage))[flight.times("actuators") > start]
 
 
 def test_stuck_motor_keeps_speed_and_others_compensate():
-    flown = fly(9, UP | {6: [inject("motor", STUCK, 3)], 6.5: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
-    volts = voltages(flown, 6.1)
+    flight = fly(9, UP | {6: [inject("motor", STUCK, 3)], 6.5: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
+    volts = voltages(flight, 6.1)
     assert len(set(volts[:, 2])) == 1
     assert volts[0, 2] > 1.0
     assert len(set(volts[:, 0])) > 10
-    assert height(flown, 8.0) > 2.0
+    assert height(flight, 8.0) > 2.0
 
 
 def test_weak_motor_is_detected_and_vehicle_lands_upright():
-    flown = fly(16, UP | {6: [inject("motor", WRONG, 3)]}, ENABLED)
-    assert "a motor has failed: land" in said(flown)
-    assert at(flown, "status", 6.5, lambda m: m.failed_motor) == 3
-    sound = flown.column("actuators", lambda m: tuple(m.motor_voltage))[flown.times("actuators") < 5.9][-1]
-    assert voltages(flown, 6.02)[0, 2] < 0.9 * sound[2]  # what it gets; the controller asks for more
-    assert height(flown, 7.0) > 2.0
-    assert math.dist(place(flown, 16.0)[:2], (0.0, 0.0)) < 0.5
-    assert not at(flown, "status", 16.0, lambda m: m.armed)
+    flight = fly(16, UP | {6: [inject("motor", WRONG, 3)]}, ENABLED)
+    assert "a motor has failed: land" in said(flight)
+    assert at(flight, "status", 6.5, lambda m: m.failed_motor) == 3
+    sound = flight.column("actuators", lambda m: tuple(m.motor_voltage))[flight.times("actuators") < 5.9][-1]
+    assert voltages(flight, 6.02)[0, 2] < 0.9 * sound[2]  # what it gets; the controller asks for more
+    assert height(flight, 7.0) > 2.0
+    assert math.dist(place(flight, 16.0)[:2], (0.0, 0.0)) < 0.5
+    assert not at(flight, "status", 16.0, lambda m: m.armed)
 
 
 def test_slow_motor_follows_every_twentieth_command():
-    flown = fly(8, UP | {6: [inject("motor", SLOW)], 6.2: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
-    changes = np.flatnonzero(np.diff(voltages(flown, 6.3)[:, 0]) != 0.0)
+    flight = fly(8, UP | {6: [inject("motor", SLOW)], 6.2: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
+    changes = np.flatnonzero(np.diff(voltages(flight, 6.3)[:, 0]) != 0.0)
     assert len(changes) > 10
     assert set(np.diff(changes) % SLOWED) == {0}
-    assert height(flown, 8.0) > 2.0
+    assert height(flight, 8.0) > 2.0
 
 
 def test_repaired_motors_follow_at_once():
-    flown = fly(8, UP | {6: [inject("motor", STUCK)], 6.1: [inject("motor", SOUND, 2, id=8)]}, ENABLED)
-    volts = voltages(flown, 6.2)
+    flight = fly(8, UP | {6: [inject("motor", STUCK)], 6.1: [inject("motor", SOUND, 2, id=8)]}, ENABLED)
+    volts = voltages(flight, 6.2)
     assert len(set(volts[:, 0])) == 1
     assert len(set(volts[:, 1])) > 10
 
@@ -195,9 +195,9 @@ def test_repaired_motors_follow_at_once():
     [(1, "the battery is low"), (2, "the battery is critical: return"), (3, "the battery is nearly empty: land")],
 )
 def test_wrong_battery_reports_charge_of_parameter(level, text):
-    flown = fly(7, UP | {6: [inject("battery", WRONG)]}, ENABLED, f"autopilot.parameters.SYS_FAIL_BAT_LVL={level}")
-    assert at(flown, "status", 6.9, lambda m: m.battery_warning) == level
-    assert text in said(flown)
+    flight = fly(7, UP | {6: [inject("battery", WRONG)]}, ENABLED, f"autopilot.parameters.SYS_FAIL_BAT_LVL={level}")
+    assert at(flight, "status", 6.9, lambda m: m.battery_warning) == level
+    assert text in said(flight)
 
 
 def test_stuck_battery_does_not_warn():
@@ -217,21 +217,21 @@ def test_each_of_six_motors_can_fail():
         "autopilot.estimator=ground_truth",
         "effects.rotor_damage.time=99.0",
     ]
-    flown = memory_log.fly(load("hexacopter", overrides), scripted(script))
-    assert at(flown, "status", 6.9, lambda m: m.failed_motor) == 6
-    assert set(voltages(flown, 6.1)[:, 5]) == {0.0}
-    assert height(flown, 6.9) > 2.0
+    flight = memory_log.fly(load("hexacopter", overrides), scripted(script))
+    assert at(flight, "status", 6.9, lambda m: m.failed_motor) == 6
+    assert set(voltages(flight, 6.1)[:, 5]) == {0.0}
+    assert height(flight, 6.9) > 2.0
 
 
 def test_lost_gps_descends_then_holds_on_recovery():
     script = {14: [inject("gps", OFF)], 27: [inject("gps", SOUND, id=8)]}
-    flown = fly_by_sensors(
+    flight = fly_by_sensors(
         31, script, ENABLED, "autopilot.parameters.MPC_LAND_SPEED=0.2", "autopilot.parameters.MIS_TAKEOFF_ALT=4"
     )
-    reported = said(flown)
+    reported = said(flight)
     assert reported.index("injected: gps off") < reported.index("the position is lost: descend in 9 s")
-    assert mode(flown, 24.5) == "descend"
-    assert mode(flown, 30.5) == "hold"
+    assert mode(flight, 24.5) == "descend"
+    assert mode(flight, 30.5) == "hold"
 
 
 @pytest.mark.parametrize(
@@ -245,30 +245,30 @@ def test_lost_gps_descends_then_holds_on_recovery():
     ids=lambda value: value if isinstance(value, str) else KINDS[value],
 )
 def test_sensor_that_fails_is_refused_and_others_carry_on(unit, kind):
-    flown = fly_by_sensors(13, {9: [inject(unit, kind)]}, ENABLED)
-    assert results(flown)[7] == ACCEPTED
-    assert rejected(flown, 10.0, {"distance_sensor": "sonar"}.get(unit, unit)) > 0.5
-    assert error(flown, 9.0) < (3.0 if (unit, kind) == ("gps", GARBAGE) else 1.0)  # one of many may pass the gate
-    assert math.dist(place(flown, 13.0)[:2], place(flown, 9.0)[:2]) < 1.5
+    flight = fly_by_sensors(13, {9: [inject(unit, kind)]}, ENABLED)
+    assert results(flight)[7] == ACCEPTED
+    assert rejected(flight, 10.0, {"distance_sensor": "sonar"}.get(unit, unit)) > 0.5
+    assert error(flight, 9.0) < (3.0 if (unit, kind) == ("gps", GARBAGE) else 1.0)  # one of many may pass the gate
+    assert math.dist(place(flight, 13.0)[:2], place(flight, 9.0)[:2]) < 1.5
 
 
 @pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
 @pytest.mark.parametrize("units", [("gps", "magnetometer"), ("barometer", "distance_sensor")])
 def test_remaining_readings_are_fused(units, kind):
-    flown = fly_by_sensors(13, {9: [inject(unit, kind, id=k + 1) for k, unit in enumerate(units)]}, ENABLED)
-    assert error(flown, 9.0) < 0.2
+    flight = fly_by_sensors(13, {9: [inject(unit, kind, id=k + 1) for k, unit in enumerate(units)]}, ENABLED)
+    assert error(flight, 9.0) < 0.2
     if kind != DELAYED:
         names = ["sonar" if unit == "distance_sensor" else unit for unit in units]
-        assert all(0.1 < rejected(flown, 10.0, name) < 1.0 for name in names)
+        assert all(0.1 < rejected(flight, 10.0, name) < 1.0 for name in names)
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, SLOW, DELAYED], ids=lambda kind: KINDS[kind])
 @pytest.mark.parametrize("unit", ["accelerometer", "gyro"])
 def test_vehicle_drifts_without_inertial_sensor(unit, kind):
-    flown = fly_by_sensors(15.5, {9: [inject(unit, kind)]}, ENABLED)
-    assert math.dist(place(flown, 15.5), place(flown, 9.0)) > 1.0
+    flight = fly_by_sensors(15.5, {9: [inject(unit, kind)]}, ENABLED)
+    assert math.dist(place(flight, 15.5), place(flight, 9.0)) > 1.0
     if unit == "gyro" or kind in (OFF, SLOW):  # it tumbles
-        reported = said(flown)
+        reported = said(flight)
         after = reported[reported.index(f"injected: {unit} {KINDS[kind]}") + 1 :]
         assert {"a motor has failed: land", "the position is lost: descend in 9 s"} & set(after)
 

@@ -33,45 +33,45 @@ UP_TO_3 = [command("takeoff", 3.0), command("arm", NAN, 10.0)]
 ALL = [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT]
 
 
-def rejected(flown, start, source):
+def rejected(flight, start, source):
     """Share of the estimates from a time on in which a source was refused or missing."""
-    result = flown.column("estimate", lambda m: source in m.rejected_sources)[flown.times("estimate") >= start]
+    result = flight.column("estimate", lambda m: source in m.rejected_sources)[flight.times("estimate") >= start]
     return float(np.mean(result))
 
 
 def by_flow(kind):
     """A flight whose receiver falls silent, and whose optical flow, which stands in for it, fails then."""
     script = {9: [inject("gps", OFF)], 13: [inject("optical_flow", kind, id=8)]}
-    flown = fly_by_sensors(26, script, ENABLED, FLOW)
-    assert results(flown)[8] == ACCEPTED
-    return flown
+    flight = fly_by_sensors(26, script, ENABLED, FLOW)
+    assert results(flight)[8] == ACCEPTED
+    return flight
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
 def test_failed_flow_without_gps_causes_descent(kind):
-    flown = by_flow(kind)
-    assert rejected(flown, 14.0, "optical_flow") > 0.9
-    reported = said(flown)
+    flight = by_flow(kind)
+    assert rejected(flight, 14.0, "optical_flow") > 0.9
+    reported = said(flight)
     assert reported.index(f"injected: optical_flow {KINDS[kind]}") < reported.index(
         "the position is lost: descend in 9 s"
     )
-    assert mode(flown, 26.0) == "descend"
+    assert mode(flight, 26.0) == "descend"
 
 
 @pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
 def test_remaining_flow_readings_sustain_flight(kind):
-    flown = by_flow(kind)
-    assert mode(flown, 26.0) == "hold"
-    assert math.dist(place(flown, 26.0), place(flown, 13.0)) < 2.0
-    assert error(flown, 9.0) < 1.5
+    flight = by_flow(kind)
+    assert mode(flight, 26.0) == "hold"
+    assert math.dist(place(flight, 26.0), place(flight, 13.0)) < 2.0
+    assert error(flight, 9.0) < 1.5
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
 def test_failed_flow_with_gps_does_not_affect_flight(kind):
-    flown = fly_by_sensors(13, {9: [inject("optical_flow", kind)]}, ENABLED, FLOW)
+    flight = fly_by_sensors(13, {9: [inject("optical_flow", kind)]}, ENABLED, FLOW)
     sound = fly_by_sensors(13, {}, ENABLED, FLOW)
-    assert place(flown, 13.0) == place(sound, 13.0)
-    missing = rejected(flown, 10.0, "optical_flow")
+    assert place(flight, 13.0) == place(sound, 13.0)
+    missing = rejected(flight, 10.0, "optical_flow")
     assert missing == pytest.approx(
         {OFF: 1.0, STUCK: 1.0, SLOW: 1.0 - 1.0 / SLOWED, INTERMITTENT: 0.5}.get(kind, 0.0), abs=0.25
     )
@@ -82,54 +82,54 @@ def test_rangefinder_that_looks_down_fails_as_distance_sensor(kind):
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3"]
     script = {0.04: UP_TO_3, 8: [inject("distance_sensor", kind)]}
-    flown = fly(13, script, ENABLED, "autopilot.estimator=kalman", *sensors, *laser)
-    assert results(flown)[7] == ACCEPTED
-    assert rejected(flown, 9.0, "sonar") > 0.5
-    assert height(flown, 13.0) == pytest.approx(height(flown, 8.0), abs=0.3)
+    flight = fly(13, script, ENABLED, "autopilot.estimator=kalman", *sensors, *laser)
+    assert results(flight)[7] == ACCEPTED
+    assert rejected(flight, 9.0, "sonar") > 0.5
+    assert height(flight, 13.0) == pytest.approx(height(flight, 8.0), abs=0.3)
 
 
 def test_wrong_distance_is_followed_as_height_reference():
-    flown = fly_by_sensors(13, {8: [inject("distance_sensor", WRONG)]}, ENABLED, "autopilot.parameters.EKF2_HGT_REF=2")
-    assert height(flown, 13.0) == pytest.approx(height(flown, 8.0) - EXCESS_RANGE, abs=0.1)
+    flight = fly_by_sensors(13, {8: [inject("distance_sensor", WRONG)]}, ENABLED, "autopilot.parameters.EKF2_HGT_REF=2")
+    assert height(flight, 13.0) == pytest.approx(height(flight, 8.0) - EXCESS_RANGE, abs=0.1)
 
 
 def test_stuck_distance_does_not_keep_vehicle_down():
     script = {8: [inject("distance_sensor", STUCK)], 9: [command("goto", 0.0, 0.0, 6.0, 0.0, 2.0)]}
-    flown = fly_by_sensors(14, script, ENABLED)
-    assert height(flown, 14.0) == pytest.approx(6.0, abs=0.1)
-    assert error(flown, 9.0) < 0.1
+    flight = fly_by_sensors(14, script, ENABLED)
+    assert height(flight, 14.0) == pytest.approx(6.0, abs=0.1)
+    assert error(flight, 9.0) < 0.1
 
 
 def test_rangefinder_that_autopilot_does_not_read_cannot_fail():
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     ahead = ["sensors.rangefinder.preset=lidar_lite_v3", "sensors.rangefinder.elevation_deg=0"]
     script = {0.1: [inject("distance_sensor", OFF)]}
-    flown = fly(0.3, script, ENABLED, "autopilot.estimator=kalman", *sensors, *ahead)
-    assert results(flown)[7] == DENIED
-    assert "inject failure: there is no distance_sensor" in said(flown)
+    flight = fly(0.3, script, ENABLED, "autopilot.estimator=kalman", *sensors, *ahead)
+    assert results(flight)[7] == DENIED
+    assert "inject failure: there is no distance_sensor" in said(flight)
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
 def test_failed_airspeed_is_reported_and_not_used(kind):
-    flown = fly_by_sensors(12, {9: [inject("airspeed", kind)]}, ENABLED, TUBE)
-    assert results(flown)[7] == ACCEPTED
-    after = flown.times("differential_pressure") > 9.1
-    read, got = (
-        flown.column(name, lambda m: m.fluid_pressure)[after]
+    flight = fly_by_sensors(12, {9: [inject("airspeed", kind)]}, ENABLED, TUBE)
+    assert results(flight)[7] == ACCEPTED
+    after = flight.times("differential_pressure") > 9.1
+    read, actual = (
+        flight.column(name, lambda m: m.fluid_pressure)[after]
         for name in ("differential_pressure", "differential_pressure/received")
     )
-    there = np.isfinite(got)
+    there = np.isfinite(actual)
     assert np.isfinite(read).all()
     if kind == OFF:
         assert not there.any()
     elif kind == STUCK:
-        assert len(set(got)) == 1
+        assert len(set(actual)) == 1
     elif kind == WRONG:
-        assert got == pytest.approx(read + EXCESS_DYNAMIC)
+        assert actual == pytest.approx(read + EXCESS_DYNAMIC)
     elif kind in (SLOW, INTERMITTENT):
         assert 0 < there.sum() < 0.8 * len(there)
-        assert np.array_equal(got[there], read[there])
+        assert np.array_equal(actual[there], read[there])
     else:
-        assert (got != read).mean() > 0.5
+        assert (actual != read).mean() > 0.5
     sound = fly_by_sensors(12, {}, ENABLED, TUBE)
-    assert place(flown, 12.0) == place(sound, 12.0)
+    assert place(flight, 12.0) == place(sound, 12.0)

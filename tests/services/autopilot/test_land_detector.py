@@ -13,9 +13,9 @@ REST = 0.35
 ZERO = (0.0, 0.0, 0.0)
 
 
-def after(stage, height, asked, speed=0.0, asked_speed=0.0, ticks=1):
+def after(stage, height, requested, speed=0.0, asked_speed=0.0, ticks=1):
     estimate = StateEstimate((0.0, 0.0, REST + height), NO_ROTATION, (0.0, 0.0, speed), ZERO)
-    setpoint = Setpoint((0.0, 0.0, REST + asked), (0.0, 0.0, asked_speed), ZERO, 0.0, 0.0)
+    setpoint = Setpoint((0.0, 0.0, REST + requested), (0.0, 0.0, asked_speed), ZERO, 0.0, 0.0)
     for _ in range(ticks):
         stage = update_landed_state(stage, REST, estimate, setpoint, 0.004)
     return stage.name

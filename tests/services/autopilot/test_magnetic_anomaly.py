@@ -28,11 +28,11 @@ def yaw(q):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("given", [[], [ANOMALY]])
-def test_command_flies_with_heading_wrong_by_unknown_declination(tmp_path, given):
+@pytest.mark.parametrize("values", [[], [ANOMALY]])
+def test_command_flies_with_heading_wrong_by_unknown_declination(tmp_path, values):
     """The heading is wrong by the angle between the horizontal fields: that of the model less that of the place."""
     ideal = [f"sensors.{name}.preset=ideal" for name in ("imu", "magnetometer")]  # a tilt would turn the field, too
-    sets = [*given, *ideal, "run.duration=1.0", "success.require=[]"]
+    sets = [*values, *ideal, "run.duration=1.0", "success.require=[]"]
     command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process"]
     command += ["--log", str(tmp_path / "a.mcap"), *(part for text in sets for part in ("--set", text))]
     done = subprocess.run(command, capture_output=True, text=True)
@@ -40,6 +40,6 @@ def test_command_flies_with_heading_wrong_by_unknown_declination(tmp_path, given
     flight = FlightData.read(tmp_path / "a.mcap")
     estimate, truth = flight.topic("estimate"), flight.topic("ground_truth")
     east, north, _ = STANDARD.magnetic_field_world
-    expected = math.atan2(north, east) - math.atan2(north - 1e-6, east + 2e-6) if given else 0.0
+    expected = math.atan2(north, east) - math.atan2(north - 1e-6, east + 2e-6) if values else 0.0
     wrong = yaw(estimate["pose.orientation"][5][[3, 0, 1, 2]]) - yaw(truth["pose.orientation"][5][[3, 0, 1, 2]])
     assert wrong == pytest.approx(expected, abs=2e-3)

@@ -69,9 +69,9 @@ def test_tilt_and_collective_keep_their_limits():
 
 
 def test_position_error_has_priority_over_feed_forward_velocity():
-    assert position.limited_horizontal(3.0, 0.0, 0.0, 9.0, 5.0) == pytest.approx((3.0, 4.0))
-    assert position.limited_horizontal(6.0, 8.0, 1.0, 1.0, 5.0) == pytest.approx((3.0, 4.0))
-    assert position.limited_horizontal(1.0, 0.0, 1.0, 0.5, 5.0) == (2.0, 0.5)
+    assert position.limit_horizontal(3.0, 0.0, 0.0, 9.0, 5.0) == pytest.approx((3.0, 4.0))
+    assert position.limit_horizontal(6.0, 8.0, 1.0, 1.0, 5.0) == pytest.approx((3.0, 4.0))
+    assert position.limit_horizontal(1.0, 0.0, 1.0, 0.5, 5.0) == (2.0, 0.5)
 
 
 @given(st.tuples(*[st.floats(-0.4, 0.4)] * 2), st.floats(-3.0, 3.0))

@@ -36,14 +36,14 @@ def test_axes_along_z_are_those_of_rotors_without_axes():
 
 @pytest.mark.long
 def test_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
-    flown = fly(load(SCENE))
-    assert str(flown.outcome).startswith("Landed")
-    assert "upright" in str(flown.outcome)
-    t = flown.setup.interval * np.arange(len(flown.truth))
+    flight = fly(load(SCENE))
+    assert str(flight.outcome).startswith("Landed")
+    assert "upright" in str(flight.outcome)
+    t = flight.setup.interval * np.arange(len(flight.truth))
     hover = (t > 6.5) & (t < 8.0)
-    lift = flown.truth.rotor_thrust[hover].sum(axis=1).mean() * np.cos(np.radians(15.0))
+    lift = flight.truth.rotor_thrust[hover].sum(axis=1).mean() * np.cos(np.radians(15.0))
     assert lift == pytest.approx(2.4 * 9.80665, rel=0.01)
-    assert abs(flown.truth.position[hover][:, :2]).max() < 0.1
+    assert abs(flight.truth.position[hover][:, :2]).max() < 0.1
     untilted = known_airframe(load("hexacopter"))
     assert (
         controller_parameters.moments(known_airframe(load(SCENE)))[2] > 4.5 * controller_parameters.moments(untilted)[2]

@@ -33,8 +33,8 @@ def test_payloads_are_forwarded_with_simulation_time():
             "ros2msg",
         )
         assert channel["schema"] == Imu.schema_text
-        sent, got, times, k = [], [], [], 0
-        while len(got) < 5:  # what is put before the subscription has arrived goes to nobody
+        sent, actual, times, k = [], [], [], 0
+        while len(actual) < 5:  # what is put before the subscription has arrived goes to nobody
             k += 1
             sent.append((k * TICK, Imu(header(k * TICK, "base")).encode()))
             server.put("/drone1/imu", *sent[-1])
@@ -47,9 +47,9 @@ def test_payloads_are_forwarded_with_simulation_time():
                 message = client.next()
             if message[0] == 1:
                 _, subscription, time_ns = struct.unpack_from("<BIQ", message)
-                got.append((time_ns, message[13:]))
+                actual.append((time_ns, message[13:]))
                 assert subscription == 0
-        assert set(got) <= set(sent)
+        assert set(actual) <= set(sent)
         assert times == sorted(times)
 
 
@@ -199,24 +199,24 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
         client = patient(port, run)
         assert " 403 " in handshake(port, OWN_HOST, "Origin: https://attacker.example")
         client.subscribe(f"/{vehicle}/ground_truth", f"/{vehicle}/events")
-        got, events, stopped = [], [], False
+        actual, events, stopped = [], [], False
         while (message := client.next()) is not None:
             if isinstance(message, bytes) and message[0] == 1:
                 _, subscription, time_ns = struct.unpack_from("<BIQ", message)
-                (events if subscription else got).append((time_ns, message[13:]))
-            if len(got) > 100 and events and not stopped:
+                (events if subscription else actual).append((time_ns, message[13:]))
+            if len(actual) > 100 and events and not stopped:
                 run.send_signal(signal.SIGINT)  # however long the client took to subscribe
                 stopped = True
         assert run.wait(timeout=60) == 130
     with LogReader(path) as read:
         kept = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/events"])]
-        flown = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/ground_truth"])]
-    first = flown.index(got[0])
-    both = min(len(got), len(flown) - first)  # the viewer may see a few messages more than an aborted run records
-    assert got[:both] == flown[first : first + both]  # none is missing, and all in order
+        flights = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/ground_truth"])]
+    first = flights.index(actual[0])
+    both = min(len(actual), len(flights) - first)  # the viewer may see a few messages more than an aborted run records
+    assert actual[:both] == flights[first : first + both]  # none is missing, and all in order
     assert both > 90
     assert events
     assert set(events) <= set(kept)
     # a viewer that subscribes late receives the earlier events as well; `kept` also has events found afterwards
     assert {e for e in kept if e[0] < 100_000_000} <= set(events)
-    assert {e for e in kept if e[0] <= got[-1][0] and b"phase" in e[1]} <= set(events)
+    assert {e for e in kept if e[0] <= actual[-1][0] and b"phase" in e[1]} <= set(events)

@@ -45,7 +45,7 @@ class Station:
         self.link.close()
 
     def _run(self):
-        now, asked = 0, None
+        now, requested = 0, None
         while not self._ended.is_set():
             message = self.link.recv_match(blocking=True, timeout=0.2)
             if message is None:
@@ -53,8 +53,8 @@ class Station:
             kind = message.get_type()
             if kind == "ATTITUDE":
                 now = message.time_boot_ms
-                if asked is None or now - asked > 5000:
-                    asked = now
+                if requested is None or now - requested > 5000:
+                    requested = now
                     self.link.mav.heartbeat_send(6, 8, 0, 0, 4)
                     self.link.mav.param_request_list_send(1, 1)
             elif kind == "HEARTBEAT" and message.get_srcSystem() == 1:

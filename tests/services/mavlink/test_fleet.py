@@ -93,6 +93,6 @@ def test_listening_links_get_ports_and_sending_share(url, links):
         ("udpin:127.0.0.1:65535", "port 65535: the link of vehicle 1 would be at 65536"),
     ],
 )
-def test_impossible_fleet_link_is_rejected(url, said):
-    with pytest.raises(ValueError, match=said):
+def test_impossible_fleet_link_is_rejected(url, text):
+    with pytest.raises(ValueError, match=text):
         for_vehicle_index(url, 1)

@@ -7,7 +7,7 @@ import pytest
 
 from lapwing.services.common.mavlink.frames import (
     euler,
-    saturated,
+    saturate,
     swap_attitude,
     swap_body,
     swap_world,
@@ -67,9 +67,9 @@ def test_angles_are_wrapped():
 
 
 def test_whole_numbers_are_cut_off_at_limits_of_their_field():
-    assert saturated(1.6, 8) == 2
-    assert saturated(1e9, 16) == 32767
-    assert saturated(-1e9, 16) == -32768
-    assert saturated(-1.0, 16, unsigned=True) == 0
-    assert saturated(math.nan, 16, unsigned=True) == 65535
-    assert saturated(math.inf, 8, unknown=-1) == -1
+    assert saturate(1.6, 8) == 2
+    assert saturate(1e9, 16) == 32767
+    assert saturate(-1e9, 16) == -32768
+    assert saturate(-1.0, 16, unsigned=True) == 0
+    assert saturate(math.nan, 16, unsigned=True) == 65535
+    assert saturate(math.inf, 8, unknown=-1) == -1

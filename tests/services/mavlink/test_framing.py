@@ -70,8 +70,8 @@ def test_channel_numbers_its_frames_and_codec_reads_them(signature):
     for k in range(300):
         message = mavlink.MAVLink_attitude_message(k, 0.1, -0.2, 3.0, 0.0, 0.0, 0.0)
         numbers = type(message), (k, 0.1, -0.2, 3.0, 0.0, 0.0, 0.0)
-        (got,) = reader.parse_buffer(channel.encode(numbers if k % 2 else message))
-        assert (got.get_seq(), got.time_boot_ms, got.get_signed()) == (k % 256, k, signature is not None)
+        (actual,) = reader.parse_buffer(channel.encode(numbers if k % 2 else message))
+        assert (actual.get_seq(), actual.time_boot_ms, actual.get_signed()) == (k % 256, k, signature is not None)
 
 
 @pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
@@ -80,10 +80,10 @@ def test_number_beyond_float_of_32_bits_is_not_sent_and_counted(signature):
     channel = Channel(SYSTEM, signature, True, counts)
     assert channel.encode(mavlink.MAVLink_attitude_message(0, 1e39, 0.0, 0.0, 0.0, 0.0, 0.0)) == b""
     assert counts.total() == 1
-    (got,) = mavlink.MAVLink(None, 255, 190).parse_buffer(
+    (actual,) = mavlink.MAVLink(None, 255, 190).parse_buffer(
         channel.encode(mavlink.MAVLink_attitude_message(0, 3e38, 0.0, 0.0, 0.0, 0.0, 0.0))
     )
-    assert got.get_seq() == 0
+    assert actual.get_seq() == 0
 
 
 def test_simultaneous_messages_share_datagrams():

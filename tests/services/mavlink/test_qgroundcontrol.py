@@ -136,9 +136,9 @@ ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 
 @pytest.fixture
 def station():
-    flown = Flown()
-    flown.step(25)
-    return flown.station_of(QGroundControl)
+    flight = Flown()
+    flight.step(25)
+    return flight.station_of(QGroundControl)
 
 
 def test_buttons_of_flight_without_mission(station):

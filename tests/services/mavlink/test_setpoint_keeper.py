@@ -39,16 +39,16 @@ def loss(speed):
 
 @pytest.mark.parametrize("speed", [0.5, 1.0])
 def test_setpoint_is_not_repeated_up_to_real_time(speed):
-    at, given = loss(speed)
+    at, inputs = loss(speed)
     assert at == pytest.approx(TIMEOUT, abs=2 * STEP)
-    assert given == []
+    assert inputs == []
 
 
 @pytest.mark.parametrize("speed", [3.0, 5.0, 20.0])
 def test_setpoint_is_lost_by_wall_time_in_fast_runs(speed):
-    at, given = loss(speed)
+    at, inputs = loss(speed)
     assert at / speed == pytest.approx(TIMEOUT, abs=0.3 / speed + 0.01)
-    assert set(given) == {("offboard_position", "1/2", (1.0, 2.0))}
+    assert set(inputs) == {("offboard_position", "1/2", (1.0, 2.0))}
 
 
 def test_newer_setpoint_replaces_older():

@@ -135,7 +135,7 @@ def test_growing_log_is_downloaded(tmp_path, loss):
     entry = station.last("LOG_ENTRY")
     assert (entry.num_logs, entry.size) == (1, 256 * 99)
     path.write_bytes(path.read_bytes() + b"more")
-    got = bytearray(entry.size)
+    actual = bytearray(entry.size)
     missing = set(range(0, entry.size, 90))
     for _ in range(60):
         station.got.clear()
@@ -143,11 +143,11 @@ def test_growing_log_is_downloaded(tmp_path, loss):
         station.send("log_request_data", 1, 1, entry.id, first, entry.size - first)
         bench.step(6)
         for m in station.all("LOG_DATA"):
-            got[m.ofs : m.ofs + m.count] = bytes(m.data[: m.count])
+            actual[m.ofs : m.ofs + m.count] = bytes(m.data[: m.count])
             missing.discard(m.ofs)
         if not missing:
             break
-    assert got == path.read_bytes()[: entry.size]
+    assert actual == path.read_bytes()[: entry.size]
 
 
 def test_battery_status_has_cells_and_charge_state():

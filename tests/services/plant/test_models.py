@@ -64,8 +64,8 @@ def test_motors_reach_speed_at_which_torque_and_drag_balance():
 
 def carry(scene, count):
     """(bodies, lift) of each tick, plant and control in turn."""
-    flown = memory_log.fly(scene, last=count - 1)
-    return list(zip(flown.messages("body_states"), flown.messages("rotor_wrench"), strict=True))
+    flight = memory_log.fly(scene, last=count - 1)
+    return list(zip(flight.messages("body_states"), flight.messages("rotor_wrench"), strict=True))
 
 
 def three(path):
@@ -84,12 +84,12 @@ def three(path):
 @pytest.mark.parametrize("number", [2, 3])
 def test_links_keep_their_lengths_and_load_its_path(number, tmp_path):
     scene = load(LOAD) if number == 2 else three(tmp_path / "three.toml")
-    flown = carry(scene, 2001)
+    flight = carry(scene, 2001)
     lengths = scene.lookup("cooperative_load.link_length")
-    for bodies, _ in flown[::50]:
+    for bodies, _ in flight[::50]:
         places = [np.array(p.position) for p in bodies.pose]
         assert [np.linalg.norm(places[0] - q) for q in places[1:]] == pytest.approx(lengths, abs=1e-14)
-    bodies, lift = flown[-1]
+    bodies, lift = flight[-1]
     assert stamp_ns(bodies.header) == 5_000_000_000
     assert tuple(bodies.pose[0].position) == pytest.approx((2.5, 0.0, 0.75), abs=2e-3)
     assert len(lift.thrust) == number

@@ -53,10 +53,10 @@ BROKEN = f"multibody.event=[{event(0.1, 1, 'locked')}, {event(0.1, 2, 'free')}, 
 @pytest.mark.parametrize("coordinates", ["se3", "euler"])
 def test_propellers_break_in_flight(coordinates):
     """At 0.1 s the first locks and the second loses its motor, at 0.15 s the third goes; the fourth goes on."""
-    flown = [FLOWN, BROKEN, *CALM, f"multibody.coordinates={coordinates}"]
-    just_before, _ = lifted(flown, ticks=25)
-    at_once, _ = lifted(flown, ticks=26)
-    later, bodies = lifted(flown, ticks=45)
+    flight = [FLOWN, BROKEN, *CALM, f"multibody.coordinates={coordinates}"]
+    just_before, _ = lifted(flight, ticks=25)
+    at_once, _ = lifted(flight, ticks=26)
+    later, bodies = lifted(flight, ticks=45)
     assert min(just_before.rotor_speed) > 100.0
     assert at_once.rotor_speed[0] == pytest.approx(0.0, abs=1e-9)
     assert at_once.rotor_speed[1] == pytest.approx(just_before.rotor_speed[1], rel=0.1)
@@ -73,15 +73,15 @@ def test_failure_between_ticks_acts_at_its_own_time(coordinates):
     """Half a tick later half of the impulse of the lost thrust; the two of one tick one after the other."""
     failures = [[event(time, 1, "locked"), event(0.103, 2, "torn_off")] for time in (0.1, 0.102, 0.104)]
     failures[2].reverse()
-    flown = [
+    flight = [
         lifted([FLOWN, *CALM, f"multibody.coordinates={coordinates}", f"multibody.event=[{', '.join(f)}]"], ticks=26)[0]
         for f in failures
     ]
-    early, between, late = (f.angular_velocity.x for f in flown)
+    early, between, late = (f.angular_velocity.x for f in flight)
     assert abs(late - early) > 1e-3
     assert between == pytest.approx(0.5 * (early + late), abs=0.05 * abs(late - early))
-    assert [f.rotor_speed[0] > 1.0 for f in flown] == [False, False, True]
-    assert [f.rotor_speed[1] for f in flown] == [0.0, 0.0, 0.0]
+    assert [f.rotor_speed[0] > 1.0 for f in flight] == [False, False, True]
+    assert [f.rotor_speed[1] for f in flight] == [0.0, 0.0, 0.0]
 
 
 def test_pitch_of_90_degrees_ends_only_euler_angles():

@@ -30,8 +30,8 @@ def claim(taken):
 
 
 def test_next_free_instance_is_taken():
-    setup, got = first_free(firmware_setup("px4", None, 2, chooses=True), 10, claim({2, 3}))
-    assert (setup.instance, got) == (4, 4)
+    setup, actual = first_free(firmware_setup("px4", None, 2, chooses=True), 10, claim({2, 3}))
+    assert (setup.instance, actual) == (4, 4)
 
 
 def test_given_instance_is_only_one():

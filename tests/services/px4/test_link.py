@@ -323,7 +323,7 @@ def test_battery_of_scene_is_told_to_firmware(link):
             peer.run(10**6)
 
         background = begun(link, script)
-        told = []
+        events = []
         for tick in range(300):
             link.steps.step(tick, **samples)
         link.close()
@@ -331,7 +331,7 @@ def test_battery_of_scene_is_told_to_firmware(link):
         vehicle.setblocking(False)
         with suppress(BlockingIOError):
             while True:
-                told += codec.parse_buffer(vehicle.recv(4096)) or []
-    states = [m for m in told if m.get_type() == "BATTERY_STATUS"]
+                events += codec.parse_buffer(vehicle.recv(4096)) or []
+    states = [m for m in events if m.get_type() == "BATTERY_STATUS"]
     assert states
     assert all((m.get_srcSystem(), m.battery_remaining, m.voltages[0]) == (3, 42, 11200) for m in states)

@@ -52,30 +52,30 @@ NOMINAL = {
 
 def test_readings_invert_messages():
     sent = Sensors((0.1, -0.2, 0.3), (0.5, 0.6, 9.8), (2e-5, -1e-5, -4e-5), 95000.0, 12.0)
-    got = readings(HIL_SENSOR.number, sensor_values(4000, sent), NOMINAL)
-    assert got[ports.IMU] == ImuReading(sent.omega_body, sent.specific_force_body, 1e-6, 1e-3, True)
-    assert np.allclose(got[ports.MAGNETOMETER].field_body, sent.field_body, rtol=1e-12, atol=0.0)
-    assert got[ports.BAROMETER] == BarometerReading(pytest.approx(95000.0, rel=1e-12), 4.0, True)
-    assert got[ports.AIRSPEED] == AirspeedReading(pytest.approx(12.0), 2.0, True)
+    actual = readings(HIL_SENSOR.number, sensor_values(4000, sent), NOMINAL)
+    assert actual[ports.IMU] == ImuReading(sent.omega_body, sent.specific_force_body, 1e-6, 1e-3, True)
+    assert np.allclose(actual[ports.MAGNETOMETER].field_body, sent.field_body, rtol=1e-12, atol=0.0)
+    assert actual[ports.BAROMETER] == BarometerReading(pytest.approx(95000.0, rel=1e-12), 4.0, True)
+    assert actual[ports.AIRSPEED] == AirspeedReading(pytest.approx(12.0), 2.0, True)
 
 
 def test_fix_inverts_message_to_its_resolution():
     fix = GpsReading(47.3977, 8.5456, 488.0, (0.5, 0.5, 2.25), (1.0, -2.0, 0.5), 0.0, 0.0, True)
-    got = readings(HIL_GPS.number, gps_values(4000, fix), NOMINAL)[ports.GPS]
-    assert got.latitude_deg == pytest.approx(fix.latitude_deg, abs=1e-7)
-    assert got.longitude_deg == pytest.approx(fix.longitude_deg, abs=1e-7)
-    assert got.height == pytest.approx(488.0, abs=1e-3)
-    assert got.position_variance == pytest.approx(fix.position_variance, rel=1e-9)
-    assert got.velocity_world == pytest.approx(fix.velocity_world, abs=0.01)
-    assert got.velocity_variance == 0.01
+    actual = readings(HIL_GPS.number, gps_values(4000, fix), NOMINAL)[ports.GPS]
+    assert actual.latitude_deg == pytest.approx(fix.latitude_deg, abs=1e-7)
+    assert actual.longitude_deg == pytest.approx(fix.longitude_deg, abs=1e-7)
+    assert actual.height == pytest.approx(488.0, abs=1e-3)
+    assert actual.position_variance == pytest.approx(fix.position_variance, rel=1e-9)
+    assert actual.velocity_world == pytest.approx(fix.velocity_world, abs=0.01)
+    assert actual.velocity_variance == 0.01
 
 
 def test_sensors_without_update_give_no_reading():
     assert readings(HIL_SENSOR.number, sensor_values(4000, Sensors(pressure=95000.0)), NOMINAL).keys() == {"barometer"}
     assert readings(HIL_GPS.number, gps_values(4000, GpsReading()), NOMINAL) == {}
     distance = distance_values(4000, DistanceReading(1.23, 0.0, True))
-    got = readings(DISTANCE_SENSOR.number, distance, NOMINAL)
-    assert got == {ports.SONAR: DistanceReading(pytest.approx(1.23), 1e-4, True)}
+    actual = readings(DISTANCE_SENSOR.number, distance, NOMINAL)
+    assert actual == {ports.SONAR: DistanceReading(pytest.approx(1.23), 1e-4, True)}
 
 
 class Simulator:
@@ -132,10 +132,10 @@ def test_messages_are_split_at_sensor_of_first_imu(connected):
 def test_answer_has_time_controls_and_lock_step(connected):
     simulator, client = connected
     client.answer(4000, (0.25, 0.5, 0.75, 1.0), True)
-    got = simulator.answer()
-    assert (got.time_usec, got.flags, got.mode) == (4000, 1, 129)
-    assert tuple(got.controls[:5]) == (0.25, 0.5, 0.75, 1.0, 0.0)
-    values = (got.time_usec, got.flags, *got.controls, got.mode)
+    actual = simulator.answer()
+    assert (actual.time_usec, actual.flags, actual.mode) == (4000, 1, 129)
+    assert tuple(actual.controls[:5]) == (0.25, 0.5, 0.75, 1.0, 0.0)
+    values = (actual.time_usec, actual.flags, *actual.controls, actual.mode)
     assert actuator_controls(values).lock_step
 
 

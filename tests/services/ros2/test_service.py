@@ -124,18 +124,18 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
         arm, mode = graph.publisher("/drone1/command/arm", Bool), graph.publisher("/drone1/command/mode", String)
         target = graph.publisher("/drone1/command/pose", PoseStamped)
         events = graph.subscribe("/drone1/events", Log)
-        heard = [poses.get(timeout=PATIENCE)]
+        received = [poses.get(timeout=PATIENCE)]
         topics = graph.topics()
-        there = heard[0].pose.__class__(
-            graph.type_("geometry_msgs/msg/Point")(2.0, 1.0, 3.0), heard[0].pose.orientation
+        there = received[0].pose.__class__(
+            graph.type_("geometry_msgs/msg/Point")(2.0, 1.0, 3.0), received[0].pose.orientation
         )
         started = False
-        while heard[-1].header.stamp.sec < 13:
-            heard.append(poses.get(timeout=PATIENCE))
-            if heard[-1].header.stamp.sec >= 6:  # the estimator has settled
+        while received[-1].header.stamp.sec < 13:
+            received.append(poses.get(timeout=PATIENCE))
+            if received[-1].header.stamp.sec >= 6:  # the estimator has settled
                 if poses.empty():  # not for each of those that wait
-                    target.publish(header=heard[-1].header, pose=there)
-                if not started and heard[-1].header.stamp.nanosec > 500_000_000:
+                    target.publish(header=received[-1].header, pose=there)
+                if not started and received[-1].header.stamp.nanosec > 500_000_000:
                     started = True
                     mode.publish(data="offboard")
                     arm.publish(data=True)
@@ -150,9 +150,9 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     types.pop("/wall_time")  # made by who writes the log
     assert types.items() <= topics.items()
-    place = recorded.index(next(m for m in recorded if plain(m) == plain(heard[0])))
-    assert [plain(m) for m in heard] == [plain(m) for m in recorded[place : place + len(heard)]]
-    assert clock.qsize() >= len(heard) - 1
+    place = recorded.index(next(m for m in recorded if plain(m) == plain(received[0])))
+    assert [plain(m) for m in received] == [plain(m) for m in recorded[place : place + len(received)]]
+    assert clock.qsize() >= len(received) - 1
     reported = [events.get_nowait() for _ in range(events.qsize())]
     assert ("arming", "armed") in {(event.name, event.msg) for event in reported}
     commands = [command for message in inputs for command in message.commands]
@@ -372,8 +372,8 @@ def test_ros2_installation_observes_and_commands_run(tmp_path, port):
     assert run.returncode == 0, output
     assert "commands accepted\n" in output
     with LogReader(tmp_path / "a.mcap") as log:
-        _, flown = log.history("/drone1/pose")
+        _, flights = log.history("/drone1/pose")
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
     kinds = [command.kind for message in inputs for command in message.commands]
     assert [kind for kind in kinds if kind != "offboard_position"] == ["offboard", "arm"]
-    assert flown["pose.position"][-1] == pytest.approx([2.0, 1.0, 3.0], abs=0.5)
+    assert flights["pose.position"][-1] == pytest.approx([2.0, 1.0, 3.0], abs=0.5)

@@ -61,11 +61,11 @@ def test_filter_equals_exact_simulation_of_linear_input():
     u = np.interp(t, [0.0, 0.1, 0.3, 0.8], [0.0, 2.0, -1.0, 4.0])
     w = 2.0 * math.pi * f.bandwidth_hz
     _, expected, _ = signal.lsim(([w * w], [1.0, math.sqrt(2.0) * w, w * w]), u, t)
-    s, found = low_pass.started(ZERO), []
+    s, result = low_pass.state_at_rest(ZERO), []
     for value in u:
-        s = low_pass.filtered(f, s, rate, (value, 0.0, 0.0))
-        found.append(s.output[0])
-    np.testing.assert_allclose(found, expected, atol=1e-9)
+        s = low_pass.update(f, s, rate, (value, 0.0, 0.0))
+        result.append(s.output[0])
+    np.testing.assert_allclose(result, expected, atol=1e-9)
 
 
 def test_filter_response_equals_transfer_function():
@@ -88,8 +88,8 @@ def test_filter_delays_slow_motion_by_its_group_delay():
 def test_matrix_and_response_to_g():
     rows = (1.01, 0.002, 0.0, -0.003, 1.0, 0.0, 0.0, 0.004, 0.99)
     p = imu.Imu(cross_coupling=CrossCoupling(gyro_matrix=rows))
-    found = readings(p, spin=np.full(4, 2.0), samples=4)[3, :3]
-    np.testing.assert_allclose(found, 2.0 * np.array([0.0, 0.0, 0.99]), atol=1e-15)
+    result = readings(p, spin=np.full(4, 2.0), samples=4)[3, :3]
+    np.testing.assert_allclose(result, 2.0 * np.array([0.0, 0.0, 0.99]), atol=1e-15)
     drawn = [
         readings(
             imu.Imu(cross_coupling=CrossCoupling(g_sensitivity_dps_per_g=0.1)), samples=1, key=stream_key(k, "", "imu")
@@ -142,10 +142,10 @@ def test_imbalance_aliases_and_filter_weakens_it():
 def test_vibration_is_rectified():
     v = RotorVibration(rotor_speed=250.0, damage_mg=100.0, damage=Damage(0, 0, 1.0))
     c = CrossCoupling(rectification_mg_per_g2=20.0, gyro_rectification_dps_per_g2=0.5)
-    found = readings(imu.Imu(rotor_vibration=v, cross_coupling=c), TURNING, samples=8000).mean(axis=0)
+    result = readings(imu.Imu(rotor_vibration=v, cross_coupling=c), TURNING, samples=8000).mean(axis=0)
     square = 0.5 * (0.1 * 4.0) ** 2  # [g^2] at twice the speed
-    assert found[3] == pytest.approx(20e-3 * G0 * square, rel=0.05)
-    assert np.degrees(found[0]) == pytest.approx(0.5 * square, rel=1e-9)
+    assert result[3] == pytest.approx(20e-3 * G0 * square, rel=0.05)
+    assert np.degrees(result[0]) == pytest.approx(0.5 * square, rel=1e-9)
 
 
 def test_damage_begins_with_scene_s_effect():
@@ -165,8 +165,8 @@ def test_command_flies_scene_with_every_imu_error(tmp_path):
         "sensors.imu.sampling_jitter=1e-5", "sensors.imu.saturation_recovery=0.02", "run.duration=1.0",
         "sensors.magnetometer.soft_iron=0.01", "sensors.barometer.temperature_pa_per_k=0.5", "success.require=[]",
     )  # fmt: skip
-    given = [part for text in tables for part in ("--set", text)]
-    command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process", *given]
+    values = [part for text in tables for part in ("--set", text)]
+    command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process", *values]
     done = subprocess.run([*command, "--log", str(tmp_path / "a.mcap")], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     bad = subprocess.run(

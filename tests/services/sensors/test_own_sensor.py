@@ -127,10 +127,10 @@ def test_preset_and_its_noise(scene):
         (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a name that a topic can have"),
     ],
 )
-def test_custom_sensor_errors_are_one_line(scene, overrides, text, said):
+def test_custom_sensor_errors_are_one_line(scene, overrides, text, output):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(*overrides, text=text))
-    assert said in str(caught.value)
+    assert output in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

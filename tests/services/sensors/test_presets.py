@@ -98,8 +98,8 @@ def test_command_flies_with_second_parts(tmp_path):
         "barometer": "dps422", "sonar": "hc_sr04", "rangefinder": "tfmini", "airspeed": "ms4525do",
         "optical_flow": "paw3902", "gps": "standard", "magnetometer": "hmc5883l", "imu": "bmi088",
     }  # fmt: skip
-    given = [f"sensors.{name}.preset={part}" for name, part in parts.items()]
-    sets = [part for text in (*given, "run.duration=1.0", "success.require=[]") for part in ("--set", text)]
+    values = [f"sensors.{name}.preset={part}" for name, part in parts.items()]
+    sets = [part for text in (*values, "run.duration=1.0", "success.require=[]") for part in ("--set", text)]
     command = [sys.executable, "-m", "lapwing", "run", "quad_x", *sets, "--mode", "single-process"]
     done = subprocess.run([*command, "--log", str(tmp_path / "a.mcap")], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -65,8 +65,8 @@ def test_invalid_table_error_is_one_line(table, words):
         ("optical_flow", {"range_min": 31.0}, "optical_flow.range_min: expected less than range_max = 30 m, got 31"),
     ],
 )
-def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, said):
-    with pytest.raises(ConfigError, match=said):
+def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, text):
+    with pytest.raises(ConfigError, match=text):
         registry.parameters(sensor, table, 0.004)
 
 

@@ -288,12 +288,12 @@ def test_constellation_excludes_sky():
 
 @pytest.mark.long
 def test_command_records_details(tmp_path):
-    given = [
+    values = [
         "run.duration=4.0", "success.require=[]", "sensors.gps.constellation={time=1000.0}",
         "sensors.gps.rtk={corrections_lost=[{start=1.0}],age_max=1.0}", "sensors.gps.time_to_first_fix=0.5",
     ]  # fmt: skip
     log = tmp_path / "a.mcap"
-    sets = [part for text in given for part in ("--set", text)]
+    sets = [part for text in values for part in ("--set", text)]
     command = [sys.executable, "-m", "lapwing", "run", "quad_x", *sets, "--mode", "single-process", "--log", str(log)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -29,11 +29,11 @@ def test_cast_equals_ray_march(terrain):
         origin = (*random.uniform(-3.0, 3.0, 2).tolist(), random.uniform(1.5, 4.0))
         d = random.normal(size=3) * (1.0, 1.0, 0.4)
         direction = tuple((d / np.linalg.norm(d)).tolist())
-        found, expected = (
+        results, expected = (
             cast(terrain, origin, direction, steepness(terrain), 60.0),
             ray(terrain, origin, direction, 60.0),
         )
-        differences.append(0.0 if found == expected else abs(found - expected))
+        differences.append(0.0 if results == expected else abs(results - expected))
     assert np.quantile(differences, 0.98) < 1e-5
 
 
@@ -104,12 +104,12 @@ def test_noise_has_stated_deviation_and_repeats():
 @pytest.mark.long
 def test_command_records_scans(tmp_path):
     box = "environment.terrain.box=[{position=[6.0,0.0],size=[2.0,4.0],top=9.0}]"
-    given = [
+    values = [
         "sensors.lidar.columns=36", "sensors.lidar.preset=rplidar_a2", "sensors.depth_camera.preset=ideal",
         "sensors.depth_camera.width=8", "sensors.depth_camera.height=6", box, "run.duration=1.0", "success.require=[]",
     ]  # fmt: skip
     log = tmp_path / "scan.mcap"
-    sets = [part for text in given for part in ("--set", text)]
+    sets = [part for text in values for part in ("--set", text)]
     command = [sys.executable, "-m", "lapwing", "run", "hover", *sets, "--mode", "single-process", "--log", str(log)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

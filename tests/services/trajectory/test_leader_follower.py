@@ -101,11 +101,11 @@ def test_follower_derivatives_match_finite_differences(tmp_path, tick):
 
 def test_follower_setpoint_follows_leader(tmp_path):
     scene = parse(tmp_path / "two.toml", SCENE)
-    flown = fly(resolve(scene))
-    reported, core = flown.view("wing/setpoint"), path(tmp_path)
+    flight = fly(resolve(scene))
+    reported, core = flight.view("wing/setpoint"), path(tmp_path)
     assert reported.position[400] == pytest.approx(at(core, 400).position_world)
-    assert flown.messages("wing/setpoint")[400].phase == "beside"
-    assert flown.view("wing/ground_truth").position[-1] == pytest.approx(reported.position[-1], abs=0.15)
+    assert flight.messages("wing/setpoint")[400].phase == "beside"
+    assert flight.view("wing/ground_truth").position[-1] == pytest.approx(reported.position[-1], abs=0.15)
 
 
 @pytest.mark.parametrize(

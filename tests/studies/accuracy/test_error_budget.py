@@ -34,12 +34,12 @@ def test_difference_at_common_ticks():
 
 
 def test_flight_in_memory_is_plants_own():
-    flown = fly(load(ROOT / "lapwing/scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
-    assert len(flown.truth) == 101
-    assert flown.setup.interval == 0.004
+    flights = fly(load(ROOT / "lapwing/scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
+    assert len(flights.truth) == 101
+    assert flights.setup.interval == 0.004
     t = 0.4
-    assert flown.truth.position[-1, 1] > 0.0  # experiment 2 moves to +y
-    assert abs(flown.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t
+    assert flights.truth.position[-1, 1] > 0.0  # experiment 2 moves to +y
+    assert abs(flights.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t
 
 
 @pytest.mark.long

@@ -38,11 +38,11 @@ def test_command_compares_asked_and_got(tmp_path, accuracy, code, verdict):
         "flying up to 1 s",
     ]
     assert ("solver.step: set to 0.004 s, which does not depend on" in result.stdout) == (verdict == "missed")
-    found = json.loads((tmp_path / "a.json").read_text())
-    names = {quantity["name"] for quantity in found["quantities"]}
+    results = json.loads((tmp_path / "a.json").read_text())
+    names = {quantity["name"] for quantity in results["quantities"]}
     assert {"position", "attitude", "velocity", "body rates", "rotor speed"} <= names
-    assert found["got"] == max(quantity["error"] for quantity in found["quantities"])
-    assert (found["got"] > accuracy) == (code == 1)
+    assert results["got"] == max(quantity["error"] for quantity in results["quantities"])
+    assert (results["got"] > accuracy) == (code == 1)
 
 
 @pytest.mark.long
@@ -69,9 +69,9 @@ def test_error_of_solver_is_told_from_digits_of_sensors(tmp_path, accuracy, code
     assert result.returncode == code, result.stdout + result.stderr
     assert f"accuracy of the solver {verdict}: asked {accuracy:g}" in result.stdout
     assert "closed loop" in result.stdout
-    found = json.loads((tmp_path / "a.json").read_text())
-    loop = found["closed_loop"]
-    assert max(quantity["error"] for quantity in loop["quantities"]) > 1e-4 > 1e-6 > found["got"]
+    results = json.loads((tmp_path / "a.json").read_text())
+    loop = results["closed_loop"]
+    assert max(quantity["error"] for quantity in loop["quantities"]) > 1e-4 > 1e-6 > results["got"]
     assert loop["apart"]["error"] > 1e-4
     if accuracy == 1e-4:
         assert loop["signal"]["name"].startswith("imu.")

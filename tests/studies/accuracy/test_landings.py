@@ -16,7 +16,7 @@ def test_sliding_touch_down_meets_accuracy():
     exact, events = cases.exact(case)
     assert events > 5
     for accuracy in cases.ACCURACIES:
-        assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
+        assert cases.errors(cases.fly(case, accuracy)[0], exact).max() < accuracy
 
 
 @pytest.mark.parametrize("seed", [0, 6, 11])
@@ -26,7 +26,7 @@ def test_random_landing_meets_accuracy(seed):
     exact, events = cases.exact(case)
     assert events > 20
     for accuracy in (1e-3, 1e-6, 1e-9):
-        assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
+        assert cases.errors(cases.fly(case, accuracy)[0], exact).max() < accuracy
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("steps", 0), ("steps", 3), ("toppling", 0)])
@@ -36,7 +36,7 @@ def test_landing_at_step_or_toppling_meets_accuracy(kind, seed):
     exact, events = cases.exact(case)
     assert events > 50
     for accuracy in (1e-3, 1e-6, 1e-9):
-        assert cases.errors(cases.flown(case, accuracy)[0], exact).max() < accuracy
+        assert cases.errors(cases.fly(case, accuracy)[0], exact).max() < accuracy
 
 
 def test_reference_is_independent_of_its_tolerance():

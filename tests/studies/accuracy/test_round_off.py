@@ -12,9 +12,9 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.kernels import always_inline, math
 from lapwing.studies.accuracy import plant, round_off
-from lapwing.studies.accuracy.integrate import fixed_ways
+from lapwing.studies.accuracy.integrate import fixed_step_methods
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.round_off import end_in_extended_precision, extended, in_extended_precision
+from lapwing.studies.accuracy.round_off import end_in_extended_precision, extend, in_extended_precision
 from lapwing.studies.accuracy.systems import problems
 from lapwing.studies.accuracy.targets import scene_of
 
@@ -55,7 +55,7 @@ def test_end_of_linear_system_has_digits_of_extended_precision() -> None:
 
 
 def test_round_off_of_linear_system_is_that_of_digits() -> None:
-    ways = fixed_ways(P, START, DURATION, 8)
+    ways = fixed_step_methods(P, START, DURATION, 8)
     result = round_off.measure(Problem("oscillator", "s", DURATION, ways, lambda: np.zeros(2), "", {}))
     (way,) = (way for way in ways if way.name == round_off.METHOD)
     h = DURATION / result.steps
@@ -75,7 +75,7 @@ def elementary(x):
 
 
 def test_elementary_functions_have_extended_precision() -> None:
-    value = extended(elementary)(np.longdouble(0.3))
+    value = extend(elementary)(np.longdouble(0.3))
     with mpmath.workdps(50):
         x = mpmath.mpf(0.3)
         exact = mpmath.sin(x) * mpmath.exp(x) + mpmath.sqrt(mpmath.cos(x)) + mpmath.hypot(x, 2) + mpmath.atan2(x, 3)
@@ -115,7 +115,7 @@ def test_multirotor_of_scene_has_digits_of_extended_precision() -> None:
     _, p = plant.model(scene).described(scene)
     volts, speed, h, steps = 12.3, 320.0, 0.004, 20
     state = in_extended_precision(multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=speed))
-    fly, method = extended(multirotor.advance), integrators.get(round_off.METHOD).Method()
+    fly, method = extend(multirotor.advance), integrators.get(round_off.METHOD).Method()
     numbers, command = in_extended_precision(p), in_extended_precision((volts,) * 4)
     for tick in range(steps):
         state = fly(method, numbers, (0, 0), tick, state, command, np.longdouble(h), 1)

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from lapwing.studies.accuracy.coordinates import error, matrices, of_state
-from lapwing.studies.accuracy.reference import turning
+from lapwing.studies.accuracy.reference import attitude_rate
 from lapwing.studies.accuracy.systems import free_rigid_body, problems
 from lapwing.studies.accuracy.work_precision import drift
 
@@ -39,7 +39,7 @@ def test_closed_form_solves_eulers_equations(t):
 
     def rate(_, y):
         o = y[9:]
-        return np.concatenate([turning(y[:9], o), np.cross(inertia * o, o) / inertia])
+        return np.concatenate([attitude_rate(y[:9], o), np.cross(inertia * o, o) / inertia])
 
     other = solve_ivp(rate, (0.0, t), of_state(start), method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     assert free_rigid_body.closed_form(inertia, start, t) == pytest.approx(other, abs=1e-10)

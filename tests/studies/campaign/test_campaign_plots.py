@@ -122,7 +122,7 @@ def test_influential_parameters_are_drawn_others_listed():
 
 def test_printed_axis_labels_do_not_overlap():
     rmse = {f"rmse.{axis}": lambda drawn: 0.01 + 0.16 * drawn["a"] for axis in ("x", "y", "z")}
-    with matplotlib_figure.styled():
+    with matplotlib_figure.plot_style():
         canvas = FigureCanvasAgg(matplotlib_figure.figure(errors(table(50, **rmse))))
         canvas.draw()
         boxes = [

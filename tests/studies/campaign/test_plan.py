@@ -65,8 +65,8 @@ def test_values_that_are_finitely_many(text, values):
         ("3.0", "expected a distribution"),
     ],
 )
-def test_no_distribution(text, said):
-    with pytest.raises(ValueError, match=re.escape(said)):
+def test_no_distribution(text, output):
+    with pytest.raises(ValueError, match=re.escape(output)):
         parse(text)
 
 
@@ -125,9 +125,9 @@ def test_sweep_keeps_rows_together(tmp_path):
         ("a\n1 2\n", "1 2 is not a TOML value"),
     ],
 )
-def test_no_sweep(tmp_path, text, said):
+def test_no_sweep(tmp_path, text, output):
     (tmp_path / "s.csv").write_text(text)
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=output):
         plan("hover", sweep=tmp_path / "s.csv")
 
 
@@ -160,10 +160,10 @@ def test_rejection_text_is_independent_of_file_place():
         ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: No such file"),
     ],
 )
-def test_no_plan(arguments, said):
+def test_no_plan(arguments, output):
     from pathlib import Path
 
     if "sweep" in arguments:
         arguments = {"sweep": Path(arguments["sweep"])}
-    with pytest.raises(ValueError, match=said):
+    with pytest.raises(ValueError, match=output):
         plan("hover", **arguments)

@@ -104,7 +104,7 @@ def test_command_writes_tables_that_scene_takes(tmp_path):
         )
 
     scene = "delivery_mission"
-    flown = run(
+    flights = run(
         "run",
         scene,
         "--mode",
@@ -116,7 +116,7 @@ def test_command_writes_tables_that_scene_takes(tmp_path):
         "--set",
         "success.require=[]",
     )
-    assert flown.returncode == 0, flown.stderr
+    assert flights.returncode == 0, flights.stderr
     done = run("identify", scene, "f.mcap", "--sensors", "--out", "sensors.toml")
     assert done.returncode == 0, done.stderr
     tables = tomllib.loads((tmp_path / "sensors.toml").read_text())["sensors"]

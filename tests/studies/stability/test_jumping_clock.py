@@ -21,7 +21,7 @@ def test_clock_of_one_process_jumps(tmp_path, name, off):
 
 
 def test_monotonic_clock_never_decreases():
-    clock = jumping_clock.jumping(iter([0.0, 0.4, 0.5, 0.6, 1.6]).__next__, 1, jumping_clock.forward)
+    clock = jumping_clock.add_jumps(iter([0.0, 0.4, 0.5, 0.6, 1.6]).__next__, 1, jumping_clock.forward)
     assert [clock() for _ in range(5)] == pytest.approx([0.0, 0.4, 1.5, 1.6, 4.6])
 
 

@@ -31,9 +31,9 @@ def test_written_gains_can_be_read_and_flown(found, tmp_path):
     path = tmp_path / "new.toml"
     write(path, found.gains)
     assert load(str(path)) == found.gains
-    flown = fly(load_scene(HOVER, [f"autopilot.gains={path}"]))
-    assert flown.failure == ""
-    height = flown.truth.position[:, 2]
+    flight = fly(load_scene(HOVER, [f"autopilot.gains={path}"]))
+    assert flight.failure == ""
+    height = flight.truth.position[:, 2]
     assert height.max() - height[0] == pytest.approx(1.0, abs=0.05)
 
 

@@ -12,7 +12,7 @@ from lapwing.services.autopilot.gains import load
 from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load as load_scene
-from lapwing.studies.tune.systems import closed_loop, step, systems
+from lapwing.studies.tune.systems import close_loop, step, systems
 
 TICK, DELAY = 0.004, 1
 SCENES = Path(__file__).parents[3] / "lapwing/scenes"
@@ -35,7 +35,7 @@ def test_same_responses_margins_and_stability(name, airframe):
         m = margins(own[loop])
         assert math.radians(phase) == pytest.approx(m.phase, abs=5e-3), loop
         assert any(up == pytest.approx(g, rel=5e-3) for g in (m.gain, m.reduction)), loop
-        assert stable(own[loop]) == (closed_loop(system).poles().real.max() < 0.0), loop
+        assert stable(own[loop]) == (close_loop(system).poles().real.max() < 0.0), loop
 
 
 def test_step_of_first_order_loop_is_closed_form():

@@ -30,9 +30,9 @@ def log(tmp_path_factory):
 
 
 def test_own_setpoints_give_own_flight(log):
-    flown = fly_setpoints(SCENE, open_flight(log))
-    assert flown.time[-1] > 3.0
-    assert flown.difference < 0.01  # begins in the recording's climb, from rest
+    flights = fly_setpoints(SCENE, open_flight(log))
+    assert flights.time[-1] > 3.0
+    assert flights.difference < 0.01  # begins in the recording's climb, from rest
 
 
 def test_flight_without_setpoints_is_left_out(log):

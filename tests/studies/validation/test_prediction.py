@@ -10,7 +10,7 @@ from page_texts import page_text
 
 from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import constant_velocity, magnitudes, pooled
+from lapwing.studies.validation.prediction_metrics import constant_velocity, magnitudes, pool_flights
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import compare, predict, window_starts
 
@@ -89,7 +89,7 @@ def test_linear_fit_beats_constant_velocity(flights):
 
 def test_interval_resamples_flights_not_windows():
     flights = [np.full((1000, 1, 5), value) for value in (1.0, 2.0, 3.0, 4.0)]
-    ((metric, *_),) = pooled(flights)
+    ((metric, *_),) = pool_flights(flights)
     assert metric.mean == pytest.approx(2.5)
     assert metric.low < 1.8
     assert metric.high > 3.2

@@ -171,7 +171,7 @@ def airborne_steps(accuracy: float, integrator: str) -> int:
     raise ValueError(f"{integrator}: not accurate to {accuracy:g} in the air; use a method of higher order")
 
 
-def flown(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") -> tuple[np.ndarray, float]:
+def fly(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") -> tuple[np.ndarray, float]:
     """Return (states of the plant at the same moments, wall time [s])."""
     p, state = plant(case)
     n = airborne_steps(accuracy, integrator)  # compiles or loads, too

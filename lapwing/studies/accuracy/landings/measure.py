@@ -26,13 +26,13 @@ class LandingErrors(NamedTuple):
     round_off: float  # difference that the last bit of the start makes
 
 
-def measured(kind: str, seed: int) -> LandingErrors:
+def fly_and_compare(kind: str, seed: int) -> LandingErrors:
     """Fly a landing at every accuracy and compare its whole state, at every moment, with the reference."""
     case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)
     got, worst, times = [], [], []
     for accuracy in cases.ACCURACIES:
-        states, seconds = cases.flown(case, accuracy)
+        states, seconds = cases.fly(case, accuracy)
         errors = cases.errors(states, exact)
         got.append(float(errors.max()))
         worst.append(float(cases.times()[errors.argmax()]))
@@ -45,7 +45,7 @@ def measure(seeds: Iterable[int], processes: int | None = None, kind: str = "ran
     waiting = list(seeds)
     if waiting:
         with workers(max(1, min(len(waiting), processes or os.cpu_count() or 1))) as pool:
-            yield from pool.map(partial(measured, kind), waiting)
+            yield from pool.map(partial(fly_and_compare, kind), waiting)
 
 
 def read(path: Path) -> dict[int, LandingErrors]:

@@ -8,7 +8,7 @@ from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.reference import TOLERANCE, dop853, turning
+from lapwing.studies.accuracy.reference import TOLERANCE, attitude_rate, dop853
 
 DURATION = 2.0  # [s]
 INERTIA = (0.0820, 0.0845, 0.1377)  # [kg m^2]
@@ -41,13 +41,13 @@ def _problem(title: str, p: CooperativeLoadParameters, invariants: dict) -> Prob
         "s",
         DURATION,
         ways(p, START, DURATION, 16),
-        lambda: swing(p, START, DURATION),
+        lambda: free_motion(p, START, DURATION),
         f"SciPy DOP853 at {TOLERANCE:g} on three particles held together by Lagrange multipliers",
         invariants,
     )
 
 
-def swing(p: CooperativeLoadParameters, x: CooperativeLoadState, duration: float) -> np.ndarray:
+def free_motion(p: CooperativeLoadParameters, x: CooperativeLoadState, duration: float) -> np.ndarray:
     """Return the final coordinates of free particles under constraint forces, without spheres in their equations."""
     y, n = of_state(x), len(x.link)
     length = np.array(p.link_length)[:, None]
@@ -83,7 +83,7 @@ def right_hand_side(p: CooperativeLoadParameters, z: np.ndarray) -> np.ndarray:
     acceleration = np.linalg.solve(saddle, np.concatenate([force.ravel(), right]))[:k]
     inertia = np.array(p.quad_inertia)
     spin = (np.array(p.drive.moment_body) - np.cross(o, inertia * o)) / inertia
-    return np.concatenate([v.ravel(), acceleration, *map(turning, R, o), spin.ravel()])
+    return np.concatenate([v.ravel(), acceleration, *map(attitude_rate, R, o), spin.ravel()])
 
 
 def energy(t: np.ndarray, y: np.ndarray) -> np.ndarray:

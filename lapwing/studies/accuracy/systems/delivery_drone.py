@@ -30,7 +30,7 @@ from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.coordinates import coordinates
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
-from lapwing.studies.accuracy.reference import TOLERANCE, turning
+from lapwing.studies.accuracy.reference import TOLERANCE, attitude_rate
 
 AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
 DURATION, SAMPLES, COARSEST, HALVINGS = 2.0, 8, 64, 10
@@ -88,7 +88,7 @@ def problems() -> dict[str, Problem]:
     for name, form in (("SE(3)", multirotor_multibody), ("Euler", multirotor_euler)):
         for stabilisation in multirotor_multibody.STABILISATIONS:
             p = form.parameters(frame, (), "speed", stabilisation)
-            x = thrown(p, frame)
+            x = initial_bodies(p, frame)
             state = MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
             ways.append(_way(f"{name}, {stabilisation}", p, state, volts))
     problem = Problem(
@@ -103,7 +103,7 @@ def problems() -> dict[str, Problem]:
     return {"delivery_drone": problem}
 
 
-def thrown(p: Any, frame: Any) -> FiveBodies:
+def initial_bodies(p: Any, frame: Any) -> FiveBodies:
     """Return the initial state of the five bodies, blades along x."""
     speeds = tuple(-sign * SPEED for sign in frame.rotors.reaction_sign)
     machine = five_bodies_machine(p.layout.bodies.drone, STILL, speeds=speeds)
@@ -161,7 +161,7 @@ def reference(frame: Any) -> np.ndarray:
         return np.linalg.solve(inertia(frame, spin * t), y.reshape(3, 3).T @ momentum - own)
 
     result = solve_ivp(
-        lambda t, y: turning(y, omega(t, y)), (0.0, DURATION), start.ravel(), method="DOP853",
+        lambda t, y: attitude_rate(y, omega(t, y)), (0.0, DURATION), start.ravel(), method="DOP853",
         rtol=TOLERANCE, atol=0.1 * TOLERANCE,
     )  # fmt: skip
     end = result.y[:, -1]

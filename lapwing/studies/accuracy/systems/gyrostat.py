@@ -8,7 +8,7 @@ from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.reference import DOP853, dop853, to_world, turning
+from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853, to_world
 
 DURATION = 60.0  # [min]: the numbers of Ge and Lin have minutes for seconds
 START = RigidBody(NO_ROTATION, (0.1, 0.1, 0.1))  # [rad/min]
@@ -72,7 +72,7 @@ def right_hand_side(p: GyrostatParameters, t: float, y: np.ndarray) -> np.ndarra
     dv = ((c - a) * u * w - h1 * w + spin * u + back[1]) / b
     forcing = h3 * f * frequency * np.sin(frequency * t)
     dw = ((a - b) * u * v - h2 * u + h1 * v + forcing - p.damping * w + back[2]) / c
-    return np.concatenate([turning(y[:9], y[9:]), [du, dv, dw]])
+    return np.concatenate([attitude_rate(y[:9], y[9:]), [du, dv, dw]])
 
 
 def energy(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from lapwing.kernels import always_inline
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.reference import DOP853, dop853, to_world, turning
+from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853, to_world
 
 MASS, GRAVITY = 1.0, 9.81  # [kg], [m/s^2]
 ARM = 0.2  # [m] from the pivot to the centre of mass, along body x
@@ -67,7 +67,7 @@ def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
     R, o = y[:9].reshape(3, 3), y[9:]
     torque_world = np.cross(ARM * R[:, 0], [0.0, 0.0, -MASS * GRAVITY])
     omega_rate = (R.T @ torque_world - np.cross(o, np.multiply(INERTIA, o))) / INERTIA
-    return np.concatenate([turning(y[:9], o), omega_rate])
+    return np.concatenate([attitude_rate(y[:9], o), omega_rate])
 
 
 def energy(t: np.ndarray, y: np.ndarray) -> np.ndarray:

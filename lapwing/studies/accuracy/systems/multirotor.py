@@ -14,7 +14,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, Mul
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.reference import DOP853, dop853, turning
+from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853
 
 AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
 DURATION = 2.0  # [s]
@@ -62,4 +62,4 @@ def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
     omega_rate = (torque - np.cross(o, inertia * o)) / inertia
     acceleration = R[:, 2] * thrust.sum() / body.mass - [0.0, 0.0, gravity.acceleration]
     lag = layout.lag_rate * (np.array(drive.voltage) * layout.speed_per_volt - speed)
-    return np.concatenate([y[12:15], turning(y[3:12], o), acceleration, omega_rate, lag])
+    return np.concatenate([y[12:15], attitude_rate(y[3:12], o), acceleration, omega_rate, lag])

@@ -9,7 +9,7 @@ from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import ways
 from lapwing.studies.accuracy.problem import Problem
-from lapwing.studies.accuracy.reference import DOP853, dop853, turning
+from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853
 
 DURATION = 3.0  # [s]
 STILL = (0.0, 0.0, 0.0)
@@ -64,4 +64,4 @@ def right_hand_side(p: Os4Parameters, y: np.ndarray) -> np.ndarray:
     acceleration = (
         R[:, 2] * thrust.sum() / p.mass - np.multiply(p.translational_drag, v) / p.mass - [0.0, 0.0, p.gravity]
     )
-    return np.concatenate([v, turning(y[3:12], o), acceleration, omega_rate, np.zeros(4)])
+    return np.concatenate([v, attitude_rate(y[3:12], o), acceleration, omega_rate, np.zeros(4)])

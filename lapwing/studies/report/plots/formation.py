@@ -20,7 +20,7 @@ def draw(flight: FlightData) -> Plot:
     """Plot three panels over time on the left, the side view on the right."""
     t = flight.times("body_states")
     places = flight.topic("body_states").position
-    desired = _desired(flight, t)
+    desired = _desired_path(flight, t)
     error = np.linalg.norm(places[:, 0] - desired, axis=1)
     links = places[:, :1] - places[:, 1:]
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
@@ -61,7 +61,7 @@ def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
     return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
 
 
-def _desired(flight: FlightData, t: np.ndarray) -> np.ndarray:
+def _desired_path(flight: FlightData, t: np.ndarray) -> np.ndarray:
     """Return the load's desired path [m] at times t, shape (n, 3)."""
     path = np.array(flight.origin.scene["formation"]["path"])
     return path[0] + t[:, None] * path[1] + t[:, None] ** 2 * path[2]

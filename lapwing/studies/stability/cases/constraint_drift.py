@@ -19,9 +19,9 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
 from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, STILL, flight
-from lapwing.studies.accuracy.systems.delivery_drone import thrown as drone_thrown
+from lapwing.studies.accuracy.systems.delivery_drone import initial_bodies as drone_bodies
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
-from lapwing.studies.stability.drone import PAPER, delivery_drone, thrown
+from lapwing.studies.stability.drone import PAPER, delivery_drone, spinning_state
 
 HARD = "an hour of five bodies held together by 20 constraints: the index-1 equations hold only their second derivative"
 
@@ -37,7 +37,7 @@ WHY = "round-off of coordinates of a metre, a thousand steps of it: what a stabi
 def defects(way: int) -> np.ndarray:
     """Return the maximum defect on either level [m, -, m/s, rad/s] per minute, shape (MINUTES,); NaN if invalid."""
     p: Any
-    p, x = thrown(delivery_drone(**PAPER), OMEGA, SPEEDS)
+    p, x = spinning_state(delivery_drone(**PAPER), OMEGA, SPEEDS)
     result = []
     for minute in range(MINUTES):
         x = advance(METHOD.Method(), p, 60.0 * minute, x, STEP, EACH, way)
@@ -51,7 +51,7 @@ def of_plant(stabilisation: str, seconds: float) -> float:
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     p = multirotor_multibody.parameters(frame, (), "speed", stabilisation)
     out = np.empty((2, len(flatten(Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)))))
-    state = MultirotorState(drone_thrown(p, frame), ())
+    state = MultirotorState(drone_bodies(p, frame), ())
     return float(flight(METHOD.Method(), p, state, volts, 2e-3, round(seconds / 2e-3), out))
 
 

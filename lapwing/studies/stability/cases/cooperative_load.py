@@ -10,7 +10,7 @@ from lapwing.dynamics.lie.ts2 import Swing
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
 from lapwing.kernels.state_tree import flatten
-from lapwing.studies.accuracy.integrate import adapted
+from lapwing.studies.accuracy.integrate import adapt_step
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import rows
 
@@ -50,7 +50,7 @@ def start(name: str) -> tuple[Any, CooperativeLoadState]:
 def adaptive(p: Any, x: Any) -> np.ndarray:
     """Return the states, shape (SAMPLES + 1, n), with shorter steps where a light load snaps through."""
     out = np.full((SAMPLES + 1, len(flatten(x))), np.nan)
-    adapted(p, x, np.linspace(0.0, DURATION, SAMPLES + 1), TOLERANCE, out)
+    adapt_step(p, x, np.linspace(0.0, DURATION, SAMPLES + 1), TOLERANCE, out)
     return out
 
 

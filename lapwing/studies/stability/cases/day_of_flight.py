@@ -35,7 +35,7 @@ def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
     return memory, seconds
 
 
-def appending() -> float:
+def append_time_ratio() -> float:
     """Return the time of the last 1000 appended rows over that of the first, minus one: the baseline."""
     history, seconds = np.zeros(0), []
     for _ in range(20):
@@ -69,7 +69,7 @@ def run() -> CaseResult:
             "within 5 %, as the issue asks",
             min(seconds[-3:]) / min(seconds[:3]) - 1.0,
             "a history that is appended to, 20 000 rows",
-            appending(),
+            append_time_ratio(),
         ),
     ]
     hours = np.arange(1.0, HOURS + 1)

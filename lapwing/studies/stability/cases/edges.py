@@ -37,7 +37,7 @@ def run_on(p: Any, state: Any, voltage: tuple[float, ...], seconds: float, step:
     return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
 
 
-def gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
+def energy_gain(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
     """Return the maximum energy gain over the kinetic energy of a slide into a step at that distance."""
     p, state, off = on(relief(steps=[(distance, rise)]))
     state = state._replace(motion=state.motion._replace(velocity_world=(speed, 0.0, 0.0)))
@@ -50,7 +50,7 @@ def gained(distance: float, rise: float, speed: float = SPEED, step: float = STE
 
 
 def baseline_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
-    """Return the `gained` energy of a point mass on a height field, at most one step deep beyond the riser."""
+    """Return the `energy_gain` of a point mass on a height field, at most one step deep beyond the riser."""
     mass, x, z, v = DRONE.mass.total, 0.0, 0.0, 0.0
     highest = 0.0
     for _ in range(round(1.0 / step)):
@@ -63,7 +63,7 @@ def baseline_gained(distance: float, rise: float, speed: float = SPEED, step: fl
     return highest / (0.5 * speed**2)
 
 
-def lifted(share: float) -> float:
+def acceleration_under_lift(share: float) -> float:
     """Return the downhill acceleration [m/s^2] of a drone whose rotors carry a share of its weight."""
     p, state, voltage = on(relief(slope=(0.0, math.tan(ANGLE))), share)
     down = np.array([0.0, -math.cos(ANGLE), -math.sin(ANGLE)])
@@ -75,7 +75,7 @@ def lifted(share: float) -> float:
 
 
 def exact(share: float) -> float:
-    """Return the acceleration [m/s^2] of `lifted` by Newton's law, with friction of the remaining weight."""
+    """Return the acceleration [m/s^2] of `acceleration_under_lift` by Newton's law."""
     return G * (math.sin(ANGLE) - DYNAMIC * max(math.cos(ANGLE) - share, 0.0))
 
 
@@ -88,11 +88,11 @@ def run() -> CaseResult:
     unloaded = G * (math.sin(ANGLE) - DYNAMIC * math.cos(ANGLE))
     rows = [
         Row("step", faces, "energy gained at a step of 10 cm, over the kinetic", 1e-9, none,
-            gained(0.4, RISER), field, baseline_gained(0.4, RISER)),
+            energy_gain(0.4, RISER), field, baseline_gained(0.4, RISER)),
         Row("edge", faces, "energy gained over an edge of 40 cm, over the kinetic", 1e-9, none,
-            gained(0.4, -DROP), "forward Euler on spring and damper, upright", baseline_fall()),
+            energy_gain(0.4, -DROP), "forward Euler on spring and damper, upright", baseline_fall()),
         Row("take_off", "friction elements, RK4 at 1 ms", newton, 1e-3, slid,
-            abs(lifted(LIGHT) / exact(LIGHT) - 1.0),
+            abs(acceleration_under_lift(LIGHT) / exact(LIGHT) - 1.0),
             "friction by the whole weight", abs(unloaded / exact(LIGHT) - 1.0)),
     ]  # fmt: skip
     return CaseResult(rows, sweep().plot())
@@ -112,7 +112,7 @@ def baseline_fall() -> float:
 def sweep() -> Sweep:
     """Increase the speed into a step."""
     speeds = np.array([1.0, 2.0, 4.0, 8.0])
-    ways = {"faces": gained, "height field": baseline_gained}
+    ways = {"faces": energy_gain, "height field": baseline_gained}
     curves = [
         Curve(name, speeds, np.maximum([way(0.4, RISER, float(v)) for v in speeds], 1e-17))
         for name, way in ways.items()

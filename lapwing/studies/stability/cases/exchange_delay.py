@@ -51,7 +51,7 @@ def flies(rate: int, delay: int) -> bool:
     return not flight.failure and len(left) > 0 and bool(left.max() < QUIET)
 
 
-def predicted(rate: int, delay: int) -> bool:
+def is_stable_by_nyquist(rate: int, delay: int) -> bool:
     """Return True if Nyquist's criterion calls every loop stable."""
     of = scene(rate)
     frame = known_airframe(of)
@@ -68,7 +68,7 @@ def longest(works: list[bool]) -> float:
 def run() -> CaseResult:
     """Compare the longest interval of each delay, in flight and by analysis."""
     measured = np.array([longest([flies(rate, d) for rate in RATES]) for d in DELAYS])
-    linear = np.array([longest([predicted(rate, d) for rate in RATES]) for d in DELAYS])
+    linear = np.array([longest([is_stable_by_nyquist(rate, d) for rate in RATES]) for d in DELAYS])
     baseline = np.full(len(DELAYS), 1.0 / RATES[-1])
     ratio = np.maximum(measured / linear, linear / measured)
     blind = np.maximum(measured / baseline, baseline / measured)

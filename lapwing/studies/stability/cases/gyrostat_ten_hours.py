@@ -6,10 +6,10 @@ import numpy as np
 
 from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.kernels.state_tree import flatten
-from lapwing.studies.accuracy.reference import turning
+from lapwing.studies.accuracy.reference import attitude_rate
 from lapwing.studies.accuracy.systems.gyrostat import SPINNING, START
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
-from lapwing.studies.stability.sampled_runs import marched, rows, worst
+from lapwing.studies.stability.sampled_runs import rows, run_fixed_steps, worst
 
 HARD = "ten hours of gyrostat, 60 000 steps, chaotic: an attitude must stay one, the order its own, the bits the same"
 
@@ -26,22 +26,22 @@ def defect(R: np.ndarray) -> np.ndarray:
 
 def on_entries() -> np.ndarray:
     """Integrate the matrix entries by forward Euler (baseline), under the true rates, shape (SAMPLES + 1, 9)."""
-    omega = marched("rkmk4", SPINNING, START, DURATION, STEPS, STEPS)[:, 9:]
+    omega = run_fixed_steps("rkmk4", SPINNING, START, DURATION, STEPS, STEPS)[:, 9:]
     R, h, result = np.eye(3).ravel(), DURATION / STEPS, []
     for i in range(STEPS + 1):
         if i % (STEPS // SAMPLES) == 0:
             result.append(R)
-        R = R + h * turning(R, omega[i])
+        R = R + h * attitude_rate(R, omega[i])
     return np.array(result)
 
 
 def order(method: str) -> float:
     """Return the observed order from three halvings of the step."""
-    ends = [marched(method, SPINNING, START, SHORT, COARSE * 2**k, 1)[-1] for k in range(3)]
+    ends = [run_fixed_steps(method, SPINNING, START, SHORT, COARSE * 2**k, 1)[-1] for k in range(3)]
     return math.log2(worst(ends[1] - ends[0]) / worst(ends[2] - ends[1]))
 
 
-def accumulated() -> np.ndarray:
+def final_state_in_parts() -> np.ndarray:
     """Return the final state if each of ten parts starts at the accumulated clock of the previous one."""
     x, t, h = START, 0.0, DURATION / STEPS
     for _ in range(10):
@@ -53,7 +53,7 @@ def accumulated() -> np.ndarray:
 
 def run() -> CaseResult:
     """Check orthogonality, order, and bit-for-bit identical results for any recording interval."""
-    ours = marched("rkmk4", SPINNING, START, DURATION, STEPS, SAMPLES)
+    ours = run_fixed_steps("rkmk4", SPINNING, START, DURATION, STEPS, SAMPLES)
     baseline = on_entries()
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     off, baseline_off = defect(ours[:, :9]), defect(baseline)
@@ -87,7 +87,7 @@ def run() -> CaseResult:
             "the same bits: a chaotic run can be repeated in no other way",
             worst(ends[0] - ends[1]),
             "time as a sum of steps, in ten parts",
-            worst(accumulated() - ends[0]),
+            worst(final_state_in_parts() - ends[0]),
         ),
     ]
     curves = [Curve("rkmk4", t, np.maximum(off, 1e-17)), Curve("Euler on entries", t, baseline_off)]

@@ -9,7 +9,7 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.reference import to_world
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.sampled_runs import drift, marched
+from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
 HARD = "1000 s of tumbling about the intermediate axis (Dzhanibekov): every flip multiplies an error of the energy"
 
@@ -42,10 +42,12 @@ def closed_form(epsilon: float, t: np.ndarray) -> np.ndarray:
 
 def figures(method: str, epsilon: float, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return (maximum difference from the closed form so far, drift of energy, of momentum), (k,) each."""
-    return compared(marched(method, FreeBodyParameters(INERTIA), start(epsilon), DURATION, steps, SAMPLES), epsilon)
+    return figures_of_run(
+        run_fixed_steps(method, FreeBodyParameters(INERTIA), start(epsilon), DURATION, steps, SAMPLES), epsilon
+    )
 
 
-def compared(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def figures_of_run(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the `figures` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     off = np.abs(y[:, 9:12] - closed_form(epsilon, t)).max(axis=1)

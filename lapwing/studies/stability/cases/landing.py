@@ -28,7 +28,7 @@ STIFFNESS, DAMPING = 4e6, 4e3  # [N/m], [N s/m] of four feet
 SHEAR, STICTION = 8e5, 0.15  # [N/m] of four feet along the ground, [m/s]
 
 
-def standing(
+def state_above_slope(
     height: float, speed: float, angle: float = 0.0, ground: dict[str, Any] | None = None, **table: Any
 ) -> tuple[Any, Any]:
     """Return (parameters, state) at `height` [m] above a slope of `angle` [rad] along y, sinking at `speed` [m/s].
@@ -51,7 +51,7 @@ def run_on(p: Any, state: Any, seconds: float, step: float = STEP) -> Any:
 def restitution(speed: float, phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> float:
     """Return the speed after the first contact over that before, from the energies."""
     start = speed * (2e-3 + phase * STEP)
-    p, state = standing(start, speed)
+    p, state = state_above_slope(start, speed)
     p = p._replace(tolerance=tolerance)
     m = run_on(p, state, 12e-3, step).motion
     return math.sqrt(
@@ -83,7 +83,7 @@ def exact_restitution() -> np.ndarray:
 
 def rest_place(phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> np.ndarray:
     """Return the rest position [m], shape (3,), after a leaning, yawing touch-down at 1 m/s."""
-    p, state = standing(0.05 + phase * STEP, 1.0)
+    p, state = state_above_slope(0.05 + phase * STEP, 1.0)
     m = state.motion._replace(attitude=exp((0.1, -0.06, 0.2)), velocity_world=(0.5, -0.3, -1.0))
     return np.array(run_on(p._replace(tolerance=tolerance), state._replace(motion=m), 4.0, step).motion.position_world)
 
@@ -98,9 +98,9 @@ def baseline_rest_place(phase: float, step: float) -> float:
     return x
 
 
-def settled(angle: float = 0.0) -> tuple[Any, Any]:
+def rest_state(angle: float = 0.0) -> tuple[Any, Any]:
     """Return (parameters, state) at rest on a slope, some seconds after a soft contact."""
-    p, state = standing(0.0, 0.0, angle)
+    p, state = state_above_slope(0.0, 0.0, angle)
     return p, run_on(p, state, 3.0)
 
 
@@ -116,24 +116,24 @@ def baseline_rest() -> float:
     return high - low
 
 
-def resting(seconds: float, angle: float) -> float:
+def drift_at_rest(seconds: float, angle: float) -> float:
     """Return the distance [m] from the rest position after a time."""
-    p, state = settled(angle)
+    p, state = rest_state(angle)
     later = run_on(p, state, seconds).motion
     return float(np.abs(np.subtract(later.position_world, state.motion.position_world)).max())
 
 
-def creeping(angle: float) -> float:
+def creep_distance(angle: float) -> float:
     """Return the distance [m] from the rest position after a second of regularised friction."""
-    _, rest = settled(angle)
-    p, state = standing(0.0, 0.0, angle, friction="regularised")
+    _, rest = rest_state(angle)
+    p, state = state_above_slope(0.0, 0.0, angle, friction="regularised")
     later = run_on(p, state._replace(motion=rest.motion), 1.0).motion
     return float(np.abs(np.subtract(later.position_world, rest.motion.position_world)).max())
 
 
 def stick_slip() -> tuple[float, float]:
     """Return the speeds [m/s] a second after a slide at 1 m/s has ended: stick-slip friction, sign friction."""
-    p, state = settled()
+    p, state = rest_state()
     m = state.motion._replace(velocity_world=(1.0, 0.0, 0.0))
     ours = np.abs(run_on(p, state._replace(motion=m), 2.0).motion.velocity_world).max()
     v = 1.0
@@ -144,7 +144,7 @@ def stick_slip() -> tuple[float, float]:
 
 def slide(step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> float:
     """Return how far [m] a touch-down at 0.1 m/s, at 0.4 m/s ahead, slides in 0.24 s."""
-    p, state = standing(5e-3, 0.1)
+    p, state = state_above_slope(5e-3, 0.1)
     state = state._replace(motion=state.motion._replace(velocity_world=(0.4, 0.0, -0.1)))
     return float(run_on(p._replace(tolerance=tolerance), state, 0.24, step).motion.position_world[0])
 
@@ -211,7 +211,7 @@ def run() -> CaseResult:
             "way [m] in an hour of rest",
             1e-9,
             "a hundredth of the depth by which round-off of a position of metres shows",
-            resting(3600.0, 0.0),
+            drift_at_rest(3600.0, 0.0),
             f"{euler}, 1 ms, over a second",
             baseline_rest(),
         ),
@@ -221,9 +221,9 @@ def run() -> CaseResult:
             "way [m] in ten minutes on 20 degrees",
             1e-6,
             "a thousandth of the millimetre that no survey would find",
-            resting(600.0, slope),
+            drift_at_rest(600.0, slope),
             "friction as a function of the slip, a second",
-            creeping(slope),
+            creep_distance(slope),
         ),
         Row(
             "stick_slip",

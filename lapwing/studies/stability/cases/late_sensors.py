@@ -26,7 +26,7 @@ SHORT, TIMEOUT = "run.duration=4.0", 600.0  # [s] of the second: of a process th
 WHY = "as in the case `estimator`"
 
 
-def refused(override: str) -> bool:
+def is_stable(override: str) -> bool:
     """Return True if a scene with it is stable."""
     try:
         load("delivery_mission", [override])
@@ -104,7 +104,7 @@ def run() -> CaseResult:
             f"of {len(ODD)} rates that divide nothing, flown",
             0.0,
             "none: a message is due at whole ticks",
-            float(sum(not refused(odd) for odd in ODD)),
+            float(sum(not is_stable(odd) for odd in ODD)),
             "sent whenever float time modulo the period is small, an hour",
             float(by_remainder(25, 900_000)),
         )

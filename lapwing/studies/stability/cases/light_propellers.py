@@ -13,7 +13,7 @@ from lapwing.dynamics.multibody.five_body_stabilisation import (
     constraint_violation,
 )
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.drone import PAPER, delivery_drone, thrown
+from lapwing.studies.stability.drone import PAPER, delivery_drone, spinning_state
 
 HARD = "propellers with a thousandth of their inertia at 1000 rad/s: a mass ratio of 10 to 1e-8, and 0.25 rad a step"
 
@@ -29,7 +29,9 @@ def defects(way: int, scale: float, speed: float, step: float, looks: int) -> np
     """Return the largest defect on either level after every EACH steps, shape (looks,)."""
     inertia = tuple(scale * i for i in PAPER["propeller_inertia"])
     p: Any
-    p, x = thrown(delivery_drone(**{**PAPER, "propeller_inertia": inertia}, driven="speed"), OMEGA, (speed, -speed) * 2)
+    p, x = spinning_state(
+        delivery_drone(**{**PAPER, "propeller_inertia": inertia}, driven="speed"), OMEGA, (speed, -speed) * 2
+    )
     result = []
     for look in range(looks):
         x = advance(METHOD, p, look * EACH * step, x, step, EACH, way)

@@ -8,7 +8,7 @@ from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.reference import to_world
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.sampled_runs import drift, marched
+from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
 HARD = "60 s of continuous looping: pitch goes through 90 degrees twice a turn, and the vehicle flies upside down"
 
@@ -67,7 +67,9 @@ def _coordinates(y: tuple[float, ...]) -> list[float]:
 
 def run() -> CaseResult:
     """Measure the angular momentum in the world, which no torque changes."""
-    ours = drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(ASIDE), DURATION, STEPS, SAMPLES)))
+    ours = drift(
+        momentum(run_fixed_steps("rkmk4", FreeBodyParameters(INERTIA), start(ASIDE), DURATION, STEPS, SAMPLES))
+    )
     baseline = drift(momentum(euler_angles(ASIDE, STEPS // 4, SAMPLES)))
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     row = Row(
@@ -90,7 +92,7 @@ def sweep() -> Sweep:
     """Pass the pole ever closer."""
     asides = np.geomspace(10.0, 1e-6, 15)
     ours = [
-        drift(momentum(marched("rkmk4", FreeBodyParameters(INERTIA), start(a), DURATION, STEPS, 60))).max()
+        drift(momentum(run_fixed_steps("rkmk4", FreeBodyParameters(INERTIA), start(a), DURATION, STEPS, 60))).max()
         for a in asides
     ]
     baseline = [drift(momentum(euler_angles(a, STEPS // 6, 100))).max() for a in asides]

@@ -14,7 +14,7 @@ ALLOWED = 1e-9
 LAGS = np.geomspace(1e-2, 1e-6, 9)
 
 
-def lagging(lag: float) -> tuple[np.ndarray, np.ndarray]:
+def fly_with_lag(lag: float) -> tuple[np.ndarray, np.ndarray]:
     """Return (times [s], maximum relative deviation of a rotor's speed from that of its voltage) of a flight."""
     truth = fly("hover", [f"airframe.motor.time_constant={lag!r}"]).truth
     speed, voltage = truth.rotor_speed, truth.motor_voltage
@@ -29,7 +29,7 @@ def unsplit(lag: float, steps: int) -> np.ndarray:
         return np.abs(factor) ** np.arange(1, steps + 1, dtype=float)
 
 
-def accepted(lag: float) -> float:
+def is_accepted(lag: float) -> float:
     """Return 1 if a scene with this lag is accepted, 0 if it is rejected."""
     try:
         load("hover", [f"airframe.motor.time_constant={lag!r}"])
@@ -40,7 +40,7 @@ def accepted(lag: float) -> float:
 
 def run() -> CaseResult:
     """Fly with stiff motors, and with motors without lag."""
-    t, off = lagging(STIFF)
+    t, off = fly_with_lag(STIFF)
     baseline = unsplit(STIFF, round(INTERVAL / STEP))
     with np.errstate(divide="ignore", invalid="ignore"):
         endless = np.float64(1.0) / np.float64(0.0) * np.float64(0.0)  # lag rate times a speed that is reached
@@ -61,7 +61,7 @@ def run() -> CaseResult:
             "scenes without lag that are flown",
             0.0,
             "none: a lag rate of infinity times a difference of nothing is no number",
-            accepted(0.0) + accepted(1e-9),
+            is_accepted(0.0) + is_accepted(1e-9),
             "1 / lag times the difference: NaN",
             float(np.isnan(endless)),
         ),
@@ -72,7 +72,7 @@ def run() -> CaseResult:
 
 def sweep() -> Sweep:
     """Decrease the lag of the motors: distance at the end of a flight."""
-    ours = np.array([lagging(float(lag))[1][-1] for lag in LAGS])
+    ours = np.array([fly_with_lag(float(lag))[1][-1] for lag in LAGS])
     baseline = np.array([unsplit(float(lag), 1000)[-1] for lag in LAGS])
     curves = [Curve("split", LAGS, ours), Curve("RK4 at 1 ms", LAGS, baseline)]
     return Sweep("lag [s]", "rotor speed off its voltage's", 1.0, curves, falling=True)

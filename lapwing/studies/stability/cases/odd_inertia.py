@@ -7,7 +7,7 @@ from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.reference import to_world
 from lapwing.studies.accuracy.systems.free_rigid_body import closed_form
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.sampled_runs import drift, marched
+from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
 HARD = "a needle (a moment a millionth of the others), a flat plate, a body spherical but for 1e-9"
 
@@ -26,11 +26,11 @@ WHY = "2e-16 for each of 100 000 steps, were every rounding of one sign"
 def drifts(method: str, body: str, steps: int) -> np.ndarray:
     """Return the larger of the drifts of energy and momentum, shape (k,)."""
     inertia, omega = BODIES[body]
-    y = marched(method, FreeBodyParameters(inertia), RigidBody(ASKEW, omega), DURATION, steps, SAMPLES)
-    return drifted(y, inertia)
+    y = run_fixed_steps(method, FreeBodyParameters(inertia), RigidBody(ASKEW, omega), DURATION, steps, SAMPLES)
+    return drifts_of_run(y, inertia)
 
 
-def drifted(y: np.ndarray, inertia: tuple[float, float, float]) -> np.ndarray:
+def drifts_of_run(y: np.ndarray, inertia: tuple[float, float, float]) -> np.ndarray:
     """Return the `drifts` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
     energy = (y[:, 9:12] ** 2 * inertia).sum(axis=1)
     return np.maximum(drift(energy), drift(to_world(y[:, :9], y[:, 9:12] * inertia)))
@@ -51,7 +51,7 @@ def nearly_spherical() -> tuple[float, float]:
     second = bend(SPHERICAL, o + 0.5 * first) - bend(SPHERICAL, o - 0.5 * first)
     exact = o + DURATION * first + 0.5 * DURATION**2 * second
     start = RigidBody(ASKEW, ALMOST)
-    ours = marched(METHOD, FreeBodyParameters(SPHERICAL), start, DURATION, STEPS, SAMPLES)[-1, 9:12]
+    ours = run_fixed_steps(METHOD, FreeBodyParameters(SPHERICAL), start, DURATION, STEPS, SAMPLES)[-1, 9:12]
     baseline = closed_form(SPHERICAL, start, DURATION)[9:12]
     return float(np.abs(ours - exact).max()), float(np.abs(baseline - exact).max())
 

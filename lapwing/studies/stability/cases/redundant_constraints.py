@@ -51,7 +51,7 @@ def saddle(system, q, v, drive) -> np.ndarray:  # type: ignore[no-untyped-def]
         return np.zeros(n)  # it has no answer
 
 
-def violated(system, q, v, drive, a) -> float:  # type: ignore[no-untyped-def]
+def constraint_violation(system, q, v, drive, a) -> float:  # type: ignore[no-untyped-def]
     """Return the largest J a - gamma, relative to the largest gamma."""
     _, e = rows(system.arrays, q, v, drive)
     return float(np.abs(e.jacobian_t.T @ a - e.gamma).max() / max(np.abs(e.gamma).max(), 1.0))
@@ -71,7 +71,7 @@ def redundant() -> tuple[float, float]:
         )
         drive = np.column_stack([speeds, 10.0 * rng.normal(size=4)])
         ours = accelerations(system, q, v, None, drive).acceleration.ravel()
-        both = [violated(system, q, v, drive, a) for a in (ours, saddle(system, q, v, drive))]
+        both = [constraint_violation(system, q, v, drive, a) for a in (ours, saddle(system, q, v, drive))]
         worst = np.maximum(worst, both)
     return float(worst[0]), float(worst[1])
 

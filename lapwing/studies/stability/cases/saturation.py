@@ -75,7 +75,7 @@ def rebound(gains: str) -> float:
     return float(over[flight.truth.times[:n] > 10.0].max())
 
 
-def tumbling() -> tuple[float, float]:
+def norm_errors_in_tumble() -> tuple[float, float]:
     """Return the norm error of the attitude quaternion with a motor out: in flight, and stepped from its rates."""
     truth = fly("hover", OUT).truth
     q = np.array([1.0, 0.0, 0.0, 0.0])
@@ -89,7 +89,7 @@ def run() -> CaseResult:
     """Measure the overshoot after a loss of thrust, a drop in wind, and the attitude of a vehicle that turns over."""
     t, ours = height(True, LOSS)
     _, baseline = height(False, LOSS)
-    unit, stepped = tumbling()
+    unit, stepped = norm_errors_in_tumble()
     rows = [
         Row(
             "thrust_loss",

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp, multiply
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
-from lapwing.studies.stability.cases.landing import STEP, G, baseline_restitution, run_on, standing
+from lapwing.studies.stability.cases.landing import STEP, G, baseline_restitution, run_on, state_above_slope
 
 HARD = "slopes up to where feet that are loaded unevenly let go, and beyond; bumps; a touch with one foot first"
 
@@ -21,15 +21,15 @@ STILL, SLIDES = 1e-6, 1e-3  # [m], relative
 def way(degrees: float, seconds: float = 60.0) -> float:
     """Return the distance [m] that a vehicle at rest moves on a slope."""
     # set down gently: held until the springs across the slope carry the weight, and then let go
-    model, state = standing(0.0, 0.0, math.radians(degrees), friction_static=5.0)
+    model, state = state_above_slope(0.0, 0.0, math.radians(degrees), friction_static=5.0)
     state = run_on(model, state, 3.0)
-    p, _ = standing(0.0, 0.0, math.radians(degrees))
+    p, _ = state_above_slope(0.0, 0.0, math.radians(degrees))
     state = run_on(p, state, 3.0)  # the uphill feet slip by hundredths of a millimetre, and stick again
     later = run_on(p, state, seconds).motion
     return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))
 
 
-def chattering(degrees: float, seconds: float = 60.0) -> float:
+def chatter_distance(degrees: float, seconds: float = 60.0) -> float:
     """Return the distance [m] with sign friction and forward Euler at the plant's step: the baseline."""
     a, x, v = math.radians(degrees), 0.0, 0.0
     for _ in range(round(seconds / STEP)):
@@ -38,10 +38,10 @@ def chattering(degrees: float, seconds: float = 60.0) -> float:
     return abs(x)
 
 
-def sliding(degrees: float) -> float:
+def slide_acceleration(degrees: float) -> float:
     """Return the downhill acceleration [m/s^2] while it slides."""
     a = math.radians(degrees)
-    p, state = standing(0.0, 0.0, a)
+    p, state = state_above_slope(0.0, 0.0, a)
     early = run_on(p, state, 0.3)
     late = run_on(p, early, 0.5)
     down = np.array([0.0, -math.cos(a), -math.sin(a)])
@@ -58,7 +58,7 @@ def energy(p: Any, m: Any) -> float:
 
 def one_foot() -> float:
     """Return the maximum energy over the initial one, minus one, of a landing on one foot at 1 m/s."""
-    p, state = standing(0.1, 1.0)
+    p, state = state_above_slope(0.1, 1.0)
     m = state.motion
     state = state._replace(motion=m._replace(attitude=multiply(m.attitude, exp((0.15, -0.12, 0.3)))))
     energies = [energy(p, state.motion)]
@@ -70,7 +70,7 @@ def one_foot() -> float:
 
 def bumps() -> float:
     """Return the distance [m] moved in a minute at rest on bumps of 2 cm."""
-    p, state = standing(0.1, 0.0, ground={"bump_height": 0.02, "bump_length": 0.7})
+    p, state = state_above_slope(0.1, 0.0, ground={"bump_height": 0.02, "bump_length": 0.7})
     state = run_on(p, state, 3.0)
     later = run_on(p, state, 60.0).motion
     return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))
@@ -90,13 +90,13 @@ def run() -> CaseResult:
         "acceleration on 30 degrees, relative to g (sin - mu cos)",
         "way [m] in a minute on bumps of 2 cm",
     )
-    off, baseline_off = abs(sliding(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
+    off, baseline_off = abs(slide_acceleration(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
     none, euler = "none but round-off: the ground adds no energy", "forward Euler on spring and damper, upright"
     rows = [
-        Row("below", anchored, steep, STILL, stuck, way(below), sign, chattering(below)),
+        Row("below", anchored, steep, STILL, stuck, way(below), sign, chatter_distance(below)),
         Row("beyond", anchored, against, SLIDES, slid, off, "one coefficient for both", baseline_off),
         Row("one_foot", anchored, gained, 1e-9, none, one_foot(), euler, gain),
-        Row("bumps", anchored, on_bumps, STILL, stuck, bumps(), sign, chattering(5.0)),
+        Row("bumps", anchored, on_bumps, STILL, stuck, bumps(), sign, chatter_distance(5.0)),
     ]
     return CaseResult(rows, sweep().plot())
 
@@ -104,6 +104,6 @@ def run() -> CaseResult:
 def sweep() -> Sweep:
     """Increase the slope."""
     angles = np.array([5.0, 10.0, 15.0, 20.0, 22.0, 22.5, 23.0, 23.5, 24.0, 25.0, 26.0, 26.5, 26.7, 28.0])
-    ways = {"friction elements": way, "sign of the slip": chattering}
+    ways = {"friction elements": way, "sign of the slip": chatter_distance}
     curves = [Curve(name, angles, np.maximum([f(float(d), 5.0) for d in angles], 1e-17)) for name, f in ways.items()]
     return Sweep(f"slope [degrees], uphill feet let go at {EDGE:.1f}", "way in 5 s [m]", STILL, curves, log_x=False)

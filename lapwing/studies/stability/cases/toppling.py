@@ -10,7 +10,16 @@ import numpy as np
 from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
 from lapwing.dynamics.vector import scale
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.cases.landing import DAMPING, DRONE, HEIGHT, STEP, STIFFNESS, G, run_on, standing
+from lapwing.studies.stability.cases.landing import (
+    DAMPING,
+    DRONE,
+    HEIGHT,
+    STEP,
+    STIFFNESS,
+    G,
+    run_on,
+    state_above_slope,
+)
 from lapwing.studies.stability.cases.slopes import energy
 
 HARD = (
@@ -43,21 +52,21 @@ def unit(axis: int) -> tuple[float, float, float]:
     return (1.0, 0.0, 0.0) if axis == 0 else (0.0, 1.0, 0.0)
 
 
-def toppled(state: Any, axis: int) -> bool:
+def is_toppled(state: Any, axis: int) -> bool:
     """Return True if it leans over its edge."""
     return rotation_matrix(state.motion.attitude)[8] < math.cos(edge(axis))
 
 
-def leaning(axis: int, angle: float) -> tuple[Any, Any]:
+def state_on_edge(axis: int, angle: float) -> tuple[Any, Any]:
     """Return (parameters, state at rest) on two feet, which just touch, leaning by an angle [rad]."""
-    p, state = standing(base(axis) * math.sin(angle) + HEIGHT * (math.cos(angle) - 1.0), 0.0)
+    p, state = state_above_slope(base(axis) * math.sin(angle) + HEIGHT * (math.cos(angle) - 1.0), 0.0)
     return p, state._replace(motion=state.motion._replace(attitude=exp(scale(angle, unit(axis)))))
 
 
 def falls(axis: int, angle: float, step: float = STEP) -> bool:
     """Return True if a vehicle that is set down leaning topples."""
-    p, state = leaning(axis, angle)
-    return toppled(run_on(p, state, SECONDS, step), axis)
+    p, state = state_on_edge(axis, angle)
+    return is_toppled(run_on(p, state, SECONDS, step), axis)
 
 
 def inertia(axis: int) -> float:
@@ -70,20 +79,20 @@ def enough(axis: int) -> float:
     return math.sqrt(2.0 * MASS * G * (math.hypot(base(axis), HEIGHT) - HEIGHT) / inertia(axis))
 
 
-def settled() -> tuple[Any, Any]:
+def rest_state() -> tuple[Any, Any]:
     """Return (parameters, state) of the vehicle at rest on all feet, which do not slide."""
-    p, state = standing(0.0, 0.0, friction_static=GRIP, friction_dynamic=GRIP)
+    p, state = state_above_slope(0.0, 0.0, friction_static=GRIP, friction_dynamic=GRIP)
     return p, run_on(p, state, 3.0)
 
 
-def pushed(axis: int, rest: tuple[Any, Any], rate: float) -> bool:
+def topples_after_push(axis: int, rest: tuple[Any, Any], rate: float) -> bool:
     """Return True if a standing vehicle that is pushed about the edge of its feet topples."""
     p, state = rest
     omega = scale(rate, unit(axis))
     arm = (0.0, base(axis), HEIGHT) if axis == 0 else (-base(axis), 0.0, HEIGHT)  # from the edge to the middle
     velocity = tuple(float(v) for v in np.cross(omega, arm))
     motion = state.motion._replace(omega_body=omega, velocity_world=velocity)
-    return toppled(run_on(p, state._replace(motion=motion), SECONDS / 2.0), axis)
+    return is_toppled(run_on(p, state._replace(motion=motion), SECONDS / 2.0), axis)
 
 
 def threshold(topples: Callable[[float], bool], low: float, high: float, parts: int) -> float:
@@ -125,9 +134,9 @@ def baseline_falls(axis: int, angle: float, rate: float = 0.0, step: float = STE
     return bool(abs(baseline(axis, angle, rate, step, friction)[-1, 0]) > edge(axis))
 
 
-def gained(axis: int, angle: float) -> float:
+def energy_gain(axis: int, angle: float) -> float:
     """Return the maximum energy over the initial one, relative to the energy of the edge over rest."""
-    p, state = leaning(axis, angle)
+    p, state = state_on_edge(axis, angle)
     energies = [energy(p, state.motion)]
     for _ in range(1000):
         state = run_on(p, state, SECONDS / 1000.0)
@@ -155,8 +164,8 @@ def push_error(axis: int, topples: Callable[[float], bool], parts: int) -> float
 def run() -> CaseResult:
     """Set down leaning, pushed, and what becomes of the energy."""
     ours, euler = "friction elements, RK4 at 1 ms", "forward Euler on spring, damper and friction, 1 ms"
-    rest = settled()
-    rate = max(push_error(i, partial(pushed, i, rest), 20) for i in AXES)
+    rest = rest_state()
+    rate = max(push_error(i, partial(topples_after_push, i, rest), 20) for i in AXES)
     baseline_rate = max(push_error(i, partial(baseline_falls, i, 0.0, friction=GRIP), 16) for i in AXES)
     beside = [(i, edge(i) + side) for i in AXES for side in (-NEAR, NEAR)]
     kicked = max(float(np.ptp(np.maximum(e[:, 1], e[0, 1]))) / lift(i) for i, a in beside for e in (baseline(i, a),))
@@ -170,7 +179,7 @@ def run() -> CaseResult:
             rate, euler, baseline_rate),
         Row("energy", ours, f"energy gained, set down {NEAR:g} rad to either side, over that of the edge", GAINED,
             "none but round-off: the ground adds no energy",
-            max(gained(i, a) for i, a in beside), euler, kicked),
+            max(energy_gain(i, a) for i, a in beside), euler, kicked),
     ]  # fmt: skip
     return CaseResult(rows, course())
 
@@ -180,7 +189,7 @@ def course() -> Plot:
     t = np.arange(251) * 0.02
     curves = []
     for name, off in (("before the edge", -NEAR), ("beyond it", NEAR)):
-        p, state = leaning(0, edge(0) + off)
+        p, state = state_on_edge(0, edge(0) + off)
         angles = [edge(0) + off]
         for _ in t[1:]:
             state = run_on(p, state, 0.02)

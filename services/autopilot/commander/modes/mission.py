@@ -116,7 +116,7 @@ class Mode(FlightMode):
         for after in islice(guidance.route.following(), FORESIGHT):
             if _instant(after):
                 continue
-            if not _flown_through(before) or after.action not in (*TO_PLACES, "land"):
+            if not _needs_no_stop(before) or after.action not in (*TO_PLACES, "land"):
                 break
             place = _place(after, ahead[-1][0])
             if place != ahead[-1][0]:
@@ -141,7 +141,7 @@ class Mode(FlightMode):
             self._time_there += view.dt
             left = norm(subtract(self._leg.target, guidance.smoothing.position))
             return left < max(item.radius, ARRIVED) or 0.0 < item.hold_time <= self._time_there
-        if self._time_there == 0.0 and not self._reached(guidance, item):
+        if self._time_there == 0.0 and not self._is_reached(guidance, item):
             return False
         if item.action == "loiter_to_alt" and self._leg.target[2] != item.position.z and math.isfinite(item.position.z):
             self._leg = Leg(self._leg.target, (*self._leg.target[:2], item.position.z))
@@ -154,7 +154,7 @@ class Mode(FlightMode):
         self._time_there += view.dt
         return self._time_there >= item.hold_time
 
-    def _reached(self, guidance: Guidance, item: Any) -> bool:
+    def _is_reached(self, guidance: Guidance, item: Any) -> bool:
         """Return True if position and yaw of the item are reached."""
         smoothing = guidance.smoothing
         aligned = math.isnan(self._yaw) or abs(wrap_angle(self._yaw - smoothing.yaw)) < guidance.yaw_tolerance
@@ -164,10 +164,10 @@ class Mode(FlightMode):
 def _radius(guidance: Guidance, item: Any) -> float:
     """Return the acceptance radius [m] of an item."""
     radius = item.radius if item.radius > 0.0 else guidance.parameters["NAV_ACC_RAD"]
-    return radius if _flown_through(item) else min(radius, EXACT_RADIUS)
+    return radius if _needs_no_stop(item) else min(radius, EXACT_RADIUS)
 
 
-def _flown_through(item: Any) -> bool:
+def _needs_no_stop(item: Any) -> bool:
     """Return True if the item needs no stop at its position."""
     return item.action in ("waypoint", "loiter_time") and item.hold_time == 0.0
 

@@ -29,15 +29,15 @@ def step(
 ) -> tuple[NavigationState, tuple[()], int]:
     """Start once the vehicle is at rest with a magnetometer reading; then predict to `tick`."""
     imu, magnetometer, flight = inputs
-    r, begun, x = imu.value, s.begun, s.filter
-    if not begun:
+    r, started, x = imu.value, s.begun, s.filter
+    if not started:
         still = abs(norm(r.specific_force_body) - p.filter.gravity) < STANDSTILL_RATIO * p.filter.gravity
         if magnetometer.due and still:
             nothing = (math.nan, math.nan, math.nan)
             field = magnetometer.value.field_body if magnetometer.value.valid else nothing
             x = estimator.initial(p.filter, x.memory, p.start_world, r.specific_force_body, field)
-            begun = True
-    if begun:
+            started = True
+    if started:
         omega_variance = r.omega_variance if r.valid else -1.0
         force_variance = r.specific_force_variance if r.valid else -1.0
         valid = omega_variance >= 0.0 and force_variance >= 0.0
@@ -48,4 +48,4 @@ def step(
         on_ground = not flight.due or (flight.value.landed_state == ON_GROUND and tick >= flight.value.still_from)
         if on_ground and tick % p.standstill_every == 0:
             x = estimator.update_standstill(p.filter, x, omega_variance, force_variance)
-    return NavigationState(begun, x), (), CONTINUE
+    return NavigationState(started, x), (), CONTINUE

@@ -189,12 +189,12 @@ def test_non_finite_command_is_rejected(scene):
         ),
     ],
 )  # fmt: skip
-def test_error_is_one_line_with_key(scene, module, text, name, overrides, said):
+def test_error_is_one_line_with_key(scene, module, text, name, overrides, printed):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
     assert line.startswith("--set autopilot.controller")
-    assert said in line
+    assert printed in line
     assert "\n" not in line
 
 

@@ -229,10 +229,10 @@ def test_battery_is_told_as_battery_of_vehicle():
     vehicle.beat()
     client.poll(0.0)
     client.send_battery(14.2, 12.5, 0.37)
-    told = next(m for m in vehicle.sent if m.get_type() == "BATTERY_STATUS")
-    assert (told.get_srcSystem(), told.get_srcComponent()) == (7, mavlink.MAV_COMP_ID_BATTERY)
-    assert told.voltages[:2] == [14200, 65535]
-    assert (told.current_battery, told.battery_remaining) == (1250, 37)
+    notes = next(m for m in vehicle.sent if m.get_type() == "BATTERY_STATUS")
+    assert (notes.get_srcSystem(), notes.get_srcComponent()) == (7, mavlink.MAV_COMP_ID_BATTERY)
+    assert notes.voltages[:2] == [14200, 65535]
+    assert (notes.current_battery, notes.battery_remaining) == (1250, 37)
 
 
 def test_version_of_firmware_is_requested():
@@ -240,8 +240,8 @@ def test_version_of_firmware_is_requested():
     client = MissionClient(vehicle, px4.CONVENTIONS, (), {})
     vehicle.beat()
     client.poll(0.0)
-    asked = [m for m in vehicle.sent if m.get_type() == "COMMAND_LONG" and m.command == 512]
-    assert [m.param1 for m in asked] == [148.0]
+    requested = [m for m in vehicle.sent if m.get_type() == "COMMAND_LONG" and m.command == 512]
+    assert [m.param1 for m in requested] == [148.0]
     vehicle.tell(mavlink.MAVLink_autopilot_version_message(0, 0x01110080, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0))
     client.poll(0.1)
     assert FlightStatus("px4", client).version == "1.17.0"
