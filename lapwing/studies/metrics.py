@@ -55,7 +55,7 @@ def check_success(scene: Scene) -> None:
 
 
 def unmet_criteria(flight: FlightData) -> list[str]:
-    """Return the expressions of `success.require` that do not hold; without the default one, which the outcome names."""
+    """Return the expressions of `success.require` that do not hold, without the default one."""
     with suppress(ValueError):  # no run configuration, or one of another version
         criteria = Success.model_validate(flight.origin.scene.get(Success.TABLE, {}))
         own = [text for text in criteria.require if text not in Success().require]

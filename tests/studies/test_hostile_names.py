@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import flights_in_space
 import numpy as np
 import pytest
-import synthetic_flights
 
 from lapwing.studies import report
 from lapwing.studies.flight_events import Event
@@ -19,7 +18,7 @@ from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Band, Level, Line, Panel, Plot, Stretch
 from lapwing.studies.report.plotly_figure import figure
 from lapwing.studies.report.sections import Section
-from lapwing.studies.view3d import available, headless
+from lapwing.studies.view3d import headless
 
 HOSTILE = "\"'><img src=x onerror='top.hit=1'><script>top.hit=2</script>$\\q$ {{7*7}} %{x}"
 RAW = ("<img", "<script>top")
@@ -81,7 +80,7 @@ def pages():
             nearest=HOSTILE,
             refused=[(1, HOSTILE)],
             refusals=1,
-        ),  # fmt: skip
+        ),
     )
 
 

@@ -82,7 +82,7 @@ def figure(plot: Plot) -> Figure:
 
 
 def show_dollars(figure: Figure) -> None:
-    """Draw each "$" of a name as it is, where matplotlib would read a formula; ticks, which have none yet, keep theirs."""
+    """Draw each "$" of a name as it is, where matplotlib would read a formula; ticks get theirs later."""
     for text in figure.findobj(Text):
         if "$" in text.get_text():
             text.set_parse_math(False)
