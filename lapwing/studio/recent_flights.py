@@ -12,7 +12,7 @@ from lapwing.flight import Flight
 from lapwing.studies.flight_data import SHOWN
 from lapwing.studies.metrics import unmet_criteria
 from lapwing.studies.report import write
-from lapwing.studies.report.key_numbers import KeyNumber, key_numbers, trouble
+from lapwing.studies.report.key_numbers import TROUBLE, KeyNumber, key_numbers
 from lapwing.studies.report.page import LOOKS
 from lapwing.studio.path_picture import Picture, picture
 
@@ -127,7 +127,7 @@ def _summary(path: Path) -> FlightSummary:
         worst.outcome.kind,
         tuple(flight.vehicle for flight in flights),
         tuple(key_numbers(worst)),
-        sum(len(trouble(flight)) for flight in flights),
+        sum(event.kind in TROUBLE for flight in flights for event in flight.events),
         float(worst.truth.times[-1] - worst.truth.times[0]),
         picture([flight.truth.position for flight in flights]),
         worst.origin.scene,
