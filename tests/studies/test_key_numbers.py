@@ -76,6 +76,16 @@ def test_number_without_limit_is_neither_good_nor_bad(tmp_path):
     assert "<div><dt>largest distance from reference</dt>" in text
 
 
+def test_numbers_of_fleet_name_their_vehicle(tmp_path):
+    first, other = flight(), flight()
+    first.events, other.vehicle = [Event(1.0, "phase", "climb")], "drone2"
+    first.others, first.fleet = (other,), {one.vehicle: one.truth for one in (first, other)}
+    text = write(first, tmp_path / "a.html").read_text(encoding="utf-8")
+    assert '<p class="missing">drone1:</p>' in text
+    assert "drone1: no faults, failsafes or warnings." in text
+    assert "1 event</h2>" in text
+
+
 def test_report_begins_with_verdict_numbers_and_escaped_trouble(tmp_path):
     text = write(flight(), tmp_path / "a.html").read_text(encoding="utf-8")
     places = [

@@ -51,6 +51,7 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
         ],
         unmet=[unmet_criteria(flight) for flight in flights],
         events=[flight.events for flight in flights],
+        vehicle=flights[0].vehicle,
         numbers=[key_numbers(flight) for flight in flights],
         trouble=[trouble(flight) for flight in flights],
         facts={key: [one.get(key, "") for one in tables] for key in dict.fromkeys(k for one in tables for k in one)},
