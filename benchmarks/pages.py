@@ -2,7 +2,8 @@
 
     python -m benchmarks.pages [LOG]      (of the delivery mission, where none is named)
 
-In headless Chromium with software rendering, which is the slow case: a laptop has a graphics processor.
+In headless Chromium with software rendering, which is the slow case: a laptop has a graphics processor. The work of the
+page for a frame is what remains there: it is measured as processor time, in a page whose drawing calls do nothing.
 """
 
 import copy
@@ -39,6 +40,7 @@ for (;;) {
 """
 FILM = 180.0  # [s]
 READY = "while (!window.lapwingView?.ready) await new Promise((done) => setTimeout(done, 5));"
+FRAME, FRAMES = 1000.0 / 60.0, 300  # [ms] of a frame on a laptop; frames that are stepped
 RATE = f"""
 {READY}
 const begin = lapwingView.frames(), start = performance.now();
@@ -75,6 +77,31 @@ def rows(log):
             view.write_text(page([fleet(flight, count)], [flight.vehicle]), encoding="utf-8")
             with Browser(view, size=SIZE) as browser:
                 yield Row(f"frames of the 3D view, {count} vehicles", browser.run(RATE), "1/s", 30.0, True)
+            cpu, draws, sent = frame_work(view)
+            yield Row(f"processor time of the page for a frame, {count} vehicles", cpu, "ms", FRAME)
+            yield Row(f"draw calls of a frame, {count} vehicles", draws, "1", 120)
+            yield Row(f"uploads of a frame, {count} vehicles", sent / 1e3, "kB", 200)
+
+
+def frame_work(view):
+    """Processor time [ms] of a page's thread, draw calls and uploads [byte] for a frame at 60 frames a second."""
+    with Browser("data:text/html,empty", size=SIZE) as browser:
+        script = Path(__file__).with_name("frame_work.js").read_text(encoding="utf-8")
+        browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)
+        browser.call("Performance.enable", timeDomain="threadTicks")
+        browser.call("Page.navigate", url=view.resolve().as_uri())
+        step = f"return stepFrames({FRAMES}, {1000.0 / FRAME});"
+        browser.run(f"{READY} {step}")  # until the browser has compiled its scripts
+        before = _task_duration(browser)
+        draws, sent, played = browser.run(step)
+        assert abs(1000.0 * played - FRAME) < 1.0, f"{played} s of flight in a frame"
+        return 1000.0 * (_task_duration(browser) - before) / FRAMES, draws, sent
+
+
+def _task_duration(browser):
+    """Processor time [s] of the page's thread since its start."""
+    metrics = {entry["name"]: entry["value"] for entry in browser.call("Performance.getMetrics")["metrics"]}
+    return metrics["TaskDuration"]
 
 
 def drawn(report):
@@ -85,8 +112,7 @@ def drawn(report):
             browser.call("Performance.enable", timeDomain="threadTicks")
             browser.call("Page.navigate", url=report.resolve().as_uri())
             wall = 1e-3 * browser.run(DRAWN)
-            metrics = {entry["name"]: entry["value"] for entry in browser.call("Performance.getMetrics")["metrics"]}
-            times.append((wall, metrics["TaskDuration"]))
+            times.append((wall, _task_duration(browser)))
     return tuple(map(min, zip(*times, strict=True)))
 
 

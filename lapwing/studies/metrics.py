@@ -3,6 +3,7 @@
 import hashlib
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -51,6 +52,15 @@ def check_success(scene: Scene) -> None:
     """Raise SceneError if the scene's `[success]` names an unknown metric."""
     with scene.located():
         scene[Success].check_names(METRICS)
+
+
+def unmet_criteria(flight: FlightData) -> list[str]:
+    """Return the expressions of `success.require` that do not hold, without the default one."""
+    with suppress(ValueError):  # no run configuration, or one of another version
+        criteria = Success.model_validate(flight.origin.scene.get(Success.TABLE, {}))
+        own = [text for text in criteria.require if text not in Success().require]
+        return Success(require=tuple(own)).unmet(metrics(flight)) if own else []
+    return []
 
 
 def metrics(flight: FlightData) -> dict[str, Any]:

@@ -215,7 +215,8 @@ class Pages:
         """Show a recorded flight."""
         name = request.path_params["name"]
         path = self._flights.path(name)
-        return self._page("flight_page.html", flight=self._flights.summary(name), path=path, command=_report_of(path))
+        code = f"import lapwing\n\nflight = lapwing.read_log({str(path)!r})\nprint(flight.outcome)\n"
+        return self._page("flight_page.html", flight=self._flights.summary(name), command=_report_of(path), python=code)
 
     def report(self, request: Request) -> Response:
         """Answer with the report of a flight."""

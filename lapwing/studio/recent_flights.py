@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 from lapwing.cosim.output_lock import is_locked
 from lapwing.flight import Flight
 from lapwing.studies.flight_data import SHOWN
+from lapwing.studies.metrics import unmet_criteria
 from lapwing.studies.report import write
-from lapwing.studies.report.key_numbers import KeyNumber, key_numbers, trouble
+from lapwing.studies.report.key_numbers import TROUBLE, KeyNumber, key_numbers
 from lapwing.studies.report.page import LOOKS
 from lapwing.studio.path_picture import Picture, picture
 
@@ -115,18 +116,20 @@ def _summary(path: Path) -> FlightSummary:
         reason = str(error).removeprefix(f"{path}: ")
         return FlightSummary(path.name, path.stem, "", recorded, "bad", "", "", (), (), 0, 0.0, None, {}, reason)
     worst = max(flights, key=lambda flight: flight.outcome.kind not in LOOKS)
+    unmet = [text for flight in flights for text in unmet_criteria(flight)]
+    outcome = "; not met: ".join([str(worst.outcome), *dict.fromkeys(unmet)])
     run = worst.origin.scene.get("run", {})
     return FlightSummary(
         path.name,
         worst.metadata.get("scene") or path.stem,
         str(run.get("title", "")),
         recorded,
-        LOOKS.get(worst.outcome.kind, "bad"),
-        f"{worst.vehicle}: {worst.outcome}" if len(flights) > 1 else str(worst.outcome),
+        "bad" if unmet else LOOKS.get(worst.outcome.kind, "bad"),
+        f"{worst.vehicle}: {outcome}" if len(flights) > 1 else outcome,
         worst.outcome.kind,
         tuple(flight.vehicle for flight in flights),
         tuple(key_numbers(worst)),
-        sum(len(trouble(flight)) for flight in flights),
+        sum(event.kind in TROUBLE for flight in flights for event in flight.events),
         float(worst.truth.times[-1] - worst.truth.times[0]),
         picture([flight.truth.position for flight in flights]),
         worst.origin.scene,

@@ -73,10 +73,14 @@ def form_changes(
     except SceneError as error:
         return [], {}, str(error)
     changed, faults = changes(fields.values(), posted, added)
-    if faults:
-        return changed, faults, ""
-    try:
-        resolve(load_named(name, changed))
-    except SceneError as error:
-        return changed, ({error.key: error.sentence} if error.key in fields else {}), str(error)
-    return changed, {}, ""
+    remaining, message = changed, ""
+    while True:  # without each fault in turn, so that all are named at once
+        try:
+            resolve(load_named(name, remaining))
+            return changed, faults, message
+        except SceneError as error:
+            message = message or str(error)
+            before, remaining = remaining, [change for change in remaining if change.key != error.key]
+            if error.key not in fields or len(remaining) == len(before):
+                return changed, faults, message
+            faults[error.key] = error.sentence

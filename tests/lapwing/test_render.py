@@ -46,6 +46,23 @@ def test_render_rejects_wrong_options_in_one_line(log, tmp_path, words, message)
     assert not (tmp_path / words[1]).exists()
 
 
+def test_film_without_encoder_is_rejected_in_one_line(lapwing, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
+    code, _, err = lapwing("render", tmp_path / "none.mcap", "--out", tmp_path / "a.mp4")
+    assert (code, err.count("\n")) == (2, 1)
+    assert "a.mp4: needs the encoder of imageio-ffmpeg; pip install lapwing[view3d], or write .webp" in err
+
+
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+def test_browser_that_ends_is_named():
+    with headless.Browser("data:text/html,empty") as browser:
+        with pytest.raises(headless.BrowserError, match="script in the browser: Error: never"):
+            browser.run('throw new Error("never");')
+        browser._process.kill()
+        with pytest.raises(headless.BrowserError, match="the headless browser has ended unexpectedly"):
+            browser.run("await new Promise(() => {});")
+
+
 @pytest.mark.long
 @pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
 def test_picture_shows_vehicle_on_ground_under_sky(log):

@@ -54,6 +54,38 @@ def test_trouble_is_faults_without_phases():
     assert [event.kind for event in trouble(flight())] == ["fault"]
 
 
+def test_trouble_names_crash_at_its_time():
+    crashed = flight()
+    crashed.outcome = crashed.outcome._replace(kind="crashed", time=1.5, how="turned over")
+    assert [(event.time, event.kind) for event in trouble(crashed)] == [(1.5, "crashed"), (2.0, "fault")]
+
+
+def test_report_names_criteria_of_scene_that_are_not_met(tmp_path):
+    values = flight()
+    values.origin.scene["success"] = {
+        "require": ["max_distance < 0.4", "rmse.x < 1", "outcome in ('landed', 'completed')"]
+    }
+    text = write(values, tmp_path / "a.html").read_text(encoding="utf-8")
+    assert text.count("Not met: ") == 1
+    assert "Not met: max_distance &lt; 0.4<" in text
+
+
+def test_number_without_limit_is_neither_good_nor_bad(tmp_path):
+    text = write(flight(), tmp_path / "a.html").read_text(encoding="utf-8")
+    assert '<div class="bad"><dt>position error, RMS</dt>' in text
+    assert "<div><dt>largest distance from reference</dt>" in text
+
+
+def test_numbers_of_fleet_name_their_vehicle(tmp_path):
+    first, other = flight(), flight()
+    first.events, other.vehicle = [Event(1.0, "phase", "climb")], "drone2"
+    first.others, first.fleet = (other,), {one.vehicle: one.truth for one in (first, other)}
+    text = write(first, tmp_path / "a.html").read_text(encoding="utf-8")
+    assert '<p class="missing">drone1:</p>' in text
+    assert "drone1: no faults, failsafes or warnings." in text
+    assert "1 event</h2>" in text
+
+
 def test_report_begins_with_verdict_numbers_and_escaped_trouble(tmp_path):
     text = write(flight(), tmp_path / "a.html").read_text(encoding="utf-8")
     places = [

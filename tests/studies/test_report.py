@@ -425,6 +425,7 @@ def test_keys_in_which_two_scenes_differ():
     one = {"effects": {"gravity": {}, "wind": {"sigma": 1.0}}, "run": {"seed": 1}}
     other = {"effects": {"wind": {"sigma": 2.0}}, "run": {"seed": 1}}
     assert differences(one, other) == {"effects.gravity": ("yes", ""), "effects.wind.sigma": ("1", "2")}
+    assert differences({"published": {"rmse": {"x": 1.0}}, "run": {"title": "a"}}, {"run": {"title": "b"}}) == {}
     many = differences({str(k): k for k in range(MANY + 3)}, {})
     assert len(many) == MANY + 1
     assert "3 more" in many

@@ -240,6 +240,7 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     recorder = Recorder()
     add_surroundings(recorder, flight(scene=scene))
     (node,) = (node for node in recorder.nodes.values() if node.kind == "add_mesh_simple")
+    assert node.cast_shadow is False  # on itself, as a pattern
     vertices = node.arguments[0]
     assert vertices[np.argmax(vertices[:, 2])] == pytest.approx([0.0, 0.0, 0.0], abs=0.01)  # heights are from home's
     assert vertices[:, 2].min() == pytest.approx(-2.0)
@@ -413,6 +414,31 @@ def test_browser_ties_view_to_plots(tmp_path, page):
     assert 0.1 < played < 4.0
     assert sought == pytest.approx(2.5, abs=0.01)
     assert re.match(r"(0\.99|1|2\.5)\S* s", cursor)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_view_opens_at_event_that_was_chosen_before(tmp_path, page):
+    with chromium.Browser(page, tmp_path / "profile") as browser:
+        time = browser.run(
+            """
+            const until = async (holds) => {
+              for (let k = 0; k < 1200 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+              if (!holds()) throw new Error(`never: ${holds}`);
+            };
+            await until(() => document.readyState === "complete");
+            const event = document.createElement("button");
+            event.dataset.time = 2.5;
+            document.body.append(event);
+            event.click();
+            const space = document.querySelector("#space .space");
+            space.closest("details").open = true;
+            await until(() => Math.abs(Number(space.dataset.time) - 2.5) < 0.01);
+            return Number(space.dataset.time);
+            """
+        )
+        assert browser.errors == []
+    assert time == pytest.approx(2.5, abs=0.01)
 
 
 @pytest.mark.long

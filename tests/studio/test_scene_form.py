@@ -109,6 +109,18 @@ def test_text_of_another_kind_is_fault(schema, key, text, message):
     assert changes(known.values(), {key: text}, ()) == ([], {key: message})
 
 
+def test_all_faults_of_form_are_named_at_once():
+    forms = pytest.importorskip("lapwing.studio.scene_forms", reason="needs starlette (pip install lapwing[studio])")
+    posted = {"run.duration": "long", "run.seed": "-3", "effects.random_wind_force.sigma": "99"}
+    _, faults, message = forms.form_changes("delivery_mission", posted, ())
+    assert {key: text.rpartition("got ")[2][:4] for key, text in faults.items()} == {
+        "run.duration": "long",
+        "run.seed": "-3",
+        "effects.random_wind_force.sigma": "99.0",
+    }
+    assert message
+
+
 def test_command_line_and_python_fly_same():
     changed = [Change("run.seed", 3), Change("vehicle.airframe", "my drone.toml"), Change("effects.battery", {})]
     words = command_line("hover", changed, "2", True)

@@ -42,7 +42,7 @@ class User:
         while True:
             try:
                 return self._browser.run(HELPERS + script)
-            except AssertionError as error:
+            except chromium.BrowserError as error:
                 if "navigated" not in str(error):
                     raise
 
@@ -56,7 +56,7 @@ class User:
                     'return document.readyState === "complete" ? location.href : "";'
                 ):
                     return
-            except AssertionError:  # the page went away under the script
+            except chromium.BrowserError:  # the page went away under the script
                 continue
         raise AssertionError(f"no page {part}")
 
@@ -100,6 +100,10 @@ def test_user_picks_changes_runs_looks_and_compares(start, tmp_path):
         )
         differs = user.do("return [...document.querySelectorAll('.differs')].map((row) => row.textContent);")
         assert any(text.startswith("run.seed") and "17" in text for text in differs)
+        browser.call("Emulation.setDeviceMetricsOverride", width=390, height=800, deviceScaleFactor=1, mobile=False)
+        widths = user.do("return [one('.scroll').scrollWidth, one('.scroll').clientWidth];")
+        assert widths[0] <= widths[1]  # both flights are in the window of a phone
+        browser.call("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)
         user.go("one('.brand').click()", studio.address)
         cards = user.do(
             """

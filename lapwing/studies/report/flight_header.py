@@ -70,9 +70,9 @@ def uses_gains(scene: dict[str, Any]) -> bool:
 
 
 def _leaves_in_use(scene: dict[str, Any], gains: bool) -> dict[str, Any]:
-    """Return the leaves of a scene, without those of the gain set unless `gains`."""
-    leaves = dict(_leaves(scene))
-    return leaves if gains else {k: v for k, v in leaves.items() if not k.startswith(("gains.", "autopilot.gains"))}
+    """Return the leaves of a scene that a flight depends on; those of the gain set only if `gains`."""
+    unused = ("published.", "run.title", *(() if gains else ("gains.", "autopilot.gains")))
+    return {key: value for key, value in _leaves(scene) if not key.startswith(unused)}
 
 
 def _gains(scene: dict[str, Any]) -> str:

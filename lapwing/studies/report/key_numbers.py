@@ -7,6 +7,7 @@ import numpy as np
 
 from lapwing.studies.battery_use import WATT_HOUR, battery_use
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_events import Event
 from lapwing.studies.outcome import HARD, LANDING_RADIUS
 
 TROUBLE = ("failsafe", "fault", "warning", "battery", "slack")  # kinds of events that a report names first
@@ -55,6 +56,9 @@ def key_numbers(flight: FlightData) -> list[KeyNumber]:
     return numbers
 
 
-def trouble(flight: FlightData) -> list:
-    """Return the events that went wrong, in order of time."""
-    return [event for event in flight.events if event.kind in TROUBLE]
+def trouble(flight: FlightData) -> list[Event]:
+    """Return the events that went wrong, in order of time, with a crash or a divergence."""
+    events, outcome = [event for event in flight.events if event.kind in TROUBLE], flight.outcome
+    if outcome.kind in ("crashed", "diverged"):
+        events.append(Event(outcome.time, outcome.kind, outcome.how))
+    return sorted(events, key=lambda event: event.time)

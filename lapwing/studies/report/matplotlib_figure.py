@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.image import imsave
+from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
 from lapwing.studies.report.downsampling import drawn, extremes
@@ -76,7 +77,15 @@ def figure(plot: Plot) -> Figure:
     """Return the plot as a figure of `WIDTH`; call and save it within `plot_style`."""
     figure = ShownFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
     draw_plot(plot, figure)
+    show_dollars(figure)
     return figure
+
+
+def show_dollars(figure: Figure) -> None:
+    """Draw each "$" of a name as it is, where matplotlib would read a formula; ticks get theirs later."""
+    for text in figure.findobj(Text):
+        if "$" in text.get_text():
+            text.set_parse_math(False)
 
 
 def draw_plot(plot: Plot, figure: Figure | SubFigure) -> None:

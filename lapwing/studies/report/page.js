@@ -80,9 +80,10 @@
 
   // The 3D view is a page of its own in a frame; both sides tell each other the time.
   const space = document.querySelector("#space .space");
-  let frame = null;
+  let frame = null, pending = null; // [s] time for a 3D view that is closed or not drawn yet
   function seek(time) {
-    frame?.contentWindow.postMessage({ lapwing: "seek", time }, "*");
+    if (space?.dataset.time === undefined) pending = time;
+    else frame.contentWindow.postMessage({ lapwing: "seek", time }, "*");
   }
   function visible({ box }) {
     const place = box.getBoundingClientRect();
@@ -102,7 +103,9 @@
     addEventListener("message", ({ data, source }) => {
       if (source !== frame?.contentWindow || data?.lapwing !== "time") return;
       space.dataset.time = data.time;
-      hover(data.time);
+      if (pending === null) hover(data.time);
+      else seek(pending);
+      pending = null;
     });
     const details = space.closest("details"); // it is heavy: without a GPU it would hold up the plots
     details.addEventListener("toggle", () => details.open && show());

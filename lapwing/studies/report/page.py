@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, FileSystemLoader
 
 from lapwing.studies.flight_data import AXES, FlightData
+from lapwing.studies.metrics import unmet_criteria
 from lapwing.studies.report.flight_header import differences, facts
 from lapwing.studies.report.key_numbers import key_numbers, trouble
 from lapwing.studies.report.plotly_script import gzip_base64, remove_unused_traces, script
@@ -48,7 +49,9 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
             (LOOKS.get(flight.outcome.kind, "bad"), f"{flight.vehicle}: {flight.outcome}" if others else flight.outcome)
             for flight in flights
         ],
+        unmet=[unmet_criteria(flight) for flight in flights],
         events=[flight.events for flight in flights],
+        vehicle=flights[0].vehicle,
         numbers=[key_numbers(flight) for flight in flights],
         trouble=[trouble(flight) for flight in flights],
         facts={key: [one.get(key, "") for one in tables] for key in dict.fromkeys(k for one in tables for k in one)},

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from lapwing.studies.report.matplotlib_figure import draw_plot, plot_style
+from lapwing.studies.report.matplotlib_figure import draw_plot, plot_style, show_dollars
 from lapwing.studies.report.plot import Plot
 from lapwing.studies.report.style import QUIET, TEXT, WIDTH
 
@@ -53,6 +53,7 @@ def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
         for number, drawn in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
             text = f"{cover.title} · page {number} of {1 + len(packed)}"
             drawn.text(1.0 - MARGIN / PAGE[0], 0.5 * MARGIN / PAGE[1], text, ha="right", fontsize=7, color=QUIET)
+            show_dollars(drawn)
             out.savefig(drawn)
 
 

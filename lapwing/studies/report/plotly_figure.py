@@ -86,8 +86,8 @@ def _narrow(plot: Plot) -> dict[str, Any]:
 def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, timed: list[str], bottom: bool) -> None:
     x: dict[str, Any] = {"domain": domains[0], "anchor": f"y{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
     y: dict[str, Any] = {"domain": domains[1], "anchor": f"x{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
-    y["title"] = {"text": panel.y_label, "standoff": 6}
-    x["title"] = {"text": panel.x_label, "standoff": 4}
+    y["title"] = {"text": text_of(panel.y_label), "standoff": 6}
+    x["title"] = {"text": text_of(panel.x_label), "standoff": 4}
     if panel.log_x:
         x |= {"type": "log", "dtick": 1}
     if panel.log_y:

@@ -62,7 +62,7 @@ def _line(mark: Line, panel: Panel) -> dict:
     if line.hidden:
         trace["visible"] = "legendonly"
     if not line.name:
-        label = panel.y_label.partition(" [")[0]
+        label = text_of(panel.y_label.partition(" [")[0])
         trace["hovertemplate"] = f"{label} %{{y}}<extra></extra>"
     return trace
 
@@ -99,7 +99,7 @@ def _bar(mark: Stretch) -> dict:
         "textangle": 0,
         "marker": {"color": _pale(mark.colour, 0.45), "line": {"color": "#FFFFFF", "width": 1}},
         "textfont": {"color": "#222222"},
-        "hovertemplate": f"{text_of(mark.lane)}: {text_of(mark.text)}<br>{lasted}<extra></extra>",
+        "hovertemplate": f"%{{y}}: %{{text}}<br>{lasted}<extra></extra>",
     }
 
 

@@ -25,12 +25,13 @@
   const state = () => client()?.scene?.__r3f?.root.getState();
 
   const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail", reference: "reference/body", estimate: "estimate/body" };
-  const names = {};
+  const names = {}, missed = {}; // of nodes; when there was none [ms]
   function nameOf(part, number) { // of a node of a vehicle, which begins with its number
-    const nodes = client().nodeRefFromName, key = part + number;
-    if (!nodes[names[key]]) {
+    const nodes = client().nodeRefFromName, key = part + number, now = performance.now();
+    if (!nodes[names[key]] && !(view.ready && now < missed[key] + 500)) { // a search takes all names
       const shape = new RegExp(`^/${number} [^/]*/${PARTS[part]}$`);
       names[key] = Object.keys(nodes).find((name) => shape.test(name));
+      if (!names[key]) missed[key] = now;
     }
     return names[key];
   }

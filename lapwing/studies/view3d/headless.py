@@ -10,12 +10,17 @@ from pathlib import Path
 from typing import Any, Self
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
+ENDED = "the headless browser has ended unexpectedly; try again with fewer programs beside it"
 PROGRAM = next(filter(None, map(shutil.which, PROGRAMS)), None)
 # The system's OpenGL, whose software renderer is twice as fast as the browser's own, which is used where there is none.
 # The browser's own pipe is at descriptors 3 and 4.
 START = 'exec "$0" --headless=new --no-sandbox --disable-dev-shm-usage --use-angle=gl-egl \
 --ignore-gpu-blocklist --enable-unsafe-swiftshader \
 --remote-debugging-pipe --user-data-dir="$1" about:blank 3<&{reading} 4>&{writing}'
+
+
+class BrowserError(ValueError):
+    """The browser has ended, or a script of its page has failed."""
 
 
 class Browser:
@@ -58,10 +63,12 @@ class Browser:
             self._temporary.cleanup()
 
     def run(self, body: str) -> Any:
-        """Run the body of an asynchronous function in the page and return its result."""
+        """Run the body of an asynchronous function in the page; return its result. Raise BrowserError if it fails."""
         arguments = {"expression": f"(async () => {{{body}}})()", "awaitPromise": True, "returnByValue": True}
         result = self.call("Runtime.evaluate", **arguments)
-        assert "exceptionDetails" not in result, result
+        if fault := result.get("exceptionDetails"):
+            reason = fault.get("exception", {}).get("description") or fault["text"]
+            raise BrowserError(f"script in the browser: {reason.splitlines()[0]}")
         return result["result"].get("value")
 
     def picture(self) -> bytes:
@@ -74,18 +81,23 @@ class Browser:
         message = {"id": self._number, "method": method, "params": parameters}
         if self._session:
             message["sessionId"] = self._session
-        os.write(self._to, json.dumps(message).encode() + b"\0")
+        try:
+            os.write(self._to, json.dumps(message).encode() + b"\0")
+        except BrokenPipeError:
+            raise BrowserError(ENDED) from None
         while True:
             answer = self._next()
             if answer.get("id") == self._number:
-                assert "error" not in answer, answer
+                if "error" in answer:
+                    raise BrowserError(f"{method} of the browser: {answer['error'].get('message', '')}")
                 return answer["result"]
             self._note(answer)
 
     def _next(self) -> Any:
         while b"\0" not in self._rest:
             part = os.read(self._from, 1 << 16)
-            assert part, "the browser has ended"
+            if not part:
+                raise BrowserError(ENDED)
             self._rest += part
         text, self._rest = self._rest.split(b"\0", 1)
         return json.loads(text)

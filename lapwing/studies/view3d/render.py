@@ -45,6 +45,8 @@ def check(target: Path, shot: Shot) -> None:
     """Raise ValueError for an unknown format or camera, and for numbers out of range."""
     if target.suffix not in FORMATS:
         raise ValueError(f"--out {target}: expected a name that ends in {', '.join(FORMATS[:-1])} or {FORMATS[-1]}")
+    if target.suffix == ".mp4":
+        _check_encoder(target)
     if shot.camera not in CAMERAS:
         raise ValueError(f"--camera {shot.camera}: expected {', '.join(CAMERAS[:-1])} or {CAMERAS[-1]}")
     if not all(SMALLEST <= side <= LARGEST and side % 2 == 0 for side in shot.size):
@@ -52,6 +54,17 @@ def check(target: Path, shot: Shot) -> None:
         raise ValueError(f"--size {shot.size[0]}x{shot.size[1]}: expected {limits}, e.g. 1280x720")
     if not (0.0 < shot.rate <= 120.0 and 0.0 < shot.speed <= 1000.0):
         raise ValueError("--fps and --speed: expected above 0, at most 120 and 1000")
+
+
+def _check_encoder(target: Path) -> None:
+    try:
+        import imageio_ffmpeg
+
+        imageio_ffmpeg.get_ffmpeg_exe()
+    except (ImportError, RuntimeError):
+        raise ValueError(
+            f"--out {target}: needs the encoder of imageio-ffmpeg; pip install lapwing[view3d], or write .webp"
+        ) from None
 
 
 def render(

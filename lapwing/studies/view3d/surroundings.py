@@ -59,15 +59,15 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
     low = -0.002
     if not isinstance(relief, Level):
         relief_solid = _relief(relief, flight.truth.position)
-        solids.append(relief_solid)
         low = float(relief_solid.vertices[:, 2].min()) - 0.05
+        # A thin surface would cast a pattern of shadows on itself.
+        add_solid(scene, "/surroundings/relief", relief_solid, cast_shadow=False)
+        lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))
+        scene.add_line_segments("/surroundings/lines", lines, WIDE_LINE, thickness=1.0, thickness_units="screen")
     add_ground(scene, low)
     solids += [*_fence(flight), *_plan(flight)]
     for k, solid in enumerate(merge(solids)):
         add_solid(scene, f"/surroundings/{k}", solid)
-    if not isinstance(relief, Level):
-        lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))
-        scene.add_line_segments("/surroundings/lines", lines, WIDE_LINE, thickness=1.0, thickness_units="screen")
 
 
 def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
@@ -81,8 +81,7 @@ def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
         opacity=None if opaque else solid.opacity,
         flat_shading=True,
         side="double" if solid.open else "front",
-        cast_shadow=opaque,
-        **options,
+        **{"cast_shadow": opaque, **options},
     )
 
 

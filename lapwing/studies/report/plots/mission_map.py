@@ -76,7 +76,7 @@ def _events(flight: FlightData) -> Iterator[Line]:
         times.setdefault(event.kind, []).append(event.time)
     for index, (kind, when) in enumerate(times.items()):
         at = np.searchsorted(t, when).clip(max=len(t) - 1)
-        marker = ("cross", "diamond", "triangle")[index % 3]
+        marker = ("cross", "diamond", "triangle", "circle")[index % 4]
         yield Line(position[at, 0], position[at, 1], kind, BOUND, marker=marker, size=9.0, joined=False)
 
 

@@ -1,0 +1,156 @@
+"""Names of scenes and logs that are markup or formulas: every page shows them as text."""
+
+import copy
+import html
+import json
+import re
+from types import SimpleNamespace
+
+import flights_in_space
+import numpy as np
+import pytest
+
+from lapwing.studies import report
+from lapwing.studies.flight_events import Event
+from lapwing.studies.report import write
+from lapwing.studies.report.matplotlib_figure import write_png
+from lapwing.studies.report.page import render
+from lapwing.studies.report.plot import Band, Level, Line, Panel, Plot, Stretch
+from lapwing.studies.report.plotly_figure import figure
+from lapwing.studies.report.sections import Section
+from lapwing.studies.view3d import headless
+
+HOSTILE = "\"'><img src=x onerror='top.hit=1'><script>top.hit=2</script>$\\q$ {{7*7}} %{x}"
+RAW = ("<img", "<script>top")
+PHASES = np.full(flights_in_space.TICKS, HOSTILE, object)
+
+
+def flight():
+    """Every name is hostile that a scene or a log chooses."""
+    setpoint = {"position": (0.0, 0.0, 1.0), "yaw": 0.0, "phase": PHASES}
+    values = flights_in_space.flight(setpoint=setpoint)
+    values.origin = copy.copy(values.origin)
+    values.vehicle = values.name = HOSTILE
+    values.origin.scene["run"] = {"title": HOSTILE}
+    values.origin.scene["effects"] = {HOSTILE: {HOSTILE: HOSTILE}}
+    values.origin.scene["published"] = {"source": HOSTILE, "rmse": {"x": 1.0}}
+    values.events = [Event(1.0, kind, HOSTILE) for kind in ("fault", "phase", HOSTILE)]
+    return values
+
+
+def plot():
+    """A name in each place that takes one."""
+    x = np.linspace(0.0, 1.0, 20)
+    marks = (Line(x, x, HOSTILE), Line(x, x), Band(x, x, x + 1.0, HOSTILE), Level(0.5, HOSTILE))
+    texts = {"y_label": HOSTILE, "x_label": HOSTILE, "title": HOSTILE, "note": HOSTILE}
+    panels = (
+        Panel(marks, **texts, timed=False),
+        Panel((Stretch(HOSTILE, 0.0, 1.0, HOSTILE),), row=1),
+        Panel((Line(x, x),), row=2, timed=False, x_ticks=(HOSTILE,)),
+    )
+    return Plot(panels, HOSTILE, 6.0, (1.0,) * 3, phases=((HOSTILE, 0.0, 1.0),), span=(0.0, 1.0))
+
+
+def table():
+    return SimpleNamespace(title=HOSTILE, heads=[HOSTILE] * 2, rows=[[HOSTILE] * 2], failed=())
+
+
+def pages():
+    """Each page of the report's templates, by name."""
+    section = [Section("plot", HOSTILE, plot()), Section("missing", HOSTILE, missing=HOSTILE)]
+    words = {"title": HOSTILE, "lead": HOSTILE, "outcome": HOSTILE, "tables": [table(), table()]}
+    yield "validation", render("validation.html", section, **words)
+    yield "tuning", render("tuning.html", section, gains=Gains(HOSTILE), failed=True, **words)
+    failure = SimpleNamespace(value=0.5, low=0.1, high=0.9)
+    row = {"run": 1, "outcome_text": HOSTILE, "parameters": HOSTILE, "figures": [HOSTILE], "command": HOSTILE}
+    yield (
+        "campaign",
+        render(
+            "campaign.html",
+            section,
+            title=HOSTILE,
+            outcome_text=HOSTILE,
+            failure=failure,
+            facts={HOSTILE: HOSTILE},
+            heads=[HOSTILE],
+            worst=[row],
+            vehicles={HOSTILE: [HOSTILE]},
+            vehicle_heads=[HOSTILE],
+            vehicle_title=HOSTILE,
+            nearest=HOSTILE,
+            refused=[(1, HOSTILE)],
+            refusals=1,
+        ),
+    )
+
+
+class Gains:
+    """Gains as the page of `lapwing tune` lists them."""
+
+    def __init__(self, description):
+        self.description = description
+
+    def __iter__(self):
+        return iter([(HOSTILE, (1.0, 2.0, 3.0))])
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
+    """Paths of all pages."""
+    folder = tmp_path_factory.mktemp("pages")
+    paths = [write(flight(), folder / "report.html", view3d=True)]
+    paths.append(write([flight(), flight()], folder / "comparison.html", view3d=True))
+    for name, text in pages():
+        paths.append(folder / f"{name}.html")
+        paths[-1].write_text(text, encoding="utf-8")
+    return paths
+
+
+def test_pages_escape_names(written):
+    for path in written:
+        text = path.read_text(encoding="utf-8")
+        assert not [raw for raw in RAW if raw in text], path
+        assert html.escape(HOSTILE)[:20] in text.replace("&#34;", "&quot;").replace("&#39;", "&#x27;"), path
+
+
+def test_templates_mark_no_name_as_safe():
+    folder = headless.Path(report.__file__).parent
+    safe = {name for path in folder.glob("*.html") for name in re.findall(r"(\w+) \| safe", path.read_text("utf-8"))}
+    assert safe == {"library", "code", "space"}
+
+
+def test_plots_escape_names():
+    assert not [raw for raw in RAW if raw in json.dumps(figure(plot()))]
+
+
+def test_paper_shows_formulas_as_text(tmp_path):
+    write_png(tmp_path / "plot.png", [plot()])
+    write(flight(), tmp_path / "flight.pdf")
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+def test_browser_runs_no_name(written, tmp_path):
+    with headless.Browser("data:text/html,empty", tmp_path / "profile", (1000, 900)) as browser:
+        for path in written:
+            browser.call("Page.navigate", url=path.resolve().as_uri())
+            drawn, hit = browser.run(
+                """
+                const until = async (holds) => {
+                  for (let k = 0; k < 2400 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
+                  if (!holds()) throw new Error(`never: ${holds}`);
+                };
+                await until(() => document.readyState === "complete");
+                for (const details of document.querySelectorAll("details")) details.open = true;
+                const plots = [...document.querySelectorAll("figure.plot")];
+                for (const plot of plots) {
+                  plot.scrollIntoView();
+                  await until(() => plot.querySelector(".main-svg"));
+                }
+                const frame = document.querySelector("#space iframe");
+                if (frame) await until(() => frame.contentWindow.lapwingView?.ready);
+                return [plots.length, window.hit ?? 0];
+                """
+            )
+            assert (drawn > 0, hit) == (True, 0), path
+            assert not [line for line in browser.errors if "ERR_FILE_NOT_FOUND" in line], path  # of the picture
