@@ -26,6 +26,7 @@ HEIGHT_SENSORS = ("barometer", "gps", "sonar")
 _LEVELS = "1 low, 2 critical, 3 nearly empty"
 _HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
 NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # failsafe actions
+_AIRMODES = "0 nothing: roll and pitch are reduced, 1 roll and pitch, 2 roll, pitch and yaw"
 _ACTION = "0 warning, 1 hold, 2 return, 3 land, 4 descend (needs no position)"
 
 
@@ -104,6 +105,7 @@ _FAILSAFES = (
     Parameter(
         "CA_FAILURE_MODE", "", 1, 0, 1, "0: a failed motor stays in the allocation, 1: the first one is left out", True
     ),
+    Parameter("MC_AIRMODE", "", 1, 0, 2, f"the collective rises for {_AIRMODES}", True),
     Parameter("SIM_GPS_USED", "", 16, 0, 50, "satellites of the simulated GPS; below 4 it has no fix", True),
     Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"action outside the fence: {_ACTION}", True),
