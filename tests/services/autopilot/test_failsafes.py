@@ -112,7 +112,7 @@ def test_position_loss_hands_over_to_manual_control():
     assert "goto: the position is lost" in said(flown)
     assert place(flown, 20.0)[0] > 2.0  # forward
     assert mode(flown, 23.0) == "descend"  # the sticks were let go of
-    assert mode(flown, 26.0) == "hold"  # there is a position again, and an operator
+    assert mode(flown, 26.0) == "return"  # there is a position again, but no sticks
 
 
 STICKS = UP | {(5.0, 7.0): [command("manual", 0.0, 0.0, 0.0, 0.0)]}  # centred
