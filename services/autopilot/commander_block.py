@@ -25,6 +25,7 @@ from lapwing.services.autopilot.controller_parameters import build, lift
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
 from lapwing.services.autopilot.failure_injection.motor_failures import DirectMotorControl
 from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
+from lapwing.services.autopilot.mixer import airmode
 from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
@@ -252,7 +253,7 @@ def controller(config: AutopilotSetup, values: dict[str, float]) -> Any:
     """Return the controller's parameters with the commander's parameter `values`."""
     gains = config.gains if flies_px4_cascade(config) else with_gains(config.gains, values)
     law = build(gains, config.airframe, config.geometric)
-    return law._replace(shares=tables_for_failures(law.shares, values))
+    return law._replace(shares=tables_for_failures(law.shares, values), airmode=airmode(values))
 
 
 def flies_px4_cascade(config: AutopilotSetup) -> bool:

@@ -57,6 +57,7 @@ class Parameters(NamedTuple):
     controls_per_acceleration: Vec3  # [N/(rad/s^2)] roll, pitch, yaw; 0 without feed-forward
     geometric: bool  # attitude error on SO(3) instead of Euler angles
     shares: tuple[Shares, ...]  # with all rotors, then with each one failed
+    airmode: int  # see `mixer.saturate`
     thrust_max: float  # [N] of a rotor
     motor: Motor
     resting_height: float  # [m] world z of the vehicle's origin at rest on the ground
@@ -176,7 +177,7 @@ def step(
         output(p.yaw, integral_angles[2], turn[2], turn_rate[2]),
     )
     shares = active_allocation(p.shares, failed)
-    saturated = saturate(shares, desired, p.thrust_max)
+    saturated = saturate(shares, desired, p.thrust_max, p.airmode)
     cut = VirtualControls(
         sign(desired.collective - saturated.collective),
         sign(desired.roll - saturated.roll),

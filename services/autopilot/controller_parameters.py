@@ -17,7 +17,7 @@ from lapwing.services.autopilot.allocation import (
 )
 from lapwing.services.autopilot.angle_reference import Smoothing
 from lapwing.services.autopilot.control import Parameters
-from lapwing.services.autopilot.mixer import Shares
+from lapwing.services.autopilot.mixer import AIRMODE_ROLL_PITCH, Shares
 from lapwing.services.autopilot.motor import Motor, thrust_at
 from lapwing.services.autopilot.pid import Pid
 from lapwing.services.common.ports import PerRotor
@@ -86,6 +86,7 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
         controls_per_acceleration=(x, y, z),
         geometric=geometric,
         shares=share,
+        airmode=AIRMODE_ROLL_PITCH,
         thrust_max=thrust_max,
         motor=airframe.motor,
         resting_height=airframe.resting_height,

@@ -1,6 +1,7 @@
 """Mixer: virtual controls to rotor thrusts with prioritised saturation (theory.md, eqs. (4.20)-(4.23), (4.28))."""
 
 import math
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from lapwing.kernels import always_inline
@@ -9,6 +10,8 @@ from lapwing.services.common.ports import PerRotor
 
 Share = tuple[float, float, float, float]  # of a rotor in collective, roll, pitch, yaw
 Shares = tuple[Share, ...]  # of every rotor
+# MC_AIRMODE: virtual controls for which the collective is raised
+AIRMODE_DISABLED, AIRMODE_ROLL_PITCH, AIRMODE_ROLL_PITCH_YAW = 0, 1, 2
 
 
 class VirtualControls(NamedTuple):
@@ -65,27 +68,59 @@ def clamp_to_range(values: PerRotor, highest: float) -> PerRotor:
     return map_tuple(_clamp_voltage, highest, values, values)
 
 
+def airmode(values: Mapping[str, float]) -> int:
+    """Return the air mode that the autopilot's parameters select."""
+    return int(values.get("MC_AIRMODE", AIRMODE_ROLL_PITCH))  # absent from former logs
+
+
 @always_inline
-def saturate(shares: Shares, q: VirtualControls, thrust_max: float) -> VirtualControls:
+def _possible_yaw(shares: Shares, roll: float, pitch: float, yaw: float, thrust_max: float) -> float:
+    """Return the part of a yaw that is possible besides roll and pitch with any collective."""
+    part = 1.0
+    for s in shares:
+        for t in shares:
+            if s[0] > 0.0 and t[0] > 0.0:
+                tilt = (s[1] * roll + s[2] * pitch) / s[0] - (t[1] * roll + t[2] * pitch) / t[0]
+                turn = (s[3] / s[0] - t[3] / t[0]) * yaw
+                if turn > 0.0:  # also by rounding, which the least room outweighs
+                    part = min(part, max(thrust_max / s[0] - tilt, 1e-12) / turn)
+    return part * yaw
+
+
+@always_inline
+def saturate(shares: Shares, q: VirtualControls, thrust_max: float, airmode: int) -> VirtualControls:
     """Return the nearest virtual controls with thrusts of 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
 
     Priority: roll and pitch, then collective, then yaw within the remaining range. Failed rotors, which have no share
     of the collective, are ignored.
+
+    Args:
+        shares: shares of every rotor.
+        q: virtual controls.
+        thrust_max: of a rotor [N].
+        airmode: AIRMODE_DISABLED reduces roll and pitch where they would raise the collective;
+            AIRMODE_ROLL_PITCH_YAW keeps yaw before the collective.
     """
     lowest = math.inf  # minimum roll and pitch thrust of a rotor, over its share of the collective
     for s in shares:
         if s[0] > 0.0:
             lowest = min(lowest, (s[1] * q.roll + s[2] * q.pitch) / s[0])
     part = 1.0
+    if airmode == AIRMODE_DISABLED:
+        part = min(part, max(q.collective, 0.0) / max(-lowest, 1e-9))
     for s in shares:
         if s[0] > 0.0:
             span = (s[1] * q.roll + s[2] * q.pitch) / s[0] - lowest
             part = min(part, thrust_max / s[0] / max(span, 1e-9))
-    roll, pitch = part * q.roll, part * q.pitch
+    roll, pitch, yaw = part * q.roll, part * q.pitch, q.yaw
+    if airmode == AIRMODE_ROLL_PITCH_YAW:
+        yaw = _possible_yaw(shares, roll, pitch, yaw, thrust_max)
     low, high = -math.inf, math.inf
     for s in shares:
         if s[0] > 0.0:
             tilt = part * ((s[1] * q.roll + s[2] * q.pitch) / s[0])
+            if airmode == AIRMODE_ROLL_PITCH_YAW:
+                tilt += s[3] * yaw / s[0]
             low, high = max(low, -tilt), min(high, thrust_max / s[0] - tilt)
     collective = clamp(q.collective, low, high)
     low, high = -math.inf, math.inf
@@ -94,4 +129,4 @@ def saturate(shares: Shares, q: VirtualControls, thrust_max: float) -> VirtualCo
             bare = s[0] * collective + s[1] * roll + s[2] * pitch
             up, down = (thrust_max - bare) / s[3], -bare / s[3]
             low, high = max(low, min(up, down)), min(high, max(up, down))
-    return VirtualControls(collective, roll, pitch, clamp(q.yaw, min(low, 0.0), max(high, 0.0)))
+    return VirtualControls(collective, roll, pitch, clamp(yaw, min(low, 0.0), max(high, 0.0)))

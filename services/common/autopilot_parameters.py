@@ -26,6 +26,7 @@ HEIGHT_SENSORS = ("barometer", "gps", "sonar")
 _LEVELS = "1 low, 2 critical, 3 nearly empty"
 _HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
 NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # failsafe actions
+_AIRMODES = "0 nothing: roll and pitch are reduced, 1 roll and pitch, 2 roll, pitch and yaw"
 _ACTION = "0 warning, 1 hold, 2 return, 3 land, 4 descend (needs no position)"
 
 
@@ -87,6 +88,12 @@ _FAILSAFES = (
     Parameter(
         "NAV_DLL_ACT", "", RETURN, 0, 3, "action on a lost ground station: 0 warning, 1 hold, 2 return, 3 land", True
     ),
+    Parameter("COM_RC_IN_MODE", "", 1, 0, 6, "sticks over MAVLink: ignored by 0 (radio only) and 4 (disabled)", True),
+    Parameter("COM_RC_LOSS_T", "s", 1.0, 0.0, 35.0, "time after which sticks are lost"),
+    Parameter("NAV_RCL_ACT", "", RETURN, 0, 3, "action on lost sticks: 0 warning, 1 hold, 2 return, 3 land", True),
+    Parameter(
+        "COM_RCL_EXCEPT", "", 0, 0, 31, "modes that need no sticks: 1 mission, 2 other automatic ones, 4 offboard", True
+    ),
     Parameter("BAT_LOW_THR", "", 0.15, 0.0, 0.5, "charge below which the battery is low, fraction"),
     Parameter("FS_BAT_LOW_ACT", "", NOTHING, 0, 4, f"action on a low battery: {_ACTION}", True),
     Parameter("BAT_CRIT_THR", "", 0.07, 0.0, 0.5, "charge below which the battery is critical and arming is denied"),
@@ -104,9 +111,12 @@ _FAILSAFES = (
     Parameter(
         "CA_FAILURE_MODE", "", 1, 0, 1, "0: a failed motor stays in the allocation, 1: the first one is left out", True
     ),
+    Parameter("MC_AIRMODE", "", 1, 0, 2, f"the collective rises for {_AIRMODES}", True),
     Parameter("SIM_GPS_USED", "", 16, 0, 50, "satellites of the simulated GPS; below 4 it has no fix", True),
     Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"action outside the fence: {_ACTION}", True),
+    Parameter("GF_MAX_HOR_DIST", "m", 0.0, 0.0, 10000.0, "horizontal distance from home of the fence; 0: none"),
+    Parameter("GF_MAX_VER_DIST", "m", 0.0, 0.0, 10000.0, "height above home of the fence; 0: none"),
 )
 _LOOPS = {
     "altitude": "PID_Z",

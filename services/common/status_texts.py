@@ -8,8 +8,10 @@ BATTERY_LOW = "the battery is low"
 LINK_LOST = "the ground station is lost"
 SETPOINTS_LOST = "the offboard setpoints are lost"
 FENCE_LEFT = "the vehicle has left the fence"
+STICKS_LOST = "the sticks are lost"
 FAILSAFES = (
     POSITION_LOST, MOTOR_FAILED, BATTERY_EMPTY, BATTERY_CRITICAL, BATTERY_LOW, LINK_LOST, SETPOINTS_LOST, FENCE_LEFT,
+    STICKS_LOST,
 )  # fmt: skip
 """Failsafe reasons; the index is the reason's event number."""
 

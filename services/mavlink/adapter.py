@@ -71,6 +71,7 @@ class Adapter:
         self.parameters = ParameterStore(description, firmware, self.commands, self.broadcast, self.counts)
         self.vehicle.parameter = self.parameters.value
         self.setpoints = SetpointKeeper(self.clock, self.commands, lambda: self.parameters.value("COM_OF_LOSS_T"))
+        self.sticks = SetpointKeeper(self.clock, self.commands, lambda: self.parameters.value("COM_RC_LOSS_T"))
         self.sessions: dict[Endpoint, Session] = {}
         store = TimeStampStore(time_stamps, key, description.system_id) if key and time_stamps else None
         self.signature = Signature(key, store) if key else None
@@ -98,6 +99,7 @@ class Adapter:
             self.parameters,
             self.missions,
             self.setpoints,
+            self.sticks,
             self.counts,
             self._log,
             self.trusts,
@@ -203,6 +205,7 @@ class Adapter:
             endpoint.send(*session.schedule.due(built), *session.log.step())
         self.commands.step()
         self.setpoints.step()
+        self.sticks.step()
         self.missions.step()
         self.parameters.step()
         if self.vehicle.time_ns >= self._next_link:

@@ -14,6 +14,7 @@ from lapwing.services.mavlink.firmware import Firmware
 from lapwing.services.mavlink.px4_facts import Fact
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
+TYPE_MISMATCH = 7  # MAV_PARAM_ERROR that pymavlink lacks
 BY_NAME = -1  # index of a request by name
 MAX_PER_STEP = 20  # values of a list sent to one endpoint at each step of the telemetry
 
@@ -98,8 +99,13 @@ class ParameterStore:
         else:
             self._refuse(endpoint, name, index, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
-    def set(self, endpoint: Endpoint, name: str, value: float, trusted: bool) -> None:
-        """Request a new value from the autopilot, then send the resulting value to every endpoint."""
+    def set(self, endpoint: Endpoint, name: str, value: float, kind: int, trusted: bool) -> None:
+        """Request a new value of a MAV_PARAM_TYPE from the autopilot, then send the result to every endpoint."""
+        bytewise = self._firmware.PARAMETER_ENCODING == mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
+        if name in self._number and bytewise and kind != self._kind(name):
+            self._refuse(endpoint, name, BY_NAME, TYPE_MISMATCH)
+            self._send(endpoint, name)
+            return
         if name in self._facts:
             self._set_fact(endpoint, self._facts[name], value, trusted)
             return
@@ -175,10 +181,15 @@ class ParameterStore:
         endpoint.send(self._message(name))
 
     def _message(self, name: str) -> Any:
-        integer = (self._table.get(name) or self._facts[name]).whole
-        kind = mavlink.MAV_PARAM_TYPE_INT32 if integer else mavlink.MAV_PARAM_TYPE_REAL32
-        value = self._firmware.param_float(self.value(name), integer)
+        kind = self._kind(name)
+        value = self._firmware.param_float(self.value(name), kind == mavlink.MAV_PARAM_TYPE_INT32)
         return mavlink.MAVLink_param_value_message(name.encode(), value, kind, len(self.names), self._number[name])
+
+    def _kind(self, name: str) -> int:
+        """Return the MAV_PARAM_TYPE of a parameter."""
+        integer = (self._table.get(name) or self._facts[name]).whole
+        kind: int = mavlink.MAV_PARAM_TYPE_INT32 if integer else mavlink.MAV_PARAM_TYPE_REAL32
+        return kind
 
     def _refuse(self, endpoint: Endpoint, name: str, index: int, error: int) -> None:
         self._counts["parameter rejected"] += 1

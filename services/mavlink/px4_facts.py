@@ -37,7 +37,6 @@ def _translate_action(name: str, counterpart: str, actions: dict[int, int], defa
 
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
 GENERIC_FRAMES = {4: 4001, 6: 6001, 8: 8001}  # SYS_AUTOSTART of 4, 6 and 8 rotors in X
-JOYSTICK_ONLY = 1  # COM_RC_IN_MODE: there is no receiver
 LOGGED_FROM_BOOT_TO_SHUTDOWN = 2  # SDLOG_MODE
 INTERNAL_COMPASS, NO_COLLISION_PREVENTION = -1, -1  # CAL_MAG0_ROT, CP_DIST
 NO_SWITCHES = ("MODE_SW", "FLTMODE", "RETURN_SW", "LOITER_SW", "OFFB_SW", "KILL_SW", "ARM_SW", "GEAR_SW", "TRANS_SW")
@@ -47,7 +46,6 @@ NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # failsafe actions of the autop
 _WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
 # PX4's actions that the autopilot has; it has no termination
 _GEOFENCE = {1: NOTHING, 0: NOTHING, 2: HOLD, 3: RETURN, 5: LAND}  # GF_ACTION
-_LINK_LOSS = {0: NOTHING, 1: HOLD, 2: RETURN, 3: LAND}  # NAV_RCL_ACT
 _MOTOR_LOSS = {0: NOTHING, 1: HOLD, 2: LAND, 3: RETURN}  # COM_ACT_FAIL_ACT
 _DESCENT = {"GF_ACTION": 5, "COM_ACT_FAIL_ACT": 2}  # to show DESCEND as landing
 _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency charge
@@ -55,8 +53,6 @@ _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency ch
     _LAND: (LAND, LAND),
     _RETURN_THEN_LAND: (RETURN, LAND),
 }
-_ROLL_PITCH = 1  # MC_AIRMODE
-EXCEPTIONS = 31  # COM_RCL_EXCEPT: all bits
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
 MULTIROTOR = 0  # CA_AIRFRAME
 SATELLITES = 16  # of a fix, as telemetry has them
@@ -92,10 +88,7 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "CAL_MAG2_ID": 0,
         **{f"CAL_MAG{k}_ROT": INTERNAL_COMPASS for k in range(3)},
         "SENS_BOARD_ROT": 0,
-        "COM_RC_IN_MODE": JOYSTICK_ONLY,
         "RC_CHAN_CNT": 0,
-        "GF_MAX_HOR_DIST": 0,
-        "GF_MAX_VER_DIST": 0,
         "COM_OBS_AVOID": 0,
         "SDLOG_MODE": LOGGED_FROM_BOOT_TO_SHUTDOWN,
         "PD_GRIPPER_EN": int(d.gripper),
@@ -116,17 +109,11 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         *[Fact(f"RC_{switch}_TH", lambda _: THRESHOLD, False) for switch in NO_THRESHOLDS],
         Fact("COM_LOW_BAT_ACT", _low_battery, assign=_assign_battery),
         _translate_action("GF_ACTION", "FS_FENCE_ACT", _GEOFENCE, _DESCENT["GF_ACTION"]),
-        _translate_action("NAV_RCL_ACT", "NAV_DLL_ACT", _LINK_LOSS),  # sticks come over the data link
         _translate_action("COM_ACT_FAIL_ACT", "FS_MOTOR_ACT", _MOTOR_LOSS, _DESCENT["COM_ACT_FAIL_ACT"]),
-        # Modes that continue without sticks: all modes that need none, whatever the value
-        Fact("COM_RCL_EXCEPT", lambda _: 0.0, assign=lambda x: {} if x in range(EXCEPTIONS + 1) else None),
         # VTOL aircraft in forward flight only need an approach to their landing, as in PX4
         Fact("RTL_APPR_FORCE", lambda _: 0.0, assign=lambda x: {} if x in (0.0, 1.0) else None),
-        # The mixer raises the collective for roll and pitch, not for yaw (theory.md, eq. (4.22))
-        Fact("MC_AIRMODE", lambda _: _ROLL_PITCH, assign=lambda x: {} if x == _ROLL_PITCH else None),
         Fact("CP_DIST", lambda _: NO_COLLISION_PREVENTION, False, "m"),
         Fact("SENS_DPRES_OFF", lambda _: 0.0, False, "Pa"),
-        Fact("COM_RC_LOSS_T", lambda v: v.get("COM_DL_LOSS_T", 0.0), False, "s", lambda x: {"COM_DL_LOSS_T": x}),
     ]
 
 

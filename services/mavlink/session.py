@@ -34,6 +34,7 @@ class Session:
         parameters: ParameterStore,
         missions: MissionStore,
         setpoints: SetpointKeeper,
+        sticks: SetpointKeeper,
         counts: Counter[str],
         log: Path | None,
         trusts: Callable[[Endpoint], bool],
@@ -48,12 +49,13 @@ class Session:
             parameters: parameters of the autopilot.
             missions: items that the vehicle holds.
             setpoints: keeper of offboard setpoints.
+            sticks: keeper of stick positions.
             counts: rejected messages by reason.
             log: log of the run, or None.
             trusts: returns True if commands of an endpoint are accepted.
         """
         self.endpoint, self.vehicle, self.clock = endpoint, vehicle, clock
-        self.parameters, self.missions, self._setpoints = parameters, missions, setpoints
+        self.parameters, self.missions, self._setpoints, self._sticks = parameters, missions, setpoints, sticks
         self.schedule = Schedule(vehicle)
         self.log = LogServer(log)
         self.files = FileServer(files(vehicle.description))
@@ -84,6 +86,11 @@ class Session:
         """Queue an offboard setpoint; it must be trusted."""
         self.command(kind, values)
         self._setpoints.hold(kind, self.endpoint.name, values)
+
+    def sticks(self, values: Sequence[float]) -> None:
+        """Queue stick positions; they must be trusted."""
+        self.command("manual", values)
+        self._sticks.hold("manual", self.endpoint.name, values)
 
     def say(self, text: str) -> None:
         """Send the reason of a rejection to this endpoint only, equal texts at most every few seconds."""

@@ -1,7 +1,7 @@
-"""Repetition of offboard setpoints in fast runs, until their sender is late by wall time too.
+"""Repetition of offboard setpoints and stick positions in fast runs, until their sender is late by wall time too.
 
-The autopilot counts COM_OF_LOSS_T in simulation time. In a run faster than real time a sender would be lost after a
-fraction of it in wall time: at five times real time a pause of 0.2 s loses 1 s.
+The autopilot counts COM_OF_LOSS_T and COM_RC_LOSS_T in simulation time. In a run faster than real time a sender would
+be lost after a fraction of it in wall time: at five times real time a pause of 0.2 s loses 1 s.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ INTERVAL = 200_000_000  # [ns] of simulation time between two repetitions
 
 
 class SetpointKeeper:
-    """Keeper of the newest offboard setpoint, which repeats it."""
+    """Keeper of the newest setpoint of a sender, which repeats it."""
 
     def __init__(self, clock: Clock, commands: CommandQueue, timeout: Callable[[], float]):
         """Create a keeper without a setpoint; `timeout` returns the time [s] after which setpoints are lost."""

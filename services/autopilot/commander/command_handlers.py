@@ -113,6 +113,8 @@ def mission_start(context: Context, command: Any) -> None:
 @handles("manual")
 def manual(context: Context, command: Any) -> None:
     """Store the sticks of the manual modes."""
+    if not context.state.guidance.takes_sticks:
+        return
     sticks = [max(-1.0, min(1.0, value(command.values, k))) for k in range(4)]
     inputs = context.state.guidance.inputs
     inputs.sticks, inputs.sticks_age = tuple(0.0 if math.isnan(v) else v for v in sticks), 0.0

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
-from lapwing.services.autopilot.commander.commander_input import CommanderInput
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_state import FailsafeTimer, State
 from lapwing.services.autopilot.commander.transitions import Context, enter
 from lapwing.services.common import status_texts
@@ -11,6 +11,9 @@ from lapwing.services.common.autopilot_parameters import DESCEND, HOLD, LAND, RE
 
 _MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend"}
 _SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never replaces a more severe one
+_MANUAL = ("position_control", "altitude_control", "stabilized", "acro")
+_EXEMPTION = {"mission": 1, "offboard": 4} | dict.fromkeys(_MANUAL, 0)  # bit of COM_RCL_EXCEPT by mode
+_AUTO = 2  # bit of the other modes
 _WARNING_TIME = 1.0  # [s] of a condition before the operator is warned
 
 
@@ -18,44 +21,56 @@ class Failsafe(NamedTuple):
     """A condition, its delay, and the parameter of its action."""
 
     reason: str
-    holds: Callable[[CommanderInput, State], bool]
+    holds: Callable[[Context], bool]
     delay: Callable[[dict[str, float]], float]  # of the parameters [s]
     action: str  # parameter
 
 
 def _battery(reason: str, threshold: str, action: str) -> Failsafe:
-    return Failsafe(reason, lambda v, s: v.battery_charge < s.guidance.parameters[threshold], lambda p: 0.5, action)
+    return Failsafe(
+        reason, lambda c: c.view.battery_charge < c.state.guidance.parameters[threshold], lambda p: 0.5, action
+    )
 
 
-def _link_lost(view: CommanderInput, state: State) -> bool:
-    inputs = state.guidance.inputs
-    return inputs.linked and inputs.link_age > state.guidance.parameters["COM_DL_LOSS_T"]
+def _link_lost(context: Context) -> bool:
+    guidance = context.state.guidance
+    return guidance.inputs.linked and guidance.inputs.link_age > guidance.parameters["COM_DL_LOSS_T"]
+
+
+def _sticks_lost(context: Context) -> bool:
+    """Return True if sticks moved by a pilot since arming are lost, as in PX4 unless the mode is exempt.
+
+    Without a position manual modes end by themselves.
+    """
+    guidance, parameters = context.state.guidance, context.state.guidance.parameters
+    if "NAV_RCL_ACT" not in parameters:  # of former logs
+        return False
+    known = guidance.takes_sticks and math.isfinite(guidance.inputs.sticks_age)
+    if not known or guidance.sticks_fresh or context.view.position_lost:
+        return False
+    return not _EXEMPTION.get(context.state.mode_name, _AUTO) & int(parameters["COM_RCL_EXCEPT"])
+
+
+def _offboard_lost(context: Context) -> bool:
+    return context.state.mode_name == "offboard" and not context.state.guidance.offboard_available
+
+
+def _outside_fence(context: Context) -> bool:
+    return not context.state.guidance.allows(context.constants, context.view.estimate.position_world)
 
 
 FAILSAFES = (
     Failsafe(
-        status_texts.POSITION_LOST,
-        lambda v, s: v.position_lost,
-        lambda p: p["COM_POS_FS_DELAY"],
-        "FS_ESTIMATE_ACT",
+        status_texts.POSITION_LOST, lambda c: c.view.position_lost, lambda p: p["COM_POS_FS_DELAY"], "FS_ESTIMATE_ACT"
     ),
-    Failsafe(status_texts.MOTOR_FAILED, lambda v, s: v.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
+    Failsafe(status_texts.MOTOR_FAILED, lambda c: c.view.failed_motor > 0, lambda p: 0.0, "FS_MOTOR_ACT"),
     _battery(status_texts.BATTERY_EMPTY, "BAT_EMERGEN_THR", "FS_BAT_EMER_ACT"),
     _battery(status_texts.BATTERY_CRITICAL, "BAT_CRIT_THR", "FS_BAT_CRIT_ACT"),
     _battery(status_texts.BATTERY_LOW, "BAT_LOW_THR", "FS_BAT_LOW_ACT"),
     Failsafe(status_texts.LINK_LOST, _link_lost, lambda p: 0.0, "NAV_DLL_ACT"),
-    Failsafe(
-        status_texts.SETPOINTS_LOST,
-        lambda v, s: s.mode_name == "offboard" and not s.guidance.offboard_available,
-        lambda p: 0.0,
-        "FS_OFFBOARD_ACT",
-    ),
-    Failsafe(
-        status_texts.FENCE_LEFT,
-        lambda v, s: not s.guidance.fence.allows(*v.estimate.position_world[:2]),
-        lambda p: 0.1,
-        "FS_FENCE_ACT",
-    ),
+    Failsafe(status_texts.STICKS_LOST, _sticks_lost, lambda p: 0.0, "NAV_RCL_ACT"),
+    Failsafe(status_texts.SETPOINTS_LOST, _offboard_lost, lambda p: 0.0, "FS_OFFBOARD_ACT"),
+    Failsafe(status_texts.FENCE_LEFT, _outside_fence, lambda p: 0.1, "FS_FENCE_ACT"),
 )
 
 
@@ -63,7 +78,7 @@ def update(context: Context) -> None:
     """Act on conditions that have lasted for their delay, once until they end."""
     view, state, parameters = context.view, context.state, context.state.guidance.parameters
     for failsafe in FAILSAFES:
-        if not failsafe.holds(view, state):
+        if not failsafe.holds(context):
             state.failsafe_timers.pop(failsafe.reason, None)
             continue
         before, acted = state.failsafe_timers.get(failsafe.reason, FailsafeTimer(0.0, False))
@@ -79,8 +94,7 @@ def update(context: Context) -> None:
 
 def any_holds(context: Context) -> bool:
     """Return True if a condition holds or a timer is running."""
-    view, state = context.view, context.state
-    return bool(state.failsafe_timers) or any(failsafe.holds(view, state) for failsafe in FAILSAFES)
+    return bool(context.state.failsafe_timers) or any(failsafe.holds(context) for failsafe in FAILSAFES)
 
 
 def _act(context: Context, reason: str, mode: str | None) -> bool:
@@ -89,7 +103,7 @@ def _act(context: Context, reason: str, mode: str | None) -> bool:
     if mode is None:
         context.outbox.send_text(reason)
         return True
-    if mode == "descend" and state.guidance.inputs.sticks_fresh:
+    if mode == "descend" and state.guidance.sticks_fresh:
         mode = "altitude_control"  # a pilot holds the sticks
     elif _severity(state) >= _SEVERITY.index(mode):
         return False

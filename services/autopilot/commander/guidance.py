@@ -1,18 +1,18 @@
 """Guidance: the part of the commander's state that flight modes read and change."""
 
-import math
 from dataclasses import dataclass, field
 
 from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
 from lapwing.dynamics.vector import Vec3
+from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.services.autopilot.commander.route import Route
 from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing
 from lapwing.services.common.ports import Setpoint
 
-STICK_TIMEOUT = 1.0  # [s] after which sticks count as centred
 STICK_DEADZONE = 0.05
+_WITHOUT_STICKS = (0, 4)  # COM_RC_IN_MODE: radio only, disabled
 
 
 @dataclass
@@ -33,16 +33,6 @@ class OperatorInputs:
         self.offboard_age += dt
         self.link_age += dt
         self.sticks_age += dt
-
-    @property
-    def sticks_fresh(self) -> bool:
-        """True if stick positions are recent."""
-        return self.sticks_age < STICK_TIMEOUT
-
-    def stick(self, index: int) -> float:
-        """Return a stick position, -1 to 1; 0 within the dead zone or without recent sticks."""
-        deflection = self.sticks[index]
-        return deflection if self.sticks_fresh and abs(deflection) >= STICK_DEADZONE else 0.0
 
 
 @dataclass
@@ -97,9 +87,39 @@ class Guidance:
         return self.home[2] + constants.resting_height + self.parameters[parameter]
 
     @property
+    def home_distances(self) -> tuple[float, float]:
+        """Maximum horizontal and vertical distance from home [m]; 0: any."""
+        p = self.parameters
+        return p.get("GF_MAX_HOR_DIST", 0.0), p.get("GF_MAX_VER_DIST", 0.0)  # absent from former logs
+
+    def allows(self, constants: Constants, position_world: Vec3) -> bool:
+        """Return True if the fence and the maximum distances from home allow a position [m]."""
+        (x, y, z), (horizontal, vertical) = position_world, self.home_distances
+        if 0.0 < horizontal <= math.dist((x, y), self.home[:2]):
+            return False
+        if 0.0 < vertical <= z - constants.resting_height - self.home[2]:
+            return False
+        return self.fence.allows(x, y)
+
+    @property
     def offboard_available(self) -> bool:
         """True if offboard setpoints are recent."""
         return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
+
+    @property
+    def takes_sticks(self) -> bool:
+        """True if stick positions are used."""
+        return self.parameters.get("COM_RC_IN_MODE", 1.0) not in _WITHOUT_STICKS  # absent from former logs
+
+    @property
+    def sticks_fresh(self) -> bool:
+        """True if stick positions are recent."""
+        return self.inputs.sticks_age < self.parameters.get("COM_RC_LOSS_T", 1.0)  # absent from former logs
+
+    def stick(self, index: int) -> float:
+        """Return a stick position, -1 to 1; 0 within the dead zone or without recent sticks."""
+        deflection = self.inputs.sticks[index]
+        return deflection if self.sticks_fresh and abs(deflection) >= STICK_DEADZONE else 0.0
 
     def lift_off(self, constants: Constants, view: CommanderInput) -> None:
         """Start the flight at the estimated position if armed and on the ground."""

@@ -38,6 +38,8 @@ def arm(context: Context) -> None:
     """Arm and set home."""
     guidance = context.state.guidance
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
+    if not guidance.sticks_fresh:
+        guidance.inputs.sticks_age = math.inf  # lost at arming: optional until they return, as in PX4
     x, y, z = context.view.estimate.position_world
     guidance.home = (x, y, z - context.constants.resting_height)
     context.outbox.send_text(status_texts.ARMED)

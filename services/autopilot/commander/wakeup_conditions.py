@@ -32,12 +32,14 @@ def time_without_changes(context: Context) -> float:
     state = context.state
     guidance = state.guidance
     counts = state.pending_arm is not None or bool(guidance.route.items)  # mission_state depends on flying
-    if not state.on_trajectory or counts or failsafes.any_holds(context):
+    moves_away = any(guidance.home_distances)  # any tick may be the first outside
+    if not state.on_trajectory or counts or moves_away or failsafes.any_holds(context):
         return 0.0
     inputs, parameters = guidance.inputs, guidance.parameters
     link_left = parameters["COM_DL_LOSS_T"] - inputs.link_age if inputs.linked else math.inf
     setpoints_left = parameters["COM_OF_LOSS_T"] - inputs.offboard_age if guidance.offboard_available else math.inf
-    return min(link_left, setpoints_left)
+    sticks_left = parameters.get("COM_RC_LOSS_T", math.inf) - inputs.sticks_age if guidance.sticks_fresh else math.inf
+    return min(link_left, setpoints_left, sticks_left)
 
 
 @always_inline

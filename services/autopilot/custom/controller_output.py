@@ -118,6 +118,7 @@ def command(
         shares, w = active_allocation(law.shares, failed), requested.wrench
         part = 1.0 / lift
         demands = VirtualControls(part * w[0], w[1] / moments[0], w[2] / moments[1], w[3] / moments[2])
-        thrust = clamp_to_range(mix(shares, saturate(shares, demands, law.thrust_max)), law.thrust_max)
+        possible = saturate(shares, demands, law.thrust_max, law.airmode)
+        thrust = clamp_to_range(mix(shares, possible), law.thrust_max)
         volts = voltages(law.motor, thrust)
     return Command(volts, thrust, requested.roll_pitch[0], requested.roll_pitch[1], yaw, False)

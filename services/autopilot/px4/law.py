@@ -10,7 +10,15 @@ from lapwing.kernels.codegen import map_tuple
 from lapwing.services.autopilot.allocation import tables_for_failures
 from lapwing.services.autopilot.control import Command, sign
 from lapwing.services.autopilot.controller_parameters import Airframe, hover_thrust, moments, shares
-from lapwing.services.autopilot.mixer import Shares, VirtualControls, active_allocation, clamp_to_range, mix, saturate
+from lapwing.services.autopilot.mixer import (
+    Shares,
+    VirtualControls,
+    active_allocation,
+    airmode,
+    clamp_to_range,
+    mix,
+    saturate,
+)
 from lapwing.services.autopilot.motor import Motor, thrust_at, thrusts_at
 from lapwing.services.autopilot.px4 import attitude, position, rates
 from lapwing.services.common.ports import Setpoint, StateEstimate
@@ -29,6 +37,7 @@ class Parameters(NamedTuple):
     thrust_model: float  # THR_MDL_FAC: 0: signal proportional to thrust setpoint, 1: to its square root
     scale: Vec3  # virtual controls over normalised torque
     shares: tuple[Shares, ...]  # with all rotors, then with each one failed
+    airmode: int  # see `mixer.saturate`
     motor: Motor
     voltage_max: float  # [V] of a full signal
 
@@ -128,6 +137,7 @@ def build(values: Mapping[str, float], airframe: Airframe) -> Parameters:
         thrust_model=thrust_model,
         scale=normalisation(airframe),
         shares=tables_for_failures(shares(airframe), values),
+        airmode=airmode(values),
         motor=airframe.motor,
         voltage_max=airframe.voltage_max,
     )
@@ -189,7 +199,7 @@ def step(
 
     table = active_allocation(p.shares, failed)
     demand = VirtualControls(norm(thrust), p.scale[0] * torque[0], p.scale[1] * torque[1], p.scale[2] * torque[2])
-    saturated = saturate(table, demand, 1.0)
+    saturated = saturate(table, demand, 1.0, p.airmode)
     cut = (sign(demand.roll - saturated.roll), sign(demand.pitch - saturated.pitch), sign(demand.yaw - saturated.yaw))
     parts = clamp_to_range(mix(table, saturated), 1.0)
     volts = map_tuple(_volts, p, parts, parts)

@@ -1,5 +1,6 @@
 """ArduPilot's copter: modes by number; whole numbers travel as floats of the same value."""
 
+import math
 from collections.abc import Sequence
 
 from lapwing.services.common.mavlink.dialect import mavlink
@@ -72,4 +73,4 @@ def param_float(value: float, integer: bool) -> float:
 
 def param_value(value: float, integer: bool) -> float:
     """Return a parameter's value decoded from a message."""
-    return float(round(value)) if integer else value
+    return float(round(value)) if integer and math.isfinite(value) else value

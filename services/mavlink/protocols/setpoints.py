@@ -138,7 +138,7 @@ def manual_control(session: Session, m: Any) -> None:
     """Handle MANUAL_CONTROL: joystick axes -1000 to 1000 forward, right and yaw right, throttle 0 to 1000."""
     values = (_stick(m.x), -_stick(m.y), _stick(2.0 * (m.z - CENTRE)), -_stick(m.r))
     if session.trusted:
-        session.command("manual", values)
+        session.sticks(values)
 
 
 def _stick(value: float) -> float:

@@ -15,7 +15,7 @@ from lapwing.services.autopilot.allocation import (
     tilted_effectiveness,
     virtual_control_effectiveness,
 )
-from lapwing.services.autopilot.mixer import VirtualControls, mix, saturate
+from lapwing.services.autopilot.mixer import AIRMODE_ROLL_PITCH, VirtualControls, mix, saturate
 
 TOP, YAW = 10.0, 0.02  # [N], [m]
 HALF = 0.5 * np.pi
@@ -117,7 +117,7 @@ ANY = st.floats(-30.0, 30.0)
 @settings(deadline=None, max_examples=300)
 def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, roll, pitch, yaw, shares):
     expected = VirtualControls(collective, roll, pitch, yaw)
-    result = saturate(shares, expected, TOP)
+    result = saturate(shares, expected, TOP, AIRMODE_ROLL_PITCH)
     thrust = np.array(mix(shares, result))
     assert thrust.min() >= -1e-9
     assert thrust.max() <= TOP + 1e-9

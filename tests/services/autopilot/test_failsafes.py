@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import REJECTED, UP, at, command, fly, height, mode, place, results, said
+from flights import ACCEPTED, REJECTED, UP, at, command, fly, height, item, mode, place, results, said
 
 from lapwing.services.scene_resolver import load
 from tests.cosim import memory_log
@@ -112,7 +112,66 @@ def test_position_loss_hands_over_to_manual_control():
     assert "goto: the position is lost" in said(flight)
     assert place(flight, 20.0)[0] > 2.0  # forward
     assert mode(flight, 23.0) == "descend"  # the sticks were let go of
-    assert mode(flight, 26.0) == "hold"  # there is a position again, and an operator
+    assert mode(flight, 26.0) == "return"  # there is a position again, but no sticks
+
+
+STICKS = UP | {(5.0, 7.0): [command("manual", 0.0, 0.0, 0.0, 0.0)]}  # centred
+
+
+@pytest.mark.parametrize(
+    ("mode_name", "settings", "after"),
+    [
+        ("position_control", [], "return"),
+        ("position_control", ["COM_RC_LOSS_T=3.0"], "position_control"),
+        ("position_control", ["NAV_RCL_ACT=3", "COM_RCL_EXCEPT=31"], "land"),  # it needs sticks
+        ("hold", ["NAV_RCL_ACT=3"], "land"),
+        ("hold", ["COM_RCL_EXCEPT=5"], "return"),
+        ("hold", ["COM_RCL_EXCEPT=2"], "hold"),
+        ("hold", ["COM_RC_IN_MODE=4"], "hold"),
+    ],
+)
+def test_lost_sticks_act_by_mode(mode_name, settings, after):
+    flight = fly(9, STICKS | {4.9: [command(mode_name)]}, *[f"autopilot.parameters.{text}" for text in settings])
+    assert mode(flight, 7.8) == mode_name
+    assert mode(flight, 8.4) == ("land" if after == "return" else after)  # home is below
+    assert (f"the sticks are lost: {after}" in said(flight)) == (after != mode_name)
+
+
+@pytest.mark.parametrize(("exempt", "after"), [(0, "return"), (6, "return"), (1, "mission")])
+def test_lost_sticks_in_mission_act_unless_exempt(exempt, after):
+    items = [item("takeoff", z=3.0), item("waypoint", 30.0, 0.0, 3.0)]
+    script = {0.04: [command("mission_upload", items=items), command("mission_start")]}
+    script[(1.0, 4.0)] = [command("manual", 0.0, 0.0, 0.0, 0.0)]
+    flight = fly(6, script, f"autopilot.parameters.COM_RCL_EXCEPT={exempt}")
+    assert (mode(flight, 4.8), mode(flight, 5.5)) == ("mission", after)
+
+
+def test_sticks_lost_at_arming_are_optional():
+    script = {0.04: [command("manual", 0.0, 0.0, 0.0, 0.0)], 3.0: [command("takeoff", 3.0), command("arm")]}
+    flight = fly(8, script)
+    assert not at(flight, "status", 8.0, lambda m: m.failsafe)
+    assert height(flight, 8.0) > 2.0
+
+
+def test_maximum_distances_from_home_are_fence():
+    limits = [f"autopilot.parameters.{text}" for text in ("GF_MAX_HOR_DIST=5", "GF_MAX_VER_DIST=6", "FS_FENCE_ACT=1")]
+    places = {
+        5.0: [command("goto", 5.5, 0.0, 3.0, id=1), command("goto", 3.0, 0.0, 6.5, id=2)],
+        5.1: [command("goto", 0.0, 4.0, 5.0, id=3), command("position_control")],
+    }
+    flight = fly(12, UP | places | {(5.2, 12.0): [command("manual", 0.6, 0.0, 0.0, 0.0)]}, *limits)
+    assert [results(flight)[k] for k in (1, 2, 3)] == [REJECTED, REJECTED, ACCEPTED]
+    assert "the vehicle has left the fence: hold" in said(flight)
+    assert 5.0 < np.hypot(*place(flight, 12.0)[:2]) < 9.0
+    rising = UP | {5.1: [command("position_control")], (5.2, 12.0): [command("manual", 0.0, 0.0, 0.5, 0.0)]}
+    assert 6.35 < height(fly(12, rising, *limits), 12.0) < 8.0
+
+
+def test_maximum_height_ends_trajectory_of_scene():
+    limits = "autopilot.parameters.GF_MAX_VER_DIST=0.5", "autopilot.parameters.FS_FENCE_ACT=1"
+    flight = fly(6, {}, *limits, operated=False)
+    modes = [name for name, _ in groupby(flight.column("status", lambda m: m.mode))]
+    assert modes == ["mission", "hold"]
 
 
 def test_trajectory_ends_when_position_returns_without_operator():

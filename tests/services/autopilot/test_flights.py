@@ -202,7 +202,7 @@ def test_by_hand_from_ground_in_stabilized_and_acro():
     assert math.degrees(pitch(flight, 4.9)) == pytest.approx(0.0, abs=1.0)
     assert at(flight, "estimate", 5.0, lambda m: m.pose.orientation.z) == pytest.approx(math.sin(0.18), abs=0.03)
     assert math.degrees(roll(flight, 7.0)) == pytest.approx(-0.15 * 100.0 * 0.55, abs=3.0)  # to the left, and kept
-    assert mode(flight, 9.4) == "hold"  # nobody holds the sticks
+    assert mode(flight, 9.4) == "return"  # nobody holds the sticks
 
 
 def test_body_rate_setpoints_tilt_and_turn():

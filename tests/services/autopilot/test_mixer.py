@@ -7,7 +7,7 @@ from scipy.optimize import linprog
 
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import load
-from lapwing.services.autopilot.mixer import VirtualControls, mix, saturate
+from lapwing.services.autopilot.mixer import AIRMODE_ROLL_PITCH, VirtualControls, mix, saturate
 
 SHARES = build(load("paper"), AIRFRAME).shares[0]
 TOP = 48.0
@@ -45,7 +45,7 @@ def test_lift_causes_no_torque():
 @example(2.0, -2.0, -2.0, -2.0)  # possible with this yaw only: the collective makes room for the tilt alone
 def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll, pitch, yaw):
     expected = VirtualControls(collective, roll, pitch, yaw)
-    given_ = saturate(SHARES, expected, TOP)
+    given_ = saturate(SHARES, expected, TOP, AIRMODE_ROLL_PITCH)
     thrust = mix(SHARES, given_)
     assert min(thrust) >= -1e-9
     assert max(thrust) <= TOP + 1e-9
@@ -58,7 +58,7 @@ def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll,
 @given(st.floats(0.0, 48.0), st.floats(-12.0, 12.0), st.floats(-12.0, 12.0), ANY)
 @settings(deadline=None)
 def test_yaw_gets_remaining_range(collective, roll, pitch, yaw):
-    given_ = saturate(SHARES, VirtualControls(collective, roll, pitch, yaw), TOP)
+    given_ = saturate(SHARES, VirtualControls(collective, roll, pitch, yaw), TOP, AIRMODE_ROLL_PITCH)
     assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
     bare = mix(SHARES, given_._replace(yaw=0.0))
     shares = [s[3] for s in SHARES]

@@ -1,5 +1,6 @@
 """Parameters: the autopilot's, and the facts that PX4's ground stations ask for; changes reach every station."""
 
+import math
 import struct
 
 import pytest
@@ -64,7 +65,7 @@ def test_ground_station_requires_no_setup():
     result = facts("lapwing/scenes/groundstation.toml")
     assert result["SYS_AUTOSTART"] == 4001
     assert all(result[f"CAL_{name}0_ID"] for name in ("GYRO", "ACC", "MAG"))
-    assert result["COM_RC_IN_MODE"] == 1
+    assert table(load("lapwing/scenes/groundstation.toml"))["COM_RC_IN_MODE"].default == 1.0
     assert (result["BAT1_N_CELLS"], result["BAT1_V_EMPTY"]) == (12, 3.0)
 
 
@@ -102,12 +103,12 @@ def test_facts_are_listed_with_parameters_and_cannot_be_set():
 def test_parameter_change_is_broadcast_with_dependent_facts():
     bench = Bench()
     one, two = bench.station(), bench.station(system=254)
-    assert integer(read(two, "NAV_RCL_ACT")) == 2  # return, as for the data link
+    assert integer(read(two, "GF_ACTION")) == 3  # return
     two.got.clear()
     three = struct.unpack("<f", struct.pack("<i", 3))[0]
-    one.send("param_set", 1, 1, b"NAV_DLL_ACT", three, mavlink.MAV_PARAM_TYPE_INT32)
+    one.send("param_set", 1, 1, b"FS_FENCE_ACT", three, mavlink.MAV_PARAM_TYPE_INT32)
     bench.step(3)
-    twice = 2 * [("NAV_DLL_ACT", 3), ("NAV_RCL_ACT", 3)]  # as PX4 does: MAVSDK's subscriptions rely on it
+    twice = 2 * [("FS_FENCE_ACT", 3), ("GF_ACTION", 5)]  # as PX4 does: MAVSDK's subscriptions rely on it
     assert [(m.param_id, integer(m)) for m in two.all("PARAM_VALUE")] == twice
     assert [(m.param_id, integer(m)) for m in one.all("PARAM_VALUE")] == twice
 
@@ -130,12 +131,9 @@ def set_whole(bench, station, name, value):
         ("GF_ACTION", 5, {"FS_FENCE_ACT": 3}),
         ("COM_LOW_BAT_ACT", 0, {"FS_BAT_CRIT_ACT": 0, "FS_BAT_EMER_ACT": 0}),
         ("COM_LOW_BAT_ACT", 2, {"FS_BAT_CRIT_ACT": 3, "FS_BAT_EMER_ACT": 3}),
-        ("NAV_RCL_ACT", 1, {"NAV_DLL_ACT": 1}),
         ("COM_ACT_FAIL_ACT", 3, {"FS_MOTOR_ACT": 2}),
         ("COM_ACT_FAIL_ACT", 1, {"FS_MOTOR_ACT": 1}),
-        ("COM_RCL_EXCEPT", 7, {}),
         ("RTL_APPR_FORCE", 1, {}),
-        ("MC_AIRMODE", 1, {}),
     ],
 )
 def test_px4_parameter_sets_its_counterparts(name, value, counterparts):
@@ -149,7 +147,7 @@ def test_px4_parameter_sets_its_counterparts(name, value, counterparts):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("GF_ACTION", 4), ("COM_LOW_BAT_ACT", 1), ("COM_RCL_EXCEPT", 32), ("MC_AIRMODE", 0)]
+    ("name", "value"), [("GF_ACTION", 4), ("COM_LOW_BAT_ACT", 1), ("COM_ACT_FAIL_ACT", 4), ("RTL_APPR_FORCE", 2)]
 )
 def test_px4_value_without_counterpart_is_rejected(name, value):
     bench = Bench()
@@ -182,6 +180,28 @@ def test_rejected_value_is_reported_to_sender_only():
     bench.step(3)
     assert one.last("PARAM_VALUE").param_value == pytest.approx(2.5)
     assert two.last("PARAM_VALUE") is None
+
+
+@pytest.mark.parametrize("name", ["NAV_DLL_ACT", "MIS_TAKEOFF_ALT", "GF_ACTION", "SYS_AUTOSTART"])
+def test_parameter_of_other_type_is_rejected(name):
+    bench = Bench()
+    station = bench.station()
+    before = read(station, name)
+    other = ({mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32} - {before.param_type}).pop()
+    station.send("param_set", 1, 1, name.encode(), 1.0, other)
+    bench.step(3)
+    assert station.last("PARAM_ERROR").error == 7  # MAV_PARAM_ERROR_TYPE_MISMATCH
+    assert station.last("PARAM_VALUE").param_value == before.param_value
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e9])
+def test_ardupilot_rejects_integer_that_is_none(value):
+    bench = Bench("mavlink.firmware=ardupilot")
+    station = bench.station()
+    station.send("param_set", 1, 1, b"NAV_DLL_ACT", value, mavlink.MAV_PARAM_TYPE_REAL32)
+    bench.step(3)
+    assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert station.last("PARAM_VALUE").param_value == 2.0
 
 
 def test_ardupilot_has_none_of_px4s():

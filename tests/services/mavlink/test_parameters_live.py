@@ -1,5 +1,6 @@
 """PX4's parameters set over a real MAVLink connection to a running process, and their effects."""
 
+import math
 import struct
 import subprocess
 import sys
@@ -13,12 +14,26 @@ from lapwing.services.common.mavlink.dialect import mavlink
 pytestmark = pytest.mark.long
 
 WAIT = 300.0  # [s] for a message on a busy machine
+INTEGER, REAL = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
+OUT_OF_RANGE, TYPE_MISMATCH = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE, 7
+
+
+def as_float(value):
+    """Return an integer as in the float field of PX4's messages."""
+    return struct.unpack("<f", struct.pack("<i", value))[0]
+
+
+def lapwing(*arguments):
+    """Run a command, and return its output."""
+    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=True).stdout
 
 
 class Station:
     """Ground station of a run."""
 
-    def __init__(self, port):
+    def __init__(self, port, process):
+        self.process = process
         self.link = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
         self.receive("HEARTBEAT")
         self.link.mav.heartbeat_send(6, 8, 0, 0, 0)
@@ -33,10 +48,22 @@ class Station:
 
     def set(self, name, value):
         """Set a parameter of integers, and return the value that the vehicle confirms."""
-        bits = struct.unpack("<f", struct.pack("<i", value))[0]
-        self.link.mav.param_set_send(1, 1, name.encode(), bits, mavlink.MAV_PARAM_TYPE_INT32)
+        self.link.mav.param_set_send(1, 1, name.encode(), as_float(value), mavlink.MAV_PARAM_TYPE_INT32)
         message = self.receive("PARAM_VALUE", lambda m: m.param_id == name)
         return struct.unpack("<i", struct.pack("<f", message.param_value))[0]
+
+    def error(self, name, value, kind):
+        """Set a parameter, and return the error that the vehicle reports."""
+        self.link.mav.param_set_send(1, 1, name.encode(), value, kind)
+        return self.receive("PARAM_ERROR", lambda m: m.param_id == name).error
+
+    def take_off(self):
+        """Arm when the vehicle is ready, and climb."""
+        ready = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        self.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
+        assert self.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+        assert self.command(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
+        return self.receive("GLOBAL_POSITION_INT", lambda m: m.relative_alt > 2000)
 
     def command(self, number, *params):
         """Send a command, and return its final result."""
@@ -51,7 +78,7 @@ def station(tmp_path):
     command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--mavlink", f"udpout:127.0.0.1:{port}"]
     command += ["--speed", "5", "--key-prefix", "test-px4-parameters", "--log", str(tmp_path / "flight.mcap")]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
-        result = Station(port)
+        result = Station(port, process)
         yield result
         process.terminate()
         process.wait(WAIT)
@@ -74,13 +101,8 @@ def test_detection_of_motor_failures_is_switched_in_flight(station):
     critical, armed = mavlink.MAV_STATE_CRITICAL, mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     assert station.set("FD_ACT_EN", 0) == 0
     assert station.set("CA_FAILURE_MODE", 0) == 0
-    assert station.set("MC_AIRMODE", 1) == 1
     assert station.set("RTL_APPR_FORCE", 0) == 0
-    ready = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
-    assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-    assert station.command(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
-    now = station.receive("GLOBAL_POSITION_INT", lambda m: m.relative_alt > 2000).time_boot_ms
+    now = station.take_off().time_boot_ms
     assert (
         station.command(
             mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_WRONG, 1.0
@@ -93,3 +115,46 @@ def test_detection_of_motor_failures_is_switched_in_flight(station):
         assert m.get_type() != "HEARTBEAT" or (m.system_status != critical and m.base_mode & armed)
     assert station.set("FD_ACT_EN", 1) == 1
     station.receive("HEARTBEAT", lambda m: m.system_status == critical)
+
+
+WHOLE = (
+    "MC_AIRMODE CA_FAILURE_MODE FD_ACT_EN COM_RCL_EXCEPT NAV_RCL_ACT GF_ACTION COM_LOW_BAT_ACT COM_ACT_FAIL_ACT "
+    "RTL_APPR_FORCE SIM_GPS_USED COM_RC_IN_MODE"
+)
+
+
+def test_hostile_values_are_answered_by_errors(station):
+    for name in WHOLE.split():
+        for value in (-1, 99, 2**31 - 1, -(2**31)):
+            assert station.error(name, as_float(value), INTEGER) == OUT_OF_RANGE
+        for value in (math.nan, 1.0):
+            assert station.error(name, value, REAL) == TYPE_MISMATCH
+    for name in ("COM_RC_LOSS_T", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST"):
+        for value in (math.nan, math.inf, -math.inf, -1.0, 1e9):
+            assert station.error(name, value, REAL) == OUT_OF_RANGE
+        assert station.error(name, as_float(3), INTEGER) == TYPE_MISMATCH
+    assert station.error("SYS_AUTOSTART", as_float(1), INTEGER) == mavlink.MAV_PARAM_ERROR_READ_ONLY
+    station.receive("HEARTBEAT")
+
+
+def test_air_mode_fence_and_sticks_act_and_are_saved(station, tmp_path):
+    assert station.set("MC_AIRMODE", 0) == 0
+    assert station.set("NAV_RCL_ACT", 3) == 3
+    station.take_off()
+    assert station.set("MC_AIRMODE", 2) == 2
+    assert station.set("GF_ACTION", 2) == 2
+    station.link.mav.param_set_send(1, 1, b"GF_MAX_VER_DIST", 1.0, REAL)
+    station.receive("STATUSTEXT", lambda m: m.text.startswith("the vehicle has left the fence: hold"))
+    station.link.mav.manual_control_send(1, 0, 0, 500, 0, 0)  # once: then the sticks are lost
+    station.receive("STATUSTEXT", lambda m: m.text.startswith("the sticks are lost: land"))
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    station.receive("HEARTBEAT", lambda m: not m.base_mode & armed)
+    station.process.terminate()
+    station.process.wait(WAIT)
+    saved, log = tmp_path / "saved.params", tmp_path / "next.mcap"
+    lapwing("parameters", tmp_path / "flight.mcap", "--save", saved)
+    following = ["--set", f"autopilot.parameters={saved}", "--set", "run.duration=0.2"]
+    lapwing("run", "groundstation", "--mode", "single-process", *following, "--log", log)
+    printed = [line.split()[:2] for line in lapwing("parameters", log).splitlines()]
+    assert ["MC_AIRMODE", "2"] in printed
+    assert ["NAV_RCL_ACT", "3"] in printed

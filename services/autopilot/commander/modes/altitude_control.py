@@ -19,14 +19,14 @@ class Mode(FlightMode):
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Follow the sticks; change mode without recent sticks."""
-        forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
+        forward, left, up, yaw = (guidance.stick(k) for k in range(4))
         if up > 0.0:
             guidance.lift_off(constants, view)
         if not guidance.flying:
             self._flight = None
             return None
         self._flight = self._flight or AltitudeFlight(guidance)
-        if not guidance.inputs.sticks_fresh:
+        if not guidance.sticks_fresh:
             self.next_mode = "descend" if view.position_lost else "hold"
         limits, tilt = guidance.manual_limits, guidance.manual_tilt
         climb_rate = up * (limits.up if up > 0.0 else limits.down)

@@ -19,7 +19,7 @@ class Mode(FlightMode):
         self._target = fill_in(guidance.smoothing.position, vector(values, 0))
         if not all(map(math.isfinite, self._target)) or self._target[2] <= constants.resting_height:
             raise ValueError("go to: expected a place above the ground")
-        if not guidance.fence.allows(self._target[0], self._target[1]):
+        if not guidance.allows(constants, self._target):
             raise ValueError("go to: the place is outside of the fence")
         self._leg = Leg(guidance.smoothing.position, self._target)
         self._yaw, speed = value(values, 3), value(values, 4)

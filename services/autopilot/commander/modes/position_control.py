@@ -18,7 +18,7 @@ class Mode(FlightMode):
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Follow the sticks; hold the position when they are centred."""
-        forward, left, up, yaw = (guidance.inputs.stick(k) for k in range(4))
+        forward, left, up, yaw = (guidance.stick(k) for k in range(4))
         if not guidance.armed:
             return
         if up > 0.0:

@@ -22,14 +22,14 @@ class Mode(FlightMode):
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
         """Follow the sticks; change mode without recent sticks."""
-        forward, left, up, turn = (guidance.inputs.stick(k) for k in range(4))
+        forward, left, up, turn = (guidance.stick(k) for k in range(4))
         thrust = stick_thrust(constants, up)
         if not guidance.flying:
             if guidance.armed and thrust > constants.hover_thrust:
                 guidance.lift_off(constants, view)
             self._flight = None
             return None
-        if not guidance.inputs.sticks_fresh:
+        if not guidance.sticks_fresh:
             self.next_mode = "descend" if view.position_lost else "hold"
         self._flight = self._flight or AttitudeFlight(view)
         rate = self._turn(view, guidance, forward, left, turn, self._flight)
