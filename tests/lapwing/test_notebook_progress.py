@@ -4,6 +4,7 @@ import os
 import re
 
 import pytest
+
 from tests.lapwing.test_work_progress import CALLS, SLOW
 
 nbclient = pytest.importorskip("nbclient")
