@@ -10,7 +10,7 @@ from lapwing.studies.report.sections import labels
 
 
 def cover(flights: Sequence[FlightData]) -> Cover:
-    """Return title, outcomes, table of errors and facts of one flight or of two, and the keys in which two scenes differ."""
+    """Return title, outcomes, table of errors and facts of one flight or of two, with the keys that differ."""
     scenes = [flight.origin.scene for flight in flights]
     names, published = labels(flights), scenes[0].get("published", {})
     many = len(flights) > 1
