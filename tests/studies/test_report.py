@@ -589,3 +589,11 @@ def test_thinning_line_keeps_its_peaks_and_ends(count):
     assert (drawn_t[0], drawn_t[-1]) == (0.0, 1.0)
     assert set(zip(drawn_t, drawn_y, strict=True)) <= set(zip(t, y, strict=True))
     assert (drawn_y.max(), drawn_y.min()) == (9.0, -9.0)
+
+
+def test_labelled_axis_has_room_for_numbers_of_many_digits():
+    line = Line(np.arange(50.0), 4.9e-4 + 1e-7 * np.arange(50.0))
+    panels = tuple(Panel((line,), label, timed=False, column=k) for k, label in enumerate(("position [m]", "")))
+    layout = figure(Plot(panels, "", 3.0))["layout"]
+    assert layout["yaxis"]["automargin"]
+    assert "automargin" not in layout["yaxis2"]
