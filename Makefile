@@ -10,11 +10,11 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints. Byte code is compiled on import: most modules are never imported.
-INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --no-compile
 PINNED := $(INSTALL) --constraint $(VENV)/versions.txt --editable
 $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	@echo "installing the pinned packages into $(VENV) (once, 1 to 3 minutes)"
+	@echo "installing the pinned packages into $(VENV) (once)"
 	$(INSTALL) --require-hashes --requirement deploy/requirements.lock
 	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' deploy/requirements.lock > $(VENV)/versions.txt
 	$(PINNED) ".[dev]"

@@ -132,12 +132,13 @@ def campaign(
     def one(run: int) -> Flight:
         return _fly(setup(run))
 
-    with WorkProgress(f"campaign {base.name}", len(seeds), "flights") as bar:
+    workers = cpu_count() or 1
+    with WorkProgress(f"campaign {base.name}", len(seeds), "flights", workers) as bar:
         first = setup(0)
-        with notify_on_compile(first, bar.compiling, alone=False):
+        with notify_on_compile(first, bar.compiling):
             flights = [_fly(first)]  # alone: it compiles
         bar.show(1)
-        with ThreadPoolExecutor(cpu_count()) as pool:
+        with ThreadPoolExecutor(workers) as pool:
             for flight in pool.map(one, range(1, len(seeds))):
                 flights.append(flight)
                 bar.show(len(flights))
@@ -152,11 +153,10 @@ def _fly_with_bar(setup: RunConfig) -> Flight:
     """Fly with a progress bar, which appears if the flight takes long."""
     with (
         WorkProgress(setup.scene, setup.last_tick * setup.interval, "s") as bar,
-        notify_on_compile(setup, bar.compiling, alone=False) as compiling,
+        notify_on_compile(setup, bar.compiling),
     ):
 
         def observe(tick: int) -> None:
-            compiling.stop()
             bar.show(tick * setup.interval)
 
         return simulate.fly(setup, kind=Flight, observe=observe)

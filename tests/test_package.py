@@ -1,7 +1,11 @@
-"""Package data: what is not Python and belongs into a wheel is declared."""
+"""Package data that is not Python is declared; `make` shows the steps of its set-up."""
 
+import shutil
+import subprocess
 import tomllib
 from pathlib import Path
+
+import pytest
 
 from lapwing.kernels.compiler.cache_files import SHIPPED
 
@@ -20,3 +24,12 @@ def test_package_data_covers_data_files():
 
 def test_package_data_covers_shipped_kernels():
     assert f"{SHIPPED.relative_to(ROOT / 'lapwing')}/**/*" in SETUPTOOLS["package-data"]["lapwing"]
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
+def test_set_up_shows_its_steps_and_guesses_no_time(tmp_path):
+    command = ["make", "--dry-run", "mission", f"VENV={tmp_path}/venv"]
+    lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert "-m pip install" in lines
+    assert "quiet" not in lines
+    assert "minute" not in lines

@@ -77,6 +77,7 @@ def campaign(
     from lapwing.studies.campaign.plan import plan
     from lapwing.studies.campaign.results import Results
     from lapwing.studies.terminal import console
+    from lapwing.studies.workers import cores
 
     with user_errors(), foreign_code.permission(allow_code):
         if workers is not None and workers < 1:
@@ -111,7 +112,8 @@ def campaign(
         folder = begin(out or default_path(campaign_manifest), campaign_plan, campaign_manifest)
         claim_folder(folder.path, shared=shard is not None)
         part = _part(shard, len(folder.shards))
-        _fly(screen, folder, first, _workers(screen, cluster, workers, folder), ci_half_width, part)
+        number = 0 if cluster else min(workers or cores(), len(folder.missing()))
+        _fly(screen, folder, first, _workers(screen, cluster, number), number, ci_half_width, part)
         if shard is not None and folder.missing():
             screen.print(f"{folder.path}: part {shard} complete, {len(folder.missing())} shards missing")
             return
@@ -166,14 +168,13 @@ def _part(shard: str | None, shards: int) -> range | None:
     return range(int(i) - 1, shards, int(n))
 
 
-def _workers(screen: "Console", cluster: str | None, count: int | None, folder: "Folder") -> "Workers":
+def _workers(screen: "Console", cluster: str | None, number: int) -> "Workers":
     from lapwing.studies import workers
 
     if cluster is not None:
         from lapwing.studies.campaign.cluster import dask
 
         return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
-    number = min(count or workers.cores(), len(folder.missing()))
     return workers.here if number <= 1 else workers.processes(number)
 
 
@@ -182,6 +183,7 @@ def _fly(
     folder: "Folder",
     first: "Reference",
     workers: "Workers",
+    parallel: int,
     until: float | None,
     part: range | None,
 ) -> None:
@@ -193,7 +195,7 @@ def _fly(
 
     start, previous = time.monotonic(), -1
     own_runs = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
-    with StudyProgress(screen, LINES) as progress:
+    with StudyProgress(screen, "flights", parallel, LINES, until is not None) as progress:
 
         def say(count: Count) -> None:
             nonlocal previous

@@ -54,7 +54,7 @@ def validate(
         check_distinct({"--json": json, "--report": report})
         claim(json)
         claim_named("--report", report, ".html")
-        with step_progress(console()) as say:
+        with step_progress(console(), "steps") as say:
             memory = TrimMemory(trim_force, trim_torque)
             result = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
         console_output.show(console(), result)
@@ -109,7 +109,7 @@ def identify(
         claim(out)
         claim(json)
         memory, progress = TrimMemory(trim_force, trim_torque), out.with_name(f"{out.name}.progress")
-        with step_progress(console()) as say:
+        with step_progress(console(), "steps") as say:
             result = procedure.identify(
                 scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
             )

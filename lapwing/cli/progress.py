@@ -7,40 +7,29 @@ from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
-from rich.progress_bar import ProgressBar
 from rich.text import Text
 
 from lapwing.messages import PoseStamped, Status
 from lapwing.runs.compile_notice import Compilation
-from lapwing.runs.work_progress import NEARLY, TimeLeft
+from lapwing.runs.work_progress import TimeLeft
 
 LINE_PERIOD = 2.0  # [s] of wall time between two lines if the output is not a terminal
 
 
 class _Factor(ProgressColumn):
     def render(self, task: Task) -> Text:
-        if task.fields.get("guess"):
+        if task.total is None:  # compiling
             return Text("")
         return Text(f"{task.completed / task.elapsed:5.1f}x" if task.elapsed else "    -x")
 
 
 class _Done(ProgressColumn):
-    """Show the progress: simulated seconds, or seconds of the estimate while kernels compile."""
+    """Show the progress: simulated seconds, or elapsed seconds while kernels compile."""
 
     def render(self, task: Task) -> Text:
-        if guess := task.fields.get("guess"):
-            return Text(f"{task.elapsed or 0.0:4.0f} of about {guess:.0f} s")
+        if task.total is None:
+            return Text(f"{task.elapsed or 0.0:4.0f} s")
         return Text(f"{task.completed:6.1f} / {task.total:.0f} s")
-
-
-class _Bar(BarColumn):
-    """Bar of the flight, or of the estimate, which waits before its end."""
-
-    def render(self, task: Task) -> ProgressBar:
-        if guess := task.fields.get("guess"):
-            elapsed = task.elapsed or 0.0
-            return ProgressBar(total=guess, completed=min(elapsed, NEARLY * guess), width=self.bar_width)
-        return super().render(task)
 
 
 class _TerminalBar:
@@ -70,7 +59,7 @@ class RunProgress(_TerminalBar):
         self._bar = None
         if console.is_terminal:
             self._bar = Progress(
-                _Bar(bar_width=24),
+                BarColumn(bar_width=24),
                 _Done(),
                 _Factor(),
                 TextColumn("{task.description}", markup=False),
@@ -83,16 +72,19 @@ class RunProgress(_TerminalBar):
         """Start the bar of the flight, at the first message."""
         self._started = time.monotonic()
         self._next_line = self._started + LINE_PERIOD
-        if self._bar:
-            self._bar.reset(self._task, total=self._duration, description="", guess=None)
+        self._restart("", self._duration)
 
     def compiling(self, compilation: Compilation) -> None:
         """Show that kernels are being compiled."""
         if self._bar:
-            description = f"compiling {compilation.scene}, once"
-            self._bar.reset(self._task, total=self._duration, description=description, guess=compilation.seconds)
+            self._restart(f"compiling {compilation.scene}, once", None)
         else:
             self.say(compilation.notice)
+
+    def _restart(self, description: str, total: float | None) -> None:
+        if self._bar:
+            self._bar.remove_task(self._task)
+            self._task = self._bar.add_task(description, total=total)
 
     def say(self, line: str) -> None:
         """Print a line."""
@@ -119,32 +111,45 @@ class RunProgress(_TerminalBar):
 class StudyProgress(_TerminalBar):
     """Shows how many flights of a study are finished, and its remaining time."""
 
-    def __init__(self, console: Console, every: float = 0.0):
-        """Create the display; outside a terminal it prints at most one line per `every` [s]."""
-        self._console, self._left, self._every, self._printed = console, TimeLeft(), every, -every
-        columns = (BarColumn(bar_width=24), TextColumn("{task.completed} of {task.total} flights  {task.fields[left]}"))
+    def __init__(self, console: Console, unit: str, parallel: int = 0, every: float = 0.0, most: bool = False):
+        """Create the display.
+
+        Args:
+            console: a terminal has a bar, other output lines.
+            unit: of the parts of the work.
+            parallel: number of parts that run at the same time; 0: unknown or unequal parts, without a remaining time.
+            every: [s] between two lines, at least.
+            most: the study may end before all parts are finished.
+        """
+        self._console, self._left, self._unit, self._most = console, TimeLeft(parallel), unit, most
+        self._every, self._printed = every, -every
+        columns = (BarColumn(bar_width=24), TextColumn("{task.completed} of {task.total} {task.fields[rest]}"))
         description_column = TextColumn("{task.description}", markup=False)
         self._bar = (
             Progress(*columns, description_column, console=console, transient=True) if console.is_terminal else None
         )
-        self._task = self._bar.add_task("", total=1, left="") if self._bar else None
+        self._task = self._bar.add_task("", total=1, rest=unit) if self._bar else None
 
     def say(self, text: str, done: int, total: int) -> None:
-        """Show that `done` of `total` flights are finished, and the current work."""
+        """Show that `done` of `total` parts are finished, and the current work."""
         self._left.done(done)
-        remaining = self._left.text(total)
+        remaining = self._left.text(total, self._most)
         if self._bar and self._task is not None:
-            self._bar.update(self._task, description=text, completed=done, total=total, left=remaining)
+            rest = f"{self._unit}  {remaining}"
+            self._bar.update(self._task, description=text, completed=done, total=max(total, 1), rest=rest)
             return
         if (now := time.monotonic()) - self._printed < self._every and done < total:
             return
         self._printed = now
-        self._console.print(f"{done} of {total} flights{f', {remaining}' if remaining else ''}: {text}", soft_wrap=True)
+        parts = f"{done} of {total} {self._unit}{f', {remaining}' if remaining else ''}"
+        self._console.print(f"{parts}: {text}", soft_wrap=True)
 
 
 @contextmanager
-def step_progress(console: Console) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a function that shows (text, done, total) of some work in a bar; without a terminal it shows nothing."""
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("starting", total=1)
-        yield lambda text, done, total: progress.update(task, description=text, completed=done, total=max(total, 1))
+def step_progress(console: Console, unit: str, parallel: int = 0) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield `StudyProgress.say` of a bar; without a terminal it shows nothing."""
+    if not console.is_terminal:
+        yield lambda text, done, total: None
+        return
+    with StudyProgress(console, unit, parallel) as progress:
+        yield progress.say

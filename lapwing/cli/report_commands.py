@@ -101,8 +101,8 @@ def render(
         check_distinct({"FILE": log, "--with": other, "--out": out})
         flights = [Flight.read(path, only=SHOWN) for path in (log, other) if path]
         claim(out)
-        with step_progress(console()) as say:
-            draw(flights, labels(flights), out, shot, partial(say, "pictures"))
+        with step_progress(console(), "pictures", parallel=1) as say:
+            draw(flights, labels(flights), out, shot, partial(say, ""))
         typer.echo(out)
 
 

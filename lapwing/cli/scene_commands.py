@@ -103,10 +103,9 @@ def _with_bar(setup: "RunConfig", description: str, work: Callable[[Callable[[in
 
     duration = setup.last_tick * setup.interval
     typer.echo(f"flying up to {duration:g} s: {description}")
-    with WorkProgress(setup.scene, duration, "s") as bar, notify_on_compile(setup, bar.compiling, alone=False) as watch:
+    with WorkProgress(setup.scene, duration, "s") as bar, notify_on_compile(setup, bar.compiling):
 
         def observe(tick: int) -> None:
-            watch.stop()
             bar.show(tick * setup.interval)
 
         return work(observe)

@@ -1,8 +1,8 @@
 """Studies: performance, effects, accuracy, stability, tune."""
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
+from itertools import count
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,10 +17,6 @@ from lapwing.studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import Progress, TaskID
-
-    from lapwing.cosim.scene import Scene
-    from lapwing.runs.compile_notice import Compilation
 
 
 def _study(
@@ -52,19 +48,6 @@ def _study(
         module.write_json(json, result)
     if plot:
         module.plot(plot, result)
-
-
-@contextmanager
-def _announce_compilation(scene: "Scene", progress: "Progress", task: "TaskID") -> Iterator[None]:
-    """Announce the compilation of the scene's closed loop with its estimated time, if there is one."""
-    from lapwing.runs.compile_notice import notify_on_compile
-    from lapwing.services.scene_resolver import resolve
-
-    def say(what: "Compilation") -> None:
-        progress.update(task, description=f"compiling, about {what.seconds:.0f} s, then flying")
-
-    with notify_on_compile(resolve(scene), say, alone=False):
-        yield
 
 
 @app.command()
@@ -107,7 +90,7 @@ def effects(
         screen = console()
 
         def find() -> Study:
-            with StudyProgress(screen) as progress:
+            with StudyProgress(screen, "flights") as progress:
                 return study(load(scene, set_ or []), tolerance, progress.say)
 
         _study("SCENE", scene, json, plot, screen, find, console_output)
@@ -195,9 +178,9 @@ def tune(
 
     Each loop gets its bandwidth with margins of 45 degrees and 6 dB at hover.
     """
-    from rich.progress import Progress
-
-    from lapwing.services.scene_resolver import load
+    from lapwing.cli.progress import step_progress
+    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.services.scene_resolver import load, resolve
     from lapwing.studies.terminal import console
     from lapwing.studies.tune import console_output, gain_refinement, procedure
     from lapwing.studies.tune import tuning_report as page
@@ -207,16 +190,20 @@ def tune(
         claim_named("--out", out, ".toml")
         claim_named("--report", report, ".html")
         target, screen = Bandwidths(altitude, yaw, attitude, position), console()
-        with Progress(console=screen, transient=True) as progress:
-            task = progress.add_task("linearising, then flying gain sets", total=gain_refinement.CANDIDATES)
-            loaded = load(scene, set_ or [])
+        loaded, flown = load(scene, set_ or []), count(1)
+        with step_progress(screen, "gain sets at most") as progress:
 
-            def say(text: str) -> None:
-                progress.console.print(text, soft_wrap=True)
+            def show(text: str, done: int = 0) -> None:
+                progress(text, done, gain_refinement.CANDIDATES)
 
-            with _announce_compilation(loaded, progress, task):
+            show("linearising")
+            with notify_on_compile(resolve(loaded), lambda _: show("compiling, then flying")):
                 result = procedure.tune(
-                    loaded, target, say, log, lambda: progress.update(task, advance=1, description="flying gain sets")
+                    loaded,
+                    target,
+                    lambda text: screen.print(text, soft_wrap=True),
+                    log,
+                    lambda: show("flying gain sets", next(flown)),
                 )
         console_output.show(screen, result)
         if out and (force or not result.failures):

@@ -13,7 +13,7 @@ from lapwing.cosim.processes.launcher import launch
 from lapwing.cosim.processes.run_monitor import RunMonitor
 from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
-from lapwing.runs.compile_notice import Stopwatch
+from lapwing.runs.compile_notice import Compilation
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
 from lapwing.services.process_main import ProcessSpec, write_spec
@@ -80,19 +80,19 @@ class Clock:
     def __init__(self, observer: Observer, setup: RunConfig):
         self._observer, self._started, self._slow_disk = observer, False, False
         self._pose, self._status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
-        self._compiling = Stopwatch("multi-process", setup, observer.compiling)
+        self._compilation: Compilation | None = Compilation.of(setup)  # None once shown
         self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
 
     def observe(self, watch: RunMonitor) -> bool:
         """Show the progress. Return False: the run continues."""
         self.rejected = watch.rejected
         if watch.start is None:
-            if watch.compiling:
-                self._compiling.start()
+            if watch.compiling and self._compilation:
+                self._observer.compiling(self._compilation)
+                self._compilation = None
             return False
         if not self._started:
             self._started = True
-            self._compiling.stop()
             self._observer.begin()
         if watch.slow_disk and not self._slow_disk:
             self._slow_disk = True

@@ -11,45 +11,53 @@ from lapwing.runs.compile_notice import Compilation
 
 DELAY = 2.0  # [s] of work before a bar appears
 PERIOD = 0.25  # [s] between two updates of the bar
-NEARLY = 0.97  # share of an estimate that was too short at which the bar waits
+MEASURED = 1.0  # [s] of measured work before a remaining time is shown
+BASIS, LONG = 0.05, 10.0  # share of the work, or [s] of it, that must have been measured, too
 
 
 class TimeLeft:
-    """Estimate of the remaining time of work in many equal parts, from the time that its later half took.
+    """Estimate of the remaining time of work in equal parts, from the time that its later half took in this call.
 
-    The first parts take longer (compilation, start of workers), so they count only until others have followed.
+    The first part of each worker takes longer (compilation, start of the worker) and never counts. Parts that run at
+    the same time end together, so only spans of a multiple of `parallel` reports have a known duration.
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic):
-        """Start now; `clock` returns seconds."""
-        self._clock, self._start = clock, clock()
-        self._reports = [(0.0, 0.0)]  # ([s] since the start, amount that was done)
+    def __init__(self, parallel: int = 1, clock: Callable[[], float] = time.monotonic):
+        """Start now.
+
+        Args:
+            parallel: number of parts that run at the same time; 0: unknown, without an estimate.
+            clock: returns seconds.
+        """
+        self._parallel, self._clock, self._start = parallel, clock, clock()
+        self._reports: list[tuple[float, float]] = []  # ([s] since the start, amount that was done)
 
     def done(self, amount: float) -> None:
-        """Note that `amount` of the work is done by now."""
-        if amount > self._reports[-1][1]:
+        """Note that `amount` of the work is done by now; each part is one report."""
+        if amount > (self._reports[-1][1] if self._reports else 0.0):
             self._reports.append((self._clock() - self._start, amount))
 
     def seconds(self, total: float) -> float | None:
-        """Return the remaining time [s] up to `total`; None before the second report and at the end."""
-        elapsed, done = self._reports[-1]
-        if len(self._reports) < 3 or done >= total:
+        """Return the remaining time [s] up to `total`; None while too little was measured, and at the end."""
+        reports, step = self._reports, self._parallel
+        if step < 1 or len(reports) < 2 * step or reports[-1][1] >= total:
             return None
-        later = (elapsed - self._at(0.5 * done)) / (0.5 * done)  # [s] for one part
-        return max(0.0, later * (total - done) - (self._clock() - self._start - elapsed))
+        elapsed, done = reports[-1]
+        first = len(reports) - 1 - step
+        while first >= 2 * step - 1 and done - reports[first][1] < 0.5 * done:
+            first -= step
+        span, amount = elapsed - reports[first][0], done - reports[first][1]
+        if span < MEASURED or (amount < BASIS * total and span < LONG):
+            return None
+        return max(0.0, span / amount * (total - done) - (self._clock() - self._start - elapsed))
 
-    def text(self, total: float) -> str:
-        """Return the remaining time as text, "" if it is unknown."""
+    def text(self, total: float, most: bool = False) -> str:
+        """Return the remaining time as text, "" if it is unknown; `most`: the work may end before `total`."""
         seconds = self.seconds(total)
         if seconds is None:
             return ""
-        return f"about {seconds:.0f} s left" if seconds < 90.0 else f"about {seconds / 60.0:.0f} min left"
-
-    def _at(self, amount: float) -> float:
-        """Return the time [s] at which `amount` was done, between two reports in proportion."""
-        after = next(i for i, (_, done) in enumerate(self._reports) if done >= amount)
-        (t0, a0), (t1, a1) = self._reports[after - 1], self._reports[after]
-        return t0 + (t1 - t0) * (amount - a0) / (a1 - a0)
+        number = f"{seconds:.0f} s" if seconds < 90.0 else f"{seconds / 60.0:.0f} min"
+        return f"{'at most ' if most else ''}about {number} left"
 
 
 class Picture(Protocol):
@@ -115,11 +123,11 @@ def picture() -> type[Picture] | None:
 class WorkProgress:
     """Bar of one piece of work; a context manager. It appears after DELAY seconds and disappears at the end."""
 
-    def __init__(self, title: str, total: float, unit: str):
-        """Create the bar of work that ends at `total`, in `unit`."""
-        self._title, self._total, self._unit = title, total, unit
-        self._compiles: Compilation | None = None
-        self._start, self._done, self._left = time.monotonic(), 0.0, TimeLeft()
+    def __init__(self, title: str, total: float, unit: str, parallel: int = 1):
+        """Create the bar of work that ends at `total`, a flight in "s" perhaps before it; see `TimeLeft.__init__`."""
+        self._title, self._total, self._unit, self._parallel = title, total, unit, parallel
+        self._compiles = False
+        self._start, self._done, self._left = time.monotonic(), 0.0, TimeLeft(parallel)
         self._end, self._thread = threading.Event(), None
         if (kind := picture()) is not None:
             self._thread = threading.Thread(target=self._run, args=(kind,), daemon=True)
@@ -134,24 +142,22 @@ class WorkProgress:
             self._end.set()
             self._thread.join()
 
-    def compiling(self, compilation: Compilation) -> None:
+    def compiling(self, _: Compilation) -> None:
         """Note that kernels compile, until the first call of `show`."""
-        self._start, self._compiles = time.monotonic(), compilation
+        self._start, self._compiles = time.monotonic(), True
 
     def show(self, done: float) -> None:
         """Note that `done` of the total is reached."""
-        if self._compiles is not None:
-            self._compiles, self._left = None, TimeLeft()
+        if self._compiles:
+            self._compiles, self._left = False, TimeLeft(self._parallel)
         self._done = done
         self._left.done(done)
 
     def state(self) -> tuple[float, str]:
         """Return the share of the bar that is full, and its line."""
-        if (compilation := self._compiles) is not None:
-            elapsed = time.monotonic() - self._start
-            share = min(NEARLY, elapsed / max(compilation.seconds, 1e-9))
-            return share, f"{self._title}: compiling once, {elapsed:.0f} of about {compilation.seconds:.0f} s"
-        left = self._left.text(self._total)
+        if self._compiles:
+            return 0.0, f"{self._title}: compiling once, {time.monotonic() - self._start:.0f} s"
+        left = self._left.text(self._total, most=self._unit == "s")
         line = f"{self._title}: {self._done:.{0 if self._unit == 'flights' else 1}f} of {self._total:.4g} {self._unit}"
         return self._done / self._total, f"{line}, {left}" if left else line
 

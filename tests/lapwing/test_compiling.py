@@ -1,7 +1,6 @@
-"""Compiling is told with a guess and a bar, and only where something compiles."""
+"""Notice and bar of compilation: only when something compiles, and without an estimate that has no basis."""
 
 import io
-import json
 import random
 from pathlib import Path
 
@@ -12,8 +11,8 @@ from typer.testing import CliRunner
 from lapwing.cli.main import app
 from lapwing.cli.progress import RunProgress
 from lapwing.kernels import kernel
-from lapwing.runs import compile_notice, precompile
-from lapwing.runs.compile_notice import EACH, FILE, Compilation, notify_on_compile
+from lapwing.runs import precompile
+from lapwing.runs.compile_notice import Compilation, notify_on_compile
 from lapwing.runs.precompile import compile_ahead
 from lapwing.services.scene_resolver import load, resolve
 
@@ -23,13 +22,6 @@ SERVICES = ("plant", "autopilot", "trajectory")  # of the hover scene
 @pytest.fixture(scope="module")
 def setup():
     return resolve(load("hover"))
-
-
-@pytest.fixture
-def folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(compile_notice, "cache_folder", lambda: tmp_path)
-    monkeypatch.setattr(compile_notice, "slowness", lambda: 1.0)
-    return tmp_path
 
 
 def compile_something():
@@ -53,64 +45,24 @@ class Compiling:
         pass
 
 
-def test_compile_notice_appears_once_and_only_when_needed(setup, folder):
+def test_compile_notice_appears_once_and_only_when_needed(setup):
     output = []
     with notify_on_compile(setup, output.append):
         pass
     assert output == []
-    assert not (folder / FILE).exists()
     with notify_on_compile(setup, output.append):
         compile_something()
-    assert output == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
-
-
-def test_compile_notice_estimates_from_earlier_time(setup, folder):
-    with notify_on_compile(setup, lambda _: None):
-        compile_something()
-    (key,) = known = json.loads((folder / FILE).read_text())
-    assert 0.0 <= known[key] < EACH
-    (folder / FILE).write_text(json.dumps({key: 81.5}))
-    output = []
-    with notify_on_compile(setup, output.append):
-        compile_something()
-    assert [what.seconds for what in output] == [81.5]
-    assert json.loads((folder / FILE).read_text()) == {key: 81.5}
-
-
-def test_estimate_follows_present_speed_of_machine(setup, folder, monkeypatch):
-    with notify_on_compile(setup, lambda _: None):
-        compile_something()
-    (key,) = json.loads((folder / FILE).read_text())
-    (folder / FILE).write_text(json.dumps({key: 20.0}))
-    monkeypatch.setattr(compile_notice, "slowness", lambda: 7.0)
-    output = []
-    with notify_on_compile(setup, output.append):
-        compile_something()
-    assert [what.seconds for what in output] == [140.0]
-    assert json.loads((folder / FILE).read_text()) == {key: 20.0}
-
-
-def test_slowness_is_positive_measurement():
-    assert compile_notice.slowness() > 0.0
-
-
-@pytest.mark.parametrize("content", ["", "[]", '{"a": []}'])
-def test_damaged_memory_is_none(setup, folder, content):
-    (folder / FILE).write_text(content)
-    output = []
-    with notify_on_compile(setup, output.append):
-        compile_something()
-    assert output == [Compilation("hover", SERVICES, EACH * len(SERVICES))]
+    assert output == [Compilation("hover", SERVICES)]
 
 
 def test_terminal_has_bar_and_anything_else_line():
     for terminal, expected in (
-        (True, "of about 40 s"),
-        (False, "hover: compiling kernels of plant, sensors, about 40 s"),
+        (True, "   0 s  compiling hover, once"),
+        (False, "hover: compiling kernels of plant, sensors (cached for later runs) ..."),
     ):
         console = Console(file=io.StringIO(), force_terminal=terminal, width=80)
         with RunProgress(console, 20.0) as display:
-            display.compiling(Compilation("hover", ("plant", "sensors"), 40.0))
+            display.compiling(Compilation("hover", ("plant", "sensors")))
             if display._bar:
                 display._bar.refresh()
             output = console.file.getvalue()
@@ -119,14 +71,15 @@ def test_terminal_has_bar_and_anything_else_line():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_scenes_are_compiled_ahead_with_bar_or_line_each(setup, folder, monkeypatch, terminal):
+def test_scenes_are_compiled_ahead_with_bar_or_line_each(setup, monkeypatch, terminal):
     monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     compile_ahead({"one": setup, "two": setup}, console)
     output = console.file.getvalue()
     assert output.count("ready after") == 2
-    assert ("of about 42 s  " in output) == terminal
-    assert ("hover: compiling kernels of plant, autopilot, trajectory, about 21 s" in output) == (not terminal)
+    assert ("0 of 2 scenes  one" in output) == terminal
+    assert ("hover: compiling kernels of plant, autopilot, trajectory (cached" in output) == (not terminal)
+    assert "about" not in output
 
 
 def test_broken_scene_of_folder_does_not_stop_others(tmp_path, monkeypatch):

@@ -1,8 +1,11 @@
 """`lapwing new`: the created files work in every mode, and no file is overwritten."""
 
+import ast
+import json
 import os
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -38,6 +41,15 @@ def run(folder, *command):
     )
 
 
+def flat(tables, path=""):
+    """Yield dotted key and value of each entry."""
+    for key, value in tables.items():
+        if isinstance(value, dict):
+            yield from flat(value, f"{path}{key}.")
+        else:
+            yield f"{path}{key}", value
+
+
 @pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
 def test_created_module_passes_its_test(tmp_path, kind):
     created = run(tmp_path, "lapwing", "new", kind, f"my_{kind}")
@@ -45,6 +57,26 @@ def test_created_module_passes_its_test(tmp_path, kind):
     assert created.stdout.split() == [f"my_{kind}.py", f"test_my_{kind}.py"]
     result = run(tmp_path, "pytest", "-q", "-p", "no:cacheprovider", ".")
     assert result.returncode == 0, result.stdout
+
+
+@pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
+def test_created_module_flies_as_its_first_lines_say(tmp_path, kind):
+    assert run(tmp_path, "lapwing", "new", "scene", "my_flight").returncode == 0
+    assert run(tmp_path, "lapwing", "new", kind, f"my_{kind}").returncode == 0
+    text = ast.get_docstring(ast.parse((tmp_path / f"my_{kind}.py").read_text()))
+    tables = tomllib.loads("\n".join(line for line in text.splitlines() if line.startswith("    ")))
+    scene = tmp_path / "my_flight.toml"
+    options = []
+    if kind == "segment":
+        first, separator, others = scene.read_text().rpartition("[[trajectory.phase]]")
+        assert tables["trajectory"]["phase"][0]["x"]["kind"] == "my_segment"
+        table = text[text.index("[[trajectory.phase]]") :]
+        scene.write_text(f"{first}{table}\n\n{separator}{others}")
+    else:
+        for key, value in flat(tables):
+            options += ["--set", f"{key}={json.dumps(value)}"]
+    result = run(tmp_path, "lapwing", "run", "my_flight.toml", "--mode", "single-process", *options)
+    assert result.returncode == 0, result.stdout + result.stderr
 
 
 def test_created_scene_flies(tmp_path):

@@ -34,6 +34,7 @@ from lapwing.messages import (
 from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report import flight_header, paper, plotly_script, plotly_traces, plots, write
 from lapwing.studies.report.downsampling import thin
+from lapwing.studies.report.flight_cover import cover
 from lapwing.studies.report.flight_header import MANY, differences
 from lapwing.studies.report.flight_phases import phases
 from lapwing.studies.report.overlay import overlay
@@ -309,11 +310,19 @@ def test_paper_has_outcome_errors_facts_and_every_plot(log, page, monkeypatch, t
     monkeypatch.setattr(paper, "write_pdf", lambda path, *content: written.append(content))
     flight = FlightData.read(log)
     write(flight, tmp_path / "circle.pdf")
-    ((cover, plots),) = written
-    assert cover.outcomes == (str(flight.outcome),)
-    assert [row[0] for row in cover.rows] == ["x [m]", "y [m]", "z [m]", "roll [°]", "pitch [°]", "yaw [°]"]
-    assert dict(cover.facts)["digest"]
+    ((first, plots),) = written
+    assert first.outcomes == (str(flight.outcome),)
+    assert [row[0] for row in first.rows] == ["x [m]", "y [m]", "z [m]", "roll [°]", "pitch [°]", "yaw [°]"]
+    assert dict(first.facts)["digest"]
     assert len(plots) == len(page.plots)
+
+
+def test_paper_of_two_flights_lists_keys_that_differ(log):
+    flights = [FlightData.read(log), FlightData.read(log)]
+    flights[1].origin.scene["autopilot"] = {"controller": "geometric:build"}
+    facts = cover(flights).facts
+    assert ("scenes differ in", "autopilot.controller: none | geometric:build") in facts
+    assert not any(name == "scenes differ in" for name, _ in cover(flights[:1]).facts)
 
 
 def test_pages_hold_plots_in_order_within_their_height():
@@ -583,3 +592,11 @@ def test_thinning_line_keeps_its_peaks_and_ends(count):
     assert (drawn_t[0], drawn_t[-1]) == (0.0, 1.0)
     assert set(zip(drawn_t, drawn_y, strict=True)) <= set(zip(t, y, strict=True))
     assert (drawn_y.max(), drawn_y.min()) == (9.0, -9.0)
+
+
+def test_labelled_axis_has_room_for_numbers_of_many_digits():
+    line = Line(np.arange(50.0), 4.9e-4 + 1e-7 * np.arange(50.0))
+    panels = tuple(Panel((line,), label, timed=False, column=k) for k, label in enumerate(("position [m]", "")))
+    layout = figure(Plot(panels, "", 3.0))["layout"]
+    assert layout["yaxis"]["automargin"]
+    assert "automargin" not in layout["yaxis2"]

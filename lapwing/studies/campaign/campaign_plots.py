@@ -31,6 +31,8 @@ def label_and_factor(name: str) -> tuple[str, float]:
         return f"{name} [W h]", 1.0 / WATT_HOUR
     if unit == "rad":
         return f"{name} [°]", 1.0 / DEGREE
+    if name.startswith(("nees", "nis")):  # no shares: expected 9 and 1
+        return name, 1.0
     return (f"{name} [{unit}]", 1.0) if unit else (f"{name} [%]", 100.0)
 
 

@@ -3,14 +3,14 @@
 from collections.abc import Sequence
 
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.report.flight_header import facts
+from lapwing.studies.report.flight_header import differences, facts
 from lapwing.studies.report.page import accuracy
 from lapwing.studies.report.paper import Cover
 from lapwing.studies.report.sections import labels
 
 
 def cover(flights: Sequence[FlightData]) -> Cover:
-    """Return title, outcomes, table of errors and facts of one flight or of two."""
+    """Return title, outcomes, table of errors and facts of one flight or of two, with the keys that differ."""
     scenes = [flight.origin.scene for flight in flights]
     names, published = labels(flights), scenes[0].get("published", {})
     many = len(flights) > 1
@@ -24,6 +24,7 @@ def cover(flights: Sequence[FlightData]) -> Cover:
     tables = [facts(flight) for flight in flights]
     keys = dict.fromkeys(key for one in tables for key in one)
     values = {key: list(dict.fromkeys(one.get(key, "") for one in tables)) for key in keys}
+    differing = differences(*scenes) if len(scenes) == 2 else {}
     return Cover(
         " and ".join(names) if many else flights[0].metadata.get("scene") or names[0],
         " · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
@@ -33,5 +34,15 @@ def cover(flights: Sequence[FlightData]) -> Cover:
         ),
         tuple(heads),
         tuple(rows),
-        tuple((key, " | ".join(text or "none" for text in several)) for key, several in values.items()),
+        (
+            *((key, _beside(several)) for key, several in values.items()),
+            *(
+                ("" if k else "scenes differ in", f"{key}: {_beside(v)}")
+                for k, (key, v) in enumerate(differing.items())
+            ),
+        ),
     )
+
+
+def _beside(values: Sequence[str]) -> str:
+    return " | ".join(text or "none" for text in values)

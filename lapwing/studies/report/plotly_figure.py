@@ -87,6 +87,8 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
     x: dict[str, Any] = {"domain": domains[0], "anchor": f"y{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
     y: dict[str, Any] = {"domain": domains[1], "anchor": f"x{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
     y["title"] = {"text": text_of(panel.y_label), "standoff": 6}
+    if panel.y_label and domains[0][0] == 0.0:
+        y["automargin"] = True  # numbers of many digits would reach below the label
     x["title"] = {"text": text_of(panel.x_label), "standoff": 4}
     if panel.log_x:
         x |= {"type": "log", "dtick": 1}

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import Progress
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from lapwing.studies.stability import console_output, stability_page
 from lapwing.studies.stability.case_runner import measure, select
@@ -27,8 +27,9 @@ def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Pa
     """
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     names = select(case, long, sweep)
-    with Progress(console=console, transient=True) as progress:
-        task = progress.add_task("running the cases (the first time they are compiled)", total=len(names))
+    columns = (TextColumn("running the cases (the first time they are compiled)"), BarColumn(), MofNCompleteColumn())
+    with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as progress:
+        task = progress.add_task("", total=len(names))
         results = measure(names, sweep, lambda name: progress.advance(task))
     console_output.table(console, results)
     console_output.sweeps(console, results)

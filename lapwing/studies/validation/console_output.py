@@ -2,11 +2,12 @@
 
 import math
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
 from lapwing.studies.validation.closed_loop import ClosedLoop
-from lapwing.studies.validation.prediction_metrics import FIELDS, Metric
+from lapwing.studies.validation.prediction_metrics import FIELDS
 from lapwing.studies.validation.procedure import Validation
 
 UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True))
@@ -15,18 +16,15 @@ UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True
 def show(console: Console, validation: Validation) -> None:
     """Print the errors beside the baselines, and what was left out."""
     extent = f"{validation.windows} windows, {len(validation.flights)} flights"
-    table = Table(title=f"{validation.scene}: mean absolute prediction error, {extent}")
-    table.add_column("after", justify="right")
-    table.add_column("predicted by")
-    shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(validation.plant[0][k].mean)]
-    for name in (FIELDS[k] for k in shown):
-        table.add_column(f"{name.replace('_', ' ')} [{UNITS[name]}]", justify="right")
-    for k, steps in enumerate(validation.horizons):
-        after = f"{steps * validation.interval:g} s"
-        table.add_row(after, "plant", *(with_interval(validation.plant[k][f]) for f in shown))
-        for name, rows in validation.baselines.items():
-            last = name == list(validation.baselines)[-1]
-            table.add_row("", name.replace("_", " "), *(plain(rows[k][f].mean) for f in shown), end_section=last)
+    heads, rows = error_table(validation)
+    console.print(f"{validation.scene}: mean absolute prediction error, {extent}", soft_wrap=True)
+    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
+    for k, head in enumerate(heads):
+        table.add_column(
+            head.replace(" ", "\n") if k > 1 else head, justify="left" if k == 1 else "right", no_wrap=True
+        )
+    for k, row in enumerate(rows):
+        table.add_row(*row, end_section=k + 1 == len(rows) or rows[k + 1][0] != row[0])
     console.print(table)
     for flight in validation.closed_loop:
         console.print(closed_loop_line(flight), soft_wrap=True)
@@ -43,6 +41,26 @@ def show(console: Console, validation: Validation) -> None:
         console.print(f"marked samples: {name}: {text}")
 
 
+def error_table(validation: Validation) -> tuple[list[str], list[list[str]]]:
+    """Return heads and rows of the mean errors: a row for each horizon and measured quantity, one number in a cell.
+
+    The plant's 95 % interval has columns of its own, which fewer than three flights lack.
+    """
+    shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(validation.plant[0][k].mean)]
+    interval = any(math.isfinite(metric.low) for metrics in validation.plant for metric in metrics)
+    names = [name.replace("_", " ") for name in validation.baselines]
+    heads = ["after", "error", "plant", *(["95 % from", "95 % to"] if interval else []), *names]
+    rows = []
+    for k, steps in enumerate(validation.horizons):
+        for f in shown:
+            metric = validation.plant[k][f]
+            numbers = [metric.mean, *([metric.low, metric.high] if interval else [])]
+            numbers += [baseline[k][f].mean for baseline in validation.baselines.values()]
+            quantity = f"{FIELDS[f].replace('_', ' ')} [{UNITS[FIELDS[f]]}]"
+            rows.append([f"{steps * validation.interval:g} s", quantity, *map(plain, numbers)])
+    return heads, rows
+
+
 def closed_loop_line(flight: ClosedLoop) -> str:
     """Return one line on a flight of recorded setpoints."""
     return (
@@ -50,15 +68,6 @@ def closed_loop_line(flight: ClosedLoop) -> str:
         f"tracking error {flight.tracking_error(flight.simulated):.3g} m, "
         f"recorded {flight.tracking_error(flight.recorded):.3g} m"
     )
-
-
-def with_interval(metric: Metric) -> str:
-    """Return mean and interval as text; a dash without measurement, no interval of fewer than three flights."""
-    if not math.isfinite(metric.mean):
-        return "-"
-    if not math.isfinite(metric.low):
-        return plain(metric.mean)
-    return f"{plain(metric.mean)} ({plain(metric.low)} to {plain(metric.high)})"
 
 
 def plain(value: float) -> str:

@@ -8,7 +8,7 @@ from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.sections import Section
 from lapwing.studies.tune.console_output import Rows
-from lapwing.studies.validation.console_output import UNITS, plain, with_interval
+from lapwing.studies.validation.console_output import UNITS, error_table
 from lapwing.studies.validation.envelope import CHANNELS, explanations, residual_spectra, trends
 from lapwing.studies.validation.prediction_metrics import FIELDS
 from lapwing.studies.validation.procedure import Validation
@@ -55,13 +55,10 @@ def _outcome(validation: Validation) -> str:
 
 
 def _errors(validation: Validation) -> Rows:
-    heads = [f"{name.replace('_', ' ')} [{UNITS[name]}]" for name in FIELDS]
-    table = Rows("Mean absolute error", "after, by", *heads)
-    for k, steps in enumerate(validation.horizons):
-        after = f"{steps * validation.interval:g} s"
-        table.add(f"{after}, plant", *map(with_interval, validation.plant[k]))
-        for name, rows in validation.baselines.items():
-            table.add(f"{after}, {name.replace('_', ' ')}", *(plain(m.mean) for m in rows[k]))
+    heads, rows = error_table(validation)
+    table = Rows("Mean absolute error", *heads)
+    for row in rows:
+        table.add(*row)
     return table
 
 

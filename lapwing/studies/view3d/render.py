@@ -125,10 +125,10 @@ def _pictures(browser: Browser, times: np.ndarray, lossless: bool, progress: Any
     kind, quality = ("png", 1.0) if lossless else ("jpeg", JPEG)
     for k in range(0, len(times), BATCH):
         some = times[k : k + BATCH].tolist()
-        for i, address in enumerate(browser.run(f"return lapwingView.film({some}, 'image/{kind}', {quality});")):
+        for address in browser.run(f"return lapwingView.film({some}, 'image/{kind}', {quality});"):
             picture = Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB")
-            progress(k + i + 1, len(times))
             yield picture
+        progress(k + len(some), len(times))
 
 
 def write_film(target: Path, pictures: Iterator[Any], shot: Shot) -> None:

@@ -133,3 +133,10 @@ def test_printed_axis_labels_do_not_overlap():
         ]
     assert len(boxes) >= 9
     assert not [1 for a, b in combinations(boxes, 2) if a.padded(2.0).overlaps(b)]
+
+
+def test_shares_are_in_per_cent_and_consistency_ratios_are_not():
+    shares = {"saturation", "within_95.nees", *(f"within_3sigma.{axis}" for axis in "xyz")}
+    numbers = {name for name, unit in METRICS.items() if not unit and not name.startswith("outcome")}
+    assert {name for name in numbers if campaign_plots.shown(name) == (f"{name} [%]", 100.0)} == shares
+    assert {campaign_plots.shown(name) for name in numbers - shares} == {(name, 1.0) for name in numbers - shares}

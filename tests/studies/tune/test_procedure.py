@@ -62,6 +62,7 @@ def test_page_and_tables(found, tmp_path):
     page = page_text(path)
     assert page.count('<figure class="plot">') == 2
     assert "Open loops" in page
+    assert "rise time" in page  # what the numbers in the panels are
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
     console = Console(record=True, width=120)
     console_output.show(console, found)

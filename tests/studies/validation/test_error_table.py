@@ -1,0 +1,33 @@
+"""Table of prediction errors: one number in a cell, complete in a narrow terminal."""
+
+import math
+
+import pytest
+from rich.console import Console
+
+from lapwing.studies.validation import console_output
+from lapwing.studies.validation.prediction_metrics import FIELDS, Metric
+from lapwing.studies.validation.procedure import TrimMemory, Validation
+
+
+def validation(interval):
+    """Return the errors of two horizons: the smallest and largest numbers of letters, and no power."""
+    nan = math.nan
+    metric = Metric(1.23e-07, *((1.11e-07, 0.000134) if interval else (nan, nan)))
+    row = [Metric(nan, nan, nan) if name == "power" else metric for name in FIELDS]
+    baselines = {"constant_velocity": [row, row], "linear_fit": [row, row]}
+    return Validation("scene", 0.01, (1, 50), TrimMemory(0.15, 10.0), (), (), [row, row], baselines)
+
+
+@pytest.mark.parametrize("interval", [True, False])
+def test_every_cell_has_one_complete_number(interval):
+    heads, rows = console_output.error_table(validation(interval))
+    assert len(rows) == 2 * (len(FIELDS) - 1)
+    assert [heads[2:5] == ["plant", "95 % from", "95 % to"], len(heads)] == [interval, 7 if interval else 5]
+    assert {len(row) for row in rows} == {len(heads)}
+    assert all(math.isfinite(float(cell)) for row in rows for cell in row[2:])
+    console = Console(record=True, width=80)
+    console_output.show(console, validation(interval))
+    text = console.export_text()
+    assert "…" not in text
+    assert text.count("1.23e-07") == 2 * (len(FIELDS) - 1) * 3
