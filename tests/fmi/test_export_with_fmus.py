@@ -16,14 +16,22 @@ pytest.importorskip("fmpy")
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 SCENE = """
+[effects.wind_constant]
+velocity = [0.0, 0.0, 0.0]
+[effects.body_drag]
 [effects.battery]
+[effects.dc_motor]
 [services.pack]
 fmu = "parts.fmu"
-start = { open_circuit = 48.0, resistance = 0.01 }
+start = { open_circuit = 48.0, resistance = 0.01, wind = 2.0, torque_constant = 0.2, speed_constant = 0.2, winding = 0.1 }
 [services.pack.inputs]
 current_0 = "truth.motor_current.0"
+voltage_0 = "actuators.motor_voltage.0"
+speed_0 = "truth.rotor_speed.0"
 [services.pack.outputs]
 "effect.battery.voltage" = "supply"
+"effect.wind_constant.velocity.1" = "wind_y"
+"effect.dc_motor.torque.0" = "torque_0"
 [services.sense]
 fmu = "small.fmu"
 start = { gain = 3.28 }
