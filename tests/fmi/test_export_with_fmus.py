@@ -12,7 +12,8 @@ from effect_fmu import write_effect_fmu
 from event_fmu import write_event_fmu
 from small_fmu import write_small_fmu
 
-pytest.importorskip("fmpy")
+fmpy = pytest.importorskip("fmpy")
+from lxml import etree  # noqa: E402
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 SCENE = """
@@ -23,7 +24,7 @@ velocity = [0.0, 0.0, 0.0]
 [effects.dc_motor]
 [services.pack]
 fmu = "parts.fmu"
-start = { open_circuit = 48.0, resistance = 0.01, wind = 2.0, torque_constant = 0.2, speed_constant = 0.2, winding = 0.1 }
+start = { open_circuit = 48.0, resistance = 0.01, wind = 2.0, torque_constant = 0.2, winding = 0.1 }
 [services.pack.inputs]
 current_0 = "truth.motor_current.0"
 voltage_0 = "actuators.motor_voltage.0"
@@ -118,6 +119,15 @@ def test_package_without_fmu_flies_without_it(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "pack_fmu" not in done.stdout
     assert "motor_fmu" in done.stdout
+
+
+def test_structure_satisfies_schema_of_fmpy(folder: Path) -> None:
+    """FMPy has the schema of SSP 1.0, which differs by the version here."""
+    schema = etree.XMLSchema(file=str(Path(fmpy.__file__).parent / "ssp/schema/SystemStructureDescription.xsd"))
+    with zipfile.ZipFile(folder / "a.ssp") as archive:
+        text = archive.read("SystemStructure.ssd").replace(b'version="2.0"', b'version="1.0"')
+    assert b"<ssv:Real value=" in text
+    schema.assertValid(etree.fromstring(text))
 
 
 def test_connections_have_sources_and_factors(folder: Path) -> None:
