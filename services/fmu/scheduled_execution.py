@@ -20,6 +20,9 @@ class ScheduledExecution(FmuInstance):
     def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
         super().__init__(spec, model, fmu, inputs, outputs)
+        address = ctypes.cast(self.function("ActivateModelPartition"), ctypes.c_void_p).value or 0
+        # not FMPy's method, which had another argument until FMI 3.0 was released
+        self._run = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_double)(address)
         clocks = sorted(input_clocks(Path(spec["folder"], DESCRIPTION).read_bytes()), key=_priority)
         self._due = {clock: clock.shift if clock.variability in PERIODIC else math.inf for clock in clocks}
         self._ticks = dict.fromkeys(clocks, 0)  # of periodic ones, so that their times have no accumulated error
@@ -58,7 +61,7 @@ class ScheduledExecution(FmuInstance):
             self._ticks[clock] += 1
             periodic = clock.variability in PERIODIC
             self._due[clock] = clock.shift + self._ticks[clock] * clock.interval if periodic else math.inf
-            self.fmu.activateModelPartition(clock.reference, now)
+            self.check("activateModelPartition", self._run(self.address, clock.reference, now))
             self._start_countdowns(now)
             for index, reference in self._output_clocks:
                 if self.fmu.getClock([reference])[0]:

@@ -51,6 +51,7 @@ int fmi3GetIntervalDecimal(void *c, const unsigned r[], size_t n, double x[], in
 int fmi3ActivateModelPartition(void *c, unsigned clock, double time) {
     model *m = c;
     int k = clock - 1;
+    if (m->wait < 0) return 3;
     m->order = (time == m->time ? 10 * m->order : 0) + k + 1;
     m->time = time;
     m->count[k]++;

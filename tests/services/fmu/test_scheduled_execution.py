@@ -62,6 +62,12 @@ def test_countdown_between_two_ticks_is_error(path: Path) -> None:
         fmu.advance(0.3)
 
 
+def test_failing_partition_is_error(path: Path) -> None:
+    fmu = OpenedFmu(path, TICKS, start={"wait": -1.0})
+    with pytest.raises(HostError, match="activateModelPartition failed with status 3"):
+        fmu.initialise()
+
+
 SERVICE = """
 [services.clocks]
 fmu = "clocks.fmu"
