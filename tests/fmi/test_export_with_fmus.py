@@ -166,7 +166,7 @@ def test_plant_with_permission_is_exported(folder: Path, command: str) -> None:
         assert "inputs actuators, status, effect.battery" in done.stdout
 
 
-def test_fmus_that_package_cannot_have_are_named(folder: Path, tmp_path: Path) -> None:
+def test_fmus_that_package_cannot_have_are_named(tmp_path: Path) -> None:
     write_event_fmu(tmp_path / "ball.fmu", kind="CoSimulation")
     ball = '\n[services.ball]\nfmu = "ball.fmu"\n[services.ball.inputs]\n"u[0]" = "truth.velocity_world.2"\n'
     ball += '[services.ball.outputs]\n"trajectory.position_world.2" = "h"\n'
