@@ -13,6 +13,7 @@ from lapwing.cli.preflight import with_solver_selected
 
 Part = Annotated[str, typer.Option(metavar="PART", help="plant, sensors, autopilot, trajectory or vehicle (all)")]
 Cpu = Annotated[str, typer.Option(metavar="NAME", help="processors that run it: x86-64-v2, -v3, -v4 or native")]
+AllowCode = Annotated[bool, typer.Option("--allow-code", help="run FMUs of the scene to record its flight manager")]
 
 
 def _check(part: str, cpu: str) -> None:
@@ -30,13 +31,16 @@ def export_library(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="where to write the libraries, headers and example")],
     part: Part = "plant",
     cpu: Cpu = "x86-64-v3",
+    allow_code: AllowCode = False,
     set_: Overrides = None,
 ) -> None:
     """Export a part of a scene as a native library for C and C++.
 
     The library has the machine code of `lapwing run` and computes the same bits. It needs neither Python nor numba.
     """
-    with user_errors():
+    from lapwing.services.common import foreign_code
+
+    with user_errors(), foreign_code.permission(allow_code):
         _check(part, cpu)
         from lapwing.fmi.library import export_library, library_name
         from lapwing.services.scene_resolver import resolve
@@ -59,13 +63,16 @@ def export_fmu(
     part: Part = "plant",
     fmi: Annotated[int, typer.Option(metavar="N", help="version of FMI: 2 or 3")] = 3,
     cpu: Cpu = "x86-64-v3",
+    allow_code: AllowCode = False,
     set_: Overrides = None,
 ) -> None:
     """Export a part of a scene as an FMU for co-simulation.
 
     The FMU has the machine code of `lapwing run` and computes the same bits. It needs neither Python nor numba.
     """
-    with user_errors():
+    from lapwing.services.common import foreign_code
+
+    with user_errors(), foreign_code.permission(allow_code):
         _check(part, cpu)
         _check_fmi(fmi)
         if out.suffix != ".fmu":
@@ -86,13 +93,16 @@ def export_ssp(
     out: Annotated[Path, typer.Option(metavar="FILE", help="package to write, NAME.ssp")],
     fmi: Annotated[int, typer.Option(metavar="N", help="version of FMI: 3 (SSP 2.0) or 2 (SSP 1.0)")] = 3,
     cpu: Cpu = "x86-64-v3",
+    allow_code: AllowCode = False,
     set_: Overrides = None,
 ) -> None:
     """Export a scene as a package of connected FMUs (SSP).
 
     `lapwing run NAME.ssp` flies it, also after FMUs were exchanged. SSP tools simulate it without Lapwing.
     """
-    with user_errors():
+    from lapwing.services.common import foreign_code
+
+    with user_errors(), foreign_code.permission(allow_code):
         _check("vehicle", cpu)
         _check_fmi(fmi)
         if out.suffix != ".ssp":

@@ -76,7 +76,7 @@ def _ports(part: ExportedPart, ports: Sequence[BoundaryPort]) -> list[str]:
     result, staged = [], 0
     for p in ports:
         width = row_width(p.port.like)
-        result.append(f"{{{part.image.rows[p.port.name]}, {p.depth}, {width}, {p.port.period}, {p.lag}, {staged}}}")
+        result.append(f"{{{part.image.rows[p.ring]}, {p.depth}, {width}, {p.port.period}, {p.lag}, {staged}}}")
         staged += width
     return result
 

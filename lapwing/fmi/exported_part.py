@@ -10,6 +10,7 @@ from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.fmi.memory_image import MemoryImage, image_of
 from lapwing.fmi.python_actions import Action, record_actions
+from lapwing.services.fmu.service_config import fmus_of, replaced_ports
 from lapwing.services.process_table import create_all
 
 VEHICLE = "vehicle"
@@ -31,6 +32,7 @@ class BoundaryPort(NamedTuple):
     port: Port
     lag: int  # [ticks] of an input: 0 if its value belongs to the tick that is computed, else 1
     depth: int  # rows in the ring
+    ring: str  # name of the port in the diagram; another one if an FMU computes columns of the port
 
 
 @dataclass
@@ -90,12 +92,18 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
     roots = [(block.part.name, block.bound.cell) for block in blocks if block.bound]
     image = image_of(roots, diagram._rows)
     actions = record_actions(setup, services, image, diagram) if any(b.bound is None for b in blocks) else []
+    originals = {own: port for port, own in replaced_ports(fmus_of(setup.services)).items()}
+
+    def boundary(port: Port, lag: int) -> BoundaryPort:
+        public = port._replace(name=originals.get(port.name, port.name))
+        return BoundaryPort(public, lag, len(diagram._rows[port.name]), port.name)
+
     return ExportedPart(
         name,
         setup,
         blocks,
-        [BoundaryPort(diagram.ports[port], lag, len(diagram._rows[port])) for port, lag in lags.items()],
-        [BoundaryPort(port, 0, len(diagram._rows[port.name])) for port in published if port.name in diagram._rows],
+        [boundary(diagram.ports[port], lag) for port, lag in lags.items()],
+        [boundary(port, 0) for port in published if port.name in diagram._rows],
         image,
         actions,
     )

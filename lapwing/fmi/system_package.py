@@ -1,21 +1,55 @@
-"""System Structure and Parameterization packages: the parts of a scene as connected FMUs."""
+"""System Structure and Parameterization packages: the parts of a scene, and its own FMUs, as connected FMUs."""
 
 import json
 import tempfile
 import zipfile
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
 
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.fmi import variables as kinds
 from lapwing.fmi.fmu import ZIP_DATE, export_fmu
 from lapwing.fmi.machine_code import PORTABLE
-from lapwing.fmi.variables import variables_of
-from lapwing.services.fmu.service_config import fmus_of
-from lapwing.services.fmu.system_structure import COMMON, DESCRIPTION, PART, SCENE, STRUCTURE
+from lapwing.fmi.variables import column_names, variables_of
+from lapwing.services.common.foreign_code import FMU_SUFFIX
+from lapwing.services.fmu import system_structure as ssp
+from lapwing.services.fmu.description import content_of
+from lapwing.services.fmu.service_config import (
+    CO_SIMULATION,
+    MODEL_EXCHANGE,
+    SCHEDULED_EXECUTION,
+    FmuConfig,
+    StartValue,
+    fmus_of,
+    own_port,
+)
 
 SSP_VERSIONS = {3: "2.0", 2: "1.0"}  # by the version of FMI; SSP 1.0 does not know FMI 3.0
+_INTERFACES = {
+    CO_SIMULATION: "CoSimulation", MODEL_EXCHANGE: "ModelExchange", SCHEDULED_EXECUTION: "ScheduledExecution",
+}  # fmt: skip
+
+
+class _Source(NamedTuple):
+    """Where a connection begins."""
+
+    component: str
+    connector: str
+    factor: float  # from its unit to that of the other end
+
+
+class _Component(NamedTuple):
+    """An FMU of the package."""
+
+    name: str
+    implementation: str
+    connectors: dict[str, str]  # causality by name
+    sources: dict[str, _Source]  # by input
+    start: Sequence[StartValue]
 
 
 def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORTABLE) -> list[str]:
@@ -28,55 +62,132 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
         cpu: generation of processors that run the FMUs.
 
     Raises:
-        ValueError: a part cannot be exported, or there is no C compiler.
+        ValueError: a part cannot be exported, an FMU of the scene does not fit, or there is no C compiler.
     """
-    if fmus_of(setup.services) or setup.modules:
-        raise ValueError(f"{setup.scene}: has code of other authors; export a scene without [services] and modules")
-    connectors: dict[str, list[tuple[str, str]]] = {}
-    with tempfile.TemporaryDirectory() as name:
-        for part in setup.order:
-            exported = export_fmu(setup, part, Path(name) / f"{part}.fmu", version, cpu)
-            connectors[part] = [
-                (v.name, v.causality) for v in variables_of(exported) if v.causality in (kinds.INPUT, kinds.OUTPUT)
-            ]
-        files = {f"resources/{part}.fmu": (Path(name) / f"{part}.fmu").read_bytes() for part in connectors}
-    files[STRUCTURE] = _structure(setup, connectors, SSP_VERSIONS[version])
-    files[SCENE] = json.dumps(setup.resolved, sort_keys=True).encode()
+    fmus = fmus_of(setup.services)
+    _check(setup, fmus, version)
+    parts: dict[str, dict[str, str]] = {}  # causality by connector
+    files: dict[str, bytes] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in (each for each in setup.order if not each.endswith(FMU_SUFFIX)):
+            path = Path(folder) / f"{name}.fmu"
+            variables = variables_of(export_fmu(setup, name, path, version, cpu))
+            parts[name] = {v.name: v.causality for v in variables if v.causality in (kinds.INPUT, kinds.OUTPUT)}
+            files[ssp.FMU_PATH.format(name)] = path.read_bytes()
+    for fmu in fmus:
+        content = content_of(f"services.{fmu.name}.fmu", Path(fmu.path), fmu.content)
+        files[ssp.FMU_PATH.format(fmu.name)] = content
+    components = _components(setup, parts, fmus)
+    files[ssp.STRUCTURE] = _structure(setup, components, SSP_VERSIONS[version])
+    files[ssp.SCENE] = json.dumps(_scene(setup, fmus), sort_keys=True).encode()
     with zipfile.ZipFile(out, "w") as archive:
-        for path, content in files.items():
-            archive.writestr(zipfile.ZipInfo(path, ZIP_DATE), content, zipfile.ZIP_DEFLATED)
-    return list(connectors)
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), content, zipfile.ZIP_DEFLATED)
+    return [component.name for component in components]
 
 
-def _structure(setup: RunConfig, connectors: dict[str, list[tuple[str, str]]], version: str) -> bytes:
-    """Return the system structure description: components in the order of execution, and their connections."""
-    Xml.register_namespace("ssd", DESCRIPTION)
-    Xml.register_namespace("ssc", COMMON)
+def _check(setup: RunConfig, fmus: Iterable[FmuConfig], version: int) -> None:
+    """Raise ValueError if a scene cannot be a package."""
+    if setup.modules:
+        raise ValueError(f"{setup.scene}: has Python modules, which a package cannot have; export a scene without them")
+    if not setup.vehicle and any(fmus_of(member.services) for member in members(setup)):
+        raise ValueError(f"{setup.scene}: has [services] of several vehicles; export a scene of one vehicle")
+    for fmu in fmus:
+        if fmu.version > version:
+            raise ValueError(f"services.{fmu.name}: is an FMU of FMI 3.0, which SSP 1.0 does not know; use --fmi 3")
+        for element in (*(c.element for c in (*fmu.inputs, *fmu.outputs)), *(each.element for each in fmu.start)):
+            if element.size > 1:
+                message = f"services.{fmu.name}: {element.variable} is an element of an array"
+                raise ValueError(f"{message}, which SSP cannot connect; use scalar variables")
+
+
+def _components(setup: RunConfig, parts: dict[str, dict[str, str]], fmus: Sequence[FmuConfig]) -> list[_Component]:
+    """Return the parts in the order of execution, and the FMUs, with their connections."""
+    ports = [port for service in setup.services.values() for port in service.ports]
+    names = {(port.name, k): name for port in ports for k, name in enumerate(column_names(port))}
+    own = {n: _Source(part, n, 1.0) for part in parts for n, kind in parts[part].items() if kind == kinds.OUTPUT}
+    of_fmus = {(c.port, c.column): _Source(f.name, c.element.variable, c.factor) for f in fmus for c in f.outputs}
+    computed = {**own, **{names[column]: source for column, source in of_fmus.items()}}
+    result = []
+    for name, connectors in parts.items():
+        inputs = [n for n, kind in connectors.items() if kind == kinds.INPUT and n in computed]
+        result.append(_Component(name, "CoSimulation", connectors, {n: computed[n] for n in inputs}, ()))
+    for fmu in fmus:
+        sources = {}
+        for c in fmu.inputs:  # ports that Lapwing computes, or outputs of other FMUs
+            column = c.port, c.column
+            source = of_fmus[column] if c.port.startswith(own_port("")) else own[names[column]]
+            sources[c.element.variable] = source._replace(factor=source.factor * c.factor)
+        connectors = {
+            **{c.element.variable: kinds.INPUT for c in fmu.inputs},
+            **{c.element.variable: kinds.OUTPUT for c in fmu.outputs},
+        }
+        result.append(_Component(fmu.name, _INTERFACES[fmu.interface], connectors, sources, fmu.start))
+    return result
+
+
+def _scene(setup: RunConfig, fmus: Sequence[FmuConfig]) -> dict[str, Any]:
+    """Return the tables of the scene, whose FMUs are files of the package."""
+    scene = dict(setup.resolved)
+    if fmus:
+        tables = {name: {k: v for k, v in table.items() if k != "content"} for name, table in scene["services"].items()}
+        scene["services"] = {name: {**table, "fmu": ssp.FMU_PATH.format(name)} for name, table in tables.items()}
+    return scene
+
+
+def _structure(setup: RunConfig, components: Sequence[_Component], version: str) -> bytes:
+    """Return the system structure description: components and their connections."""
+    description, common = (f"{{{each}}}" for each in (ssp.DESCRIPTION, ssp.COMMON))
+    Xml.register_namespace("ssd", ssp.DESCRIPTION)
+    Xml.register_namespace("ssc", ssp.COMMON)
+    Xml.register_namespace("ssv", ssp.VALUES)
     tool = {"generationTool": f"Lapwing {package_version()}"}
-    root = Xml.Element(
-        f"{{{DESCRIPTION}}}SystemStructureDescription", {"version": version, "name": setup.scene, **tool}
-    )
-    system = Xml.SubElement(root, f"{{{DESCRIPTION}}}System", {"name": setup.scene, "description": setup.title})
-    elements = Xml.SubElement(system, f"{{{DESCRIPTION}}}Elements")
-    common = {"type": "application/x-fmu-sharedlibrary", "implementation": "CoSimulation"}
-    source: dict[str, str] = {}
-    for part, listed in connectors.items():
-        attributes = {"name": part, **common, "source": f"resources/{part}.fmu"}
-        component = Xml.SubElement(elements, f"{{{DESCRIPTION}}}Component", attributes)
-        own = Xml.SubElement(component, f"{{{DESCRIPTION}}}Connectors") if listed else component
-        for name, kind in listed:
-            Xml.SubElement(own, f"{{{DESCRIPTION}}}Connector", {"name": name, "kind": kind})
-        notes = Xml.SubElement(component, f"{{{DESCRIPTION}}}Annotations")
-        note = Xml.SubElement(notes, f"{{{COMMON}}}Annotation", {"type": PART})
-        Xml.SubElement(note, "part", {"scene": SCENE, "name": part})
-        source |= {name: part for name, kind in listed if kind == kinds.OUTPUT}
-    connections = Xml.SubElement(system, f"{{{DESCRIPTION}}}Connections")
-    for part, listed in connectors.items():
-        for name, kind in listed:
-            if kind == kinds.INPUT:
-                ends = {"startElement": source[name], "startConnector": name, "endElement": part, "endConnector": name}
-                Xml.SubElement(connections, f"{{{DESCRIPTION}}}Connection", ends)
+    root = Xml.Element(f"{description}SystemStructureDescription", {"version": version, "name": setup.scene, **tool})
+    system = Xml.SubElement(root, f"{description}System", {"name": setup.scene, "description": setup.title})
+    elements = Xml.SubElement(system, f"{description}Elements")
+    for each in components:
+        attributes = {"type": ssp.FMU_TYPE, "implementation": each.implementation}
+        source = {"source": ssp.FMU_PATH.format(each.name)}
+        component = Xml.SubElement(elements, f"{description}Component", {"name": each.name, **attributes, **source})
+        own = Xml.SubElement(component, f"{description}Connectors") if each.connectors else component
+        for name, kind in each.connectors.items():
+            Xml.SubElement(own, f"{description}Connector", {"name": name, "kind": kind})
+        if each.start:
+            component.append(_parameters(each.start, version))
+        notes = Xml.SubElement(component, f"{description}Annotations")
+        note = Xml.SubElement(notes, f"{common}Annotation", {"type": ssp.PART})
+        Xml.SubElement(note, "part", {"scene": ssp.SCENE, "name": each.name})
+    connections = Xml.SubElement(system, f"{description}Connections")
+    for each in components:
+        for name, begin in each.sources.items():
+            ends = {"startElement": begin.component, "startConnector": begin.connector}
+            ends |= {"endElement": each.name, "endConnector": name}
+            connection = Xml.SubElement(connections, f"{description}Connection", ends)
+            if begin.factor != 1.0:
+                Xml.SubElement(connection, f"{common}LinearTransformation", {"factor": repr(begin.factor)})
     stop = {"startTime": "0", "stopTime": repr(setup.duration)}
-    Xml.SubElement(root, f"{{{DESCRIPTION}}}DefaultExperiment", stop)
+    Xml.SubElement(root, f"{description}DefaultExperiment", stop)
     Xml.indent(root)
     return Xml.tostring(root, "utf-8", xml_declaration=True) + b"\n"
+
+
+def _parameters(start: Sequence[StartValue], version: str) -> Xml.Element:
+    """Return the parameter bindings with the start values of an FMU."""
+    description, values = (f"{{{each}}}" for each in (ssp.DESCRIPTION, ssp.VALUES))
+    bindings = Xml.Element(f"{description}ParameterBindings")
+    binding = Xml.SubElement(bindings, f"{description}ParameterBinding")
+    given = Xml.SubElement(binding, f"{description}ParameterValues")
+    table = Xml.SubElement(given, f"{values}ParameterSet", {"version": version, "name": "start"})
+    parameters = Xml.SubElement(table, f"{values}Parameters")
+    for element, value in start:
+        if element.type in ("String", "Binary"):
+            kind, text = element.type, str(value)
+        elif element.type in ("Real", "Float64", "Float32"):
+            kind, text = "Real", repr(float(value))
+        elif element.type == "Boolean":
+            kind, text = "Boolean", "true" if value else "false"
+        else:
+            kind, text = "Integer", str(int(value))
+        parameter = Xml.SubElement(parameters, f"{values}Parameter", {"name": element.variable})
+        Xml.SubElement(parameter, f"{values}{kind}", {"value": text})
+    return bindings

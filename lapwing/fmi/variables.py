@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 from numba.core import types
 
+from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.fmi.exported_part import BoundaryPort, ExportedPart
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common.field_units import field_unit
@@ -45,6 +46,11 @@ def variables_of(part: ExportedPart) -> list[Variable]:
         name = _indices(".".join(filter(None, (prefix, structured_name(block), rest))))
         result.append(Variable(name, causality, REAL, unit, start, 0, leaf.offset))
     return result
+
+
+def column_names(port: Port) -> list[str]:
+    """Return the names of the variables of a port, one for each column."""
+    return [v.name for v in _columns(BoundaryPort(port, 0, 1, port.name), INPUT, 0, 0)]
 
 
 def structured_name(name: str) -> str:

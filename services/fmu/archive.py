@@ -4,29 +4,42 @@ import importlib.util
 import io
 import re
 import zipfile
+import zlib
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.fmu.clocks import DESCRIPTION, Clock, input_clocks
+from lapwing.services.fmu.service_config import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION
 
 LARGEST = 4_000_000_000  # [bytes] of all files of an FMU together
 LARGEST_DESCRIPTION = 100_000_000  # [bytes]
-DESCRIPTION = "modelDescription.xml"
 BINARIES = {2: "binaries/linux64", 3: "binaries/x86_64-linux"}  # by the version of FMI
 _MACHINE = slice(18, 20)  # of a header in the format ELF
 _X86_64 = (62).to_bytes(2, "little")
 
 
-def read_description(key: str, path: Path, content: bytes) -> Any:
-    """Return FMPy's model description of an FMU.
+class Content(NamedTuple):
+    """Description of an FMU that has a library for this platform."""
+
+    model: Any  # FMPy's model description
+    version: int  # of FMI, 2 or 3
+    interface: str  # CO_SIMULATION, MODEL_EXCHANGE or SCHEDULED_EXECUTION
+    clocks: list[Clock]  # input clocks of scheduled execution
+
+
+def read_archive(key: str, path: Path, content: bytes, interface: str | None) -> Content:
+    """Return the description of an FMU.
 
     Args:
         key: of the FMU in the scene.
         path: of the FMU, for messages.
         content: of the file.
+        interface: the desired one; None: the first that the FMU has.
 
     Raises:
-        ConfigError: not an FMU, too large, damaged, or with paths or entities that lead out of it.
+        ConfigError: not an FMU, too large, damaged, with paths or entities that lead out of it, without the interface,
+            or for another platform.
     """
     if importlib.util.find_spec("fmpy") is None:
         raise ConfigError(key, "FMUs need FMPy", "it installed: pip install lapwing[fmi]")
@@ -36,14 +49,11 @@ def read_description(key: str, path: Path, content: bytes) -> Any:
         with zipfile.ZipFile(io.BytesIO(content)) as archive:
             _check_files(key, path, archive)
             text = archive.read(DESCRIPTION)
-        if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
-            raise ConfigError(key, f"{path}: {DESCRIPTION} declares a document type", "XML without entities")
-        version = re.search(rb"<fmiModelDescription\b[^>]*\bfmiVersion\s*=\s*[\"']([\w.-]*)", text)
-        if version is None:
-            raise ConfigError(key, f"{path}: {DESCRIPTION} describes no model", "an FMU")
-        if version[1][:2] not in (b"2.", b"3."):
-            raise ConfigError(key, f"{path}: FMI {version[1].decode()}", "an FMU of version 2.0 or 3.0")
-        return fmpy.read_model_description(io.BytesIO(content), validate=False)
+            version = _version(key, path, text)
+            model = fmpy.read_model_description(io.BytesIO(content), validate=False)
+            name, identifier = _interface(key, path, model, interface)
+            _check_library(key, path, archive, version, identifier)
+        return Content(model, version, name, input_clocks(text) if name == SCHEDULED_EXECUTION else [])
     except ConfigError:
         raise
     except Exception as error:  # zipfile, lxml and FMPy raise many
@@ -65,31 +75,50 @@ def _check_files(key: str, path: Path, archive: zipfile.ZipFile) -> None:
         raise ConfigError(key, f"{path}: its files have {size / 1e9:.3g} GB", f"at most {LARGEST / 1e9:g} GB")
     if archive.getinfo(DESCRIPTION).file_size > LARGEST_DESCRIPTION:
         raise ConfigError(key, f"{path}: {DESCRIPTION} is too large", f"at most {LARGEST_DESCRIPTION / 1e6:g} MB")
-    if damaged := archive.testzip():
-        raise ConfigError(key, f"{path}: file {damaged} is damaged", "a whole FMU")
 
 
-def check_binary(key: str, path: Path, content: bytes, version: int, identifier: str) -> None:
-    """Raise ConfigError unless an FMU has a library for this platform.
+def _version(key: str, path: Path, text: bytes) -> int:
+    """Return the version of FMI of a model description, 2 or 3."""
+    if b"<!DOCTYPE" in text or b"<!ENTITY" in text:
+        raise ConfigError(key, f"{path}: {DESCRIPTION} declares a document type", "XML without entities")
+    version = re.search(rb"<fmiModelDescription\b[^>]*\bfmiVersion\s*=\s*[\"']([\w.-]*)", text)
+    if version is None:
+        raise ConfigError(key, f"{path}: {DESCRIPTION} describes no model", "an FMU")
+    if version[1][:2] not in (b"2.", b"3."):
+        raise ConfigError(key, f"{path}: FMI {version[1].decode()}", "an FMU of version 2.0 or 3.0")
+    return int(version[1][:1])
 
-    Args:
-        key, path, content: see `read_description`.
-        version: of FMI.
-        identifier: name of the library.
-    """
+
+def _interface(key: str, path: Path, model: Any, desired: str | None) -> tuple[str, str]:
+    """Return the name of an interface, and that of its library."""
+    interfaces = {
+        CO_SIMULATION: model.coSimulation,
+        MODEL_EXCHANGE: model.modelExchange,
+        SCHEDULED_EXECUTION: model.scheduledExecution,
+    }
+    available = {name: interface for name, interface in interfaces.items() if interface is not None}
+    if not available or desired not in (None, *available):
+        has = ", ".join(available) or "no interface"
+        raise ConfigError(key, f"{path}: has no {desired or 'interface'}, but {has}", "an interface that the FMU has")
+    name = desired or next(iter(available))
+    return name, available[name].modelIdentifier or ""
+
+
+def _check_library(key: str, path: Path, archive: zipfile.ZipFile, version: int, identifier: str) -> None:
+    """Raise ConfigError unless an FMU has the library `identifier` for this platform."""
     if not re.fullmatch(r"\w+", identifier):
         raise ConfigError(key, f"{path}: modelIdentifier {identifier!r}", "letters, digits and underscores")
-    folder = BINARIES[version]
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        names = archive.namelist()
-        if not any(name.startswith(f"{folder}/") for name in names):
-            folders = {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
-            listed = ", ".join(sorted(folders)) or "no platform"
-            raise ConfigError(key, f"{path}: has binaries for {listed}", "an FMU for Linux on x86-64")
-        name = f"{folder}/{identifier}.so"
-        if name not in names:
-            raise ConfigError(key, f"{path}: has no file {name}", "the library that modelIdentifier names")
-        with archive.open(name) as file:
-            header = file.read(_MACHINE.stop)
-    if not header.startswith(b"\x7fELF") or header[_MACHINE] != _X86_64:
+    folder, names = BINARIES[version], archive.namelist()
+    if not any(name.startswith(f"{folder}/") for name in names):
+        folders = {name.split("/")[1] for name in names if name.startswith("binaries/") and name.count("/") > 1}
+        listed = ", ".join(sorted(folders)) or "no platform"
+        raise ConfigError(key, f"{path}: has binaries for {listed}", "an FMU for Linux on x86-64")
+    name = f"{folder}/{identifier}.so"
+    if name not in names:
+        raise ConfigError(key, f"{path}: has no file {name}", "the library that modelIdentifier names")
+    try:
+        library = archive.read(name)
+    except (zipfile.BadZipFile, zlib.error):
+        raise ConfigError(key, f"{path}: file {name} is damaged", "a whole FMU") from None
+    if not library.startswith(b"\x7fELF") or library[_MACHINE] != _X86_64:
         raise ConfigError(key, f"{path}: {name} is no library for x86-64", "an FMU for Linux on x86-64")

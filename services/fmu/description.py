@@ -9,8 +9,9 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.field_units import Unit, parse_unit
-from lapwing.services.fmu.archive import LARGEST, check_binary, read_description
-from lapwing.services.fmu.service_config import CO_SIMULATION, MODEL_EXCHANGE, Element
+from lapwing.services.fmu.archive import LARGEST, read_archive
+from lapwing.services.fmu.clocks import TRIGGERED, check_clock
+from lapwing.services.fmu.service_config import CLOCK, SCHEDULED_EXECUTION, Element
 
 INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
 TYPES = ("Real", "Float64", "Float32", "Integer", *INTEGERS, "Boolean", "Enumeration")
@@ -30,29 +31,29 @@ class Description:
 
     Attributes:
         version: of FMI, 2 or 3.
-        interface: CO_SIMULATION or MODEL_EXCHANGE.
+        interface: CO_SIMULATION, MODEL_EXCHANGE or SCHEDULED_EXECUTION.
     """
 
-    def __init__(self, key: str, path: Path, content: bytes, interface: str | None):
+    def __init__(self, key: str, path: Path, content: bytes, interface: str | None, tick: float):
         """Read the description.
 
         Args:
             key: of the FMU in the scene.
             path: of the FMU, for messages.
             content: of the file.
-            interface: the desired one; None: co-simulation if the FMU has it.
+            interface: the desired one; None: the first that the FMU has.
+            tick: length of one [s].
 
         Raises:
-            ConfigError: no FMU, of another platform, or without this interface.
+            ConfigError: no FMU, of another platform, without this interface, or with clocks that cannot tick.
         """
-        model = read_description(key, path, content)
-        self.version = int(model.fmiVersion[0])
-        self.interface = _interface(key, path, model, interface)
-        interfaces = {CO_SIMULATION: model.coSimulation, MODEL_EXCHANGE: model.modelExchange}
-        check_binary(key, path, content, self.version, interfaces[self.interface].modelIdentifier or "")
-        if clock := next((v for v in model.modelVariables if _must_tick(v)), None):
-            message = f"{path}: input clock {clock.name}, which the importer must activate in time, is not supported"
-            raise ConfigError(key, message, "an FMU without clocks, or with triggered ones")
+        model, self.version, self.interface, clocks = read_archive(key, path, content, interface)
+        for clock in clocks:
+            check_clock(key, path, clock, tick)
+        is_scheduled = self.interface == SCHEDULED_EXECUTION
+        if v := next((v for v in model.modelVariables if _must_tick(v) and not is_scheduled), None):
+            message = f"{path}: input clock {v.name}, which the importer must activate in time, is not supported"
+            raise ConfigError(key, message, "an FMU without clocks, with triggered ones, or for scheduled execution")
         self._units = {u.name: u.baseUnit for u in model.unitDefinitions or () if u.baseUnit is not None}
         self._variables = {v.name: v for v in model.modelVariables}
         self._references = {v.valueReference: v for v in model.modelVariables}
@@ -71,9 +72,12 @@ class Description:
             raise ConfigError.unknown(key, "variable", name, self._variables)
         if causality and v.causality != causality:
             raise ConfigError(key, f"{name} has causality {v.causality}", f"an {causality} of the FMU")
-        if v.type not in (TYPES if causality else TYPES + TEXTS):
+        is_clock = v.type == CLOCK and self.interface == SCHEDULED_EXECUTION and causality
+        if is_clock and causality == "input" and v.intervalVariability != TRIGGERED:
+            raise ConfigError(key, f"{name} is a clock with ticks of its own", "a triggered clock, or another variable")
+        if not is_clock and v.type not in (TYPES if causality else TYPES + TEXTS):
             raise ConfigError(key, f"{name} has the type {v.type}", f"a variable of type {', '.join(TYPES)}")
-        if v.clocks:
+        if v.clocks and self.interface != SCHEDULED_EXECUTION:
             clock = v.clocks[0].name
             raise ConfigError(key, f"{name} changes with the clock {clock}", "a variable without a clock")
         if v.causality == "structuralParameter":
@@ -135,17 +139,6 @@ def _position(key: str, name: str, index: str, shape: tuple[int, ...]) -> int:
     for i, n in zip(indices, shape, strict=True):
         position = position * n + i
     return position
-
-
-def _interface(key: str, path: Path, model: Any, desired: str | None) -> str:
-    interfaces = {CO_SIMULATION: model.coSimulation, MODEL_EXCHANGE: model.modelExchange}
-    available = [name for name, interface in interfaces.items() if interface is not None]
-    if desired is not None and desired not in available:
-        has = ", ".join(available) or "scheduled execution"
-        raise ConfigError(key, f"{path}: has no {desired}, but {has}", "an interface that the FMU has")
-    if not available:
-        raise ConfigError(key, f"{path}: for scheduled execution only", "an FMU for co-simulation or model exchange")
-    return desired or available[0]
 
 
 def content_of(key: str, path: Path, embedded: str | None) -> bytes:

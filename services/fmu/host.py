@@ -16,7 +16,7 @@ from typing import Any
 
 from lapwing.services.fmu.co_simulation import CoSimulation, channel
 from lapwing.services.fmu.instance import FmuInstance
-from lapwing.services.fmu.service_config import CO_SIMULATION
+from lapwing.services.fmu.service_config import CO_SIMULATION, SCHEDULED_EXECUTION
 
 LENGTH = struct.Struct("<q")
 
@@ -33,7 +33,7 @@ def instantiated(spec: dict[str, Any], inputs: Any, outputs: Any) -> FmuInstance
     """
     import fmpy
     from fmpy.fmi2 import FMU2Model, FMU2Slave
-    from fmpy.fmi3 import FMU3Model, FMU3Slave
+    from fmpy.fmi3 import FMU3Model, FMU3ScheduledExecution, FMU3Slave
 
     folder, is_3 = Path(spec["folder"]), spec["version"] == 3
     content = base64.b64decode(spec["content"]) if spec["content"] else Path(spec["path"]).read_bytes()
@@ -45,12 +45,18 @@ def instantiated(spec: dict[str, Any], inputs: Any, outputs: Any) -> FmuInstance
     model = fmpy.read_model_description(str(folder), validate=False)
     if spec["interface"] == CO_SIMULATION:
         kind, interface = FMU3Slave if is_3 else FMU2Slave, model.coSimulation
+    elif spec["interface"] == SCHEDULED_EXECUTION:
+        kind, interface = FMU3ScheduledExecution, model.scheduledExecution
     else:
         kind, interface = FMU3Model if is_3 else FMU2Model, model.modelExchange
     identifier = interface.modelIdentifier
     fmu = kind(guid=model.guid, unzipDirectory=str(folder), instanceName=spec["name"], modelIdentifier=identifier)
     if spec["interface"] == CO_SIMULATION:
         return CoSimulation(spec, model, fmu, inputs, outputs)
+    if spec["interface"] == SCHEDULED_EXECUTION:
+        from lapwing.services.fmu.scheduled_execution import ScheduledExecution
+
+        return ScheduledExecution(spec, model, fmu, inputs, outputs)
     from lapwing.services.fmu.model_exchange import ModelExchange  # imports the integrators
 
     return ModelExchange(spec, model, fmu, inputs, outputs)

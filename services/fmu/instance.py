@@ -4,6 +4,7 @@ import ctypes
 import math
 from typing import Any
 
+from lapwing.services.fmu.service_config import CLOCK
 from lapwing.services.fmu.stepping import UPDATES, WARNING
 from lapwing.services.fmu.variable_group import Group
 
@@ -64,6 +65,8 @@ class FmuInstance:
     def _groups(self, verb: str, elements: list[list[Any]], numbers: Any) -> list[Group]:
         entries: dict[str, list[tuple[int, list[Any]]]] = {}
         for index, element in enumerate(elements):
+            if element[2] == CLOCK:
+                continue  # a subclass activates it
             entries.setdefault(element[2], []).append((index, element))
         return [Group(self, verb, kind, own, numbers) for kind, own in entries.items()]
 

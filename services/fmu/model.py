@@ -13,7 +13,7 @@ from lapwing.services.common.ports import EFFECT
 from lapwing.services.fmu.description import Description, NamedUnit, content_of, start_elements
 from lapwing.services.fmu.schema import FmuTable
 from lapwing.services.fmu.service_config import (
-    CO_SIMULATION,
+    MODEL_EXCHANGE,
     Connection,
     Element,
     FmuConfig,
@@ -31,12 +31,12 @@ class ImportedFmu:
         exported: variables that other FMUs read, in the columns of `own_port`.
     """
 
-    def __init__(self, name: str, table: FmuTable):
+    def __init__(self, name: str, table: FmuTable, tick: float):
         """Read the description. Raise ConfigError if the FMU cannot run here."""
         self.name, self.table, self.key = name, table, f"services.{name}"
         self.path = Path(table.fmu)
         self.content = content_of(f"{self.key}.fmu", self.path, table.content)
-        self.description = Description(f"{self.key}.fmu", self.path, self.content, table.interface)
+        self.description = Description(f"{self.key}.fmu", self.path, self.content, table.interface, tick)
         self.exported: list[Element] = []
 
     def export(self, key: str, variable: str) -> tuple[list[int], list[NamedUnit | None]]:
@@ -98,11 +98,11 @@ class ImportedFmu:
 
     def _integrator(self) -> str:
         table, key = self.table, f"{self.key}.integrator"
-        if self.description.interface == CO_SIMULATION:
+        if self.description.interface != MODEL_EXCHANGE:
             for name in ("integrator", "accuracy"):
                 if getattr(table, name) is not None:
                     known = 'interface = "model_exchange"'
-                    raise ConfigError(f"{self.key}.{name}", "an FMU for co-simulation integrates by itself", known)
+                    raise ConfigError(f"{self.key}.{name}", "the FMU integrates by itself", known)
         name = table.integrator or INTEGRATOR
         if name not in integrators.names():
             raise ConfigError.unknown(key, "integrator", name, integrators.names())

@@ -7,6 +7,7 @@ from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common import effect_inputs
+from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.foreign_code import FMU_SUFFIX
 from lapwing.services.common.ports import EFFECT
 from lapwing.services.common.vehicle_schema import active
@@ -28,7 +29,7 @@ def connect(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Se
         return dict(services)
     table = scene[Services]
     known = {port.name: port for service in services.values() for port in service.ports}
-    imported = {name: ImportedFmu(name, table.fmu(name)) for name in table.tables}
+    imported = {name: ImportedFmu(name, table.fmu(name), scene[Communication].interval) for name in table.tables}
     effects = _effect_ports(scene, services)
     configs = [fmu.config(known, imported, effects) for fmu in imported.values()]
     fmus = [imported[each.name].with_exports(each) for each in configs]

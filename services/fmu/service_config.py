@@ -6,7 +6,8 @@ from typing import NamedTuple
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.services.common.ports import EFFECT
 
-CO_SIMULATION, MODEL_EXCHANGE = "co_simulation", "model_exchange"
+CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION = "co_simulation", "model_exchange", "scheduled_execution"
+CLOCK = "Clock"  # type of FMI; a number that is not 0 is a tick
 
 
 class Element(NamedTuple):
@@ -43,7 +44,7 @@ class FmuConfig(NamedTuple):
     sha256: str
     content: str  # the FMU in base64, "" if it stays in its file
     version: int  # of FMI, 2 or 3
-    interface: str  # CO_SIMULATION or MODEL_EXCHANGE
+    interface: str  # CO_SIMULATION, MODEL_EXCHANGE or SCHEDULED_EXECUTION
     integrator: str  # method of model exchange
     accuracy: float  # of model exchange, relative to 1 + size of a state
     inputs: tuple[Connection, ...]

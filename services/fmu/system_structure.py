@@ -1,15 +1,14 @@
 """Scenes from System Structure and Parameterization packages, whose components are FMUs and Lapwing parts.
 
-The package names its scene: in an annotation `PART` of the components that Lapwing exported, or as a component of the
-type `SCENE_TYPE`. Lapwing's own parts run natively and keep the connections of the scene. Each other FMU becomes a
-table `[services.NAME]` with the connections that it has.
+An annotation `PART` of the components that Lapwing exported, or a component of type `SCENE_TYPE`, names the scene. Such
+components keep its connections; its parts run natively. Each other FMU becomes a table `[services.NAME]`.
 """
 
 import base64
 import json
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.etree import ElementTree as Xml
@@ -20,6 +19,7 @@ from lapwing.cosim.scene.scene_error import KeyOrigin
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 DESCRIPTION, COMMON, VALUES = f"{_BASE}Description", f"{_BASE}Common", f"{_BASE}ParameterValues"
 STRUCTURE, SCENE = "SystemStructure.ssd", "resources/scene.json"
+FMU_PATH = "resources/{}.fmu"  # of a service in a package that Lapwing writes
 PART = "org.lapwing.part"  # type of the annotation
 FMU_TYPE, SCENE_TYPE = "application/x-fmu-sharedlibrary", "application/x-lapwing-scene"
 LARGEST = 500_000_000  # [bytes] of a file in a package
@@ -27,7 +27,8 @@ _NAMES = {"d": DESCRIPTION, "c": COMMON, "v": VALUES}
 
 
 class _Part(NamedTuple):
-    scene: str  # path of the scene in the package
+    scene: str  # paths in the package
+    source: str
 
 
 class _Fmu(NamedTuple):
@@ -107,22 +108,27 @@ def _tables(package: _Package, parse: Callable[[Path, str], Any]) -> dict[str, A
     content = _Content({}, {}, set(), {})
     _flatten(package, system, "", content)
     parts, fmus = content.parts, content.fmus
-    scenes = dict.fromkeys(part.scene for part in parts.values())
-    if len(scenes) != 1:
+    if len(scenes := {part.scene for part in parts.values()}) != 1:
         number = f"{len(scenes)} scenes" if scenes else "no Lapwing part"
         raise package.error(f"has {number}", "Lapwing parts of one scene, such as `lapwing export-ssp` writes")
-    for end, start in content.sources.items():
-        if end.element not in content.systems:
-            _connect(_component_source(package, content, start), end, fmus)
     (scene,) = scenes
     tree = _scene(package, scene, parse)
+    services = table if isinstance(table := tree.get("services"), dict) else {}
+    own = {name: t for name, t in services.items() if isinstance(t, dict) and t.get("fmu") == FMU_PATH.format(name)}
+    for end, start in content.sources.items():
+        if end.element not in content.systems:
+            _connect(_component_source(package, content, start), end, fmus, own)
+    for name in own.keys() - parts.keys():
+        del services[name]  # removed from the package, or exchanged
+    tables = {name: (part.source, own[name]) for name, part in parts.items() if name in own}
     for name, fmu in fmus.items():
         if not name.isidentifier():
             raise package.error(f"component {name!r}", "names of letters, digits and underscores")
-        own = {key: value for key, value in fmu._asdict().items() if key != "source" and value}
-        encoded = base64.b64encode(package.read(fmu.source)).decode()
-        tree.setdefault("services", {})[name] = {"fmu": f"{package.path}/{fmu.source}", "content": encoded, **own}
-    return tree
+        tables[name] = fmu.source, {key: value for key, value in fmu._asdict().items() if key != "source" and value}
+    for name, (source, table) in tables.items():
+        encoded = base64.b64encode(package.read(source)).decode()
+        services[name] = {**table, "fmu": f"{package.path}/{source}", "content": encoded}
+    return {**tree, "services": services} if services else tree
 
 
 def _flatten(package: _Package, system: Xml.Element, prefix: str, content: _Content) -> None:
@@ -153,7 +159,7 @@ def _sort(package: _Package, component: Xml.Element, name: str, parts: dict[str,
     kind, source = component.get("type", FMU_TYPE), component.get("source", "")
     note = component.find(f"d:Annotations/c:Annotation[@type='{PART}']/part", _NAMES)
     if note is not None or kind == SCENE_TYPE:
-        parts[name] = _Part(note.get("scene", SCENE) if note is not None else source)
+        parts[name] = _Part(note.get("scene", SCENE) if note is not None else source, source)
     elif kind == FMU_TYPE:
         fmus[name] = _Fmu(source, _start(package, component), {}, {})
     else:
@@ -194,7 +200,8 @@ def _connections(package: _Package, system: Xml.Element, prefix: str, content: _
             if each.element not in {*content.parts, *content.fmus, *content.systems}:
                 message = f"a connection of {each.element or 'the system itself'}"
                 raise package.error(message, "connections between the components")
-        if any(child.tag.endswith("Transformation") for child in connection):
+        transforms = any(child.tag.endswith("Transformation") for child in connection)
+        if transforms and {start.element, end.element} & content.fmus.keys():
             message = f"the connection to {end.element}.{end.connector} transforms values"
             raise package.error(message, "a connection without transformation")
         content.sources[end] = start
@@ -212,12 +219,13 @@ def _component_source(package: _Package, content: _Content, start: _End) -> _End
     return start
 
 
-def _connect(start: _End, end: _End, fmus: dict[str, _Fmu]) -> None:
-    """Enter a connection into the table of its FMU; those between Lapwing parts are those of the scene."""
+def _connect(start: _End, end: _End, fmus: dict[str, _Fmu], own: Mapping[str, Any]) -> None:
+    """Enter a connection into the table of its FMU; `own` FMUs and Lapwing parts have the connections of the scene."""
     if end.element in fmus:
-        source = f"{start.element}.{start.connector}" if start.element in fmus else _column(start.connector)
+        is_fmu = start.element in fmus or start.element in own
+        source = f"{start.element}.{start.connector}" if is_fmu else _column(start.connector)
         fmus[end.element].inputs[end.connector] = source
-    elif start.element in fmus:
+    elif start.element in fmus and end.element not in own:
         fmus[start.element].outputs[_column(end.connector)] = start.connector
 
 

@@ -116,9 +116,18 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         ),
         **dict.fromkeys(("--mavlink", "--mavlink-key"), SEPARATE),
     },
-    "export-fmu": dict.fromkeys(("--out", "--part", "--fmi", "--cpu", "--set"), "tests/fmi/test_fmu.py"),
-    "export-ssp": dict.fromkeys(("--out", "--fmi", "--cpu", "--set"), "tests/fmi/test_system_package.py"),
-    "export-library": dict.fromkeys(("--out", "--part", "--cpu", "--set"), "tests/fmi/test_library.py"),
+    "export-fmu": {
+        **dict.fromkeys(("--out", "--part", "--fmi", "--cpu", "--set"), "tests/fmi/test_fmu.py"),
+        "--allow-code": "tests/fmi/test_export_with_fmus.py",
+    },
+    "export-ssp": {
+        **dict.fromkeys(("--out", "--fmi", "--cpu", "--set"), "tests/fmi/test_system_package.py"),
+        "--allow-code": "tests/fmi/test_export_with_fmus.py",
+    },
+    "export-library": {
+        **dict.fromkeys(("--out", "--part", "--cpu", "--set"), "tests/fmi/test_library.py"),
+        "--allow-code": "tests/fmi/test_export_with_fmus.py",
+    },
     "studio": {"--port": "tests/studio/test_studio.py::test_port_in_use_is_rejected_in_one_line"},
     "view": {"--rerun": "tests/lapwing/test_view.py"},
     "render": dict.fromkeys(

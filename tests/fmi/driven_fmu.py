@@ -1,10 +1,12 @@
 """Exported FMUs that tests step by hand, through FMPy."""
 
+import ctypes
 import shutil
 from pathlib import Path
 
 import fmpy
 import numpy as np
+from fmpy import fmi2
 from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from recorded_ports import RecordedPorts
@@ -16,7 +18,7 @@ from lapwing.fmi.variables import variables_of
 class Slave:
     """One instance of an FMU of either version, with the functions that the tests use."""
 
-    def __init__(self, path: Path, name: str = "a"):
+    def __init__(self, path: Path, name: str = "a", **options: bool):
         self.model = fmpy.read_model_description(str(path))
         self.folder = fmpy.extract(str(path))
         self.is_3 = self.model.fmiVersion.startswith("3")
@@ -25,7 +27,18 @@ class Slave:
             modelIdentifier=self.model.coSimulation.modelIdentifier,
         )  # fmt: skip
         self.references = {v.name: v.valueReference for v in self.model.modelVariables}
-        self.fmu.instantiate()
+        self.messages: list[tuple[int, str]] = []  # status and text of the FMU's log
+        if self.is_3:
+            self.fmu.instantiate(
+                logMessage=lambda _, status, __, text: self.messages.append((status, text.decode())), **options
+            )
+        else:
+            self._callbacks = fmi2.fmi2CallbackFunctions()
+            ctypes.pointer(self._callbacks)[0] = fmi2.defaultCallbacks
+            self._callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(
+                lambda _, __, status, ___, text: self.messages.append((status, text.decode()))
+            )
+            self.fmu.instantiate(callbacks=self._callbacks)
         self.time = 0.0
 
     def begin(self, **start: float) -> None:

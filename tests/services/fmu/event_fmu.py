@@ -231,7 +231,7 @@ def write_event_fmu(
     Args:
         path: of the FMU.
         version: of FMI.
-        kind: ModelExchange, CoSimulation or ScheduledExecution, for FMI 3.0.
+        kind: ModelExchange or CoSimulation, for FMI 3.0.
         unit: of the height h, for FMI 3.0.
         clocks: XML of further variables, for FMI 3.0.
     """

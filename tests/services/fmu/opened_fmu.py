@@ -11,13 +11,15 @@ from lapwing.services.fmu.model import ImportedFmu
 from lapwing.services.fmu.schema import FmuTable
 from lapwing.services.fmu.service_config import Connection
 
+TICK = 1e-3  # [s] of a run, of which the intervals of clocks are multiples
+
 
 class OpenedFmu:
     """An FMU that is stepped by hand."""
 
     def __init__(self, path: Path, outputs: Sequence[str], inputs: Sequence[str] = (), **table: Any):
         """Start the process; `table` are further keys of the scene's table."""
-        fmu = ImportedFmu("a", FmuTable(fmu=str(path), timeout=300.0, **table))
+        fmu = ImportedFmu("a", FmuTable(fmu=str(path), timeout=300.0, **table), TICK)
         for name in outputs:
             fmu.export("outputs", name)
         config = fmu.with_exports(fmu.config({}, {"a": fmu}, {}))

@@ -334,8 +334,8 @@ def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> Non
     ("line", "message"),
     [
         ('interface = "model_exchange"', "has no model_exchange, but co_simulation"),
-        ('integrator = "rk4"', "services.motor.integrator: an FMU for co-simulation integrates by itself"),
-        ("accuracy = 1e-6", "services.motor.accuracy: an FMU for co-simulation integrates by itself"),
+        ('integrator = "rk4"', "services.motor.integrator: the FMU integrates by itself"),
+        ("accuracy = 1e-6", "services.motor.accuracy: the FMU integrates by itself"),
     ],
 )
 def test_option_of_other_interface_is_rejected(folder: Path, line: str, message: str) -> None:
@@ -378,15 +378,6 @@ def test_integrator_that_does_not_fit_is_rejected(tmp_path: Path, line: str, mes
     with pytest.raises(ValueError, match=r"services\.motor") as error:
         scene_resolver.resolve(scene_resolver.load(scene))
     assert message in str(error.value)
-
-
-@pytest.mark.long
-def test_fmu_for_scheduled_execution_is_rejected(tmp_path: Path) -> None:
-    write_event_fmu(tmp_path / "ball.fmu", kind="ScheduledExecution")
-    done = fly(scene_with(tmp_path, "ball.fmu", "", '"trajectory.position_world.2" = "h"'), tmp_path / "a.mcap")
-    assert done.returncode == 2
-    assert "for scheduled execution only; expected an FMU for co-simulation or model exchange" in done.stderr
-    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.long
