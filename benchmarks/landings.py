@@ -1,4 +1,4 @@
-"""python -m benchmarks.landings: error got over error asked in 200 random landings, on steps, toppling; in pieces."""
+"""python -m benchmarks.landings: error got over error asked in 200 random landings and other kinds; in pieces."""
 
 import argparse
 from collections.abc import Collection
@@ -14,7 +14,10 @@ def main() -> None:
     """Print the table of docs/explanation/accuracy.md."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.landings")
     parser.add_argument(
-        "--kind", choices=list(DRAWS), default="random", help="random landings, at steps, or toppling [default: random]"
+        "--kind",
+        choices=list(DRAWS),
+        default="random",
+        help="random landings, at steps, toppling, or with a strike of a propeller [default: random]",
     )
     parser.add_argument("--first", type=int, default=0, help="number of the first landing [default: 0]")
     parser.add_argument("--count", type=int, default=200, help="number of landings [default: 200]")

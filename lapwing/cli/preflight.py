@@ -12,19 +12,20 @@ if TYPE_CHECKING:
 
 def with_solver_selected(path: Path, overrides: list[str]) -> "Scene":
     """Load a scene; if it sets `solver.accuracy`, select integrator and step."""
-    from lapwing.services.plant.schema import Solver
+    from lapwing.services.plant.schema import accuracy_to_select_for
     from lapwing.services.scene_resolver import load
     from lapwing.studies.metrics import check_success
 
     scene = load(path, overrides)
     for vehicle in scene.vehicles or (scene,):
         check_success(vehicle)
-    if scene.vehicles or not scene[Solver].undecided:  # the vehicles of a fleet would select different ones
+    accuracy = accuracy_to_select_for(scene)
+    if accuracy is None:
         return scene
     from lapwing.studies.accuracy import solver_selection
 
     chosen = solver_selection.overrides(scene, typer.echo)
-    typer.echo(f"solver.accuracy = {scene[Solver].accuracy:g}: selected {', '.join(chosen)}")
+    typer.echo(f"solver.accuracy = {accuracy:g}: selected {', '.join(chosen)}")
     return load(path, [*overrides, *chosen])
 
 

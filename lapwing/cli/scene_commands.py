@@ -8,13 +8,13 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import user_errors
-from lapwing.cli.options import Overrides, SceneFile
+from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import warn_of_gains, with_solver_selected
 
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
-    from lapwing.cosim.scene import Scene
+    from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy
 
 T = TypeVar("T")
 
@@ -45,7 +45,9 @@ def scenes(
 
 @app.command()
 def check(
-    scene: SceneFile,
+    scene: Annotated[
+        Path, typer.Argument(metavar="SCENE", help="scene file (TOML), or name; with --accuracy also a log (MCAP)")
+    ],
     accuracy: Annotated[
         bool, typer.Option("--accuracy", help="fly it, and compare the error with solver.accuracy")
     ] = False,
@@ -65,6 +67,10 @@ def check(
         if json and not accuracy:
             raise ValueError("--json: holds the errors of a flight; give --accuracy, too")
         claim(json)
+        if scene.suffix == ".mcap":
+            if not _accuracy_met(_accuracy_of_log(scene, accuracy, set_ or []), json):
+                raise SystemExit(1)
+            return
         loaded = with_solver_selected(scene, set_ or [])
         setup = resolve(loaded)
         exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
@@ -80,16 +86,38 @@ def check(
         lines.append(("services", f"{', '.join(setup.order)}; {exchange.rate} Hz, {exchange.coupling}"))
         for label, line in lines:
             typer.echo(f"  {label:<9} {line}")
-        if accuracy and not _accuracy_met(loaded, loaded.overrides != tuple(set_ or []), json):
-            raise SystemExit(1)
+        if accuracy:
+            from lapwing.studies.accuracy import flight_accuracy
+
+            result = flight_accuracy.measure(loaded, _with_bar, loaded.overrides != tuple(set_ or []))
+            if not _accuracy_met(result, json):
+                raise SystemExit(1)
 
 
-def _accuracy_met(scene: "Scene", step_selected: bool, json: Path | None) -> bool:
-    """Print and write the error of the scene's flight. Return True if it is at most what the scene asks for."""
-    from lapwing.studies.accuracy import flight_accuracy, flight_accuracy_output
+def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str]) -> "FlightAccuracy":
+    """Return the error of the solver in a recorded run."""
+    from lapwing.cosim.scene import with_values
+    from lapwing.runs.resimulate import recorded_run
+    from lapwing.studies.accuracy import flight_accuracy
+
+    if not accuracy:
+        raise ValueError(f"{log}: is a log; give --accuracy to measure its solver, or use lapwing info")
+    values = with_values({}, overrides)
+    asked = values.get("solver", {}).get("accuracy")
+    if values not in ({}, {"solver": {"accuracy": asked}}):
+        raise ValueError("--set: the solver of a log is the recorded one; only solver.accuracy can be set")
+    if asked is not None and not (isinstance(asked, int | float) and asked > 0.0):
+        raise ValueError(f"--set solver.accuracy: expected a number above 0, got {asked!r}")
+    run = recorded_run(log)
+    flown = {"operator": run.operators, "recorded": run.firmware}
+    return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), flown, _with_bar, asked)
+
+
+def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
+    """Print and write the error of a flight. Return True if it is at most what was asked for."""
+    from lapwing.studies.accuracy import flight_accuracy_output
     from lapwing.studies.terminal import console
 
-    result = flight_accuracy.measure(scene, _with_bar, step_selected)
     flight_accuracy_output.show(console(), result)
     if json:
         flight_accuracy_output.write_json(json, result)

@@ -96,7 +96,7 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
                 alike = alike and _parts(like, memory, base + lane, h) == split
                 alike = alike and not _breaks(like, memory, base + lane, n * h, h / split)
             part, i = h / split, 0
-            while alike and i < n * split and _all_asleep(like, memory, base, part):
+            while alike and i < n * split and _all_asleep(like, memory, base, i, part):
                 for lane in range(WIDTH):
                     _airborne_step(method, like, memory, base + lane, i, part)
                 i += 1
@@ -180,12 +180,14 @@ def _begin(like, memory, at, key, tick, commands, member, interval):
 
 
 @always_inline
-def _all_asleep(like, memory, base, h):
-    """Return True if no sleeping effect can reach a member of a block."""
+def _all_asleep(like, memory, base, i, h):
+    """Return True if no sleeping effect can reach a member of a block, and none needs error control."""
     awake = 0
     for lane in range(WIDTH):
         m = take(like, memory, base + lane)
-        if not hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h):
+        drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
+        asleep = hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h)
+        if multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep:
             awake += 1
     return awake == 0
 

@@ -4,7 +4,7 @@ import json
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lapwing.cosim.config import user_module
 from lapwing.cosim.config.former_names import present_config
@@ -71,12 +71,21 @@ def recorded_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> I
         yield time_ns // setup.interval_ns, OperatorInput.decode(payload).commands
 
 
-def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = False) -> tuple[str, str]:
-    """Return the digests of the log, and of the run resimulated up to the log's last tick.
+class RecordedRun(NamedTuple):
+    """Run of a log, with all that it needs to be flown again."""
+
+    setup: RunConfig
+    operators: dict[str, Operator]  # commands of each vehicle
+    firmware: dict[str, Recorded]  # messages of each foreign firmware, by vehicle
+    last: int  # tick
+    digest: str
+
+
+def recorded_run(log: Path, allow_code: bool = False) -> RecordedRun:
+    """Return the run of a log up to the log's last tick.
 
     Args:
         log: log of a run.
-        observer: shows the progress.
         allow_code: True to run Python modules and FMUs of the log.
 
     Raises:
@@ -98,12 +107,26 @@ def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = F
         operators = {vehicle: _at(dict(recorded_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
         times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
         last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
-        recorded_digest = read.digest(current_names=True)
+        return RecordedRun(setup, operators, recorded, last, read.digest(current_names=True))
+
+
+def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = False) -> tuple[str, str]:
+    """Return the digests of the log, and of the run resimulated up to the log's last tick.
+
+    Args:
+        log: log of a run.
+        observer: shows the progress.
+        allow_code: True to run Python modules and FMUs of the log.
+
+    Raises:
+        ValueError: see `recorded_run`.
+    """
+    run = recorded_run(log, allow_code)
     with tempfile.TemporaryDirectory() as folder:
         new_log = Path(folder) / "again.mcap"
-        fly_single(setup, new_log, observer=observer, operator=operators, last=last, recorded=recorded)
+        fly_single(run.setup, new_log, observer=observer, operator=run.operators, last=run.last, recorded=run.firmware)
         with LogReader(new_log) as read:
-            return recorded_digest, read.digest()
+            return run.digest, read.digest()
 
 
 def firmware_vehicles(setup: RunConfig) -> list[str]:

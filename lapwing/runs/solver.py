@@ -1,7 +1,7 @@
 """Integrator and step of scenes that set an accuracy only."""
 
 from lapwing.cosim.scene import Scene
-from lapwing.services.plant.schema import Solver
+from lapwing.services.plant.schema import accuracy_to_select_for
 from lapwing.services.scene_resolver import load
 
 
@@ -11,7 +11,7 @@ def with_solver(scene: Scene) -> Scene:
     Raises:
         SceneError: no integrator meets the accuracy on this plant.
     """
-    if scene.vehicles or not scene[Solver].undecided:  # each vehicle of several would select its own
+    if accuracy_to_select_for(scene) is None:
         return scene
     from lapwing.studies.accuracy import solver_selection  # scenes that set a step have no use for it
 

@@ -1,7 +1,8 @@
 """Flies a scene in this process, in memory and compiled, as fast as it goes."""
 
-from collections.abc import Callable, Collection
-from typing import TypeVar
+from collections.abc import Callable, Collection, Mapping
+from types import MappingProxyType
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -53,27 +54,32 @@ def fly_each(
 
 
 def fly_with_ports(
-    setup: RunConfig, only: Collection[Topic] | None = None, observe: Callable[[int], None] | None = None
+    setup: RunConfig,
+    only: Collection[Topic] | None = None,
+    observe: Callable[[int], None] | None = None,
+    operator: Operator | Mapping[str, Operator] = no_operator,
+    recorded: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[list[FlightData], BlockDiagram]:
     """Return the flights of all vehicles, and the block diagram at the end with the full history of all ports.
 
-    See `fly` for arguments.
+    See `fly` and `process_table.create_all` for arguments.
     """
-    graph, _, failure, diverged = _fly(setup, only, no_operator, None, observe, every_port=True)
+    graph, _, failure, diverged = _fly(setup, only, operator, None, observe, True, recorded)
     return FlightData.of_each(graph, only, failure, diverged), graph
 
 
 def _fly(
     run: RunConfig | Scene,
     only: Collection[Topic] | None,
-    operator: Operator,
+    operator: Operator | Mapping[str, Operator],
     rows: dict[str, np.ndarray] | None,
     observe: Callable[[int], None] | None = None,
     every_port: bool = False,
+    recorded: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[BlockDiagram, Collection[Topic] | None, str, bool]:
     """Return (block diagram at the end, `only`, reason of an early end, True for a non-finite state)."""
     setup = run if isinstance(run, RunConfig) else resolve(run)
-    services = create_all(setup, operator)
+    services = create_all(setup, operator, recorded)
     wires = [wire for service in services for wire in service.wires]
     selected = {
         wire.port for wire in wires if (wire.topic.recorded if only is None else template_topic(wire.topic) in only)

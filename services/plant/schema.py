@@ -76,6 +76,12 @@ class Solver(SceneTable):
             raise ConfigError("solver.step", f"got {self.step:g} s", expected)
 
 
+def accuracy_to_select_for(scene: Scene) -> float | None:
+    """Return the smallest accuracy of a scene's vehicles; None if one of them sets a step, or no accuracy."""
+    solvers = [vehicle[Solver] for vehicle in scene.vehicles or (scene,)]
+    return min(s.accuracy or math.inf for s in solvers) if all(s.undecided for s in solvers) else None
+
+
 def method(scene: Scene) -> tuple[tuple, int, float]:
     """Return the compiled integrator, its steps per communication step, and the step [s].
 

@@ -68,6 +68,25 @@ def test_every_member_has_bits_of_one_vehicle_alone(batch):
         assert np.array_equal(rows(end)[k], alone(k, tuple(volts[k]), 125))
 
 
+@pytest.mark.long
+def test_rotors_at_limit_of_axial_inflow_have_bits_of_one_alone():
+    """Two members of three meet the limit, whose steps are under error control."""
+    batch, ticks, volts = lapwing.BatchSimulator("hexacopter_tilted", 3), 25, (4.0, 5.0, 3.0, 6.0, 4.5, 5.5)
+    start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.full((3, 6), 400.0)}
+    climb = [0.0, 6.0, -6.0]
+    batch.reset(**start, velocity_world=[(0.0, 0.0, v) for v in climb])
+    end = batch.step(motor_voltages=np.tile(volts, (3, 1)), ticks=ticks)
+    plant = resolve(load("hexacopter_tilted")).services["plant"].parameters
+    core, state = plant.core, plant.start.vehicle
+    for k, v in enumerate(climb):
+        motion = state.motion._replace(
+            position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(400.0,) * 6
+        )
+        one = state._replace(motion=motion)
+        one = flown(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
+        assert np.array_equal(rows(end)[k], pack_row(one.motion))
+
+
 def test_members_are_reset_alone(batch):
     first = batch.reset()
     volts = np.full((N, 4), 33.0)

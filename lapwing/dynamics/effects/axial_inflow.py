@@ -4,17 +4,19 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import axial_speeds
 from lapwing.dynamics.effects._from_scene import reject, validate_table
-from lapwing.dynamics.effects._hooks import loads
+from lapwing.dynamics.effects._hooks import loads, switches
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair, product
 from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
 from lapwing.kernels import always_inline, math
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels.codegen import map_tuple, reduce_tuple
 
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "flow through the rotors"
+LIMIT = 0.5  # of the rotor's speed, to which the axial speed counts
+SUDDEN = 100.0  # [m/s^2] no hub accelerates faster through the air
 
 
 class Settings(NamedTuple):
@@ -53,7 +55,7 @@ class AxialInflow(NamedTuple):
 @always_inline
 def _advance(turn_per_metre, axial, speed):
     """Return the axial speed of a hub in turns over the pitch [rad/s], clamped to the valid range."""
-    return min(max(turn_per_metre * axial, -0.5 * speed), 0.5 * speed)
+    return min(max(turn_per_metre * axial, -LIMIT * speed), LIMIT * speed)
 
 
 @always_inline
@@ -78,3 +80,17 @@ def axial_inflow(e, memory, s, factors, before):
             _less, e.induced_torque_constant * density, before.torque, map_tuple(pair, 0.0, square, factors.torque)
         ),
     )
+
+
+@always_inline
+def _reaches(c, reached, axial, speed):
+    turn_per_metre, layout, h = c
+    off = abs(turn_per_metre * abs(axial) - LIMIT * speed)
+    spin = layout.lag_rate * max(speed, layout.speed_per_volt * layout.max_voltage - speed)
+    return reached or off <= h * (turn_per_metre * SUDDEN + LIMIT * spin)
+
+
+@switches(AxialInflow)
+def reaches_limit(e, memory, s, h):
+    """Return True unless the axial speed of every hub stays within its limit, or beyond it."""
+    return reduce_tuple(_reaches, (e.turn_per_metre, s.layout, h), False, axial_speeds(s), s.motion.rotor_speed)

@@ -8,7 +8,6 @@ from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import switches, wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.environment import Environment
-from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable, cable_slackens
@@ -90,7 +89,6 @@ def shared_slung_load(e, memory, s, rotors):
 
 
 @switches(SharedSlungLoad)
-def comes_taut_or_slack(e, memory, motion, t, h):
+def comes_taut_or_slack(e, memory, s, h):
     """Return True unless the cable stays taut, or the load is unknown."""
-    both = _with_load(memory, motion, t)
-    return memory[3] >= 0.0 and cable_slackens(e.sling, rotation_matrix(motion.attitude), both, h)
+    return memory[3] >= 0.0 and cable_slackens(e.sling, s.R_world_body, _with_load(memory, s.motion, s.t), h)

@@ -107,16 +107,23 @@ def _constant(c, a, b):
 
 
 @always_inline
+def inputs(drive, t, motion):
+    """Return the EffectInputs of a motion."""
+    p, memory, body = drive.parameters, drive.memory, drive.body
+    R_world_body = rotation_matrix(motion.attitude)
+    still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
+    s = EffectInputs(t, motion, R_world_body, body, p.layout, still, ZERO)
+    air_rate_body = hooks.all_air_rate(p.effects, memory, s, ZERO)
+    air = hooks.all_air(p.effects, memory, s, still)
+    return EffectInputs(t, motion, R_world_body, body, p.layout, air, air_rate_body)
+
+
+@always_inline
 def evaluate(drive, t, motion):
     """Evaluate all effects. Return (inputs, rotors, force_world [N], torque_body [N m])."""
     p, memory = drive.parameters, drive.memory
     layout, speed = p.layout, motion.rotor_speed
-    body = drive.body
-    R_world_body = rotation_matrix(motion.attitude)
-    still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
-    s = EffectInputs(t, motion, R_world_body, body, layout, still, ZERO)
-    air_rate_body = hooks.all_air_rate(p.effects, memory, s, ZERO)
-    s = EffectInputs(t, motion, R_world_body, body, layout, hooks.all_air(p.effects, memory, s, still), air_rate_body)
+    s = inputs(drive, t, motion)
     # adding to -0.0 changes no number, so the compiler drops it
     one, zero = map_tuple(_constant, 1.0, speed, speed), map_tuple(_constant, -0.0, speed, speed)
     factors = hooks.all_load_factors(p.effects, memory, s, Factors(one, one))

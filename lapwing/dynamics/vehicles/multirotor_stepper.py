@@ -13,6 +13,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     StateForm,
     accelerations_of_form,
     evaluate,
+    inputs,
     motion_of,
 )
 from lapwing.kernels import always_inline, kernel
@@ -34,8 +35,15 @@ def _step(method, drive, t, x, h):
 
 
 @generic(inline=True)
-def _switches(layout, x, h):
+def _form_switches(layout, x, h):
     return FORMS[x.instance_class].switches
+
+
+@always_inline
+def switches(drive, t, x, h):
+    """Return True if the loads can jump or have a kink within h [s] of t [s], at a moment that depends on the state."""
+    p, seen = drive.parameters, motion_of(drive.parameters.layout, x)
+    return _form_switches(p.layout, x, h) or hooks.all_switches(p.effects, drive.memory, inputs(drive, t, seen), h)
 
 
 @always_inline
@@ -201,11 +209,11 @@ def steps(method, drive, x, start, end, h, first, n):
         layout, airborne = p.layout, _airborne(p, body, memory, voltage)
         for i in range(first, n):
             seen = motion_of(layout, x)
-            switches = _switches(layout, x, h) or hooks.all_switches(p.effects, memory, seen, start + i * h, h)
-            if not switches and hooks.all_sleeping(p.effects, memory, seen, h):
+            switching = switches(MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
+            if not switching and hooks.all_sleeping(p.effects, memory, seen, h):
                 x = _step(method, airborne, start + i * h, x, h)
                 continue
-            if switches or not hooks.all_stiff_sleeping(p.effects, memory, seen, h):
+            if switching or not hooks.all_stiff_sleeping(p.effects, memory, seen, h):
                 drive = MultirotorDrive(p, body, memory, voltage)
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break

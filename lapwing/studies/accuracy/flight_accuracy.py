@@ -6,49 +6,29 @@ ten-thousandth of the accuracy in the start larger than the accuracy (`sensitivi
 There the error of the solver is measured under recorded commands (`open_loop`), and the closed loop is shown beside it.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
-
-import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
-from lapwing.messages.topics import BATTERY, TRUTH
+from lapwing.cosim.scene import KeyOrigin, Scene, SceneError, with_values
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.plant.schema import Solver
-from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.accuracy.coordinates import matrices
+from lapwing.services.process_table import foreign_firmware
+from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.accuracy.open_loop import PART, fly_parts, inputs_of_plant
 from lapwing.studies.accuracy.sensitivity import Signal, first_signal, start_difference, with_start_shifted
+from lapwing.studies.accuracy.state_errors import TOPICS, Quantity, differences_of_all, worst_of
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly_with_ports
 
 FINER = 8  # times as many steps in a communication step
 STRICTER = 1e-3  # times the accuracy, in contact
 STRICTEST = 1e-10  # beyond which contact is limited by round-off
-TOPICS = (TRUTH, BATTERY)
-BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState; its current jumps where a motor is switched off
-STATE_FIELDS = (
-    ("position", "position"),
-    ("attitude", "orientation"),
-    ("velocity", "velocity"),
-    ("body rates", "angular_velocity"),
-    ("rotor speed", "rotor_speed"),
-)  # name, field of the topic
-
+MISSING = "missing; set the error to compare with, e.g. --set solver.accuracy=1e-4"
 Work = Callable[[Callable[[int], None]], Any]  # flies, and calls its argument with the tick that is reached
 Progress = Callable[[RunConfig, str, Work], Any]  # of a run and the description of the work, whose result it returns
-Errors = tuple[str, np.ndarray, np.ndarray]  # name of a quantity, times [s], errors
-
-
-class Quantity(NamedTuple):
-    """Largest error of one part of a vehicle's state, of its numbers relative to 1 + their size."""
-
-    vehicle: str
-    name: str
-    error: float
-    time: float  # [s] of the moment
 
 
 class ClosedLoop(NamedTuple):
@@ -71,8 +51,8 @@ class FlightAccuracy(NamedTuple):
     step_selected: bool  # False if the scene sets it, whatever accuracy is asked
     duration: float  # [s] that both flights last
     quantities: list[Quantity]  # that count
-    closed_loop: ClosedLoop | None = None  # None: `quantities` are those of the closed loop
-    part: float = PART  # [s] length of the parts that `quantities` are measured in, otherwise
+    part: float | None = None  # [s] length of the parts that `quantities` are measured in; None: of the closed loop
+    closed_loop: ClosedLoop | None = None
 
     @property
     def worst(self) -> Quantity:
@@ -83,11 +63,6 @@ class FlightAccuracy(NamedTuple):
     def met(self) -> bool:
         """True if no error exceeds what was asked for."""
         return self.worst.error <= self.asked
-
-
-def worst_of(quantities: Iterable[Quantity]) -> Quantity:
-    """Return the quantity with the largest error."""
-    return max(quantities, key=lambda quantity: quantity.error)
 
 
 class _Flight(NamedTuple):
@@ -106,43 +81,93 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
 
     Raises:
         SceneError: the scene asks for no accuracy.
-        ValueError: a flight fails.
+        ValueError: a flight fails, or a foreign firmware flies.
     """
     solver = (scene.vehicles or (scene,))[0][Solver]
     if solver.accuracy is None:
-        message = "missing; set the error to compare with, e.g. --set solver.accuracy=1e-4"
-        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path))
-    interval = scene[Communication].interval
-    step = interval / (FINER * solver.steps(scene[Communication]))
-    strict = max(STRICTER * solver.accuracy, STRICTEST)
-    finer = resolve(load(scene.path, [*scene.overrides, f"solver.step={step!r}", f"solver.accuracy={strict!r}"]))
+        raise SceneError("solver.accuracy", MISSING, source=KeyOrigin(scene.path))
+    setup = resolve(scene)
+    if firmware := foreign_firmware(setup):
+        raise ValueError(
+            f"{scene.path}: no two runs of {firmware} are equal; record one with lapwing run, and check its log"
+        )
+    step, overrides = _finer(scene, solver.accuracy)
+    finer = resolve(load(scene.path, [*scene.overrides, *overrides]))
     name = f"{solver.integrator}, step {1e3 * FINER * step:g} ms"
     finer_name = f"{solver.integrator}, step {1e3 * step:g} ms"
-    coarse = _fly(scene, resolve(scene), progress, name)
+    coarse = _fly(scene, setup, progress, name)
     fine = _fly(scene, finer, progress, finer_name)
     duration = float(min(flight.truth.times[-1] for flight in (*coarse.vehicles, *fine.vehicles)))
-    quantities = _differences(coarse.vehicles, fine.vehicles)
+    quantities = differences_of_all(coarse.vehicles, fine.vehicles)
     result = FlightAccuracy(solver.accuracy, solver.integrator, FINER * step, step, step_selected, duration, quantities)
     if result.met or not inputs_of_plant(coarse.graph):
         return result
     shift = start_difference(solver.accuracy)
     description = f"{finer_name}, start {shift:g} apart"
     shifted = _fly(scene, with_start_shifted(finer, shift), progress, description)
-    apart = worst_of(_differences(shifted.vehicles, fine.vehicles))
+    apart = worst_of(differences_of_all(shifted.vehicles, fine.vehicles))
     if apart.error <= solver.accuracy:
         return result
     closed_loop = ClosedLoop(quantities, shift, apart, *_cause(coarse, fine, solver.accuracy))
-    parts = progress(
-        finer, f"{finer_name}, parts of {PART:g} s", lambda show: fly_parts(coarse.graph, finer, TOPICS, show)
+    return result._replace(
+        quantities=_in_parts(coarse, finer, progress, finer_name), part=PART, closed_loop=closed_loop
     )
-    errors = [q for part in parts for q in _differences(coarse.vehicles, part.flights, part.spans)]
+
+
+def measure_recorded(
+    setup: RunConfig, flown: Mapping[str, Any], progress: Progress, accuracy: float | None = None
+) -> FlightAccuracy:
+    """Return the accuracy of the solver in a recorded run, whose commands need not be those of Lapwing's autopilot.
+
+    Args:
+        setup: configuration of the run, of one vehicle, that ends at its last recorded tick.
+        flown: its commands, keyword arguments of `fly_with_ports`.
+        progress: see `measure`.
+        accuracy: error to compare with; None: that of the run.
+
+    Raises:
+        SceneError: neither has an accuracy.
+        ValueError: several vehicles, or the flight fails.
+    """
+    if not setup.vehicle:
+        raise ValueError(f"{setup.scene}: has {len(setup.vehicles)} vehicles; expected the log of one vehicle")
+    scene = from_resolved(setup.resolved, setup.scene)
+    solver, asked = scene[Solver], accuracy or scene[Solver].accuracy
+    if asked is None:
+        raise SceneError("solver.accuracy", MISSING)
+    step, overrides = _finer(scene, asked)
+    finer = resolve(from_resolved(with_values(setup.resolved, overrides)))._replace(last_tick=setup.last_tick)
+    coarse = _fly(
+        scene, setup, progress, f"recorded commands, {solver.integrator}, step {1e3 * FINER * step:g} ms", flown
+    )
+    quantities = _in_parts(coarse, finer, progress, f"{solver.integrator}, step {1e3 * step:g} ms")
+    duration = float(coarse.vehicles[0].truth.times[-1])
+    return FlightAccuracy(asked, solver.integrator, FINER * step, step, False, duration, quantities, PART)
+
+
+def _finer(scene: Scene, accuracy: float) -> tuple[float, list[str]]:
+    """Return the step [s] of the finer flight and its overrides."""
+    solver = (scene.vehicles or (scene,))[0][Solver]
+    step = scene[Communication].interval / (FINER * solver.steps(scene[Communication]))
+    return step, [f"solver.step={step!r}", f"solver.accuracy={max(STRICTER * accuracy, STRICTEST)!r}"]
+
+
+def _in_parts(coarse: _Flight, finer: RunConfig, progress: Progress, name: str) -> list[Quantity]:
+    """Return the largest errors of a flight in parts with finer steps."""
+    parts = progress(finer, f"{name}, parts of {PART:g} s", lambda show: fly_parts(coarse.graph, finer, TOPICS, show))
+    errors = [q for part in parts for q in differences_of_all(coarse.vehicles, part.flights, part.spans)]
     names = dict.fromkeys((q.vehicle, q.name) for q in errors)
-    largest = [worst_of(q for q in errors if (q.vehicle, q.name) == name) for name in names]
-    return result._replace(quantities=largest, closed_loop=closed_loop)
+    return [worst_of(q for q in errors if (q.vehicle, q.name) == name) for name in names]
 
 
-def _fly(scene: Scene, setup: RunConfig, progress: Progress, description: str) -> _Flight:
-    flights, graph = progress(setup, description, lambda show: fly_with_ports(setup, TOPICS, show))
+def _fly(
+    scene: Scene,
+    setup: RunConfig,
+    progress: Progress,
+    description: str,
+    flown: Mapping[str, Any] = MappingProxyType({}),
+) -> _Flight:
+    flights, graph = progress(setup, description, lambda show: fly_with_ports(setup, TOPICS, show, **flown))
     for flight in flights:
         if flight.failure:
             raise ValueError(f"{scene.path}: {flight.failure}")
@@ -156,51 +181,4 @@ def _cause(flight: _Flight, exact: _Flight, limit: float) -> tuple[Signal | None
         return None, 0.0
     tick = 0.5 * flight.setup.interval
     moment = [(signal.time - tick, signal.time + tick)]
-    return signal, worst_of(_differences(flight.vehicles, exact.vehicles, moment)).error
-
-
-def _differences(
-    flights: Iterable[FlightData], exact: Iterable[FlightData], spans: list[tuple[float, float]] | None = None
-) -> list[Quantity]:
-    return [q for pair in zip(flights, exact, strict=True) for q in differences(*pair, spans)]
-
-
-def differences(
-    flight: FlightData, exact: FlightData, spans: list[tuple[float, float]] | None = None
-) -> list[Quantity]:
-    """Return the largest error of each part of the state, at the ticks that both flights have.
-
-    Args:
-        flight: any flight.
-        exact: the flight to compare with.
-        spans: [s] only the moments between these times, end exclusive, in order; None: all.
-    """
-    result = []
-    for name, times, errors in _errors(flight, exact):
-        if spans is not None:
-            inside = np.searchsorted(np.ravel(spans), times, side="right") % 2 == 1
-            times, errors = times[inside], errors[inside]
-        if len(times):
-            result.append(Quantity(flight.vehicle, name, float(errors.max()), float(times[errors.argmax()])))
-    return result
-
-
-def _errors(flight: FlightData, exact: FlightData) -> Iterator[Errors]:
-    """Yield the error of each part of the state, at the ticks that both flights have."""
-    for name, field in STATE_FIELDS:
-        a, b = (np.asarray(getattr(each.truth, field)) for each in (flight, exact))
-        if field == "orientation":
-            a, b = matrices(a), matrices(b)
-        yield from _error(name, flight.truth.times, a, b)
-    if flight.has("battery"):
-        for field in BATTERY_FIELDS:
-            a, b = (np.asarray(getattr(each.topic("battery"), field)) for each in (flight, exact))
-            yield from _error(f"battery {field}", flight.times("battery"), a, b)
-
-
-def _error(name: str, times: np.ndarray, a: np.ndarray, b: np.ndarray) -> Iterator[Errors]:
-    """Yield the error of one part of the state, unless the vehicle does not have it."""
-    n = min(len(a), len(b))
-    a, b = a[:n].reshape(n, -1), b[:n].reshape(n, -1)
-    if a.size and np.isfinite(b).all():
-        yield name, times[:n], (np.abs(a - b) / (1.0 + np.abs(b))).max(axis=1)
+    return signal, worst_of(differences_of_all(flight.vehicles, exact.vehicles, moment)).error

@@ -9,7 +9,8 @@ from rich.table import Table
 
 from lapwing.dynamics import integrators
 from lapwing.studies import json_file
-from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy, worst_of
+from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy
+from lapwing.studies.accuracy.state_errors import worst_of
 
 
 def show(console: Console, result: FlightAccuracy) -> None:
@@ -31,7 +32,7 @@ def _table(result: FlightAccuracy) -> Table:
     fleet = _is_fleet(result)
     closed = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
     table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if fleet and closed else (0, 1))  # within 80 columns
-    names = ["quantity", "solver error" if closed else "largest error", "got / asked", "at (s)"]
+    names = ["quantity", "solver error" if result.part else "largest error", "got / asked", "at (s)"]
     for name in [*names, *(["closed loop", "at (s)"] if closed else [])]:
         table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
     for q in result.quantities:
@@ -45,18 +46,20 @@ def _table(result: FlightAccuracy) -> Table:
 
 
 def _column_legend(result: FlightAccuracy) -> list[str]:
-    """Return the meaning of the columns, in a table that has both errors."""
-    if result.closed_loop is None:
+    """Return the meaning of the columns, in a table that has errors of parts."""
+    if result.part is None:
         return []
-    return [
+    lines = [
         f"solver error: each {result.part:g} s of the flight again with finer steps, from its own states and under its "
-        "own motor commands",
-        "closed loop: the whole flight again with finer steps, with sensors and autopilot",
+        "own motor commands"
     ]
+    if result.closed_loop:
+        lines.append("closed loop: the whole flight again with finer steps, with sensors and autopilot")
+    return lines
 
 
 def _verdict(result: FlightAccuracy) -> str:
-    what = "accuracy of the solver" if result.closed_loop else "accuracy"
+    what = "accuracy of the solver" if result.part else "accuracy"
     verdict, worst = "met" if result.met else "missed", result.worst
     return f"{what} {verdict}: asked {result.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)"
 
@@ -84,11 +87,10 @@ def _remedy(result: FlightAccuracy) -> list[str]:
     """Return what to do about a missed accuracy."""
     if result.met:
         return []
-    cause = "solver.step: selected for a less violent flight"
     if not result.step_selected:
         cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
-        if not _is_fleet(result):
-            return [f"{cause}; remove it, and a step is selected"]
+        return [f"{cause}; remove it, and a step is selected"]
+    cause = "solver.step: selected for a less violent flight"
     count = math.ceil((result.worst.error / result.asked) ** (1.0 / integrators.get(result.integrator).ORDER))
     return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:g}"]
 

@@ -14,7 +14,7 @@ from lapwing.kernels import cache_folder, source_digest
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Effects, Vehicle
-from lapwing.services.plant.schema import Solver
+from lapwing.services.plant.schema import Solver, accuracy_to_select_for
 from lapwing.studies.accuracy import scenes
 from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
 from lapwing.studies.complete_file import complete_file
@@ -29,6 +29,8 @@ JUMP_SHARE = (
 def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     """Return the overrides that meet the scene's accuracy at the least cost; none if it sets a step.
 
+    The vehicles of a fleet get one solver, which meets the accuracy of each in flight alone.
+
     Args:
         scene: any scene.
         say: told of a measurement before it begins.
@@ -36,22 +38,34 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
     Raises:
         SceneError: no integrator meets the accuracy on this plant.
     """
-    solver = scene[Solver]
-    if not solver.undecided:
+    accuracy = accuracy_to_select_for(scene)
+    if accuracy is None:
         return []
-    assert solver.accuracy is not None
+    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.vehicles or (scene,)}.values()
+    try:
+        chosen = cheapest(_of_all([_expected_of(vehicle, accuracy, say) for vehicle in distinct]), accuracy)
+    except ConfigError as error:
+        message = f"{accuracy:g}: {error.message}"
+        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
+    # the step that `Solver.check` takes for a divisor of the interval
+    return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
+
+
+def _of_all(vehicles: list[list[Point]]) -> list[Point]:
+    """Return the points that all vehicles have, each with the largest error and the time of all."""
+    by_key = [{(p.way, p.setting): p for p in points} for points in vehicles]
+    common = [[points[key] for points in by_key] for key in by_key[0] if all(key in points for points in by_key)]
+    return [same[0]._replace(error=max(p.error for p in same), time=sum(p.time for p in same)) for same in common]
+
+
+def _expected_of(scene: Scene, accuracy: float, say: Callable[[str], None]) -> list[Point]:
+    """Return the points of one vehicle with the largest errors to expect of a flight."""
+    solver = scene[Solver]
     names = (solver.integrator,) if "integrator" in solver.model_fields_set else CANDIDATES
     gentle, *jumping = (
         [p for p in points if p.way in names or len(names) > 1] for points in _points(scene, names, say)
     )
-    share = _share(scene, gentle, solver.accuracy) / solver.accuracy
-    try:
-        chosen = cheapest(_expected_errors(gentle, share, jumping), solver.accuracy)
-    except ConfigError as error:
-        message = f"{solver.accuracy:g}: {error.message}"
-        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
-    # the step that `Solver.check` takes for a divisor of the interval
-    return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
+    return _expected_errors(gentle, _share(scene, gentle, accuracy) / accuracy, jumping)
 
 
 def _expected_errors(gentle: list[Point], share: float, jumping: list[list[Point]]) -> list[Point]:

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy, Quantity, differences
+from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy
 from lapwing.studies.accuracy.flight_accuracy_output import show
+from lapwing.studies.accuracy.state_errors import Quantity, differences
 
 ROOT = Path(__file__).parents[3]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lapwing
-from lapwing.studies.accuracy.coordinates import error
+from lapwing.studies.accuracy.coordinates import error, of_state
 from lapwing.studies.accuracy.landings import cases, measure
 from lapwing.studies.accuracy.systems.landing import TOUCH_DOWNS, problems
 
@@ -29,9 +29,19 @@ def test_random_landing_meets_accuracy(seed):
         assert cases.errors(cases.fly(case, accuracy)[0], exact).max() < accuracy
 
 
-@pytest.mark.parametrize(("kind", "seed"), [("steps", 0), ("steps", 3), ("toppling", 0)])
-def test_landing_at_step_or_toppling_meets_accuracy(kind, seed):
-    """Into a wall, over an edge and down, over one foot onto the hull: faces and points that come and go."""
+def test_strike_of_propeller_comes_before_feet():
+    case = cases.DRAWS["strikes"](0)
+    p, state = cases.plant(case)
+    points = np.array(cases.contact_of(p).feet) @ of_state(state.motion.attitude).reshape(3, 3).T
+    over = points[:, 2] - points[:, :2] @ case.slope
+    assert over.argmin() >= 4
+    reach = np.linalg.norm(np.array(cases.contact_of(p).feet)[4:], axis=1)
+    assert reach == pytest.approx(0.35171491 * np.sqrt(2.0) + 0.2794)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("steps", 0), ("steps", 3), ("toppling", 0), ("strikes", 0)])
+def test_landing_at_step_toppling_or_strike_meets_accuracy(kind, seed):
+    """Into a wall, over an edge and down, over one foot onto the hull, on a propeller: faces and points that change."""
     case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)
     assert events > 50

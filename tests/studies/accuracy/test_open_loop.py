@@ -11,9 +11,9 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.services.common.ports import ImuReading, TrueState
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy import open_loop
-from lapwing.studies.accuracy.flight_accuracy import TOPICS, differences
 from lapwing.studies.accuracy.open_loop import fly_parts, inputs_of_plant
 from lapwing.studies.accuracy.sensitivity import first_signal, with_start_shifted
+from lapwing.studies.accuracy.state_errors import TOPICS, differences
 from lapwing.studies.simulate import fly_with_ports
 
 

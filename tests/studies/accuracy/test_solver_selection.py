@@ -61,6 +61,35 @@ def test_voltages_that_jump_count_with_their_share(accuracy, step, measured, mon
     assert solver_selection.overrides(scene, lambda text: None)[1] == f"solver.step={step!r}"
 
 
+def test_fleet_gets_one_solver_that_each_vehicle_meets(measured, monkeypatch):
+    """Each airframe is measured once, with all vehicles of a kind as one."""
+    points = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]
+    errors = iter([(1e-5, 5e-6, 3e-7), (4e-4, 2e-4, 1e-6)])
+    by_problem = {}
+
+    def measure(problem):
+        if "jumping" not in problem.title:
+            return points
+        key = problem.title, len(by_problem)
+        by_problem[key] = next(errors)
+        return [p._replace(error=error) for p, error in zip(points, by_problem[key], strict=True)]
+
+    monkeypatch.setattr(solver_selection, "measure", measure)
+    scene = load(ROOT / "lapwing/scenes/formation.toml", ["solver.accuracy=1e-4", "vehicle.1.airframe=quad_x"])
+    result = solver_selection.overrides(scene, lambda text: None)
+    assert len(by_problem) == 2
+    assert result == ['solver.integrator="rk4"', "solver.step=0.001"]
+    decided = load(scene, result)
+    assert [method(vehicle)[2] for vehicle in decided.vehicles] == [0.001] * 3
+
+
+def test_fleet_with_step_of_one_vehicle_selects_none(measured):
+    overrides = ["solver.accuracy=1e-4", "vehicle.1.solver.step=0.002"]
+    scene = load(ROOT / "lapwing/scenes/formation.toml", overrides)
+    assert solver_selection.overrides(scene, lambda text: None) == []
+    assert not measured
+
+
 @pytest.mark.parametrize(
     ("solver", "chosen"),
     [

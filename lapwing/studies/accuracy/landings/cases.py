@@ -15,9 +15,9 @@ from lapwing.dynamics.effects._contact_parameters import GroundContact
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, multiply
 from lapwing.dynamics.terrain import relief
-from lapwing.dynamics.vector import Vec3, scale
+from lapwing.dynamics.vector import Vec3, add, scale
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.airframe import load_airframe
+from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorParameters, MultirotorState
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.plant.schema import contact_tolerance
@@ -49,6 +49,7 @@ class Landing(NamedTuple):
     rotor_speed: float  # [rad/s], slowing down
     start: float = 0.0  # [m] x of the centre of mass
     step: tuple[float, float] = NO_STEP  # x of its wall and rise [m]
+    tips: bool = False  # True: the hull's points are the outermost ones of the propellers, not the rotor hubs
 
 
 def draw(seed: int) -> Landing:
@@ -100,13 +101,27 @@ def draw_toppling(seed: int) -> Landing:
     )  # fmt: skip
 
 
-DRAWS: dict[str, Callable[[int], Landing]] = {"random": draw, "steps": draw_step, "toppling": draw_toppling}
+def draw_strike(seed: int) -> Landing:
+    """Draw a landing that leans by 40 to 75 degrees, so that a propeller's tip strikes the ground before the feet."""
+    rng = np.random.default_rng([36, seed])
+    tilt, about = math.radians(rng.uniform(40.0, 75.0)), float(rng.uniform(0.0, 2.0 * math.pi))
+    return draw(seed)._replace(
+        bump=0.0, speed=float(rng.uniform(0.5, 2.0)), tilt=(tilt * math.cos(about), tilt * math.sin(about), 0.0),
+        slip=(float(rng.uniform(-1.0, 1.0)), float(rng.uniform(-1.0, 1.0))), tips=True,
+    )  # fmt: skip
+
+
+DRAWS: dict[str, Callable[[int], Landing]] = {
+    "random": draw, "steps": draw_step, "toppling": draw_toppling, "strikes": draw_strike,
+}  # fmt: skip
 FASTEST = Landing((0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0)  # after bounces
 
 
 def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
     """Return the plant's parameters and its state above the ground."""
     frame = load_airframe(AIRFRAME)
+    if case.tips:
+        frame = _with_tips(frame)
     steps = [case.step] if case.step != NO_STEP else []
     terrain = relief(case.slope, bump_height=case.bump, bump_length=2.0 * math.pi / WAVE, steps=steps)
     tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
@@ -121,6 +136,17 @@ def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
         p, (case.start, 0.0, float(clear)), attitude, case.rotor_speed, (*case.slip, -case.speed), case.spin
     )
     return p, state
+
+
+def _with_tips(frame: Airframe) -> Airframe:
+    """Return the airframe with the outermost point of each propeller's disc as its hull."""
+    assert frame.contact
+    assert frame.propeller
+    radius = 0.5 * frame.propeller.diameter
+    hull = tuple(
+        add(hub, scale(radius / math.hypot(hub[0], hub[1]), (hub[0], hub[1], 0.0))) for hub in frame.rotors.position
+    )
+    return frame.model_copy(update={"contact": frame.contact.model_copy(update={"hull": hull})})
 
 
 def contact_of(p: MultirotorParameters) -> GroundContact:

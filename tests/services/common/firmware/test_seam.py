@@ -1,5 +1,6 @@
 """The seam of foreign firmwares: motor order, volts, time-outs, playback of the recorded commands."""
 
+import json
 import re
 import subprocess
 import sys
@@ -101,6 +102,10 @@ class Thrower:
         type(self).closed += 1
 
 
+class Counted(Thrower):
+    opened = closed = 0
+
+
 class Broken(Thrower):
     def step(self, tick, read, waits):
         return FirmwareOutput((float("nan"),) * 4, True)
@@ -113,16 +118,60 @@ def with_link(monkeypatch, link):
 
 
 def test_recorded_commands_fly_again_to_recorded_digest(tmp_path, monkeypatch):
-    with_link(monkeypatch, Thrower)
+    with_link(monkeypatch, Counted)
     log = tmp_path / "flight.mcap"
     fly_single(resolve(load("betaflight_quad", QUAD)), log)
-    assert (Thrower.opened, Thrower.closed) == (1, 1)
+    assert (Counted.opened, Counted.closed) == (1, 1)
     with LogReader(log) as read:
         assert read.metadata["firmware"].startswith("betaflight scripted: 501 steps, skew 0 ms")
         assert re.search(r"CPU [\d.]+ s of Lapwing and 250 s of the firmware", read.metadata["firmware"])
         flights = read.digest()
     assert resimulate(log) == (flights, flights)
-    assert Thrower.opened == 1
+    assert Counted.opened == 1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("accuracy", "code"), [(1e-4, 0), (1e-12, 1)])
+def test_accuracy_of_recorded_commands_is_measured(tmp_path, monkeypatch, accuracy, code):
+    with_link(monkeypatch, Thrower)
+    log = tmp_path / "flight.mcap"
+    fly_single(resolve(load("betaflight_quad", QUAD)), log)
+    result = lapwing_check(tmp_path, log, "--json", "a.json", "--set", f"solver.accuracy={accuracy}")
+    assert result.returncode == code, result.stdout + result.stderr
+    assert f"accuracy of the solver {'missed' if code else 'met'}: asked {accuracy:g}" in result.stdout
+    assert "against steps of 0.125 ms" in result.stdout
+    errors = {q["name"]: q["error"] for q in json.loads((tmp_path / "a.json").read_text())["quantities"]}
+    assert 1e-12 < max(errors.values()) < 1e-6
+    assert {"position", "attitude", "velocity", "body rates", "rotor speed"} <= set(errors)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--set", "solver.step=0.001"), "--set: the solver of a log is the recorded one; only solver.accuracy can"),
+        (("--set", "solver.accuracy=-1"), "--set solver.accuracy: expected a number above 0, got -1"),
+        ((), "solver.accuracy: missing; set the error to compare with"),
+    ],
+)
+def test_check_of_log_rejects_invalid_request(tmp_path, monkeypatch, options, message):
+    with_link(monkeypatch, Thrower)
+    log = tmp_path / "flight.mcap"
+    fly_single(resolve(load("betaflight_quad", ["run.duration=0.01", "run.real_time_factor=1000.0"])), log)
+    result = lapwing_check(tmp_path, log, *options)
+    assert (result.returncode, message in result.stderr) == (2, True), result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_check_of_firmware_scene_names_log(tmp_path):
+    options = ("--set", "solver.accuracy=1e-4", "--set", "solver.step=0.001")
+    result = lapwing_check(tmp_path, "betaflight_quad", *options)
+    assert result.returncode == 2
+    assert "no two runs of betaflight are equal; record one with lapwing run, and check its log" in result.stderr
+
+
+def lapwing_check(folder, scene, *options):
+    command = [sys.executable, "-m", "lapwing", "check", str(scene), "--accuracy", *options]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
 
 
 def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):

@@ -1,0 +1,83 @@
+"""Differences of two flights in the whole state, part by part, relative to 1 + size."""
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from lapwing.messages.topics import BATTERY, TRUTH
+from lapwing.studies.accuracy.coordinates import matrices
+from lapwing.studies.flight_data import FlightData
+
+TOPICS = (TRUTH, BATTERY)
+BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState; its current jumps where a motor is switched off
+STATE_FIELDS = (
+    ("position", "position"),
+    ("attitude", "orientation"),
+    ("velocity", "velocity"),
+    ("body rates", "angular_velocity"),
+    ("rotor speed", "rotor_speed"),
+)  # name, field of the topic
+Errors = tuple[str, np.ndarray, np.ndarray]  # name of a quantity, times [s], errors
+
+
+class Quantity(NamedTuple):
+    """Largest error of one part of a vehicle's state, of its numbers relative to 1 + their size."""
+
+    vehicle: str
+    name: str
+    error: float
+    time: float  # [s] of the moment
+
+
+def worst_of(quantities: Iterable[Quantity]) -> Quantity:
+    """Return the quantity with the largest error."""
+    return max(quantities, key=lambda quantity: quantity.error)
+
+
+def differences_of_all(
+    flights: Iterable[FlightData], exact: Iterable[FlightData], spans: list[tuple[float, float]] | None = None
+) -> list[Quantity]:
+    """Return `differences` of all vehicles."""
+    return [q for pair in zip(flights, exact, strict=True) for q in differences(*pair, spans)]
+
+
+def differences(
+    flight: FlightData, exact: FlightData, spans: list[tuple[float, float]] | None = None
+) -> list[Quantity]:
+    """Return the largest error of each part of the state, at the ticks that both flights have.
+
+    Args:
+        flight: any flight.
+        exact: the flight to compare with.
+        spans: [s] only the moments between these times, end exclusive, in order; None: all.
+    """
+    result = []
+    for name, times, errors in _errors(flight, exact):
+        if spans is not None:
+            inside = np.searchsorted(np.ravel(spans), times, side="right") % 2 == 1
+            times, errors = times[inside], errors[inside]
+        if len(times):
+            result.append(Quantity(flight.vehicle, name, float(errors.max()), float(times[errors.argmax()])))
+    return result
+
+
+def _errors(flight: FlightData, exact: FlightData) -> Iterator[Errors]:
+    """Yield the error of each part of the state, at the ticks that both flights have."""
+    for name, field in STATE_FIELDS:
+        a, b = (np.asarray(getattr(each.truth, field)) for each in (flight, exact))
+        if field == "orientation":
+            a, b = matrices(a), matrices(b)
+        yield from _error(name, flight.truth.times, a, b)
+    if flight.has("battery"):
+        for field in BATTERY_FIELDS:
+            a, b = (np.asarray(getattr(each.topic("battery"), field)) for each in (flight, exact))
+            yield from _error(f"battery {field}", flight.times("battery"), a, b)
+
+
+def _error(name: str, times: np.ndarray, a: np.ndarray, b: np.ndarray) -> Iterator[Errors]:
+    """Yield the error of one part of the state, unless the vehicle does not have it."""
+    n = min(len(a), len(b))
+    a, b = a[:n].reshape(n, -1), b[:n].reshape(n, -1)
+    if a.size and np.isfinite(b).all():
+        yield name, times[:n], (np.abs(a - b) / (1.0 + np.abs(b))).max(axis=1)
