@@ -11,10 +11,11 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, start, terminate_unused
 from lapwing.cosim.processes.cpu_starvation import waited
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, RunMonitor
-from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunSupervisor, reason
+from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunState, RunSupervisor, reason
 from lapwing.cosim.run_errors import END_SIGNAL
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY
+from lapwing.cosim.transport.session_settings import CHILD_LINKS
 
 TERM_TIMEOUT = 1.5  # [s] from the request to end to SIGKILL
 BRIEF = 0.005  # [s] between two checks whether all processes have exited
@@ -64,7 +65,8 @@ def launch(
                     send_spec(name, endpoints, stream)
 
         listen, connect = mesh(MONITOR, endpoints)
-        with ZenohBus(listen, connect, gid=publisher_ids.gid(MONITOR), awaits=False) as bus:
+        links = {} if external else CHILD_LINKS
+        with ZenohBus(listen, connect, "peer", publisher_ids.gid(MONITOR), links, awaits=False) as bus:
             try:
                 monitor = RunMonitor(bus, publisher_ids, [*required, *optional, *external], services=services)
                 bus.declare_liveliness(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # all others wait for it
@@ -72,8 +74,10 @@ def launch(
                 start_processes(ready)
                 start_processes([name for name in own if name not in ready])
                 terminate_unused(early)
-                RunSupervisor(monitor, children, required, external).supervise(observe)
-                _wait([children[name] for name in optional if name in monitor.confirmed], SHUTDOWN_TIMEOUT)
+                supervisor = RunSupervisor(monitor, children, required, external)
+                supervisor.supervise(observe)
+                if supervisor.state is RunState.ENDED:  # their reports follow
+                    _wait([children[name] for name in optional], SHUTDOWN_TIMEOUT)
             finally:
                 for name in optional:
                     if name in children and (code := children[name].process.poll()) is not None:
