@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
+from threading import Thread
 from types import MappingProxyType
 from typing import IO
 
@@ -58,11 +59,14 @@ def launch(
         def start_processes(names: list[str]) -> None:
             for name in names:
                 children[name] = early.pop(name) if name in early else start(name)
-            for name in names:
-                stream = children[name].process.stdin
-                assert stream is not None
-                with suppress(BrokenPipeError):  # it has exited; its output says why
-                    send_spec(name, endpoints, stream)
+            for name in names:  # in threads: a pipe holds less than a specification, and a stopped child reads none
+                Thread(target=send, args=(name,), daemon=True).start()
+
+        def send(name: str) -> None:
+            stream = children[name].process.stdin
+            assert stream is not None
+            with suppress(BrokenPipeError):  # it has exited; its output says why
+                send_spec(name, endpoints, stream)
 
         listen, connect = mesh(MONITOR, endpoints)
         links = {} if external else CHILD_LINKS
@@ -125,4 +129,5 @@ def _end(children: Iterable[Child]) -> None:
             child.process.kill()
             child.process.wait()
         if child.process.stdin:
-            child.process.stdin.close()
+            with suppress(BrokenPipeError):  # it was killed before it had read its specification
+                child.process.stdin.close()
