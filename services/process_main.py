@@ -85,6 +85,7 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
     from lapwing.cosim.executors.lockstep import run_encoder, run_lockstep
     from lapwing.cosim.executors.participant import Participant, Stopped
     from lapwing.cosim.transport.bus import ZenohBus, mesh
+    from lapwing.cosim.transport.session_settings import CHILD_LINKS
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
 
@@ -93,7 +94,8 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
     participants = PublisherIds(spec.key_prefix, spec.secret, tuple(spec.external or ()))
     listen, connect = mesh(spec.name, spec.peers)
     if spec.with_parent:
-        security = door_settings(spec.name, spec.key_prefix, spec.keys) if spec.open else {}
+        links = {} if spec.external else CHILD_LINKS
+        security = door_settings(spec.name, spec.key_prefix, spec.keys) if spec.open else links
     else:
         security = settings(setup, spec.name, spec.key_prefix, spec.keys)
     endpoints, gid = [*listen, *spec.open], participants.gid(spec.name)

@@ -21,6 +21,7 @@ LOST = 6.0  # [s] without a message after which a run counts as lost: TCP retrie
 GRACE = 2.0  # [s] largest difference of the delays of two links
 JOIN_TIMEOUT = 120.0  # [s] until all services have joined
 CLOSE_TIMEOUT = 5.0  # [s] for the recorder to close its log after a failure
+CONFIRMED = 60.0  # [s] without news after the end until a participant counts as stalled
 
 
 def monitor_run(
@@ -72,10 +73,14 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
             watch.last_news = time.monotonic()  # comparing run configurations takes time over a slow network
         elif culprit := watch.stall_message(names):
             raise RunFailed(culprit)
+        elif watch.ended and time.monotonic() - watch.last_news > CONFIRMED:
+            silent = sorted(names - watch.gone - watch.confirmed) or [process_table.RECORDER]
+            raise RunFailed(f"{', '.join(silent)}: did not end within {CONFIRMED:g} s of the last news")
     # After a cut, links recover one by one; the clock owner stays until its outcome is confirmed
     others = names - {process_table.RECORDER}
     _becomes_true(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
     live(watch)
+    _becomes_true(watch, lambda: watch.present <= watch.gone | watch.confirmed, LOST)  # viewers have the last events
     if early := watch.abort_message():
         raise RunFailed(early)
 

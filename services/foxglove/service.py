@@ -7,7 +7,6 @@ from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.transport.bus_keys import BATCH_KEY
 from lapwing.cosim.transport.packets import unpack_log_packet
 from lapwing.messages.topics import EVENTS
-from lapwing.services.common.last_events import LastEvents
 from lapwing.services.foxglove.server import Server
 
 
@@ -28,18 +27,16 @@ def run(process: Participant, spec: Any) -> None:
             for recorded in process.create_service(name).topics:
                 server.declare(recorded.key(setup.vehicle), recorded.message.type_name)
         process.join()
-        unfinished, ends = (
-            set(process.setup.services),
-            LastEvents(events),
-        )  # services whose last log packet has not arrived
-        while ends.await_more(bool(unfinished)) and not process.stopping:
+        unfinished = set(setup.services)  # services whose last log packet has not arrived
+        open_events = set(events) if MONITOR in process.others else set()  # they end after the flight
+        while (unfinished or open_events) and not process.stopping:
             news = arrived.get_with_key(POLL)
             if news is None:
                 continue
             key, time_ns, payload = news
             if not payload:
                 unfinished.discard(key.rpartition("/")[2])
-                ends.take(key)
+                open_events.discard(key)
                 continue
             if key in events:
                 server.log(events[key], time_ns, payload)

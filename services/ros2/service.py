@@ -11,7 +11,6 @@ from lapwing.cosim.executors.participant import POLL, Participant
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import EVENTS, of_vehicle
-from lapwing.services.common.last_events import LastEvents
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
@@ -45,8 +44,8 @@ def run(process: Participant, spec: Any) -> None:
         process.join()
         unfinished = set(topics)  # topics that have not ended
         topics |= events
-        ends = LastEvents(events)
-        while ends.await_more(bool(unfinished)) and not process.stopping:
+        open_events = set(events) if MONITOR in process.others else set()  # they end after the flight
+        while (unfinished or open_events) and not process.stopping:
             while received := subscription.get():
                 commands = commands_by_topic[received[0]]
                 for command in commands.read(*received):
@@ -59,7 +58,7 @@ def run(process: Participant, spec: Any) -> None:
                 node.put(topics[key].key(setup.vehicle), time_ns, payload)
             else:
                 unfinished.discard(key)
-                ends.take(key)
+                open_events.discard(key)
         process.confirm()
     for commands in dict.fromkeys(commands_by_topic.values()):
         if report := commands.report():

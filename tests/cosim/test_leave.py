@@ -43,6 +43,14 @@ def test_missing_confirmation_is_named(monkeypatch):
         process.leave(lambda: None)
 
 
+def test_supervised_participant_waits_as_long_as_its_supervisor(monkeypatch):
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "CONFIRMED", 0.1)
+    with joined(monkeypatch) as (process, other):
+        process.supervised = True
+        threading.Timer(1.0, lambda: other.declare_liveliness(f"{PREFIX}/{HEARD_KEY}/other")).start()
+        process.leave(lambda: None)
+
+
 def test_last_message_is_repeated_until_confirmed(monkeypatch):
     output, received = Counter(), threading.Event()
     with joined(monkeypatch) as (process, other):

@@ -1,14 +1,18 @@
 """Many short runs at once on a busy machine: each has to end by itself, with a complete log.
 
-    python -m tests.faults.stress --runs 2000 --at-once 6 --load 5
+    python -m tests.faults.stress --runs 2000 --at-once 6 --load 5 [--seconds 3000]
 
 Takes turns at the `KINDS` of runs. Every log must have the digest that the same scene has in one process, to which
-every message counts. `--load` is the number of processes that do nothing but keep a processor busy. Exit code 1 where a
-run fails, or its log lacks a message.
+every message counts, and a run prints no line of a fault. `--load` is the number of processes that do nothing but keep
+a processor busy. Prints a line per batch; after `--seconds` no further run starts. Exit code 1 if a run fails, prints
+a fault, or its log lacks a message.
 """
 
 import argparse
 import json
+import os
+import re
+import resource
 import subprocess
 import sys
 import tempfile
@@ -32,6 +36,8 @@ KINDS = {
     "fleet with MAVLink": [*FLEET, *MAVLINK],
 }
 TIMEOUT = 900.0  # [s] for one run
+BATCH = 20  # runs in a line of progress
+FAULT = re.compile(r"ended before|unexpectedly|confirm|rejected:|incomplete")  # in the output of a run
 
 
 class Result(NamedTuple):
@@ -40,10 +46,23 @@ class Result(NamedTuple):
     kind: str
     seconds: float
     wrong: str  # "" where nothing is
+    lost: int = 0  # messages that the log lacks
 
 
-def reference(kind: str, folder: Path) -> str:
-    """The digest of a kind of run, flown in one process; compiles what the runs need.
+class Recorded(NamedTuple):
+    """Content of a log."""
+
+    digest: str
+    messages: int
+
+    @classmethod
+    def of(cls, log: Path) -> "Recorded":
+        with LogReader(log, skip_damaged=True) as reader:
+            return cls(reader.metadata.get("digest", ""), sum(1 for _ in reader.messages()))
+
+
+def reference(kind: str, folder: Path) -> Recorded:
+    """The log of a kind of run, flown in one process; compiles what the runs need.
 
     A link belongs to runs in processes only: there the log of one is flown again in one process, to the same digest.
     """
@@ -54,25 +73,25 @@ def reference(kind: str, folder: Path) -> str:
     )
     if not mode:
         subprocess.run([*LAPWING, "resimulate", str(log)], check=True, capture_output=True, timeout=TIMEOUT)
-    with LogReader(log) as reader:
-        return reader.metadata["digest"]
+    return Recorded.of(log)
 
 
-def fly(kind: str, expected: str, folder: Path, number: int) -> Result:
-    """One run, whose log is to have the digest `expected`."""
+def fly(kind: str, expected: Recorded, folder: Path, number: int) -> Result:
+    """One run, whose log is to be as `expected`."""
     log, figures = folder / f"{number}.mcap", folder / f"{number}.json"
     command = [*LAPWING, "run", *KINDS[kind], "--log", str(log), "--json", str(figures)]
     began = time.monotonic()
     done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT)
     seconds = time.monotonic() - began
+    recorded = Recorded.of(log) if log.exists() else Recorded("", 0)
+    lost = expected.messages - recorded.messages
     if done.returncode:
-        return Result(
-            kind, seconds, f"exit code {done.returncode}: {(done.stderr.strip() or 'no word').splitlines()[-1]}"
-        )
-    with LogReader(log) as reader:
-        recorded = reader.metadata["digest"]
-    if not recorded == json.loads(figures.read_text())["digest"] == expected:
-        return Result(kind, seconds, f"its log has the digest {recorded}, expected {expected}")
+        fault = f"exit code {done.returncode}: {(done.stderr.strip() or 'no word')[-300:]}"
+        return Result(kind, seconds, fault, lost)
+    if lines := [line for line in (done.stdout + done.stderr).splitlines() if FAULT.search(line)]:
+        return Result(kind, seconds, "; ".join(lines), lost)
+    if not recorded.digest == json.loads(figures.read_text())["digest"] == expected.digest:
+        return Result(kind, seconds, f"its log has {recorded}, expected {expected}", lost)
     for file in folder.glob(f"{number}.*"):
         file.unlink()
     return Result(kind, seconds, "")
@@ -90,16 +109,21 @@ def busy(processes: int) -> Iterator[None]:
             process.wait()
 
 
-def trial(runs: int, at_once: int, load: int) -> Iterator[Result]:
-    """So many runs, so many at once, beside so many processes that keep a processor busy."""
+def trial(runs: int, at_once: int, load: int, seconds: float = float("inf")) -> Iterator[Result]:
+    """So many runs, so many at once, beside so many processes that keep a processor busy; fewer if time is short."""
+    until = time.monotonic() + seconds
     with tempfile.TemporaryDirectory(prefix="stress-") as name:
         folder = Path(name)
         expected = {kind: reference(kind, folder) for kind in KINDS}
-        kinds = [list(KINDS)[k % len(KINDS)] for k in range(runs)]
+
+        def fly_in_time(number: int) -> Result | None:
+            kind = list(KINDS)[number % len(KINDS)]
+            return fly(kind, expected[kind], folder, number) if time.monotonic() < until else None
+
         with busy(load), ThreadPoolExecutor(at_once) as pool:
-            flight = [pool.submit(fly, kind, expected[kind], folder, k) for k, kind in enumerate(kinds)]
-            for run in flight:
-                yield run.result()
+            for result in pool.map(fly_in_time, range(runs)):
+                if result is not None:
+                    yield result
 
 
 def main() -> None:
@@ -108,16 +132,28 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=60)
     parser.add_argument("--at-once", type=int, default=6)
     parser.add_argument("--load", type=int, default=0, help="processes that keep a processor busy")
+    parser.add_argument("--seconds", type=float, default=float("inf"), help="after which no further run starts")
     values = parser.parse_args()
-    flight, wrong, longest = Counter[str](), Counter[str](), Counter[str]()
-    for number, (kind, seconds, fault) in enumerate(trial(values.runs, values.at_once, values.load)):
-        flight[kind] += 1
+    tried, wrong, longest = Counter[str](), Counter[str](), Counter[str]()
+    all_lost = 0
+    results = trial(values.runs, values.at_once, values.load, values.seconds)
+    for number, (kind, seconds, fault, lost) in enumerate(results):
+        tried[kind] += 1
+        all_lost += lost
         longest[kind] = max(longest[kind], seconds)
         if fault:
             wrong[kind] += 1
             print(f"run {number} ({kind}): {fault}", flush=True)
-    for kind in flight:
-        print(f"{kind}: {flight[kind] - wrong[kind]} of {flight[kind]} right, the longest {longest[kind]:.0f} s")
+        if (number + 1) % BATCH == 0:
+            total, used = tried.total(), resource.getrusage(resource.RUSAGE_CHILDREN)
+            each = (used.ru_utime + used.ru_stime) / total
+            print(
+                f"{time.strftime('%H:%M:%S')} {total} tried, {total - wrong.total()} right, {all_lost} messages lost, "
+                f"load {os.getloadavg()[0]:.0f}, {each:.1f} s of processor time per run",
+                flush=True,
+            )
+    for kind in tried:
+        print(f"{kind}: {tried[kind] - wrong[kind]} of {tried[kind]} right, the longest {longest[kind]:.0f} s")
     raise SystemExit(bool(wrong))
 
 

@@ -32,7 +32,7 @@ OUTSIDE_PERIOD = 0.4  # [s] between two messages about a program outside the run
 PATIENCE = 1.0  # [s] of waiting before a service publishes what it waits for
 JOIN_TIMEOUT = 600.0  # [s] for the others to compile their kernels and to appear
 ANSWER_TIMEOUT = 5.0  # [s] for the reply of a participant with its run configuration
-CONFIRMED = 60.0  # [s] for the other participants to confirm a last message; a launcher ends the run earlier
+CONFIRMED = 60.0  # [s] without a change among the others, which confirm a last message
 INTERRUPTED = 1.0  # [s] for these confirmations after a request to stop
 REPEAT = 0.2  # [s] between two last messages, for late subscribers and links that were cut
 BRIEF = 0.02  # [s] between two checks for confirmations
@@ -206,7 +206,9 @@ class Participant(StopRequest):
     def leave(self, repeat: Callable[[], None], key: str = HEARD_KEY, only: Collection[str] | None = None) -> None:
         """Wait until the others have confirmed the last message of this process, or have left.
 
-        Zenoh drops queued messages when a session closes, so no process closes its session earlier.
+        Zenoh drops queued messages when a session closes, so no process closes its session earlier. In a supervised run
+        the run monitor alone decides that a participant does not confirm: it receives all signs of progress, and knows
+        how long processes have waited for a CPU.
 
         Args:
             repeat: publishes the last message again; called until all have confirmed it.
@@ -214,19 +216,20 @@ class Participant(StopRequest):
             only: participants that confirm it; None for all.
 
         Raises:
-            LockStepError: names the participants that did not confirm in time.
+            LockStepError: names the participants that did not confirm in time, in a run without a run monitor.
         """
-        start = last_repeat = time.monotonic()
+        start = last_repeat = last_change = time.monotonic()
         while unconfirmed := self._peers.unconfirmed(key, only, time.monotonic() - start):
             now = time.monotonic()
-            if now - start > (INTERRUPTED if self.stopping else CONFIRMED):
-                if self.stopping:
-                    return
+            if self.stopping and now - start > INTERRUPTED:
+                return
+            if not self.supervised and now - last_change > CONFIRMED:
                 raise LockStepError(f"{self.name}: {', '.join(unconfirmed)} did not confirm its last message")
             if now - last_repeat > REPEAT:
                 for status in self._final_status:
                     self.publish_status(*status)
                 repeat()
                 last_repeat = now
-            self._peers.changed.wait(BRIEF)
-            self._peers.changed.clear()
+            if self._peers.changed.wait(BRIEF):
+                self._peers.changed.clear()
+                last_change = now

@@ -24,10 +24,11 @@ class StopRequest:
         terminated: True after SIGTERM, which does not come from the launcher.
         orphaned: True after the launcher has exited.
         abandoned: name of the watched participant that has left, "" if none has.
+        supervised: True if a launcher or a run monitor ends this process when the run fails, or by leaving itself.
     """
 
     def __init__(self) -> None:
-        self.stopping = self.terminated = self.orphaned = False
+        self.stopping = self.terminated = self.orphaned = self.supervised = False
         self.abandoned = ""
 
     def handle_signals(self) -> None:
@@ -57,6 +58,7 @@ class StopRequest:
             remove(endpoint)
             os._exit(1)
 
+        self.supervised = True
         threading.Thread(target=watch, daemon=True).start()
 
     def stop_when_gone(self, bus: ZenohBus, key: str) -> None:
@@ -66,4 +68,5 @@ class StopRequest:
             if not (alive or self.stopping):
                 self.abandoned, self.stopping = key.rpartition("/")[2], True
 
+        self.supervised = True
         bus.watch_liveliness(key, on_change)

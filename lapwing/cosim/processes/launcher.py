@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
+from threading import Thread
 from types import MappingProxyType
 from typing import IO
 
@@ -11,10 +12,11 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, start, terminate_unused
 from lapwing.cosim.processes.cpu_starvation import starved_time
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, RunMonitor
-from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunSupervisor, reason
+from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunState, RunSupervisor, reason
 from lapwing.cosim.run_errors import END_SIGNAL
 from lapwing.cosim.transport.bus import ZenohBus, mesh
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY
+from lapwing.cosim.transport.session_settings import CHILD_LINKS
 
 TERM_TIMEOUT = 1.5  # [s] from the request to end to SIGKILL
 BRIEF = 0.005  # [s] between two checks whether all processes have exited
@@ -57,14 +59,18 @@ def launch(
         def start_processes(names: list[str]) -> None:
             for name in names:
                 children[name] = early.pop(name) if name in early else start(name)
-            for name in names:
-                stream = children[name].process.stdin
-                assert stream is not None
-                with suppress(BrokenPipeError):  # it has exited; its output says why
-                    send_spec(name, endpoints, stream)
+            for name in names:  # in threads: a pipe holds less than a specification, and a stopped child reads none
+                Thread(target=send, args=(name,), daemon=True).start()
+
+        def send(name: str) -> None:
+            stream = children[name].process.stdin
+            assert stream is not None
+            with suppress(BrokenPipeError):  # it has exited; its output says why
+                send_spec(name, endpoints, stream)
 
         listen, connect = mesh(MONITOR, endpoints)
-        with ZenohBus(listen, connect, gid=publisher_ids.gid(MONITOR), awaits=False) as bus:
+        links = {} if external else CHILD_LINKS
+        with ZenohBus(listen, connect, "peer", publisher_ids.gid(MONITOR), links, awaits=False) as bus:
             try:
                 monitor = RunMonitor(bus, publisher_ids, [*required, *optional, *external], services=services)
                 bus.declare_liveliness(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # all others wait for it
@@ -72,8 +78,10 @@ def launch(
                 start_processes(ready)
                 start_processes([name for name in own if name not in ready])
                 terminate_unused(early)
-                RunSupervisor(monitor, children, required, external).supervise(observe)
-                _wait([children[name] for name in optional if name in monitor.confirmed], SHUTDOWN_TIMEOUT)
+                supervisor = RunSupervisor(monitor, children, required, external)
+                supervisor.supervise(observe)
+                if supervisor.state is RunState.ENDED:  # their reports follow
+                    _wait([children[name] for name in optional], SHUTDOWN_TIMEOUT)
             finally:
                 for name in optional:
                     if name in children and (code := children[name].process.poll()) is not None:
@@ -121,4 +129,5 @@ def _end(children: Iterable[Child]) -> None:
             child.process.kill()
             child.process.wait()
         if child.process.stdin:
-            child.process.stdin.close()
+            with suppress(BrokenPipeError):  # it was killed before it had read its specification
+                child.process.stdin.close()

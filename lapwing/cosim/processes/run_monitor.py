@@ -97,36 +97,50 @@ class RunMonitor:
     def _note_confirmation(self, key: str, alive: bool) -> None:
         if alive:
             self.confirmed.add(key.rsplit("/", 1)[1])
+            self.last_news = time.monotonic()
 
     def poll(self, seconds: float) -> None:
-        """Read the messages that arrive within `seconds`."""
+        """Read the messages that arrive within `seconds`, then all that are pending.
+
+        On a busy machine the time may pass before one message is read: the process would fall ever further behind.
+        """
         deadline = time.monotonic() + seconds
         while (remaining := deadline - time.monotonic()) > 0:
             message = self._news.get_with_key(timeout=remaining)
             if message is None:
                 return
-            key, time_ns, payload = message
-            head, _, name = key.removeprefix(f"{self._key_prefix}/").partition("/")
-            if head == BATCH_KEY:
-                self._read_log_packet(name, time_ns, payload)
-            elif head == COMPILING_KEY:
-                self.compiling = True
-            elif head == DIVERGED_KEY:
-                self.diverged = True
-            elif head == WAITING_KEY:
-                self.waiting[name] = payload.decode(errors="replace")
-            elif head == OUTSIDE_KEY:
-                self.last_news = time.monotonic()  # the service has its own time-out
-            elif head == RECORDED_KEY:
-                self.last_news = time.monotonic()
-                self.slow_disk = self.slow_disk or waits_for_disk(payload)
-                if not payload and not self._logged:
-                    self._logged = True
-                    self._declare(LOGGED_KEY)
-            elif head == ENDED_KEY:
-                self.outcome = self.outcome or payload.decode(errors="replace")  # the first cause counts
-            elif head == REFUSED_KEY and payload.isdigit():
-                self._rejected[name] = int(payload)
+            self._read(*message)
+        for _ in range(self._news.pending):
+            if (message := self._news.get_with_key(timeout=0.0)) is not None:
+                self._read(*message)
+
+    def _read(self, key: str, time_ns: int, payload: bytes) -> None:
+        head, _, name = key.removeprefix(f"{self._key_prefix}/").partition("/")
+        if head == BATCH_KEY:
+            self._read_log_packet(name, time_ns, payload)
+        elif head == COMPILING_KEY:
+            self.compiling = True
+        elif head == DIVERGED_KEY:
+            self.diverged = True
+        elif head == WAITING_KEY:
+            self.waiting[name] = payload.decode(errors="replace")
+        elif head == OUTSIDE_KEY:
+            self.last_news = time.monotonic()  # the service has its own time-out
+        elif head == RECORDED_KEY:
+            self._read_log_progress(payload)
+        elif head == ENDED_KEY:
+            self.outcome = self.outcome or payload.decode(errors="replace")  # the first cause counts
+        elif head == REFUSED_KEY and payload.isdigit():
+            self._rejected[name] = int(payload)
+
+    def _read_log_progress(self, payload: bytes) -> None:
+        if self._logged:
+            return  # the recorder repeats its last message: no news
+        self.last_news = time.monotonic()
+        self.slow_disk = self.slow_disk or waits_for_disk(payload)
+        if not payload:
+            self._logged = True
+            self._declare(LOGGED_KEY)
 
     def _read_log_packet(self, name: str, time_ns: int, payload: bytes) -> None:
         if not payload:

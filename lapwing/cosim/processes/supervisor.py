@@ -9,7 +9,7 @@ from enum import Enum
 from lapwing.cosim.processes import out_of_memory
 from lapwing.cosim.processes.child_process import Child, ChildProcess
 from lapwing.cosim.processes.cpu_starvation import Starvation
-from lapwing.cosim.processes.run_monitor import LONGEST, STALL, RunMonitor
+from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, STALL, RunMonitor
 from lapwing.cosim.run_errors import ExitCode, RunFailed
 
 POLL = 0.2  # [s] between two updates in flight
@@ -57,6 +57,7 @@ class RunSupervisor:
         self._monitor, self._children, self._clock = monitor, children, clock
         self._required, self._external = set(required), set(external)
         self._own = [name for name in children if name in self._required]
+        self._optional = [name for name in children if name not in self._required]
         self._is_stopped = is_stopped or _is_stopped
         self._starvation = Starvation()
         self._stopped_since: dict[str, float] = {}
@@ -91,7 +92,7 @@ class RunSupervisor:
             return
         self._check_external()
         self._note_stopped(now)
-        pids = {name: self._children[name].process.pid for name in self._own}
+        pids = {name: child.process.pid for name, child in self._children.items()} | {MONITOR: os.getpid()}
         self._starvation.look(pids, now - self._monitor.last_news)
         if self.state is RunState.STARTING:
             self._monitor.last_news = now
@@ -142,7 +143,7 @@ class RunSupervisor:
                 self._stopped_since.pop(name, None)
 
     def _check_progress(self, now: float) -> None:
-        message = self._monitor.stall_message(self._required, self._starvation.of)
+        message = self._monitor.stall_message(self._required, self._starved)
         if message and self._stopped_since:
             raise self._stop_error()
         if message and not self._kill_optional():
@@ -152,10 +153,11 @@ class RunSupervisor:
 
     def _check_shutdown(self, now: float) -> None:
         monitor = self._monitor
-        if now - self._ending_since > STALL:
-            self._kill_optional()  # a session cannot close while a stalled peer has not received everything
         silence = now - max(self._ending_since, monitor.last_news)
-        if silence <= LONGEST and silence - self._starvation.of(self._own) <= SHUTDOWN_TIMEOUT:
+        if self._is_long(silence, STALL) and self._kill_optional():  # a stalled one confirms nothing
+            monitor.last_news = now - STALL  # the others now have their time to leave
+            return
+        if not self._is_long(silence, SHUTDOWN_TIMEOUT):
             return
         for name in self._own:
             code = self._children[name].process.poll()
@@ -166,6 +168,16 @@ class RunSupervisor:
         running = [name for name in self._own if self._children[name].process.poll() is None]
         silent = [name for name in running if name not in monitor.confirmed] or running
         raise RunFailed(f"{', '.join(silent)}: did not end within {SHUTDOWN_TIMEOUT:g} s of the last news")
+
+    def _starved(self, names: Iterable[str]) -> float:
+        """Return the time [s] that these processes, and this one, have waited for a processor since the last news."""
+        return self._starvation.of({*names, MONITOR})
+
+    def _is_long(self, silence: float, patience: float) -> bool:
+        """Return True if a silence at the end of a run exceeds `patience`, without the time that processes waited for a
+        processor, and that optional ones ran: they may have much left to handle."""
+        excused = self._starved(self._children) + self._starvation.run_time(self._optional)
+        return silence > LONGEST or silence - excused > patience
 
     def _check_outcome(self) -> None:
         """Raise RunFailed if the run ended early. A run whose processes all completed needs no message that says so."""
@@ -180,7 +192,7 @@ class RunSupervisor:
 
     def _kill_optional(self) -> bool:
         """Kill optional processes, one of which may be stalled and block the run; return True if there was one."""
-        optional = [child.process for name, child in self._children.items() if name not in self._required]
+        optional = [self._children[name].process for name in self._optional]
         running = [process for process in optional if process.poll() is None]
         for process in running:
             process.kill()

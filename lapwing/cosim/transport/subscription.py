@@ -57,6 +57,11 @@ class Subscription:
         except queue.Empty:
             return None
 
+    @property
+    def pending(self) -> int:
+        """Number of messages that have arrived and are not taken; some of them may be rejected."""
+        return self._arrived.qsize()
+
     def wake(self) -> None:
         """End the current wait, or the next one; may be called from any thread."""
         self._arrived.put(None)

@@ -3,6 +3,7 @@
 ArduPilot's axes are NED and FRD. Which outputs drive motors, and their range of pulses, is in the log's parameters.
 """
 
+import os
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -77,6 +78,20 @@ def read_dataflash_flight(path: Path) -> Recording:
 
 
 @contextmanager
+def _silent() -> Iterator[None]:
+    """Discard what pymavlink prints for each damaged byte; its indexer in C does not use `sys.stderr`."""
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "wb") as null:
+            os.dup2(null.fileno(), 2)
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
+            yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+@contextmanager
 def _opened(kind: type, path: Path) -> Iterator[Any]:
     """Yield a reader of pymavlink, and close its file, also if its constructor fails after opening it."""
     reader: Any = object.__new__(kind)
@@ -97,8 +112,7 @@ def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, fl
     parameters, unknown = {}, set()
     try:
         kind = DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text
-        # pymavlink prints what it finds damaged
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()), _opened(kind, path) as reader:
+        with _silent(), _opened(kind, path) as reader:
             while (message := reader.recv_msg()) is not None:
                 name, fields = message.get_type(), message.to_dict()
                 if name == "PARM":

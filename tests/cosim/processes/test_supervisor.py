@@ -1,6 +1,7 @@
 """State machine of a run, with simulated processes, messages and time."""
 
 import io
+import os
 import re
 from types import SimpleNamespace
 
@@ -8,7 +9,7 @@ import pytest
 
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child
-from lapwing.cosim.processes.run_monitor import STALL, RunMonitor
+from lapwing.cosim.processes.run_monitor import LONGEST, STALL, RunMonitor
 from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunState, RunSupervisor
 from lapwing.cosim.run_errors import ExitCode, RunFailed
 
@@ -163,6 +164,46 @@ def test_stalled_optional_process_is_killed_first(run):
     assert run.processes["mavlink"].killed
     with fails("plant, recorder, sensors: no answer for 2.5 s, at t = 0.000 s"):
         run.update_for(STALL + 0.4)
+
+
+def test_optional_process_may_finish_while_there_are_news(run):
+    run.start()
+    run.monitor.ended, run.monitor.outcome = True, ""
+    for _ in range(10):
+        run.update_for(2.0)
+        run.monitor.last_news = run.now  # the recorder writes to a slow disk
+    assert not run.processes["mavlink"].killed
+    run.update_for(STALL + 0.4)
+    assert run.processes["mavlink"].killed
+    assert run.state is RunState.ENDING
+
+
+@pytest.mark.parametrize("measure", ["waited", "ran"])
+def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
+    run = Run(monkeypatch)
+    run.processes["mavlink"].pid = 1 << 29
+    monkeypatch.setattr(
+        f"lapwing.cosim.processes.cpu_starvation.{measure}", lambda pid: run.now if pid == 1 << 29 else 0.0
+    )
+    run.start()
+    run.monitor.ended, run.monitor.outcome = True, ""
+    run.update_for(LONGEST - 1.0)
+    assert not run.processes["mavlink"].killed
+    run.update_for(2.0)
+    assert run.processes["mavlink"].killed
+    run.update_for(2.0)
+    assert run.state is RunState.ENDING
+
+
+def test_time_that_launcher_waits_for_processor_is_no_stall(monkeypatch):
+    run = Run(monkeypatch)
+    own = os.getpid()
+    monkeypatch.setattr(
+        "lapwing.cosim.processes.cpu_starvation.waited", lambda pid: 0.9 * run.now if pid == own else 0.0
+    )
+    run.start().update_for(15.0)
+    assert run.state is RunState.RUNNING
+    assert not run.processes["mavlink"].killed
 
 
 @pytest.mark.parametrize("joined", [True, False])

@@ -12,6 +12,7 @@ from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
 from lapwing.studies.flight_import.write_log import write_log
 from lapwing.studies.validation.plant_rows import PlantRows
+from tests.fuzz.flights import dataflash
 
 
 @pytest.fixture(scope="module")
@@ -111,3 +112,12 @@ def test_setpoint_of_csv_is_in_the_log(flight, tmp_path):
     result = open_flight(tmp_path / "flight.mcap")
     assert result.setpoint[1:, :3] == pytest.approx(desired[1 : len(result)], abs=1e-9)
     assert np.isnan(result.setpoint[:, 3:]).all()
+
+
+def test_damaged_dataflash_log_is_imported_without_lines_of_its_parser(tmp_path):
+    log = bytearray(dataflash().seeds[0])
+    log[700:760] = b"9" * 60
+    (tmp_path / "a.bin").write_bytes(log)
+    result = run("import", tmp_path / "a.bin", "--out", tmp_path / "a.mcap")
+    assert (result.returncode, result.stderr) == (0, "")
+    assert "bad header" not in result.stdout

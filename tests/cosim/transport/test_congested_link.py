@@ -1,0 +1,63 @@
+"""Links to a process that reads nothing for a while: Zenoh closes them after a time, and messages are lost."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from lapwing.cosim.access.private_sockets import private_endpoints
+from lapwing.cosim.processes.run_monitor import LONGEST
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.session_settings import CHILD_LINKS
+
+MESSAGES, SIZE = 100, 50_000  # much more than the buffers of a link hold
+PAUSE = 2.0  # [s] that the reader is stopped
+LEASE, WAIT = "transport/link/tx/lease", "transport/link/tx/queue/congestion_control/block/wait_before_close"
+
+READER = f"""
+import sys
+from lapwing.cosim.transport.bus import ZenohBus
+with ZenohBus(connect=[sys.argv[1]], awaits=False) as bus:
+    messages, count = bus.subscribe("congested/data"), 0
+    bus.declare_liveliness("congested/reader")
+    while (message := messages.get(120.0)) is not None and message[1]:
+        count += len(message[1]) == {SIZE}
+    print(count)
+"""
+
+
+def received(settings):
+    """Return the number of messages that a reader gets that is stopped while they are sent."""
+    with private_endpoints(["writer"]) as endpoints, ZenohBus([endpoints["writer"]], security=settings) as bus:
+        command = [sys.executable, "-c", READER, endpoints["writer"]]
+        reader = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        put = bus.publisher("congested/data")
+        assert bus.wait_for_liveliness(["congested/reader"], 120.0) == []
+        reader.send_signal(signal.SIGSTOP)
+        os.waitid(os.P_PID, reader.pid, os.WSTOPPED | os.WNOWAIT)
+        resume = subprocess.Popen(["sh", "-c", f"sleep {PAUSE}; kill -CONT {reader.pid}"])
+        for i in range(MESSAGES):
+            put(bytes(SIZE), i)
+        resume.wait()
+        while reader.poll() is None:  # its link may be opened again
+            put(b"", MESSAGES)
+            time.sleep(0.1)
+        return int(reader.communicate()[0])
+
+
+@pytest.mark.long
+def test_zenoh_loses_messages_when_it_closes_congested_link():
+    assert received({WAIT: 200_000}) < MESSAGES
+
+
+@pytest.mark.long
+def test_link_of_launcher_waits_for_starved_reader():
+    assert received(CHILD_LINKS) == MESSAGES
+
+
+def test_launcher_detects_stalled_process_before_zenoh_does():
+    assert CHILD_LINKS[LEASE] > 1e3 * LONGEST
+    assert CHILD_LINKS[WAIT] > 1e6 * LONGEST

@@ -1,0 +1,40 @@
+"""A launcher that gets hardly any processor time does not make its run lose messages."""
+
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from tests.participants import participants
+
+SPEED = "0.5"  # the flight of 9.5 s takes long enough for full buffers
+BURN = "import os, sys\nos.sched_setaffinity(0, {int(sys.argv[1])})\nwhile True: pass"
+
+
+def schedule(pid, policy):
+    for thread in os.listdir(f"/proc/{pid}/task"):
+        os.sched_setscheduler(int(thread), policy, os.sched_param(0))
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not hasattr(os, "SCHED_IDLE"), reason="the system has no class for idle processes")
+def test_run_of_starved_launcher_ends_with_complete_log(tmp_path):
+    log, core = tmp_path / "a.mcap", min(os.sched_getaffinity(0))
+    command = [sys.executable, "-m", "lapwing", "run", "hover", "--speed", SPEED, "--log", str(log)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as launcher:
+        while launcher.poll() is None and not (log.exists() and log.stat().st_size):
+            time.sleep(0.05)
+        os.sched_setaffinity(launcher.pid, {core})
+        schedule(launcher.pid, os.SCHED_IDLE)
+        burner = subprocess.Popen([sys.executable, "-c", BURN, str(core)])
+        while launcher.poll() is None and participants(launcher.pid):
+            time.sleep(0.5)
+        burner.kill()
+        burner.wait()
+        if launcher.poll() is None:
+            schedule(launcher.pid, os.SCHED_OTHER)
+        output, error = launcher.communicate()
+    assert (launcher.returncode, error) == (0, ""), output
+    assert "Landed at 8.52 s" in output
