@@ -1,8 +1,7 @@
 """Time per call of the elementary functions beside those of the C library, and of SVML where it is installed.
 
 Values of an array of arguments of usual size, by a compiled loop. SVML computes four values with one call, in the
-variant with an error below 1 ulp. It is found in the environment (`pip install
-intel-cmplr-lib-rt`) or by the loader.
+variant with an error below 1 ulp. It is found in the environment (`pip install intel-cmplr-lib-rt`) or by the loader.
 """
 
 import ctypes
