@@ -22,9 +22,10 @@ from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, gravity
 from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
+from lapwing.studies.accuracy.double_double import DoubleDouble
 from lapwing.studies.accuracy.integrate import SAMPLES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
-from lapwing.studies.accuracy.round_off import Number, coordinates_in_extended_numbers, extend, in_extended_precision
+from lapwing.studies.accuracy.round_off import coordinates_in_extended_numbers, extend, in_extended_precision
 
 DURATION = 2.0  # [s], about
 HEIGHT = 20.0  # [m] clear of the ground
@@ -148,7 +149,7 @@ def problem(scene: Scene, manoeuvre: Voltages = waves) -> Problem:
 
         def fly_in_extended_numbers(step: float) -> np.ndarray:
             count = round(exchange.interval / step)
-            fly, h = extend(advance), Number(exchange.interval / count)
+            fly, h = extend(advance), DoubleDouble(exchange.interval / count)
             x, numbers = in_extended_precision(state), in_extended_precision(p)
             for tick, voltage in enumerate(map(tuple, voltages.tolist()), TICK):
                 x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)

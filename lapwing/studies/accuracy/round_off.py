@@ -1,8 +1,8 @@
 """Round-off error: the same steps in double and in extended precision.
 
 Both runs execute the source of the same kernels with the same step and the same coefficients, so that their difference
-is the rounding of doubles alone. Extended numbers are numpy's `longdouble`: 64 bits of mantissa on x86-64 (2048 times
-as fine as a double), 113 on aarch64. Random numbers are doubles in both runs.
+is the rounding of doubles alone. Extended numbers are double-doubles, with 32 digits. Random numbers are doubles in
+both runs.
 """
 
 from collections.abc import Callable
@@ -17,25 +17,13 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.kernels import math
 from lapwing.kernels.codegen import GENERATORS
 from lapwing.studies.accuracy.coordinates import coordinates, error
+from lapwing.studies.accuracy.double_double import DoubleDouble
+from lapwing.studies.accuracy.double_double_math import FUNCTIONS
 from lapwing.studies.accuracy.problem import Problem
 
-Number: type = np.longdouble
-FINER = 1000.0  # times as fine as a double, at least: a long double of other systems is a double
 STEPS = 400  # at least
 METHOD = "rk4_renormalised"
-_FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "expm1", "log", "log1p", "tanh", "hypot", "cbrt", "floor")
-_MATH = SimpleNamespace(
-    **{name: getattr(np, name) for name in _FUNCTIONS},
-    **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan", "atan2")},
-    pow=np.power,
-    sincos=lambda x: (np.sin(x), np.cos(x)),
-    pi=math.pi,
-    tau=math.tau,
-    inf=math.inf,
-    isfinite=np.isfinite,
-    copysign=np.copysign,
-    square=np.square,
-)
+_MATH = SimpleNamespace(**FUNCTIONS, pi=math.pi, tau=math.tau, inf=math.inf)
 
 
 class RoundOff(NamedTuple):
@@ -46,22 +34,17 @@ class RoundOff(NamedTuple):
     error: float  # largest difference of coordinates, relative to 1 + size
 
 
-def is_available() -> bool:
-    """Return True if this machine has numbers finer than doubles."""
-    return bool(np.finfo(float).eps > FINER * np.finfo(Number).eps)
-
-
 def measure(problem: Problem) -> RoundOff | None:
-    """Return the round-off error of a problem, None if its methods or this machine have no extended numbers."""
+    """Return the round-off error of a problem, None if its methods have no extended numbers."""
     way = next((way for way in problem.ways if way.name == METHOD), None)
-    if way is None or way.extended is None or not is_available():
+    if way is None or way.extended is None:
         return None
     settings = [h for h in way.settings if round(problem.duration / h) >= STEPS]
     outcome = way.read(settings[0], way.prepare(settings[0])()) if settings else None
     if outcome is None or not np.isfinite(outcome.samples).all():
         return None
     exact = way.extended(settings[0])
-    return RoundOff(METHOD, round(problem.duration / settings[0]), error(outcome.samples[-1].astype(Number), exact))
+    return RoundOff(METHOD, round(problem.duration / settings[0]), error(outcome.samples[-1], exact))
 
 
 def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, steps: int) -> np.ndarray:
@@ -80,7 +63,7 @@ def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, step
     step, rate = extend(method.step), extend(RATES[type(p)])
     state, p = in_extended_precision(x), in_extended_precision(p)
     for n in range(steps):
-        state = step(rate, p, Number(n * h), state, Number(h))
+        state = step(rate, p, DoubleDouble(n * h), state, DoubleDouble(h))
     return coordinates_in_extended_numbers(x, state)
 
 
@@ -95,14 +78,14 @@ def coordinates_in_extended_numbers(x: Any, state: Any) -> np.ndarray:
         TypeError: part of the state is a double.
     """
     numbers = _numbers(state)
-    if not all(isinstance(number, Number) for number in numbers):
+    if not all(isinstance(number, DoubleDouble) for number in numbers):
         raise TypeError(f"{type(x).__name__}: a step returns doubles for extended numbers")
-    return coordinates(x, np.array([numbers], Number))[0]
+    return coordinates(x, np.array([numbers], object))[0]
 
 
 def in_extended_precision(tree: Any) -> Any:
     """Return a tree with its doubles as extended numbers."""
-    return _map_leaves(float, Number, tree)
+    return _map_leaves(float, DoubleDouble, tree)
 
 
 def extend(function: Any) -> Callable[..., Any]:
@@ -123,7 +106,7 @@ def _extend(function: Any, known: dict[int, Any]) -> Any:
     if id(python) in known:
         return known[id(python)]
     if python.__module__ == noise.__name__:
-        return lambda *values: in_extended_precision(function(*_map_leaves(Number, float, values)))
+        return lambda *values: in_extended_precision(function(*_map_leaves(DoubleDouble, float, values)))
     if generate is not None:
         result: Any = _extend_generator(generate, known)
         known[id(python)] = result
@@ -164,7 +147,7 @@ def _extend_generator(generate: Callable[..., Any], known: dict[int, Any]) -> Ca
         key = tuple(map(_shape, values))
         if key not in variants:
             variants[key] = _extend(
-                generate(*(numba.typeof(_map_leaves(Number, float, value)) for value in values)), known
+                generate(*(numba.typeof(_map_leaves(DoubleDouble, float, value)) for value in values)), known
             )
         return variants[key](*values)
 
