@@ -55,13 +55,14 @@ def _outcome(validation: Validation) -> str:
 
 
 def _errors(validation: Validation) -> Rows:
-    heads = [f"{name.replace('_', ' ')} [{UNITS[name]}]" for name in FIELDS]
+    known = [i for i, metric in enumerate(validation.plant[0]) if np.isfinite(metric.mean)]  # measured by a flight
+    heads = [f"{FIELDS[i].replace('_', ' ')} [{UNITS[FIELDS[i]]}]" for i in known]
     table = Rows("Mean absolute error", "after, by", *heads)
     for k, steps in enumerate(validation.horizons):
         after = f"{steps * validation.interval:g} s"
-        table.add(f"{after}, plant", *map(with_interval, validation.plant[k]))
+        table.add(f"{after}, plant", *(with_interval(validation.plant[k][i]) for i in known))
         for name, rows in validation.baselines.items():
-            table.add(f"{after}, {name.replace('_', ' ')}", *(plain(m.mean) for m in rows[k]))
+            table.add(f"{after}, {name.replace('_', ' ')}", *(plain(rows[k][i].mean) for i in known))
     return table
 
 
