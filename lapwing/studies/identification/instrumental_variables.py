@@ -8,6 +8,8 @@ independent of that of the prediction (Söderström and Stoica, System Identific
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import norm
+from scipy.stats import t as student
 
 LOSS_SCALE = 0.5  # residual, in units of its scale, where the robust loss turns from square to linear
 NO_INFLUENCE = 1e-12  # of the largest information, below which a parameter changes no prediction
@@ -32,7 +34,7 @@ def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarr
     """Return the step that makes instruments and residuals uncorrelated, and the errors of its solution.
 
     Standard errors come from the sandwich estimator over clusters, with the small-sample factor n / (n - k) of the
-    variance for n clusters.
+    variance for n clusters, and are scaled so that two of them cover as much of Student's distribution as of a normal one.
 
     Args:
         residual: shape (m,).
@@ -57,7 +59,7 @@ def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarr
     covariance = inverse @ (centred.T @ centred * factor) @ inverse.T
     spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = np.where(dead | dead[:, None], np.eye(k), covariance / np.outer(spread, spread))
-    deviation = np.where(dead, np.inf, spread)
+    deviation = np.where(dead, np.inf, spread * student.ppf(norm.cdf(2.0), max(len(total) - k, 1)) / 2.0)
     known = np.where(values > SINGULAR, 1.0 / np.maximum(values, SINGULAR), 0.0)
     step = -((right.T * known) @ left.T / np.outer(scale, scale)) @ total.sum(axis=0)
     return Moments(np.clip(step, -deviation, deviation), deviation, correlation)
