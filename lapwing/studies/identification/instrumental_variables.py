@@ -34,7 +34,8 @@ def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarr
     """Return the step that makes instruments and residuals uncorrelated, and the errors of its solution.
 
     Standard errors come from the sandwich estimator over clusters, with the small-sample factor n / (n - k) of the
-    variance for n clusters, and are scaled so that two of them cover as much of Student's distribution as of a normal one.
+    variance for n clusters. They are scaled so that two of them cover as much of Student's distribution as of a
+    normal one.
 
     Args:
         residual: shape (m,).
