@@ -1,7 +1,8 @@
 """Coverage of the standard errors of `lapwing identify` on simulated flights with sensor noise.
 
-`python -m benchmarks.identification_coverage [SEEDS]` flies so many seeds, estimates four parameters from each flight,
-and prints how many true values lie within two standard errors. Exact standard errors give 95 %.
+`python -m benchmarks.identification_coverage [SEEDS [FIRST]]` flies so many seeds from the first, estimates four
+parameters from each flight, and prints how many true values lie within two standard errors. Exact standard errors give
+95 %.
 """
 
 import sys
@@ -28,14 +29,14 @@ KEYS = (
 )
 
 
-def main(seeds: int = 100) -> None:
+def main(seeds: int = 100, first: int = 1) -> None:
     """Print coverage and mean error of each parameter."""
     begin = time.perf_counter()
     plant, rows = PlantRows(SCENE, INTERVAL), PlantRows(SCENE, INTERVAL)
     scene = load_one(SCENE, ())
     true = np.array([start_value(scene, key) for key in KEYS])
     deviations = []
-    for flight in simulated(plant, SECONDS, list(range(1, seeds + 1))):
+    for flight in simulated(plant, SECONDS, list(range(first, first + seeds))):
         fit = OutputError(rows, [flight], KEYS, list(1.05 * true), WINDOWS, NO_TRIM).solve(most=20)
         deviations.append((fit.values - true) / fit.standard_errors)
     z = np.array(deviations)

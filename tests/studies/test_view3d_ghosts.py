@@ -77,6 +77,12 @@ def test_ghost_fades_out_where_it_would_cover_body():
     assert ghosts[3]["opacity"] == OPACITY
 
 
+def test_ghost_is_hidden_without_setpoint():
+    missing = np.where(T[:, None] < 1.5, np.nan, AHEAD)
+    _, _, result = shown(missing, ASIDE)
+    assert [ghosts["reference"]["visible"] for ghosts in result] == [False, False, True, True]
+
+
 def test_ellipsoid_of_estimate_is_not_turned_with_its_ghost():
     scene, _, _ = shown(PATH, ASIDE)
     ellipsoid = scene.nodes["/0 drone1/estimate/ellipsoid"]

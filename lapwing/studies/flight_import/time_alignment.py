@@ -22,7 +22,7 @@ class ClockDrift(NamedTuple):
 def describe(turning: np.ndarray, omega: np.ndarray, valid: np.ndarray, interval: float) -> str:
     """Return offset, correlation and drift in words. See `time_offset` for arguments."""
     offset, correlation = time_offset(turning, omega, valid, interval)
-    text = f"gyroscope {1e3 * offset:+.0f} ms against attitude, correlation {correlation:.2f}"
+    text = f"gyroscope {round(1e3 * offset):+d} ms against attitude, correlation {correlation:.2f}"
     drift = clock_drift(turning, omega, valid, interval)
     if drift is None:
         return f"{text}, drift unknown: needs {FEWEST} spans of {SPAN:g} s with motion"

@@ -8,15 +8,16 @@ Flight Vehicle System Identification, 2015, sections 4 and 9).
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from scipy.ndimage import correlate1d
 from scipy.optimize import least_squares
-from scipy.signal import savgol_filter
 
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import continuous, unit
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
+from lapwing.studies.identification.instrumental_variables import LOSS_SCALE, loss, moments
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import Errors, Span, compare, predict_all, window_starts
@@ -24,13 +25,12 @@ from lapwing.studies.validation.windows import Errors, Span, compare, predict_al
 STEP = 1e-4  # of a scaled parameter, for derivatives
 RANGE = 50.0  # times the start value, and its fraction, within which a positive parameter is sought
 HORIZONS = (10, 25, 50)  # samples
-LOSS_SCALE = 0.5  # residual, in units of its scale, where the robust loss turns from square to linear
 CLUSTER = 1.0  # [s] of flight that counts as one independent observation for standard errors
-NO_INFLUENCE = 1e-12  # of the largest information, below which a parameter changes no prediction
 TOLERANCE = 1e-8  # of the relative change of loss and parameters; 1e-5 stops a standard error short of the minimum
 LARGEST = 1e3  # residual, in units of its scale
 FIELDS = ("position", "velocity", "attitude", "rate")
-SMOOTHING = 9  # samples of the local parabola whose middle is the start of a window
+START = tuple(range(-4, 5))  # samples whose parabola gives the start of a window
+INSTRUMENT = (*range(-9, -4), *range(5, 10))  # samples of another start, with independent noise
 
 
 class Window(NamedTuple):
@@ -97,11 +97,18 @@ class OutputError:
         with np.errstate(invalid="ignore"):
             return np.maximum(np.nanmedian(np.abs(residual), axis=(0, 3)) * 1.4826, 1e-9)
 
-    def residuals(self, sets: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def residuals(self, sets: Sequence[np.ndarray], samples: tuple[int, ...] = START) -> list[np.ndarray]:
         """Return scaled residuals of each parameter set, shape (windows, h, 4, 3)."""
-        return [errors * self.weights[None, :, :, None] for errors in self._errors(sets)]
+        return [errors * self.weights[None, :, :, None] for errors in self._errors(sets, samples)]
 
-    def _errors(self, sets: Sequence[np.ndarray]) -> list[np.ndarray]:
+    def derivatives(self, x: np.ndarray, samples: tuple[int, ...] = START) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residuals at scaled parameters x, shape (m,), and their derivatives, shape (m, k)."""
+        steps = STEP * np.maximum(np.abs(x), 1e-2)
+        sets = [x * self.scale, *((x + steps * row) * self.scale for row in np.eye(len(x)))]
+        base, *result = (_flat(r) for r in self.residuals(sets, samples))
+        return base, np.column_stack([(f - base) / step for f, step in zip(result, steps, strict=True)])
+
+    def _errors(self, sets: Sequence[np.ndarray], samples: tuple[int, ...] = START) -> list[np.ndarray]:
         own = [k for k, key in enumerate(self.keys) if not is_flight_parameter(key)]
         groups: dict[tuple, list[int]] = {}
         for i, values in enumerate(sets):
@@ -113,7 +120,7 @@ class OutputError:
             self.plant.set_parameters([{self.keys[k]: float(sets[i][k]) for k in own} for i in members])
             states = start_states(self.plant, flights, self.memory)
             spans = [Span(w.flight, w.starts, j) for j in range(len(members)) for w in self.windows]
-            result = predict_all(self.plant, [smooth_motion(f) for f in flights], spans, states, self.horizons)
+            result = predict_all(self.plant, [smooth_motion(f, samples) for f in flights], spans, states, self.horizons)
             parts = [
                 _stack(compare(flights[s.flight], s.starts, self.horizons, f))
                 for s, f in zip(spans, result, strict=True)
@@ -151,13 +158,11 @@ class OutputError:
                 return np.full(self._count, LARGEST)
 
         def jacobian(x: np.ndarray) -> np.ndarray:
-            steps = STEP * np.maximum(np.abs(x), 1e-2)
-            sets = [x * self.scale, *((x + steps * row) * self.scale for row in np.eye(len(x)))]
-            base, *result = (_flat(r) for r in self.residuals(sets))
+            base, derivatives = self.derivatives(x)
             if report:
-                report(len(calls), x * self.scale, float(np.mean(_loss(base))))
+                report(len(calls), x * self.scale, float(np.mean(loss(base))))
             calls.append(1)
-            return np.column_stack([(f - base) / step for f, step in zip(result, steps, strict=True)])
+            return derivatives
 
         calls: list[int] = []
         begin = self.start if begin is None else begin
@@ -166,46 +171,38 @@ class OutputError:
             residual, inner, jac=jacobian, bounds=(bounds[0] / self.scale, bounds[1] / self.scale),
             loss="soft_l1", f_scale=LOSS_SCALE, x_scale="jac", max_nfev=most, ftol=TOLERANCE, xtol=TOLERANCE,
         )  # fmt: skip
-        return self._fit(solution.x, jacobian(solution.x))
+        return self._fit(solution.x, bounds / self.scale)
 
-    def _fit(self, x: np.ndarray, jacobian: np.ndarray) -> Fit:
-        """Return the fit with standard errors by the sandwich estimator over clusters of windows."""
-        residual = _flat(self.residuals([x * self.scale])[0])
-        square = 1.0 + (residual / LOSS_SCALE) ** 2
-        information = jacobian.T @ (jacobian * (square**-1.5)[:, None])  # second derivative of the loss
-        score = (jacobian * (residual * square**-0.5)[:, None]).reshape(len(self.clusters()), -1, len(x)).sum(axis=1)
-        names = self.clusters()
-        count = int(names.max()) + 1
-        total = np.zeros((count, len(x)))
-        np.add.at(total, names, score)
-        total -= total.mean(axis=0)
-        size = np.diag(information)
-        dead = size <= NO_INFLUENCE * size.max(initial=0.0)
-        scale = np.sqrt(np.where(dead, 1.0, size))
-        normal = information / np.outer(scale, scale)
-        values, vectors = np.linalg.eigh(normal)
-        inverse = (vectors / np.maximum(values, 1e-12)) @ vectors.T / np.outer(scale, scale)
-        middle = total.T @ total * count / max(count - len(x), 1)
-        covariance = inverse @ middle @ inverse
-        deviation = np.where(dead, np.inf, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
-        spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-        correlation = np.where(dead | dead[:, None], np.eye(len(x)), covariance / np.outer(spread, spread))
+    def _fit(self, x: np.ndarray, bounds: np.ndarray) -> Fit:
+        """Return the fit at the minimum x, corrected for the noise of the starts, with standard errors."""
+        step = moments(*self.derivatives(x), self.derivatives(x, INSTRUMENT)[1], self.clusters()).step
+        x = np.clip(x + step, *bounds)
+        residual, derivatives = self.derivatives(x)
+        instruments = self.derivatives(x, INSTRUMENT)[1]
+        _, deviation, correlation = moments(residual, derivatives, instruments, self.clusters())
         vague = deviation > 0.5 * np.maximum(np.abs(x), 1e-2)
         mixed = np.abs(correlation - np.eye(len(x))).max(axis=1, initial=0.0) > 0.98
         return Fit(
-            self.keys, self.start, x * self.scale, deviation * self.scale, correlation, float(np.mean(_loss(residual))),
+            self.keys, self.start, x * self.scale, deviation * self.scale, correlation, float(np.mean(loss(residual))),
             self.evaluations, tuple(k for k, a, b in zip(self.keys, vague, mixed, strict=True) if a or b),
         )  # fmt: skip
 
 
-def smooth_motion(flight: Recording) -> Recording:
-    """Return a flight whose motion is smoothed over neighbouring samples, without delay.
+def smooth_motion(flight: Recording, samples: tuple[int, ...] = START) -> Recording:
+    """Return a flight whose motion is the middle of parabolas through neighbouring samples, without delay.
 
-    The noise of a start state enters the prediction and its derivatives alike, which biases time constants and inertia.
+    Args:
+        flight: recording.
+        samples: offsets of the neighbours, symmetric.
     """
+    reach = max(samples)
+    if len(flight) <= 2 * reach:
+        return flight
+    weights = np.zeros(2 * reach + 1)
+    weights[np.array(samples) + reach] = np.linalg.pinv(np.vander(samples, 3))[-1]
 
     def smooth(values: np.ndarray) -> np.ndarray:
-        return savgol_filter(values, SMOOTHING, 2, axis=0) if len(values) >= SMOOTHING else values
+        return correlate1d(values, weights, axis=0, mode="nearest")
 
     return replace(
         flight,
@@ -221,7 +218,3 @@ def _stack(e: Errors) -> np.ndarray:
 
 def _flat(residual: np.ndarray) -> np.ndarray:
     return np.clip(np.nan_to_num(residual, nan=LARGEST, posinf=LARGEST, neginf=-LARGEST), -LARGEST, LARGEST).ravel()
-
-
-def _loss(residual: np.ndarray) -> Any:
-    return 2.0 * LOSS_SCALE**2 * (np.sqrt(1.0 + (residual / LOSS_SCALE) ** 2) - 1.0)

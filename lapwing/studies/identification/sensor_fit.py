@@ -32,19 +32,24 @@ MOVING = 0.2  # [m/s] rms speed from which a latency of positions shows
 
 
 def fit_all(flights: Sequence[Recording]) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Return the median of each parameter over flights, and the remarks on each flight.
+    """Return the median of each parameter over flights, and each remark once with its number of flights.
 
     Raises:
         ValueError: no flight has a sensor.
     """
-    fits, notes = [], []
+    fits: list[dict[str, dict[str, Any]]] = []
+    notes: dict[str, list[str]] = {}  # names of flights by remark
     for flight in flights:
         result, remarks = fit_sensors(flight)
         fits.append(result)
-        notes += [f"{flight.name}: {remark}" for remark in remarks]
+        for remark in remarks:
+            notes.setdefault(remark, []).append(flight.name)
     if not any(fits):
         raise ValueError("no flight has sensors (imu, mag, baro, gps); use a log with gyroscope and accelerometer")
-    return _median(fits), notes
+    lines = [
+        f"{remark} ({names[0] if len(names) == 1 else f'{len(names)} flights'})" for remark, names in notes.items()
+    ]
+    return _median(fits), lines
 
 
 def _median(tables: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -110,7 +115,7 @@ def _imu(flight: Recording, s: Series, rest: tuple[float, float] | None, notes: 
             gyro["bias_instability_deg_per_h"] = 3600.0 * _slow(omega)
             accelerometer["bias_instability_ug"] = 1e3 * _slow(force)
         else:
-            notes.append(f"imu: rests for {rest[1] - rest[0]:.0f} s; bias instability needs {LONG_REST:g} s")
+            notes.append(f"imu: bias instability unknown, needs {LONG_REST:g} s at rest")
     result: dict[str, Any] = {"gyro": gyro, "accelerometer": accelerometer, "rate": _rate(s)}
     turning = body_rate(flight.attitude, np.full(len(flight), flight.interval))
     measured = np.column_stack([np.interp(_grid(flight), s.time, c) for c in s.values[:, :3].T])
@@ -121,7 +126,7 @@ def _imu(flight: Recording, s: Series, rest: tuple[float, float] | None, notes: 
         if correlation > CLEAR:
             result["latency_samples"] = _samples(lag, result["rate"])
         else:
-            notes.append(f"imu: latency unknown, correlation with the attitude is {correlation:.2f}")
+            notes.append(f"imu: latency unknown, correlation with the attitude is below {CLEAR:g}")
     return result
 
 

@@ -45,14 +45,14 @@ def pool_flights(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]
     count = np.array([np.isfinite(f).sum(axis=0) for f in flights])
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = total.sum(axis=0) / count.sum(axis=0)
-        if len(flights) < 3:
-            low = high = np.full_like(mean, np.nan)
-        else:
+        low, high = np.full_like(mean, np.nan), np.full_like(mean, np.nan)
+        if len(flights) >= 3:
             draws = np.random.default_rng(seed).integers(0, len(flights), (RESAMPLES, len(flights)))
             weights = np.stack([np.bincount(d, minlength=len(flights)) for d in draws]).astype(float)
             sampled = np.tensordot(weights, total, 1) / np.tensordot(weights, count, 1)
             tail = (100.0 - CONFIDENCE) / 2.0
-            low, high = np.nanpercentile(sampled, [tail, 100.0 - tail], axis=0)
+            known = np.isfinite(mean)  # a quantity that no flight has measured has no interval
+            low[known], high[known] = np.nanpercentile(sampled[:, known], [tail, 100.0 - tail], axis=0)
     return [
         [Metric(float(m), float(a), float(b)) for m, a, b in zip(*row, strict=True)]
         for row in zip(mean, low, high, strict=True)

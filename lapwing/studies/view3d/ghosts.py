@@ -31,12 +31,15 @@ class Ghost:
         self._mesh = add_solid(scene, f"{name}/body", Solid(vertices, faces, colour, OPACITY), visible=False)
 
     def show(self, place: np.ndarray, attitude: np.ndarray, own: np.ndarray, own_attitude: np.ndarray) -> None:
-        """Move the ghost to a place [m] and attitude w, x, y, z, and fade it by its distance from those of the body."""
+        """Move the ghost to a place [m] and attitude w, x, y, z, and fade it by its distance from those of the body.
+
+        A place or attitude that is not a number, as before the first setpoint of a recorded flight, hides the ghost.
+        """
         if self._mesh is None:
             return
         turn = 2.0 * np.arccos(np.clip(abs(float(attitude @ own_attitude)), 0.0, 1.0))
         apart = float(np.linalg.norm(place - own)) / self._size + turn
-        share = np.clip((apart - HIDDEN) / (FULL - HIDDEN), 0.0, 1.0)
+        share = np.clip((apart - HIDDEN) / (FULL - HIDDEN), 0.0, 1.0) if np.isfinite(apart) else 0.0
         opacity = round(STEP * round(OPACITY * share / STEP), 2)
         if opacity != self._opacity:
             if (opacity > 0.0) != (self._opacity > 0.0):

@@ -12,7 +12,7 @@ from flight_recordings import simulated, write_csv
 
 from lapwing.dynamics.geodesy import Home, enu_to_geodetic
 from lapwing.studies.flight_import.recording import Recording, Series
-from lapwing.studies.identification.sensor_fit import fit_sensors
+from lapwing.studies.identification.sensor_fit import fit_all, fit_sensors
 from lapwing.studies.validation.plant_rows import PlantRows
 
 INTERVAL, SECONDS = 0.01, 300.0
@@ -89,6 +89,14 @@ def test_command_fits_imu_of_columns_as_of_imported_log(tmp_path):
     imus = [tomllib.loads((tmp_path / name).read_text())["sensors"]["imu"] for name in ("columns.toml", "log.toml")]
     assert imus[0]["gyro"] == pytest.approx(imus[1]["gyro"], rel=0.01)
     assert imus[0]["accelerometer"] == pytest.approx(imus[1]["accelerometer"], rel=0.01)
+
+
+def test_remark_on_many_flights_is_printed_once(flight):
+    short = [replace(flight, name=name, omega=np.full((len(flight), 3), 3.0)) for name in "ab"]
+    assert [line for line in fit_all(short)[1] if "at rest with motors off" in line] == [
+        "no 2 s at rest with motors off: noise is measured in flight, with vibration (2 flights)"
+    ]
+    assert all(line.endswith("(flight)") for line in fit_all([replace(flight, name="flight")])[1])
 
 
 def test_white_noise_has_no_bias_instability(flight):

@@ -95,6 +95,14 @@ def test_interval_resamples_flights_not_windows():
     assert metric.high > 3.2
 
 
+@pytest.mark.filterwarnings("error")
+def test_quantity_without_measurement_has_no_interval():
+    flights = [np.array([[[1.0, np.nan]]]) for _ in range(4)]
+    ((known, unknown),) = pool_flights(flights)
+    assert known == (1.0, 1.0, 1.0)
+    assert np.isnan(unknown).all()
+
+
 def test_magnitudes_are_means_over_axes(plant, flights):
     result = errors(plant, flights[0], (10,))
     assert magnitudes(result)[:, 0, 1] == pytest.approx(np.abs(result.velocity[:, 0]).mean(axis=1))
