@@ -21,7 +21,7 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         result: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
         for name, march in methods.items():
             y = march(c.INERTIA, c.start(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
-            for row, values in zip(result, c.compared(y, c.EPSILON), strict=True):
+            for row, values in zip(result, c.figures_of_run(y, c.EPSILON), strict=True):
                 result[row][name] = float(values.max())
         return result
 
@@ -39,7 +39,7 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         return {
             body: {
                 name: float(
-                    c.drifted(
+                    c.drifts_of_run(
                         march(inertia, c.RigidBody(c.ASKEW, omega), c.DURATION, c.STEPS, c.SAMPLES), inertia
                     ).max()
                 )

@@ -115,7 +115,7 @@ def climb_in_digits(p, volts: float, height: float, speed: float, h: float, step
 
 def test_multirotor_of_scene_has_digits_of_extended_precision() -> None:
     scene = scene_of("lapwing/scenes/hover.toml", [])
-    _, p = plant.model(scene).described(scene)
+    _, p = plant.model(scene).describe(scene)
     volts, speed, h, steps = 12.3, 320.0, 0.004, 20
     state = in_extended_precision(multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=speed))
     fly, method = extend(multirotor.advance), integrators.get(round_off.METHOD).Method()
