@@ -1,4 +1,4 @@
-"""A multirotor as one rigid body with rotors: motor voltages in, the vehicle's true state out."""
+"""Multirotor of one rigid body with rotors: motor voltages in, true state out."""
 
 from types import ModuleType
 from typing import Any

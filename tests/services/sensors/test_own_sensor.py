@@ -120,11 +120,11 @@ def test_preset_and_its_noise(scene):
         (
             ("sensors.anemometer.faults=[{kind='bias'}]",),
             ANEMOMETER,
-            "sensors.anemometer.faults: anemometer knows none",
+            "sensors.anemometer.faults: anemometer has no fault model",
         ),
         ((), ANEMOMETER.replace("READING =", "READ ="), "sensors.anemometer.module: own_anemometer has no READING"),
         ((), ANEMOMETER.replace("(speed, True)", "(speed, 1.0)"), "sample's reading is of another type"),
-        (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a name that a topic can have"),
+        (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a valid topic name"),
     ],
 )
 def test_custom_sensor_errors_are_one_line(scene, overrides, text, output):
@@ -135,5 +135,5 @@ def test_custom_sensor_errors_are_one_line(scene, overrides, text, output):
 
 
 def test_sensor_that_ships_keeps_its_name():
-    with pytest.raises(ConfigError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
+    with pytest.raises(ConfigError, match=r"gps.module: gps is the name of a built-in sensor; expected another name"):
         module_of("gps", {"module": "own_anemometer"})

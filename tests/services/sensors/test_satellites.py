@@ -282,7 +282,7 @@ def test_wrong_options_are_rejected(table, message):
 
 def test_constellation_excludes_sky():
     sky = [{"azimuth_deg": a, "elevation_deg": e} for a, e in ((0.0, 45.0), (120.0, 45.0), (240.0, 45.0), (60.0, 90.0))]
-    with pytest.raises(ConfigError, match=r"gps.constellation: is given with sky; expected one of them"):
+    with pytest.raises(ConfigError, match=r"gps.constellation: cannot be combined with sky; expected one of them"):
         registry.parameters("gps", {"sky": sky, "constellation": {}}, 0.004)
 
 
