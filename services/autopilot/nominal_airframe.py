@@ -43,10 +43,10 @@ def _known_airframe(scene: Scene) -> Airframe:
         rotor_z=z if axis else (),
         rotor_axis=axis,
     )
-    alone, known = known, known._replace(wakes=wake_slopes(scene))
+    isolated, known = known, known._replace(wakes=wake_slopes(scene))
     if "gyroscopic_torque" not in scene[Effects].tables or known.gravity <= 0.0:
         return known
     slope = 2.0 * math.sqrt(known.mass * known.gravity / lift(known) * thrust_coefficient)  # [N s/rad] in hover
-    # thrust of tilted rotors yaws too, and only the z part of their spin-up torque does
-    torque = moments(known)[2] / lift(alone) if axis or known.wakes.thrust else torque_per_thrust
+    # thrust of tilted rotors also causes yaw, and of their spin-up torque only the z component does
+    torque = moments(known)[2] / lift(isolated) if axis or known.wakes.thrust else torque_per_thrust
     return known._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))

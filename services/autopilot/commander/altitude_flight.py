@@ -33,10 +33,10 @@ class AltitudeFlight:
         Args:
             constants: constants of the vehicle.
             view: input with the estimate of this tick.
-            guidance: guidance.
+            guidance: its smoothed setpoint is replaced.
             climb_rate: vertical speed [m/s].
             yaw_rate: [rad/s].
-            tilts: forward and to the left [rad].
+            tilts: tilts forward and to the left [rad].
         """
         s, limits, e = self._smoothing, guidance.limits, view.estimate
         s.move_at((0.0, 0.0, climb_rate), limits, view.dt)

@@ -48,7 +48,7 @@ class Injection:
     """Failure injection of a run; inactive without a cell of `Faults`."""
 
     def __init__(self, faults: Cell | None, setup: RunConfig, read: Collection[str], motor: Motor):
-        """Create the injection; `read` has the sensor ports that the autopilot reads."""
+        """Create the injection; `read` has the names of the sensor ports that the autopilot reads."""
         self.faults, self._motor = faults, motor
         rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
         self.released = DirectMotorControl(False, (0.0,) * rotors)  # the controller's command reaches the motors

@@ -1,4 +1,4 @@
-"""The whole PX4 cascade, from setpoint to motor voltages, and its parameters by PX4's names."""
+"""The complete PX4 cascade, from setpoint to motor voltages, and its parameters by PX4's names."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -59,7 +59,7 @@ START = State(ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
 def normalisation(airframe: Airframe) -> Vec3:
     """Return the virtual controls of normalised torques of 1 about body x, y, z.
 
-    As in PX4's control allocation: the thrusts that a unit torque demands of the rotors are scaled to a root mean
+    As in PX4's control allocation: the rotor thrusts of a unit torque are scaled to a root mean
     square of 1/sqrt(2) for the larger of roll and pitch, which share the scale, and to at most 1 for yaw.
     """
     table, effects = shares(airframe)[0], moments(airframe)

@@ -367,7 +367,7 @@ def test_small_innovations_of_one_sign_inflate_covariance(signs, inflates):
 def test_rejected_reading_is_no_drift():
     s = at_rest()
     s = estimator.update_gps_velocity(P, s, (30.0, 0.0, 0.0), 0.05**2, 0, True)
-    assert s.memory.refused[filter_state.GPS_VELOCITY]
+    assert s.memory.rejected[filter_state.GPS_VELOCITY]
     before = s.memory.covariance[filter_state.GYRO, filter_state.GYRO]
     s = estimator.update_gps_velocity(P, s, (0.01, 0.0, 0.0), 0.05**2, 0, True)
     assert s.memory.covariance[filter_state.GYRO, filter_state.GYRO] <= before

@@ -47,7 +47,7 @@ def test_fix_before_impact_does_not_correct_impact():
     hit = velocity_fix(s, 0.0, 1)  # measured 0.1 s ago, 0.08 s before the impact
     assert np.all(velocity_std(hit) > 0.99 * before)
     after = velocity_fix(predicted(hit, 25), 1.0, 2)  # the first that was measured after it
-    assert after.memory.refused[filter_state.GPS_VELOCITY] == 0
+    assert after.memory.rejected[filter_state.GPS_VELOCITY] == 0
     assert np.all(velocity_std(after) < 0.05)
     assert after.nominal.velocity_world[2] == pytest.approx(1.0, abs=0.01)
 
@@ -71,7 +71,7 @@ def test_covariance_against_dense_matrices(share):
     now, noise = h @ before @ h, block @ np.array([[0.8, 0.3], [0.3, 0.2]]) @ block * share
     noise += (0.02 if block[1] > 0.0 else 0.05) * share * 5.0  # 1^2 + 2^2: what the attitude turns onto the axis
     part = min(noise / now, 1.0)
-    s, largest = delayed_measurements.late_innovation_variances(m, 0, since, variance, force)
+    s, largest = delayed_measurements.delayed_innovation_variances(m, 0, since, variance, force)
     assert s == pytest.approx(now * (1.0 - part) + variance)
     assert largest == pytest.approx(now + noise + variance)
     fuse.apply_update(m, 0.7, s)
@@ -106,8 +106,8 @@ def test_delayed_rows_are_invariant_to_constant_attitude_error():
     _, _, delay, weighted, mean = gps_fusion._past(P, one, AGE)
     matrix = rotation_matrix(one.nominal.attitude)
     for row, force, at in (
-        (delayed_measurements.late_velocity_row, mean, filter_state.VELOCITY),
-        (delayed_measurements.late_position_row, weighted, filter_state.POSITION),
+        (delayed_measurements.delayed_velocity_row, mean, filter_state.VELOCITY),
+        (delayed_measurements.delayed_position_row, weighted, filter_state.POSITION),
     ):
         for axis in range(3):
             row(one.memory, force, matrix, axis, delay)
@@ -131,6 +131,6 @@ def test_exact_past_measurement_leaves_noise_since():
     m.covariance[:] = np.eye(filter_state.SIZE)
     m.row[:] = 0.0
     m.row[filter_state.VELOCITY + 1] = 1.0
-    s, _ = delayed_measurements.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
+    s, _ = delayed_measurements.delayed_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
     fuse.apply_update(m, 0.3, s)
     assert m.covariance[filter_state.VELOCITY + 1, filter_state.VELOCITY + 1] == pytest.approx(0.25)

@@ -90,7 +90,7 @@ def test_rejections_name_reason():
     }
     flight = fly(0.5, script)
     assert results(flight) == {1: REJECTED, 2: REJECTED, 3: REJECTED, 4: DENIED, 5: 3, 6: DENIED, 7: ACCEPTED}
-    assert "mission: there is none; upload one first" in said(flight)
+    assert "mission: no mission is uploaded; upload one first" in said(flight)
     assert any("MPC_XY_CRUISE: expected a number from 0.1 to 20" in text for text in said(flight))
 
 

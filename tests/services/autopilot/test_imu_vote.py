@@ -83,7 +83,7 @@ def last_position(flown):
 def test_injected_failure_of_one_instance_is_named_and_harmless(kind, sound_position):
     script = {7.0: [inject("gyro", kind, 1), inject("accelerometer", kind, 4, id=8)]}
     flown = fly_with_injections(script)
-    assert "inject failure: there is no accelerometer 4; expected 1 to 3, 0 for all" in said(flown)
+    assert "inject failure: accelerometer 4 does not exist; expected 1 to 3, 0 for all" in said(flown)
     assert "IMU 1 has failed, IMU 2 is in use" in said(flown)
     assert last_position(flown) == pytest.approx(sound_position, abs=0.1)
 

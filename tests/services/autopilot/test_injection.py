@@ -75,10 +75,10 @@ def test_injection_needs_parameter_and_present_unit():
     assert {k: v for k, v in results(flight).items() if k} == expected
     assert said(flight)[:8] == [
         "inject failure: SYS_FAILURE_EN is 0; set it to 1 first", "injected: motor off",
-        "inject failure: there is no gps", "inject failure: battery can be sound, off, stuck, wrong",
+        "inject failure: the vehicle has no gps", "inject failure: battery can be sound, off, stuck, wrong",
         "inject failure: motor can be sound, off, stuck, wrong, slow",
-        "inject failure: there is no motor 5; expected 1 to 4, 0 for all", "injected: motor 1, 3 off",
-        "inject failure: there is no motor 5; expected 1 to 4, 0 for all",
+        "inject failure: motor 5 does not exist; expected 1 to 4, 0 for all", "injected: motor 1, 3 off",
+        "inject failure: motor 5 does not exist; expected 1 to 4, 0 for all",
     ]  # fmt: skip
 
 

@@ -106,7 +106,7 @@ def test_rangefinder_that_autopilot_does_not_read_cannot_fail():
     script = {0.1: [inject("distance_sensor", OFF)]}
     flight = fly(0.3, script, ENABLED, "autopilot.estimator=kalman", *sensors, *ahead)
     assert results(flight)[7] == DENIED
-    assert "inject failure: there is no distance_sensor" in said(flight)
+    assert "inject failure: the vehicle has no distance_sensor" in said(flight)
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])

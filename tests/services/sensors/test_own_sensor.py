@@ -113,7 +113,7 @@ def test_preset_and_its_noise(scene):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "text", "said"),
+    ("overrides", "text", "message"),
     [
         (("sensors.anemometer.deviatoin=1.0",), ANEMOMETER, "sensors.anemometer.deviatoin: unknown key"),
         (("sensors.anemometer.rate=60.0",), ANEMOMETER, "sensors.anemometer.rate: expected a rate that divides"),
@@ -127,10 +127,10 @@ def test_preset_and_its_noise(scene):
         (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a valid topic name"),
     ],
 )
-def test_custom_sensor_errors_are_one_line(scene, overrides, text, output):
+def test_custom_sensor_errors_are_one_line(scene, overrides, text, message):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(*overrides, text=text))
-    assert output in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

@@ -56,7 +56,7 @@ def test_invalid_table_error_is_one_line(table, words):
 
 
 @pytest.mark.parametrize(
-    ("sensor", "table", "said"),
+    ("sensor", "table", "message"),
     [
         ("imu", {"gyro": {"noise_dps_per_sqrt_hz": float("inf")}}, "imu.gyro.noise_dps_per_sqrt_hz: expected a finite"),
         ("airspeed", {"scale_error": float("nan")}, "airspeed.scale_error: expected a number at least 0 and below 1"),
@@ -65,8 +65,8 @@ def test_invalid_table_error_is_one_line(table, words):
         ("optical_flow", {"range_min": 31.0}, "optical_flow.range_min: expected less than range_max = 30 m, got 31"),
     ],
 )
-def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, text):
-    with pytest.raises(ConfigError, match=text):
+def test_invalid_limit_is_rejected(sensor, table, message):
+    with pytest.raises(ConfigError, match=message):
         registry.parameters(sensor, table, 0.004)
 
 

@@ -30,7 +30,7 @@ def route():
 
 
 @pytest.mark.parametrize(
-    "given",
+    "mode_command",
     [
         command("goto", 9.0, 0.0, 3.0),
         command("land"),
@@ -41,8 +41,8 @@ def route():
     ],
     ids=lambda c: c.kind,
 )
-def test_copied_and_pickled_state_behave_alike(inputs):
-    session = in_the_air(inputs, command("manual", 0.3, 0.2, 0.1, 0.4))
+def test_copied_and_pickled_state_behave_alike(mode_command):
+    session = in_the_air(mode_command, command("manual", 0.3, 0.2, 0.1, 0.4))
     session.run(0.5)
     copied, pickled = copy.deepcopy(session.commander.state), pickle.loads(pickle.dumps(session.commander.state))
     others = [Commander(WAITING, copied), Commander(WAITING, pickled)]

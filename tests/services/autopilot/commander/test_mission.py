@@ -43,7 +43,7 @@ def test_mission_is_started_and_armed_by_one_command():
     assert flight.until(lambda s: s.mission_state == 5)
     other = Flight(command("mission_start"))
     assert not other.status.armed
-    assert other.texts == ["mission: there is none; upload one first"]
+    assert other.texts == ["mission: no mission is uploaded; upload one first"]
 
 
 def test_mission_continues_after_landing_without_disarming():

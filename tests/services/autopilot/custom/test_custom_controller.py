@@ -170,7 +170,7 @@ def test_non_finite_command_is_rejected(scene):
 
 
 @pytest.mark.parametrize(
-    ("module", "text", "name", "overrides", "said"),
+    ("module", "text", "name", "overrides", "message"),
     [
         ("own", IN_PYTHON, "Altitud", (), "unknown name in own 'Altitud'; did you mean Altitude?"),
         ("own", IN_PYTHON.replace("125.0", "100.0"), "Altitude", (), "expected a rate that divides communication.rate"),
@@ -189,12 +189,12 @@ def test_non_finite_command_is_rejected(scene):
         ),
     ],
 )  # fmt: skip
-def test_error_is_one_line_with_key(scene, module, text, name, overrides, printed):
+def test_error_is_one_line_with_key(scene, module, text, name, overrides, message):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
     assert line.startswith("--set autopilot.controller")
-    assert printed in line
+    assert message in line
     assert "\n" not in line
 
 
