@@ -89,20 +89,13 @@ class CommanderBlock:
         self._weight = a.mass * a.gravity  # [N]
         self._lift = lift(a) / len(a.rotor_x)  # vertical force for 1 N of thrust of each rotor
         table = {p.name: p for p in config.parameters}
-        thrust_max = controller(config, {p.name: p.default for p in config.parameters}).thrust_max
-        self._commander = Commander(
-            Constants(
-                table,
-                a.resting_height,
-                a.gravity,
-                self._weight / (lift(a) * thrust_max),
-                bool(config.phases),
-                config.operator,
-                injection.units,
-                len(a.rotor_x),
-                config.imus,
-            )
-        )
+        thrust_max = controller(config, {name: p.default for name, p in table.items()}).thrust_max
+        hover_thrust = self._weight / (lift(a) * thrust_max)
+        constants = Constants(
+            table, a.resting_height, a.gravity, hover_thrust, bool(config.phases), config.operator, injection.units,
+            len(a.rotor_x), config.imus,
+        )  # fmt: skip
+        self._commander = Commander(constants)
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
         self.phases = TextTable(config.phases)

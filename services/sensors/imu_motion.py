@@ -54,9 +54,9 @@ def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec
     The rate is the rotation vector from the previous attitude; the force is in that attitude. Both include coning and
     sculling.
     """
-    turned = log(multiply(conjugate(s.attitude), truth.attitude))
+    rotation = log(multiply(conjugate(s.attitude), truth.attitude))
     a = scale(p.rate, subtract(velocity_world, s.velocity_world))
-    return scale(p.rate, turned), rotate_back(s.attitude, (a[0], a[1], a[2] + truth.gravity))
+    return scale(p.rate, rotation), rotate_back(s.attitude, (a[0], a[1], a[2] + truth.gravity))
 
 
 @kernel

@@ -66,9 +66,8 @@ def update_flow(
     r, velocity = rotation_matrix(s.nominal.attitude), s.nominal.velocity_world
     passing = (flow[0] - rate[0], flow[1] - rate[1])
     expected = math.hypot(flow_row(m, r, velocity, 0, distance), flow_row(m, r, velocity, 1, distance))
-    noise = variance + _CORRELATED * math.square(
-        p.flow_scale_std * expected
-    )  # of the expected flow, to keep the gate effective
+    # the scale error is that of the expected flow, to keep the gate effective
+    noise = variance + _CORRELATED * math.square(p.flow_scale_std * expected)
     nis, accepted = 0.0, True
     for axis in range(2):
         innovation = passing[axis] - flow_row(m, r, velocity, axis, distance)

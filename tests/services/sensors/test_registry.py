@@ -1,4 +1,4 @@
-"""Sensors are found, their presets hold together, and bad tables are refused in one line."""
+"""Registry of sensors: discovery, valid presets, and one-line errors for invalid tables."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.sensors import registry
 
 
-def test_sensors_of_folder_are_found():
+def test_sensors_of_folder_are_discovered():
     assert set(registry.sensors()) == {
         "airspeed",
         "barometer",
@@ -79,7 +79,7 @@ def test_unknown_sensor_lists_choices():
         registry.parameters("radar", {}, 0.004)
 
 
-def test_satellites_that_give_no_position_are_refused():
+def test_satellites_without_position_are_rejected():
     few = [{"azimuth_deg": a, "elevation_deg": 45.0} for a in (0.0, 120.0, 240.0)]
     with pytest.raises(ValueError, match=r"gps.sky: expected 4 or more, .* got 3 satellites"):
         registry.parameters("gps", {"sky": few}, 0.004)
