@@ -19,11 +19,11 @@ from lapwing.services.autopilot.mixer import (
     Shares,
     VirtualControls,
     active_allocation,
-    at_rest,
     clamp,
     clamp_to_range,
     mix,
     saturate,
+    zero_thrust,
 )
 from lapwing.services.autopilot.motor import Motor, voltages
 from lapwing.services.autopilot.pid import Pid, integrate, output
@@ -136,7 +136,7 @@ def step(
     angles = (roll, pitch, yaw)
     landed = update_landed_state(s.landed_state, p.resting_height, estimate, setpoint, dt)
     if landed.name != FLYING:
-        off = at_rest(p.shares[0])
+        off = zero_thrust(p.shares[0])
         rest = State(landed, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
         return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
 

@@ -29,7 +29,7 @@ def _zero(_: float, share: Share, other: Share) -> float:
 
 
 @always_inline
-def at_rest(shares: Shares) -> PerRotor:
+def zero_thrust(shares: Shares) -> PerRotor:
     """Return zero thrust [N] for every rotor."""
     return map_tuple(_zero, 0.0, shares, shares)
 

@@ -27,7 +27,7 @@ from lapwing.services.autopilot.estimator.blocks.inertial import STANDSTILL_EVER
 from lapwing.services.autopilot.estimator.blocks.navigation_state import blank
 from lapwing.services.autopilot.estimator.blocks.terrain_height import GroundReference
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
-from lapwing.services.autopilot.initial_estimate import before
+from lapwing.services.autopilot.initial_estimate import estimate_before_start
 from lapwing.services.autopilot.px4 import block as px4_block
 from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.px4.block import Px4Controller
@@ -137,7 +137,7 @@ def _navigation(
         if port in known_ports:
             reading = InputPort(injection.received(port))
             parts.append(Block(f"{NAME}.{port}", fusion, state, (reading,), (), known_ports[port].period))
-    estimate_block = FilterEstimate(p, wakeup, before(config.start_world))
+    estimate_block = FilterEstimate(p, wakeup, estimate_before_start(config.start_world))
     parts.append(Block(f"{NAME}.estimate", estimate_block, state, (battery, flight), (estimate,)))
     if ports.ESTIMATE_COVARIANCE in known_ports:  # not in logs of former versions
         covariance_port = known_ports[ports.ESTIMATE_COVARIANCE]

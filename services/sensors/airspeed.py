@@ -51,7 +51,7 @@ def blank() -> AirspeedState:
 
 @always_inline
 def _true_pressure(truth: Truth) -> float:
-    """Return the differential pressure [Pa]; flow from behind causes the same suction."""
+    """Return the differential pressure [Pa]; flow from behind causes a negative one of the same size."""
     along = rotate_back(truth.attitude, truth.air_velocity_world)[0]
     return 0.5 * truth.air_density * along * abs(along)
 

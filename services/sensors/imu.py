@@ -138,9 +138,9 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
     return ImuState(gyro, accelerometer, warm_up, phase, truth.attitude, velocity_world, phases, true_force), reading
 
 
-# InvenSense PS-MPU-6000A: ranges and resolutions (500 deg/s and 8 g settings), temperature within 10 % of the raw drift
-# that calibration leaves. Noise 0.30 deg/sqrt(h), 4.6 deg/h, 0.24 mg/sqrt(Hz), 36 ug: measured Allan curves. What
-# calibration leaves of bias, scale and alignment: chosen.
+# InvenSense PS-MPU-6000A: ranges and resolutions (500 deg/s and 8 g settings), at most 10 % of the raw temperature
+# drift remains after calibration. Noise 0.30 deg/sqrt(h), 4.6 deg/h, 0.24 mg/sqrt(Hz), 36 ug: measured Allan curves.
+# Residual bias, scale and alignment after calibration: chosen.
 MPU6000 = Imu(
     Gyro(
         noise_dps_per_sqrt_hz=error_models.density_of_random_walk(0.30),

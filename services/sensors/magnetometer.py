@@ -97,7 +97,7 @@ def sample(
 
 
 # PNI RM3100 user manual: 15 nT RMS and 13 nT per count at 200 cycle counts, +-800 uT; taken as the noise at 50 Hz.
-# Instability and what a good calibration far from the power leads leaves: chosen.
+# Instability and residuals after a good calibration far from the power leads: chosen.
 RM3100 = Magnetometer(
     noise_nt_per_sqrt_hz=3.0,
     bias_instability_nt=5.0,
@@ -109,7 +109,7 @@ RM3100 = Magnetometer(
 )
 
 # Honeywell HMC5883L data sheet: 0.2 uT noise floor, 0.073 uT per count in the +-88 uT range, 75 Hz at most. Instability
-# and what calibration leaves: chosen.
+# and residuals after calibration: chosen.
 HMC5883L = Magnetometer(
     noise_nt_per_sqrt_hz=40.0,
     bias_instability_nt=30.0,

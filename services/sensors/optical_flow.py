@@ -26,7 +26,7 @@ CHANNELS = ("flow", "rate")
 
 
 class OpticalFlow(NamedTuple):
-    """Parameters of a camera at the body's origin that looks along -z of the body."""
+    """Parameters of a camera at the body's origin, along -z of the body."""
 
     noise_rad_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [rad/s/sqrt(Hz)] one-sided density of the flow
     gyro_noise_dps_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [deg/s/sqrt(Hz)] one-sided density of its gyroscopes

@@ -8,7 +8,7 @@ from lapwing.services.common.ports import Setpoint
 
 
 class AltitudeFlight:
-    """Moves altitude and heading; the horizontal setpoint is the estimate, so the wind integral is kept."""
+    """Moves altitude and heading; the horizontal setpoint is the estimate, so the wind integral does not change."""
 
     def __init__(self, guidance: Guidance):
         s = guidance.smoothing

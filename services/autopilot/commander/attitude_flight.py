@@ -19,7 +19,7 @@ def stick_thrust(constants: Constants, up: float) -> float:
 
 
 class AttitudeFlight:
-    """Converts attitudes and body rates into setpoints; the wind integral is kept."""
+    """Converts attitudes and body rates into setpoints; the wind integral does not change."""
 
     def __init__(self, view: CommanderInput):
         """Start from the estimated attitude."""

@@ -21,7 +21,7 @@ from lapwing.services.autopilot.custom.controller_output import (
     parse_controller_output,
 )
 from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
-from lapwing.services.autopilot.mixer import at_rest
+from lapwing.services.autopilot.mixer import zero_thrust
 from lapwing.services.common.ports import PerRotor
 
 
@@ -100,7 +100,7 @@ def step(
         detector = motor_failure.start(c.failure_detector.value)
     charge = battery.value.charge if battery.due else s.charge
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
-    own, held, no_voltage = s.own, s.held, at_rest(c.law.value.shares[0])
+    own, held, no_voltage = s.own, s.held, zero_thrust(c.law.value.shares[0])
     if landed.name != FLYING:
         own, held = p.own_start, ControllerOutput(True, no_voltage, NO_WRENCH, (0.0, 0.0))
     elif tick % p.every == 0:

@@ -12,7 +12,14 @@ from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.services.autopilot import control
 from lapwing.services.autopilot.control import Command
 from lapwing.services.autopilot.land_detector import FLYING, LANDED
-from lapwing.services.autopilot.mixer import VirtualControls, active_allocation, at_rest, clamp_to_range, mix, saturate
+from lapwing.services.autopilot.mixer import (
+    VirtualControls,
+    active_allocation,
+    clamp_to_range,
+    mix,
+    saturate,
+    zero_thrust,
+)
 from lapwing.services.autopilot.motor import thrusts_at, voltages
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments
 from lapwing.services.common.ports import PerRotor
@@ -109,7 +116,7 @@ def command(
         failed: number of the failed rotor, from 1; 0: none.
     """
     if landed != FLYING:
-        zero = at_rest(law.shares[0])
+        zero = zero_thrust(law.shares[0])
         return Command(zero, zero, 0.0, 0.0, yaw, landed == LANDED)
     if requested.to_motors:
         volts = clamp_to_range(requested.volts, voltage_max)

@@ -15,7 +15,7 @@ from lapwing.services.autopilot.land_detector import (
     LandedState,
     update_landed_state,
 )
-from lapwing.services.autopilot.mixer import at_rest
+from lapwing.services.autopilot.mixer import zero_thrust
 from lapwing.services.autopilot.px4 import law
 
 
@@ -57,7 +57,7 @@ def step(p: Px4Controller, s: Px4State, tick: int, inputs: tuple[InputSample, ..
     if landed.name == FLYING:
         control_state, command = law.step(p.law.value, s.law, c.interval, e, setpoint, detector.failed)
     else:
-        off = at_rest(c.law.value.shares[0])
+        off = zero_thrust(c.law.value.shares[0])
         control_state, command = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
     detector, outputs = block_outputs(c, detector, still_from, charge, order, e, setpoint, landed.name, command)
     return Px4State(landed, control_state, detector, still_from, charge), outputs, CONTINUE

@@ -52,15 +52,15 @@ def bodies_port(scene: Scene, n: int) -> Port:
     )
 
 
-def needs(scene: Scene, *tables: str) -> None:
+def require_tables(scene: Scene, *tables: str) -> None:
     """Raise ConfigError if a scene lacks one of these optional tables."""
     for name in tables:
         if not scene.has(name):
             raise ConfigError(name, "missing", f"a table [{name}], which the model {scene[Vehicle].model} needs")
 
 
-def can_have(scene: Scene, *tables: str) -> None:
-    """Raise ConfigError if a scene has a model-dependent table other than `tables`."""
+def reject_other_tables(scene: Scene, *tables: str) -> None:
+    """Raise ConfigError if a scene has a model-dependent table that is not in `tables`."""
     for name in sorted({"effects", "sensors", "autopilot", "trajectory"}.difference(tables)):
         if scene.has(name) and (scene.section(name).OPTIONAL or scene.tables(name)):
             raise ConfigError(name, f"the model {scene[Vehicle].model} has no such table; remove it")

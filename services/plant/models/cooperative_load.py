@@ -14,11 +14,11 @@ from lapwing.services.common.run_schema import CooperativeLoad
 from lapwing.services.plant.blocks.cooperative_load import CooperativePlant
 from lapwing.services.plant.models._common import (
     bodies_port,
-    can_have,
     check_system,
     last_tick,
     message_contents,
-    needs,
+    reject_other_tables,
+    require_tables,
 )
 from lapwing.services.plant.schema import method
 from lapwing.services.plant.service_config import PlantSetup
@@ -28,8 +28,8 @@ LOAD = "load"
 
 def check(scene: Scene) -> None:
     """Check that the scene describes the formation and controls it at every tick."""
-    needs(scene, "cooperative_load", "formation")
-    can_have(scene)
+    require_tables(scene, "cooperative_load", "formation")
+    reject_other_tables(scene)
     rate = scene[Communication].rate
     if scene[Rates].body_states != rate:
         expected = f"communication.rate = {rate} Hz, the rate of the control"

@@ -17,7 +17,7 @@ from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
-from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
 Wxyz = tuple[float, float, float, float]
 
@@ -44,8 +44,8 @@ class Gyrostat(SceneTable):
 
 def check(scene: Scene) -> None:
     """Check that the scene describes a valid satellite and has no table that it cannot use."""
-    needs(scene, "gyrostat")
-    can_have(scene)
+    require_tables(scene, "gyrostat")
+    reject_other_tables(scene)
     check_system(scene, *system(scene))
 
 

@@ -12,7 +12,7 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
 from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
-from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
 Four = tuple[float, float, float, float]  # per rotor: front +x, left +y, rear -x, right -y
@@ -46,8 +46,8 @@ class Os4(SceneTable):
 
 def check(scene: Scene) -> None:
     """Check that the scene describes the quadrotor and has no table that it cannot use."""
-    needs(scene, "os4")
-    can_have(scene)
+    require_tables(scene, "os4")
+    reject_other_tables(scene)
     check_system(scene, *system(scene))
 
 

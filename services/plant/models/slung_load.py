@@ -24,7 +24,7 @@ from lapwing.services.common.vehicle_schema import (
 )
 from lapwing.services.plant.blocks.slung_load import SlungLoadView
 from lapwing.services.plant.models import rigid_body
-from lapwing.services.plant.models._common import bodies_port, multirotor_plant, needs
+from lapwing.services.plant.models._common import bodies_port, multirotor_plant, require_tables
 from lapwing.services.plant.schema import Solver
 
 NAME = "slung_load"
@@ -77,7 +77,7 @@ def _sling(scene: Scene) -> Sling:
 
 def check(scene: Scene) -> None:
     """Check the rigid-body model's needs, and that the scene has a load."""
-    needs(scene, NAME)
+    require_tables(scene, NAME)
     rigid_body.check(scene)
 
 

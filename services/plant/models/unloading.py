@@ -15,7 +15,7 @@ from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
 from lapwing.services.plant.blocks import unloading_bodies
 from lapwing.services.plant.blocks.unloading_bodies import UnloadingView
-from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
 STIFFNESS, DAMPING = 2.0e4, 60.0  # [N/m], [N s/m] of a contact point
@@ -70,8 +70,8 @@ class Unloading(SceneTable):
 
 def check(scene: Scene) -> None:
     """Check that the scene describes the crate and has no table that it cannot use."""
-    needs(scene, "unloading")
-    can_have(scene)
+    require_tables(scene, "unloading")
+    reject_other_tables(scene)
     check_system(scene, *system(scene))
 
 
