@@ -165,11 +165,6 @@ def _fix_kind(rtk: Rtk | None, s: RtkState, fix_status: int) -> int:
     return s.fix
 
 
-@always_inline
-def _has_satellites(c: Constellation | None, rtk: Rtk | None) -> bool:
-    return c is not None or rtk is not None
-
-
 @kernel
 def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
     """Return the state before the first sample: the receiver has run here, at rest, for its latency."""
@@ -209,21 +204,12 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
         p.faults, s.velocity_line, p.latency_samples, 1, key, tick, velocity
     )
     latitude, longitude, height = enu_to_geodetic(truth.home, position)
+    valid = position_valid and velocity_valid and has_fix
+    reported_kind = kind if p.constellation is not None or p.rtk is not None else 0
     reading = GpsReading(
-        latitude,
-        longitude,
-        height,
-        variance,
-        velocity,
-        v * v,
-        p.latency_samples / p.rate,
-        position_valid and velocity_valid and has_fix,
-        kind if _has_satellites(p.constellation, p.rtk) else 0,
-        fix.used,
-        fix.visible,
-        math.sqrt(fix.variance[0] + fix.variance[1]),
-        math.sqrt(fix.variance[2]),
-    )
+        latitude, longitude, height, variance, velocity, v * v, p.latency_samples / p.rate, valid, reported_kind,
+        fix.used, fix.visible, math.sqrt(fix.variance[0] + fix.variance[1]), math.sqrt(fix.variance[2]),
+    )  # fmt: skip
     return GpsState(wander, s.geometry, position_line, velocity_line, ranges, rtk, s.samples + 1), reading
 
 

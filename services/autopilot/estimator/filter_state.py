@@ -240,17 +240,8 @@ def estimate(p: Estimator, s: State) -> StateEstimate:
         _deviation_along(c, (r[2], r[5], r[8])),
     )
     health, rejected = _health(p, s.memory, position_std, attitude_std)
+    acceleration = (i.force_world[0], i.force_world[1], i.force_world[2] - p.gravity)
     return StateEstimate(
-        n.position_world,
-        n.attitude,
-        n.velocity_world,
-        subtract(i.omega, n.gyro_bias),
-        (i.force_world[0], i.force_world[1], i.force_world[2] - p.gravity),
-        n.gyro_bias,
-        n.accelerometer_bias,
-        position_std,
-        _deviations(c, VELOCITY),
-        attitude_std,
-        health,
-        rejected,
-    )
+        n.position_world, n.attitude, n.velocity_world, subtract(i.omega, n.gyro_bias), acceleration,
+        n.gyro_bias, n.accelerometer_bias, position_std, _deviations(c, VELOCITY), attitude_std, health, rejected,
+    )  # fmt: skip

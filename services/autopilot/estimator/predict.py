@@ -37,6 +37,48 @@ def _is_spike(p: Estimator, i: Inertial, omega: Vec3, force: Vec3) -> bool:
     )
 
 
+@always_inline
+def _process_noise(
+    p: Estimator,
+    q_theta: float,
+    q_velocity: float,
+    twist: float,
+    jolt: float,
+    first: bool,
+    spike: bool,
+    cut_readings: int,
+    reused: bool,
+) -> tuple[float, float]:
+    """Return the variances of attitude [rad^2] and velocity [(m/s)^2] that an interval adds.
+
+    Args:
+        p: `Estimator`.
+        q_theta: variance by the gyroscopes' white noise [rad^2].
+        q_velocity: variance by the accelerometers' white noise [(m/s)^2].
+        twist: change between two gyroscope readings [rad/s].
+        jolt: change between two accelerometer readings [m/s^2].
+        first: True for the first reading.
+        spike: True if the reading is rejected as a spike.
+        cut_readings: readings since the motors stopped over the ground; 0: running.
+        reused: True if the previous reading is used again.
+    """
+    dt = p.interval
+    if not first:  # error of the trapezoidal rule between distant readings
+        q_theta += math.square(dt * max(twist - _LINEAR * p.jolt_rate, 0.0) / 6.0)
+        q_velocity += math.square(dt * max(jolt - _LINEAR * p.jolt_force, 0.0) / 6.0)
+    if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
+        q_velocity += math.square(max(0.5 * dt * jolt, _IMPACT))
+    if not first and (twist > p.jolt_rate or spike):
+        q_theta += math.square(0.5 * dt * twist)
+    if 0 < cut_readings * dt < _BOUNCE:  # the vehicle drops, and an impact may be shorter than the interval
+        q_velocity += dt * _REBOUND * math.square(math.square(1.0 - cut_readings * dt / _BOUNCE))
+        q_theta += dt * _TIPPING * math.square(math.square(1.0 - cut_readings * dt / _BOUNCE))
+    if reused:  # error of reused readings during a manoeuvre
+        q_velocity += dt * 1.0
+        q_theta += dt * 0.1
+    return q_theta, q_velocity
+
+
 @kernel
 def predict(
     p: Estimator,
@@ -96,22 +138,11 @@ def predict(
 
     jolt = norm(subtract(specific_force_body, i.force))
     twist = norm(subtract(omega_body, i.omega))
-    q_theta = dt * dt * omega_variance
-    q_velocity = dt * dt * specific_force_variance
-    if not first:  # error of the trapezoidal rule between distant readings
-        q_theta += math.square(dt * max(twist - _LINEAR * p.jolt_rate, 0.0) / 6.0)
-        q_velocity += math.square(dt * max(jolt - _LINEAR * p.jolt_force, 0.0) / 6.0)
-    if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
-        q_velocity += math.square(max(0.5 * dt * jolt, _IMPACT))
-    if not first and (twist > p.jolt_rate or spike):
-        q_theta += math.square(0.5 * dt * twist)
     cut_readings = i.cut + 1 if cut else 0
-    if 0 < cut_readings * dt < _BOUNCE:  # the vehicle drops, and an impact may be shorter than the interval
-        q_velocity += dt * _REBOUND * math.square(math.square(1.0 - cut_readings * dt / _BOUNCE))
-        q_theta += dt * _TIPPING * math.square(math.square(1.0 - cut_readings * dt / _BOUNCE))
-    if not valid or frozen:  # error of reused readings during a manoeuvre
-        q_velocity += dt * 1.0
-        q_theta += dt * 0.1
+    q_theta, q_velocity = _process_noise(
+        p, dt * dt * omega_variance, dt * dt * specific_force_variance, twist, jolt, first, spike, cut_readings,
+        not valid or frozen,
+    )  # fmt: skip
     m.history[tick % HISTORY, 6] = q_velocity
     m.history[tick % HISTORY, 7] = q_theta
     for k in range(3):
