@@ -97,7 +97,7 @@ def physics(scene: Scene, level: bool = False) -> tuple[MultirotorParameters, Mu
         scene: such a scene.
         level: start level without rotation; otherwise tilted and rotating.
     """
-    form, p = model(scene).described(scene)
+    form, p = model(scene).describe(scene)
     attitude, omega_body = (NO_ROTATION, ZERO) if level else (exp((0.1, -0.15, 0.3)), (0.4, -0.6, 0.3))
     state = form.initial_state(p, (0.0, 0.0, HEIGHT), attitude, hover_speed(p), (3.0, 1.0, -0.5), omega_body)
     if form is multirotor_slung:  # stretched by the load: the cable stays taut, and no step is split
@@ -122,7 +122,7 @@ def problem(scene: Scene, manoeuvre: Voltages = waves) -> Problem:
     """Return the plant of such a scene, under the voltages of a manoeuvre, as a problem with its solver methods."""
     exchange = scene[Communication]
     (p, state), longest = physics(scene, manoeuvre is jumps), longest_step(scene)
-    form = model(scene).described(scene)[0]
+    form = model(scene).describe(scene)[0]
     motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
     every = max(1, round(DURATION * exchange.rate / SAMPLES))
     duration = SAMPLES * every * exchange.interval

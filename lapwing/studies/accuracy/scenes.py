@@ -34,7 +34,7 @@ def manoeuvres(scene: Scene) -> list[Problem]:
     Raises:
         ValueError: see `problem`.
     """
-    if hasattr(plant.model(scene), "described"):
+    if hasattr(plant.model(scene), "describe"):
         return [plant.problem(scene), plant.problem(scene, plant.jumps)]
     return [_fixed_step_problem(scene, *physics(scene))]
 
@@ -46,7 +46,7 @@ def physics(scene: Scene) -> tuple[Any, Any]:
         ValueError: this study does not support the plant's model.
     """
     model = plant.model(scene)
-    if hasattr(model, "described"):
+    if hasattr(model, "describe"):
         return plant.physics(scene)
     if not hasattr(model, "system"):
         name = scene[Vehicle].model
