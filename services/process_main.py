@@ -30,7 +30,7 @@ class ProcessSpec(NamedTuple):
     key_prefix: str  # key prefix
     secret: str = ""  # secret of a run on one machine (lapwing.cosim.access.publisher_ids)
     speed: float | None = None  # simulated seconds per second; None for as fast as possible
-    core: int | None = None  # core that all services of a sequential lock step share
+    core: int | None = None  # processor core shared by the services of a sequential lock step
     log: str = ""  # path of the recorder's log
     sources: dict[str, str] | None = None  # texts of the scene's files by name, for the log
     mode: str = "multi-process"  # mode of the run, for the log

@@ -201,7 +201,7 @@ def create(
     """
     module = entry(name).service()
 
-    def of(member: RunConfig) -> Service:
+    def create_member(member: RunConfig) -> Service:
         own: dict[str, Any] = {}
         if name == AUTOPILOT and member.vehicle in operators:
             own = {"operator": operators[member.vehicle]}
@@ -217,9 +217,9 @@ def create(
         return service
 
     if setup.vehicle:
-        return of(setup)
+        return create_member(setup)
     users = [member for member in members(setup) if name in member.services]
-    return merge_services(name, [(member, of(member)) for member in users])
+    return merge_services(name, [(member, create_member(member)) for member in users])
 
 
 def create_all(

@@ -14,19 +14,19 @@ from lapwing.services.process_table import PROCESSES, ROUTER, certificate_name, 
 
 def names() -> list[str]:
     """Return the names of all possible participants of a run."""
-    makers = [f"{process.name}{ENCODER}" for process in PROCESSES if process.lock_step]
-    return [*(process.name for process in PROCESSES), *makers, MONITOR]
+    encoders = [f"{process.name}{ENCODER}" for process in PROCESSES if process.lock_step]
+    return [*(process.name for process in PROCESSES), *encoders, MONITOR]
 
 
-def says(setup: RunConfig, key_prefix: str) -> dict[str, list[str]]:
+def publish_permissions(setup: RunConfig, key_prefix: str) -> dict[str, list[str]]:
     """Return the key expressions that each participant may publish on, by the name in its certificate."""
     result = {name: [f"{key_prefix}/*/{name}"] for name in names()}
     result[MONITOR] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
     for name in setup.services:
         topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
-        maker = f"{name}{ENCODER}"
+        encoder = f"{name}{ENCODER}"
         result[certificate_name(name)] += [*topics, f"{key_prefix}/*/{name}"]
-        result[certificate_name(maker)] += [*topics, f"{key_prefix}/*/{name}", f"{key_prefix}/*/{maker}"]
+        result[certificate_name(encoder)] += [*topics, f"{key_prefix}/*/{name}", f"{key_prefix}/*/{encoder}"]
     return {name: list(dict.fromkeys(keys)) for name, keys in result.items()}
 
 
@@ -40,7 +40,10 @@ def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[st
     """
     if not keys:
         return without_viewers(key_prefix) if name == ROUTER else {}
-    return {**tls(Path(keys), certificate_name(name)), **by_certificate(key_prefix, says(setup, key_prefix))}
+    return {
+        **tls(Path(keys), certificate_name(name)),
+        **by_certificate(key_prefix, publish_permissions(setup, key_prefix)),
+    }
 
 
 def door_settings(name: str, key_prefix: str, keys: str) -> dict[str, Any]:

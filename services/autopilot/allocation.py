@@ -46,17 +46,19 @@ def tilted_effectiveness(positions: tuple[Vec3, ...], axes: tuple[Vec3, ...], ro
     return np.vstack([axis[:, 2], torques.T])
 
 
-def in_wakes(still: np.ndarray, turning: np.ndarray, torque_per_thrust: float, wakes: WakeSlopes) -> np.ndarray:
+def wake_effectiveness(
+    thrust_only: np.ndarray, reaction: np.ndarray, torque_per_thrust: float, wakes: WakeSlopes
+) -> np.ndarray:
     """Return the effectiveness of rotors in the wakes of others, shape (4, rotors) (theory.md, eq. (4.27b)).
 
     Args:
-        still: `effectiveness` of the rotors without reaction torques, shape (4, rotors).
-        turning: torques about body x, y, z per 1 N m of each rotor's reaction, below a row of 0; shape (4, rotors).
+        thrust_only: `effectiveness` of the rotors without reaction torques, shape (4, rotors).
+        reaction: torques about body x, y, z per 1 N m of each rotor's reaction, below a row of 0; shape (4, rotors).
         torque_per_thrust: [m] of an isolated rotor.
         wakes: slopes with a row and a column per rotor.
     """
     thrust, torque = np.array(wakes.thrust), np.array(wakes.torque)
-    return product(still, thrust) + product(turning, torque_per_thrust * np.eye(len(thrust)) + torque)
+    return product(thrust_only, thrust) + product(reaction, torque_per_thrust * np.eye(len(thrust)) + torque)
 
 
 def virtual_control_effectiveness(B: np.ndarray) -> np.ndarray:
@@ -83,16 +85,16 @@ def rotor_shares(B: np.ndarray, failed: int = 0, weights: np.ndarray | None = No
         return None
     root = np.sqrt(np.ones(B.shape[1]) if weights is None else weights)
     scaled = B / effects[:, None] / root
-    left = [k for k in range(scaled.shape[1]) if k != failed - 1]
+    remaining = [k for k in range(scaled.shape[1]) if k != failed - 1]
     for rows in ([0, 1, 2, YAW], [0, 1, 2]) if failed else ([0, 1, 2, YAW],):
-        some = scaled[np.ix_(rows, left)]
-        gram = product(some, some.T)
+        selected = scaled[np.ix_(rows, remaining)]
+        gram = product(selected, selected.T)
         smallest, *_, largest = symmetric_eigenvalues(gram)
         if not smallest * math.square(WORST_CONDITION) >= largest:
             continue
         shares = np.zeros((scaled.shape[1], 4))
-        shares[np.ix_(left, rows)] = product(some.T, inverse(gram)) / root[left, None]
-        if shares[left, 0].min() >= LEAST_LIFT:
+        shares[np.ix_(remaining, rows)] = product(selected.T, inverse(gram)) / root[remaining, None]
+        if shares[remaining, 0].min() >= LEAST_LIFT:
             return tuple(_share(row) for row in shares)
     return None
 
@@ -118,8 +120,8 @@ def tables(B: np.ndarray, weights: np.ndarray | None = None) -> tuple[Shares, ..
 
 
 def tables_for_failures(tables: tuple[Shares, ...], values: Mapping[str, float]) -> tuple[Shares, ...]:
-    """Return the shares in use after failures, of the same number: all rotors' own if CA_FAILURE_MODE is 0."""
-    ignored = values.get("CA_FAILURE_MODE", 1.0) == 0.0  # absent from former logs
+    """Return the shares in use after failures, one table per case; those of all rotors if CA_FAILURE_MODE is 0."""
+    ignored = values.get("CA_FAILURE_MODE", 1.0) == 0.0  # not in logs of former versions
     return tables[:1] * len(tables) if ignored else tables
 
 

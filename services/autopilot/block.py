@@ -31,7 +31,7 @@ class Flight(NamedTuple):
 
     landed_state: int = ON_GROUND  # ON_GROUND, FLYING or LANDED
     still_from: int = 0  # [tick] from which a vehicle on the ground is at rest
-    failed_motor: int = 0  # number from 1; 0: none
+    failed_motor: int = 0  # number of the failed motor, from 1; 0: none
 
 
 class Controller(NamedTuple):
@@ -63,7 +63,7 @@ def start(p: Controller) -> ControllerState:
 @always_inline
 def block_outputs(
     p: Controller,
-    watched: motor_failure.State,
+    detector: motor_failure.State,
     still_from: int,
     battery_charge: float,
     order: ControllerInput,
@@ -76,30 +76,30 @@ def block_outputs(
 
     Args:
         p: parameters of the block.
-        watched: state of the motor failure detector.
+        detector: state of the motor failure detector.
         still_from: [tick].
         battery_charge: fraction.
         order: input from the commander.
         e: state estimate.
         setpoint: setpoint in use.
-        stage: ON_GROUND, FLYING or LANDED.
+        landed_state: ON_GROUND, FLYING or LANDED.
         c: output of the control law.
     """
     height = e.position_world[2] - p.law.value.resting_height
-    watched = motor_failure.step(p.failure_detector.value, watched, p.interval, e, height, c.thrust)
+    detector = motor_failure.step(p.failure_detector.value, detector, p.interval, e, height, c.thrust)
     flying = landed_state == FLYING
     armed = flying if order.follow else order.armed
     finished = (c.finished and setpoint.final) if order.follow else order.finished
     released = order.released or (order.follow and setpoint.release and not flying)
     attitude_reference = (c.roll_reference, c.pitch_reference, c.yaw_reference)
     warning = battery_warning(p.thresholds.value, battery_charge)
-    return watched, (
+    return detector, (
         MotorCommand(c.motor_voltage, flying, c.thrust, attitude_reference),
         setpoint,
         AutopilotStatus(
-            setpoint.phase, order.status_text_id, armed, not flying, finished, warning, watched.failed, released
+            setpoint.phase, order.status_text_id, armed, not flying, finished, warning, detector.failed, released
         ),
-        Flight(landed_state, still_from, watched.failed),
+        Flight(landed_state, still_from, detector.failed),
     )
 
 
@@ -110,13 +110,14 @@ def step(
     """Compute the motor command at `tick`."""
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
     setpoint = inputs[3].value if order.follow else order.setpoint
-    controlled, watched, still_from = s.control, s.failure_detector, s.still_from
+    control_state, detector, still_from = s.control, s.failure_detector, s.still_from
     if order.restart_at == tick:
-        controlled, watched, still_from = control.START, motor_failure.start(p.failure_detector.value), tick + p.bounce
+        control_state, still_from = control.START, tick + p.bounce
+        detector = motor_failure.start(p.failure_detector.value)
     charge = battery.value.charge if battery.due else s.charge
-    failed = watched.failed
-    controlled, c = control.step(p.law.value, controlled, p.interval, e, setpoint, failed)
-    watched, outputs = block_outputs(
-        p, watched, still_from, charge, order, e, setpoint, controlled.landed_state.name, c
+    failed = detector.failed
+    control_state, c = control.step(p.law.value, control_state, p.interval, e, setpoint, failed)
+    detector, outputs = block_outputs(
+        p, detector, still_from, charge, order, e, setpoint, control_state.landed_state.name, c
     )
-    return ControllerState(controlled, watched, still_from, charge), outputs, CONTINUE
+    return ControllerState(control_state, detector, still_from, charge), outputs, CONTINUE

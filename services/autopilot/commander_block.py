@@ -39,9 +39,9 @@ Operator = Callable[[int], Iterable[Any]]
 class TextTable:
     """Growing table of texts with an index."""
 
-    def __init__(self, known: Iterable[Any] = ()):
-        """Create a table of `known` texts."""
-        self.table = list(known)
+    def __init__(self, texts: Iterable[Any] = ()):
+        """Create a table that starts with `texts`."""
+        self.table = list(texts)
         self._number = {text: i for i, text in enumerate(self.table)}
 
     def number(self, text: Any) -> int:
@@ -81,41 +81,25 @@ class CommanderBlock:
             px4: cell of the parameters of PX4's cascade, if it flies.
         """
         self._px4, self._detector = px4, detector
-        unwritten = () if config.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
-        self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *unwritten)
+        no_trajectory = () if config.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
+        self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *no_trajectory)
         a = config.airframe
-        self._config, self._law, self._thresholds, self._service, self._operator = (
-            config,
-            law,
-            thresholds,
-            service,
-            operator,
-        )
-        self._weight, self._lift = (
-            a.mass * a.gravity,
-            lift(a) / len(a.rotor_x),
-        )  # [N]; vertical force for 1 N of thrust of each rotor
+        self._config, self._law, self._thresholds = config, law, thresholds
+        self._service, self._operator = service, operator
+        self._weight = a.mass * a.gravity  # [N]
+        self._lift = lift(a) / len(a.rotor_x)  # vertical force for 1 N of thrust of each rotor
         table = {p.name: p for p in config.parameters}
-        thrust_max = controller(config, {p.name: p.default for p in config.parameters}).thrust_max
-        self._commander = Commander(
-            Constants(
-                table,
-                a.resting_height,
-                a.gravity,
-                self._weight / (lift(a) * thrust_max),
-                bool(config.phases),
-                config.operator,
-                injection.units,
-                len(a.rotor_x),
-                config.imus,
-            )
-        )
+        thrust_max = controller(config, {name: p.default for name, p in table.items()}).thrust_max
+        hover_thrust = self._weight / (lift(a) * thrust_max)
+        constants = Constants(
+            table, a.resting_height, a.gravity, hover_thrust, bool(config.phases), config.operator, injection.units,
+            len(a.rotor_x), config.imus,
+        )  # fmt: skip
+        self._commander = Commander(constants)
         self._injection = injection
         self._battery = injection.received(ports.BATTERY)
-        self.phases, self.status_texts = (
-            TextTable(config.phases),
-            TextTable([_status_fields(self._commander.initial_status())]),
-        )
+        self.phases = TextTable(config.phases)
+        self.status_texts = TextTable([_status_fields(self._commander.initial_status())])
         self._direct_voltages: tuple[float, ...] | None = None  # direct motor voltages in use
         self._last_step = -1  # [tick] of the commander's last step
         self._estimate: Any = None  # last estimate passed to the commander
@@ -145,7 +129,7 @@ class CommanderBlock:
             self._estimate, self._estimate_tick = graph.latest(ports.ESTIMATE, estimate_tick), estimate_tick
         flight = self._flight(tick)
         reference = self._reference(tick) if self._config.phases else None
-        request = self._commander.step(
+        output = self._commander.step(
             CommanderInput(
                 self._interval,
                 self._estimate,
@@ -159,39 +143,39 @@ class CommanderBlock:
                 self._commands(tick),
             )
         )
-        self._estimate_every_tick = request.estimate_every_tick
-        if request.parameters is not None:
-            write(self._law, controller(self._config, dict(request.parameters)))
-            write(self._thresholds, battery_thresholds(request.parameters))
-            write(self._detector, motor_failure.build(self._config.airframe, request.parameters))
+        self._estimate_every_tick = output.estimate_every_tick
+        if output.parameters is not None:
+            write(self._law, controller(self._config, dict(output.parameters)))
+            write(self._thresholds, battery_thresholds(output.parameters))
+            write(self._detector, motor_failure.build(self._config.airframe, output.parameters))
             if self._px4 is not None:
-                write(self._px4, px4_law.build(request.parameters, self._config.airframe))
-        if request.faults is not None and self._injection.faults is not None:
-            write(self._injection.faults, request.faults)
-        if self._injection.direct is not None and request.motor_voltage != self._direct_voltages:
-            self._direct_voltages = request.motor_voltage
-            write(self._injection.direct, self._direct(request.motor_voltage))
-        order = self._order(tick, request, flight)
+                write(self._px4, px4_law.build(output.parameters, self._config.airframe))
+        if output.faults is not None and self._injection.faults is not None:
+            write(self._injection.faults, output.faults)
+        if self._injection.direct is not None and output.motor_voltage != self._direct_voltages:
+            self._direct_voltages = output.motor_voltage
+            write(self._injection.direct, self._direct(output.motor_voltage))
+        order = self._order(tick, output, flight)
         if order != self._last_order:
             graph.put(ORDER, tick, order)
             self._last_order = order
-        self._publish_acknowledgements(tick, request)
-        return self._next(tick, request.valid_for)
+        self._publish_acknowledgements(tick, output)
+        return self._next_wakeup(tick, output.valid_for)
 
-    def _next(self, tick: int, valid_for: float) -> int:
+    def _next_wakeup(self, tick: int, valid_for: float) -> int:
         """Return the tick of the next wake-up after an output at `tick` that stays valid for `valid_for` [s]."""
         ticks = int(valid_for / self._interval) if valid_for < math.inf else NEVER
         if self._config.operator:
             ticks = min(ticks, *[every - tick % every for every in (ESTIMATE_POLL_TICKS, self._config.answers_every)])
         return min(tick + max(1, ticks), NEVER)
 
-    def _skip(self, missed: range) -> None:
+    def _skip(self, skipped: range) -> None:
         """Advance the commander over ticks at which its output stayed valid."""
-        last_flying = next((tick for tick in reversed(missed) if self._flies(tick)), None)
+        last_flying = next((tick for tick in reversed(skipped) if self._is_flying(tick)), None)
         setpoint = None if last_flying is None else self._reference(last_flying)
-        self._commander.skip(len(missed), self._interval, last_flying == missed[-1], setpoint)
+        self._commander.skip(len(skipped), self._interval, last_flying == skipped[-1], setpoint)
 
-    def _flies(self, tick: int) -> bool:
+    def _is_flying(self, tick: int) -> bool:
         """Return True if the vehicle flies along the trajectory."""
         return self._thrust(tick) > 0.0 and self._flight(tick).landed_state != LANDED
 
@@ -200,8 +184,8 @@ class CommanderBlock:
         return flight
 
     def _imu_selection(self, tick: int) -> ImuSelection:
-        known = self._config.imus > 1 and tick > 0
-        return self._graph.latest(ports.IMU_SELECTION, tick - 1) if known else ImuSelection()
+        voted = self._config.imus > 1 and tick > 0
+        return self._graph.latest(ports.IMU_SELECTION, tick - 1) if voted else ImuSelection()
 
     def _reference(self, tick: int) -> Setpoint:
         setpoint: Setpoint = self._graph.latest(ports.TRAJECTORY, tick)
@@ -228,22 +212,21 @@ class CommanderBlock:
         self._service.messages.append((topic.OPERATOR, tick, message.encode()))
         return tuple(message.commands)
 
-    def _order(self, tick: int, request: CommanderOutput, flight: Flight) -> ControllerInput:
-        status, setpoint = request.status, request.setpoint
-        restart = tick if request.reset_controller and flight.landed_state != ON_GROUND else -1
+    def _order(self, tick: int, output: CommanderOutput, flight: Flight) -> ControllerInput:
+        status, setpoint = output.status, output.setpoint
+        restart = tick if output.reset_controller and flight.landed_state != ON_GROUND else -1
         status_text_id = self.status_texts.number(_status_fields(status))
         if setpoint is None:
             return ControllerInput(True, Setpoint(), status_text_id, False, False, status.released, restart)
         setpoint = setpoint._replace(phase=self.phases.number(status.phase), final=False, release=False)
         return ControllerInput(False, setpoint, status_text_id, status.armed, status.finished, status.released, restart)
 
-    def _publish_acknowledgements(self, tick: int, request: CommanderOutput) -> None:
-        self._acknowledgements += request.acknowledgements
-        self._texts += request.texts
+    def _publish_acknowledgements(self, tick: int, output: CommanderOutput) -> None:
+        self._acknowledgements += output.acknowledgements
+        self._texts += output.texts
         if self._config.operator and tick % self._config.answers_every == 0:
-            message = CommandAcks(
-                header(tick * self._interval_ns, "world"), tuple(self._acknowledgements), tuple(self._texts)
-            )
+            stamp = header(tick * self._interval_ns, "world")
+            message = CommandAcks(stamp, tuple(self._acknowledgements), tuple(self._texts))
             self._service.messages.append((topic.COMMAND_ACKS, tick, message.encode()))
             self._acknowledgements.clear()
             self._texts.clear()
@@ -262,5 +245,5 @@ def flies_px4_cascade(config: AutopilotSetup) -> bool:
 
 
 def _status_fields(status: Status) -> Status:
-    """Return the part of a status that the port does not have as numbers."""
+    """Return the fields of a status that the port has as a text index."""
     return status._replace(phase="", armed=False, finished=False, battery_warning=0, released=False)

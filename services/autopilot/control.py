@@ -19,11 +19,11 @@ from lapwing.services.autopilot.mixer import (
     Shares,
     VirtualControls,
     active_allocation,
-    at_rest,
     clamp,
     clamp_to_range,
     mix,
     saturate,
+    zero_thrust,
 )
 from lapwing.services.autopilot.motor import Motor, voltages
 from lapwing.services.autopilot.pid import Pid, integrate, output
@@ -136,22 +136,22 @@ def step(
     angles = (roll, pitch, yaw)
     landed = update_landed_state(s.landed_state, p.resting_height, estimate, setpoint, dt)
     if landed.name != FLYING:
-        off = at_rest(p.shares[0])
+        off = zero_thrust(p.shares[0])
         rest = State(landed, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
         return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
 
     error = subtract(setpoint.position_world, estimate.position_world)
     error_rate = subtract(setpoint.velocity_world, estimate.velocity_world)
     # The horizontal integral is in world axes: a steady wind does not turn with the heading.
-    pushes = error[0] * s.tilt_cut[0] + error[1] * s.tilt_cut[1] > 0.0
+    saturated_tilt = error[0] * s.tilt_cut[0] + error[1] * s.tilt_cut[1] > 0.0
     integral = (
-        s.integral_world[0] if pushes else s.integral_world[0] + dt * error[0],
-        s.integral_world[1] if pushes else s.integral_world[1] + dt * error[1],
+        s.integral_world[0] if saturated_tilt else s.integral_world[0] + dt * error[0],
+        s.integral_world[1] if saturated_tilt else s.integral_world[1] + dt * error[1],
         integrate(p.altitude, s.integral_world[2], error[2], s.cut.collective, dt),
     )
-    wanted_x, wanted_y = tilt_targets(p, yaw, integral, error, error_rate, setpoint.acceleration_world)
-    limited_x, limited_y = clamp(wanted_x, -p.tilt_limit, p.tilt_limit), clamp(wanted_y, -p.tilt_limit, p.tilt_limit)
-    cut_x, cut_y = sign(wanted_x - limited_x), sign(wanted_y - limited_y)
+    desired_x, desired_y = tilt_targets(p, yaw, integral, error, error_rate, setpoint.acceleration_world)
+    limited_x, limited_y = clamp(desired_x, -p.tilt_limit, p.tilt_limit), clamp(desired_y, -p.tilt_limit, p.tilt_limit)
+    cut_x, cut_y = sign(desired_x - limited_x), sign(desired_y - limited_y)
     tilt_x = advance(p.smoothing, s.tilt_x, limited_x, dt)
     tilt_y = advance(p.smoothing, s.tilt_y, limited_y, dt)
 

@@ -10,10 +10,10 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math, python_function
 from lapwing.services.autopilot.allocation import (
     effectiveness,
-    in_wakes,
     tables,
     tilted_effectiveness,
     virtual_control_effectiveness,
+    wake_effectiveness,
 )
 from lapwing.services.autopilot.angle_reference import Smoothing
 from lapwing.services.autopilot.control import Parameters
@@ -101,18 +101,18 @@ def hover_thrust(airframe: Airframe) -> float:
 
 def hover_torque(airframe: Airframe) -> float:
     """Return the hover torque [N m] of the most loaded rotor."""
-    gained = max((math.total(row) for row in airframe.wakes.torque), default=0.0)
-    return hover_thrust(airframe) * (airframe.torque_per_thrust + max(gained, 0.0))
+    wake_torque = max((math.total(row) for row in airframe.wakes.torque), default=0.0)
+    return hover_thrust(airframe) * (airframe.torque_per_thrust + max(wake_torque, 0.0))
 
 
 def lift(airframe: Airframe) -> float:
     """Return the force along body z [N] of a collective of 1 N: the number of rotors if none is tilted."""
-    return _demand_effects(*_geometry(airframe))[0]
+    return _control_effects(*_geometry(airframe))[0]
 
 
 def moments(airframe: Airframe) -> Vec3:
     """Return the torques about body x, y, z [N m] of virtual controls of 1 N."""
-    _, x, y, z = _demand_effects(*_geometry(airframe))
+    _, x, y, z = _control_effects(*_geometry(airframe))
     return x, y, z
 
 
@@ -134,20 +134,20 @@ def _geometry(a: Airframe) -> tuple:
 def _effectiveness(
     x: PerRotor, y: PerRotor, z: PerRotor, axes: tuple, signs: PerRotor, torque: float, wakes: WakeSlopes
 ) -> np.ndarray:
-    def alone(torque: float) -> np.ndarray:
+    def isolated(torque: float) -> np.ndarray:
         reaction = tuple(sign * torque for sign in signs)
         if axes:
             return tilted_effectiveness(tuple(zip(x, y, z, strict=True)), axes, reaction)
         return effectiveness(x, y, reaction)
 
     if not wakes.thrust:
-        return alone(torque)
-    return in_wakes(alone(0.0), alone(1.0) - alone(0.0), torque, wakes)
+        return isolated(torque)
+    return wake_effectiveness(isolated(0.0), isolated(1.0) - isolated(0.0), torque, wakes)
 
 
 # used several times at a start, and by every run of a campaign
 @lru_cache(maxsize=16)
-def _demand_effects(*geometry: Any) -> tuple[float, ...]:
+def _control_effects(*geometry: Any) -> tuple[float, ...]:
     return tuple(map(float, virtual_control_effectiveness(_effectiveness(*geometry))))
 
 

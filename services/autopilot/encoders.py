@@ -19,7 +19,7 @@ from lapwing.services.common.setpoint_encoder import setpoint_encoder
 
 
 def wires(
-    setup: RunConfig, estimate_every: int, status_every: int, texts: Sequence[str], words: Sequence[Any]
+    setup: RunConfig, estimate_every: int, status_every: int, phases: Sequence[str], status_texts: Sequence[Any]
 ) -> list[TopicEncoder]:
     """Return the encoders of the autopilot's topics.
 
@@ -27,21 +27,17 @@ def wires(
         setup: run configuration.
         estimate_every: ticks between two messages of the estimate.
         status_every: ticks between two messages of the status.
-        texts: phase names by index; may grow.
-        words: status texts of the commander by index; may grow.
+        phases: phase names by index; may grow.
+        status_texts: status texts of the commander by index; may grow.
     """
     return [
         actuators_wire(setup.port(ports.ACTUATORS)),
         TopicEncoder(
             topic.ESTIMATE, ports.ESTIMATE, estimate_every, _estimate, _estimate_sample, lambda x: [x.rejected]
         ),
-        setpoint_encoder(topic.SETPOINT, ports.SETPOINT, texts),
-        status_wire(status_every, texts, words),
-        *(
-            [_covariance_wire(setup.port(ports.ESTIMATE_COVARIANCE))]
-            if ports.ESTIMATE_COVARIANCE in setup.ports
-            else []
-        ),
+        setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases),
+        status_wire(status_every, phases, status_texts),
+        *([_covariance_wire(setup.port(name))] if (name := ports.ESTIMATE_COVARIANCE) in setup.ports else []),
     ]
 
 

@@ -8,8 +8,8 @@ DOWN = -90.0  # [deg] elevation of a vertical ray
 
 def distance_sensor(scene: Scene) -> str | None:
     """Return the port of the sonar, or of a rangefinder that points straight down. Return None without either."""
-    carried = scene.tables("sensors")
-    if ports.SONAR in carried:
+    installed = scene.tables("sensors")
+    if ports.SONAR in installed:
         return ports.SONAR
-    looks_down = ports.RANGEFINDER in carried and scene.lookup("sensors.rangefinder.elevation_deg") == DOWN
-    return ports.RANGEFINDER if looks_down else None
+    points_down = ports.RANGEFINDER in installed and scene.lookup("sensors.rangefinder.elevation_deg") == DOWN
+    return ports.RANGEFINDER if points_down else None

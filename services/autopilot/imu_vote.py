@@ -1,7 +1,7 @@
 """Vote between two or three inertial measurement units (theory.md, section 3.4).
 
 A reading is good if it is valid, is not stuck, and agrees with the median of the good ones where three units are left.
-With two units only missing and stuck readings are noticed: two that disagree do not show which is wrong.
+With two units only missing and stuck readings are detected: a disagreement does not identify the wrong unit.
 """
 
 from typing import NamedTuple
@@ -63,7 +63,7 @@ def _consistent(x: ImuReading, a: ImuReading, b: ImuReading, c: ImuReading) -> b
 
 
 @always_inline
-def _read(h: UnitHistory, r: ImuReading) -> UnitHistory:
+def _update_history(h: UnitHistory, r: ImuReading) -> UnitHistory:
     """Return the history with the repetitions of a noisy unit counted."""
     same = r.valid and r.omega_variance > 0.0 and (r.omega_body == h.omega or r.specific_force_body == h.force)
     return UnitHistory(r.omega_body, r.specific_force_body, h.repeats + 1 if same else 0, h.score, h.failed)
@@ -78,7 +78,7 @@ def _update_score(h: UnitHistory, good: bool) -> UnitHistory:
 
 @always_inline
 def _choose_unit(unit: int, good: tuple[bool, bool, bool], a: UnitHistory, b: UnitHistory, c: UnitHistory) -> int:
-    """Return the unit in use: the one before while it is good, else the first good one."""
+    """Return the unit in use: the previous unit while it is good, otherwise the first good one."""
     if good[unit - 1]:
         return unit
     if good[0] and not a.failed:
@@ -93,7 +93,7 @@ def step(p: Vote, s: VoteState, tick: int, inputs: tuple[InputSample, ...]) -> t
     """Output the reading of the unit in use and the result of the vote; a third unit may be absent."""
     x, y, z = inputs[0].value, inputs[1].value, inputs[len(inputs) - 1].value
     three = len(inputs) == 3
-    a, b, c = _read(s.first, x), _read(s.second, y), _read(s.third, z)
+    a, b, c = _update_history(s.first, x), _update_history(s.second, y), _update_history(s.third, z)
     good_x = x.valid and a.repeats < p.frozen
     good_y = y.valid and b.repeats < p.frozen
     good_z = three and z.valid and c.repeats < p.frozen

@@ -9,6 +9,6 @@ EXACT = StateEstimate()
 """Estimate at the origin, at rest, without error."""
 
 
-def before(position_world: Vec3) -> StateEstimate:
+def estimate_before_start(position_world: Vec3) -> StateEstimate:
     """Return the estimate before the filter has started, at the start position [m]."""
     return EXACT._replace(position_world=position_world, health=NOT_STARTED)

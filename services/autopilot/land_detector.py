@@ -6,9 +6,8 @@ from lapwing.kernels import always_inline
 from lapwing.services.common.ports import Setpoint, StateEstimate
 
 ON_GROUND, FLYING, LANDED = 0, 1, 2  # motors off before the first take-off, flying, off after a landing
-CUT_HEIGHT = (
-    0.05  # [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
-)
+# [m] over the resting height: below it, on the way to the ground, the motors stop; paper, section 6.1
+CUT_HEIGHT = 0.05
 LANDED_TIME = 2.0  # [s] at rest with a setpoint on the ground, after which the motors stop at any estimated height
 LANDED_HEIGHT_ERROR = 0.5  # [m] maximum error of the estimated height for that
 LANDED_SPEED = 0.1  # [m/s] maximum estimated vertical speed at rest

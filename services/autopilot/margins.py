@@ -39,8 +39,8 @@ def open_loops(
     return loops(p, airframe, s, gain * np.exp(-(delay + 0.5) * tick * s))
 
 
-def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any]:
-    """Return the loops of `open_loops` at complex frequencies `s` [rad/s] with delay and gain `late`.
+def loops(p: Parameters, airframe: Airframe, s: Any, transport: Any) -> dict[str, Any]:
+    """Return the loops of `open_loops` at complex frequencies `s` [rad/s] with `transport` as delay and gain.
 
     Both may also be transfer functions, with s as the derivative.
     """
@@ -48,24 +48,24 @@ def loops(p: Parameters, airframe: Airframe, s: Any, late: Any) -> dict[str, Any
     moment_x, moment_y, moment_z = moments(airframe)
     i_x, i_y, i_z = airframe.inertia_body
     responses = {
-        "altitude": _pid(p.altitude, s) * lift(airframe) / airframe.mass * lag * late / s**2,
-        "yaw": _pid(p.yaw, s) * moment_z / i_z * (1.0 + airframe.spin_up_zero * s) * lag * late / s**2,
+        "altitude": _pid(p.altitude, s) * lift(airframe) / airframe.mass * lag * transport / s**2,
+        "yaw": _pid(p.yaw, s) * moment_z / i_z * (1.0 + airframe.spin_up_zero * s) * lag * transport / s**2,
     }
     smooth = p.smoothing.bandwidth**2 / (
         s**2 + 2.0 * p.smoothing.damping * p.smoothing.bandwidth * s + p.smoothing.bandwidth**2
     )
-    for tilt, way, feedback, outer, effect in (
+    for tilt, axis, feedback, outer, effect in (
         ("roll", "y", -_pid(p.roll_inner, s), p.roll_outer, moment_x / i_x),
         ("pitch", "x", _pid(p.pitch_inner, s), p.pitch_outer, moment_y / i_y),
     ):
-        turn = effect * lag * late / s**2  # tilt over demand
+        turn = effect * lag * transport / s**2  # tilt over demand
         demand = feedback * smooth  # demand over desired tilt
         if p.smoothing.lag > 0.0:
             demand = smooth * (s**2 / effect + feedback / (1.0 + p.smoothing.lag * s))
         position = _pid(outer, s) * p.gravity / s**2  # desired tilt over tilt
         responses[tilt] = turn * feedback
-        responses[way] = position * turn * demand / (1.0 + turn * feedback)
-        responses[f"{way}_plant_input"] = turn * (feedback + position * demand)
+        responses[axis] = position * turn * demand / (1.0 + turn * feedback)
+        responses[f"{axis}_plant_input"] = turn * (feedback + position * demand)
     return responses
 
 

@@ -29,7 +29,7 @@ def _zero(_: float, share: Share, other: Share) -> float:
 
 
 @always_inline
-def at_rest(shares: Shares) -> PerRotor:
+def zero_thrust(shares: Shares) -> PerRotor:
     """Return zero thrust [N] for every rotor."""
     return map_tuple(_zero, 0.0, shares, shares)
 
@@ -58,31 +58,31 @@ def clamp(x: float, low: float, high: float) -> float:
 
 
 @always_inline
-def _clamp_voltage(highest: float, value: float, _: float) -> float:
+def _clamp(highest: float, value: float, _: float) -> float:
     return clamp(value, 0.0, highest)
 
 
 @always_inline
 def clamp_to_range(values: PerRotor, highest: float) -> PerRotor:
     """Return the nearest values within 0..highest."""
-    return map_tuple(_clamp_voltage, highest, values, values)
+    return map_tuple(_clamp, highest, values, values)
 
 
 def airmode(values: Mapping[str, float]) -> int:
     """Return the air mode that the autopilot's parameters select."""
-    return int(values.get("MC_AIRMODE", AIRMODE_ROLL_PITCH))  # absent from former logs
+    return int(values.get("MC_AIRMODE", AIRMODE_ROLL_PITCH))  # not in logs of former versions
 
 
 @always_inline
-def _possible_yaw(shares: Shares, roll: float, pitch: float, yaw: float, thrust_max: float) -> float:
-    """Return the part of a yaw that is possible besides roll and pitch with any collective."""
+def _feasible_yaw(shares: Shares, roll: float, pitch: float, yaw: float, thrust_max: float) -> float:
+    """Return the part of a yaw control that is feasible with roll and pitch at any collective."""
     part = 1.0
     for s in shares:
         for t in shares:
             if s[0] > 0.0 and t[0] > 0.0:
                 tilt = (s[1] * roll + s[2] * pitch) / s[0] - (t[1] * roll + t[2] * pitch) / t[0]
                 turn = (s[3] / s[0] - t[3] / t[0]) * yaw
-                if turn > 0.0:  # also by rounding, which the least room outweighs
+                if turn > 0.0:  # may be due to rounding, hence the lower limit of the range
                     part = min(part, max(thrust_max / s[0] - tilt, 1e-12) / turn)
     return part * yaw
 
@@ -114,7 +114,7 @@ def saturate(shares: Shares, q: VirtualControls, thrust_max: float, airmode: int
             part = min(part, thrust_max / s[0] / max(span, 1e-9))
     roll, pitch, yaw = part * q.roll, part * q.pitch, q.yaw
     if airmode == AIRMODE_ROLL_PITCH_YAW:
-        yaw = _possible_yaw(shares, roll, pitch, yaw, thrust_max)
+        yaw = _feasible_yaw(shares, roll, pitch, yaw, thrust_max)
     low, high = -math.inf, math.inf
     for s in shares:
         if s[0] > 0.0:
@@ -126,7 +126,7 @@ def saturate(shares: Shares, q: VirtualControls, thrust_max: float, airmode: int
     low, high = -math.inf, math.inf
     for s in shares:
         if s[3] != 0.0:
-            bare = s[0] * collective + s[1] * roll + s[2] * pitch
-            up, down = (thrust_max - bare) / s[3], -bare / s[3]
+            without_yaw = s[0] * collective + s[1] * roll + s[2] * pitch
+            up, down = (thrust_max - without_yaw) / s[3], -without_yaw / s[3]
             low, high = max(low, min(up, down)), min(high, max(up, down))
     return VirtualControls(collective, roll, pitch, clamp(yaw, min(low, 0.0), max(high, 0.0)))

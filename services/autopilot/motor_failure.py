@@ -15,12 +15,12 @@ from lapwing.services.autopilot.controller_parameters import Airframe, lift, rot
 from lapwing.services.common.ports import PerRotor, StateEstimate
 
 BANDWIDTH = 40.0  # [rad/s] of the observer
-LOST = 0.3  # minimum fraction of lost thrust
+LEAST_LOSS = 0.3  # minimum fraction of lost thrust
 ALIGNED = 0.25  # maximum squared fraction of the disturbance that is not along the rotor's arm
 DETECTION_TIME = 0.1  # [s]
-CLEAR = 0.3  # [m] height below which the feet may push too
-IMPACT = 1.0  # [g] specific force upwards beyond that of the rotors, of which only a contact is capable
-PAUSE = 0.5  # [s] after an impact, in which feet may push or bounce
+CLEAR = 0.3  # [m] height below which the feet may push
+IMPACT = 1.0  # [g] upward specific force, beyond that of the rotors, that only a contact causes
+PAUSE = 0.5  # [s] after an impact, during which the feet may push or bounce
 LEAST = 0.3  # minimum expected thrust, as a fraction of the hover thrust
 
 
@@ -31,7 +31,7 @@ class Parameters(NamedTuple):
     pitch_arm: PerRotor  # [m] torque about body y per 1 N of each rotor's thrust
     inertia_body: Vec3  # [kg m^2]
     time_constant: float  # of the rotor speeds [s]
-    hovering: float  # thrust of each rotor [N]
+    hover_thrust: float  # thrust of each rotor [N]
     gravity: float  # [m/s^2]
     enabled: bool  # False: no failure is detected
 
@@ -39,23 +39,25 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """State of the detector."""
 
-    asked: PerRotor  # commanded thrusts of the last tick [N]
+    commanded: PerRotor  # commanded thrusts of the last tick [N]
     root: PerRotor  # square root of the expected thrusts [N^(1/2)]
     rate: tuple[float, float]  # omega x, y as predicted [rad/s]
     disturbance: tuple[float, float]  # unexplained angular acceleration [rad/s^2]
     suspect: int  # number of the suspected rotor, from 1; 0: none
-    lasting: float  # [s] since it is suspected
+    duration: float  # [s] since it is suspected
     failed: int  # number of the failed rotor, from 1; 0: none
-    pause: float  # [s] left of the time after an impact
+    pause: float  # [s] remaining time after an impact
 
 
 def build(airframe: Airframe, values: Mapping[str, float]) -> Parameters:
     """Return the detector of an airframe with the autopilot's parameter `values`."""
     a = airframe
     _, roll, pitch, _ = rotor_effectiveness(a).tolist()
-    hovering = a.mass * a.gravity / lift(a)
-    enabled = values.get("FD_ACT_EN", 1.0) != 0.0  # absent from former logs
-    return Parameters(tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, hovering, a.gravity, enabled)
+    hover_thrust = a.mass * a.gravity / lift(a)
+    enabled = values.get("FD_ACT_EN", 1.0) != 0.0  # not in logs of former versions
+    return Parameters(
+        tuple(roll), tuple(pitch), a.inertia_body, a.motor.time_constant, hover_thrust, a.gravity, enabled
+    )
 
 
 @always_inline
@@ -71,14 +73,14 @@ def start(p: Parameters) -> State:
 
 
 @always_inline
-def _follow(share: float, root: float, asked: float) -> float:
-    return root + share * (math.sqrt(asked) - root)
+def _follow(share: float, root: float, commanded: float) -> float:
+    return root + share * (math.sqrt(commanded) - root)
 
 
 @always_inline
 def _arm(p: Parameters, k: int, root: PerRotor) -> tuple[float, float]:
     """Return the expected angular acceleration [rad/s^2] of rotor k about x and y."""
-    thrust = max(root[k] * root[k], LEAST * p.hovering)
+    thrust = max(root[k] * root[k], LEAST * p.hover_thrust)
     return p.roll_arm[k] * thrust / p.inertia_body[0], p.pitch_arm[k] * thrust / p.inertia_body[1]
 
 
@@ -86,13 +88,13 @@ def _arm(p: Parameters, k: int, root: PerRotor) -> tuple[float, float]:
 def suspect(p: Parameters, root: PerRotor, disturbance: tuple[float, float]) -> int:
     """Return the number, from 1, of the rotor whose loss of thrust explains the disturbance, 0 if none does."""
     x, y = disturbance
-    suspected, most = 0, LOST
+    suspected, largest = 0, LEAST_LOSS
     for k in range(len(p.roll_arm)):
         ax, ay = _arm(p, k, root)
-        lack = -(x * ax + y * ay) / (ax * ax + ay * ay)
-        left = (x + lack * ax) * (x + lack * ax) + (y + lack * ay) * (y + lack * ay)
-        if lack > most and left < ALIGNED * (x * x + y * y):
-            suspected, most = k + 1, lack
+        loss = -(x * ax + y * ay) / (ax * ax + ay * ay)
+        residual = (x + loss * ax) * (x + loss * ax) + (y + loss * ay) * (y + loss * ay)
+        if loss > largest and residual < ALIGNED * (x * x + y * y):
+            suspected, largest = k + 1, loss
     return suspected
 
 
@@ -104,11 +106,11 @@ def excess(p: Parameters, root: PerRotor, attitude: Quaternion, acceleration_wor
     thrust = 0.0
     for k in range(len(root)):
         thrust += root[k] * root[k]
-    return load / p.gravity - thrust / (len(root) * p.hovering)
+    return load / p.gravity - thrust / (len(root) * p.hover_thrust)
 
 
 @always_inline
-def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, asked: PerRotor) -> State:
+def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, commanded: PerRotor) -> State:
     """Return the state after a tick.
 
     Args:
@@ -117,10 +119,10 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, as
         dt: length of the tick [s].
         e: state estimate.
         height: above the resting height [m].
-        asked: commanded thrusts from now on [N].
+        commanded: commanded thrusts from now on [N].
     """
     share = 1.0 - math.exp(-dt / p.time_constant)
-    root = map_tuple(_follow, share, s.root, s.asked)
+    root = map_tuple(_follow, share, s.root, s.commanded)
     ix, iy, iz = p.inertia_body
     wx, wy, wz = e.omega_body
     ax, ay = (iy - iz) * wy * wz / ix, (iz - ix) * wz * wx / iy
@@ -129,11 +131,11 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, as
         ax += p.roll_arm[k] * thrust / ix
         ay += p.pitch_arm[k] * thrust / iy
     before = s.failed if p.enabled else 0
-    # the ground may be higher than that at the start
-    has_hit = excess(p, root, e.attitude, e.acceleration_world) > IMPACT
-    pause = PAUSE if has_hit else max(s.pause - dt, 0.0)
+    # the ground may be higher than at the start
+    is_impact = excess(p, root, e.attitude, e.acceleration_world) > IMPACT
+    pause = PAUSE if is_impact else max(s.pause - dt, 0.0)
     if height < CLEAR or pause > 0.0:
-        return State(asked, root, (wx, wy), (0.0, 0.0), 0, 0.0, before, pause)
+        return State(commanded, root, (wx, wy), (0.0, 0.0), 0, 0.0, before, pause)
     ex, ey = wx - s.rate[0], wy - s.rate[1]
     gain = 2.0 * BANDWIDTH
     rate = (
@@ -143,6 +145,6 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, as
     square = BANDWIDTH * BANDWIDTH * dt
     disturbance = (s.disturbance[0] + square * ex, s.disturbance[1] + square * ey)
     suspected = suspect(p, root, disturbance)
-    lasting = s.lasting + dt if suspected > 0 and suspected == s.suspect else 0.0
-    failed = suspected if lasting > DETECTION_TIME and before == 0 and p.enabled else before
-    return State(asked, root, rate, disturbance, suspected, lasting, failed, pause)
+    duration = s.duration + dt if suspected > 0 and suspected == s.suspect else 0.0
+    failed = suspected if duration > DETECTION_TIME and before == 0 and p.enabled else before
+    return State(commanded, root, rate, disturbance, suspected, duration, failed, pause)

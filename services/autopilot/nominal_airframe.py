@@ -29,7 +29,7 @@ def _known_airframe(scene: Scene) -> Airframe:
     x, y, z = zip(*frame.rotors.position, strict=True)
     axis = frame.rotors.tilted_axis
     engine = frame.motor
-    known = Airframe(
+    nominal = Airframe(
         frame.mass.total,
         frame.mass.inertia,
         x,
@@ -43,10 +43,10 @@ def _known_airframe(scene: Scene) -> Airframe:
         rotor_z=z if axis else (),
         rotor_axis=axis,
     )
-    alone, known = known, known._replace(wakes=wake_slopes(scene))
-    if "gyroscopic_torque" not in scene[Effects].tables or known.gravity <= 0.0:
-        return known
-    slope = 2.0 * math.sqrt(known.mass * known.gravity / lift(known) * thrust_coefficient)  # [N s/rad] in hover
-    # thrust of tilted rotors yaws too, and only the z part of their spin-up torque does
-    torque = moments(known)[2] / lift(alone) if axis or known.wakes.thrust else torque_per_thrust
-    return known._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))
+    isolated, nominal = nominal, nominal._replace(wakes=wake_slopes(scene))
+    if "gyroscopic_torque" not in scene[Effects].tables or nominal.gravity <= 0.0:
+        return nominal
+    slope = 2.0 * math.sqrt(nominal.mass * nominal.gravity / lift(nominal) * thrust_coefficient)  # [N s/rad] in hover
+    # thrust of tilted rotors also causes yaw, and of their spin-up torque only the z component does
+    torque = moments(nominal)[2] / lift(isolated) if axis or nominal.wakes.thrust else torque_per_thrust
+    return nominal._replace(spin_up_zero=frame.rotors.inertia / (slope * torque))

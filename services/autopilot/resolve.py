@@ -33,14 +33,14 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
     follows = follows_trajectory(scene)
     exact, user_code = config.estimator == "ground_truth", config.estimator not in ESTIMATORS
-    fitted = sorted(scene.tables("sensors"))
-    sensors = [name for name in FUSED if name in fitted and not exact and not user_code]
+    installed = sorted(scene.tables("sensors"))
+    sensors = [name for name in FUSED if name in installed and not exact and not user_code]
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
-    inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (fitted if user_code else sensors)]
+    inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (installed if user_code else sensors)]
     imus = scene.lookup("sensors.imu.instances") if ports.IMU in sensors else 1
     inputs += [InputPort(name) for name in ports.IMUS[1:imus]]
-    if ports.AIRSPEED in fitted and config.accept_commands and not user_code:
+    if ports.AIRSPEED in installed and config.accept_commands and not user_code:
         inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only
     inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}

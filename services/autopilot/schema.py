@@ -31,15 +31,15 @@ class Autopilot(FirmwareKeys):
 
     TABLE: ClassVar[str] = "autopilot"
     OPTIONAL: ClassVar[bool] = True
-    gains: str = "tuned"  # shipped, in gains/ next to the scene, or the path of a .toml file
+    gains: str = "tuned"  # name of a shipped set or one in gains/ next to the scene, or path of a .toml file
     estimator: str = "kalman"  # the Kalman filter; "ground_truth": the true state; or "module:Name" of a user's class
     estimator_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
-    attitude_error: Literal["euler", "so3"] = "euler"  # by Euler angles, as in the paper, or on SO(3)
-    controller: str | None = None  # instead of the cascaded PID "px4", PX4's cascade, or "module:Name" of a user's
+    attitude_error: Literal["euler", "so3"] = "euler"  # Euler angles, as in the paper, or SO(3)
+    controller: str | None = None  # "px4": PX4's cascade; "module:Name": a user's; default: cascaded PID
     controller_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
     accept_commands: bool = False  # accept commands of an operator
     follow_trajectory: bool = True  # follow the scene's [trajectory]; false: start disarmed and wait for commands
-    parameters: dict[str, float] = Field(default_factory=dict)  # by name, or the path of a file of them
+    parameters: dict[str, float] = Field(default_factory=dict)  # values by name, or path of a parameter file
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
@@ -66,7 +66,7 @@ class Autopilot(FirmwareKeys):
             tree[cls.TABLE]["parameters"] = parse(text, path)
 
     def check(self, scene: Scene) -> None:
-        """Raise ConfigError if parameters are invalid, the vehicle cannot hover, or sensors are missing."""
+        """Raise ConfigError if parameters are invalid, the vehicle cannot hover, or a sensor is missing."""
         if self.firmware in FIRMWARES:
             return
         self.check_own()
@@ -98,8 +98,8 @@ class Autopilot(FirmwareKeys):
                 raise ConfigError("environment.magnetic_field", message, f"at least {WEAKEST_FIELD:g} T")
             reference = int(self.parameters.get("EKF2_HGT_REF", parameters.GPS_HEIGHT))
             sensor = parameters.HEIGHT_SENSORS[reference]
-            known = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor
-            if known not in scene.tables("sensors"):
+            required = distance_sensor(scene) if reference == parameters.SONAR_HEIGHT else sensor
+            if required not in scene.tables("sensors"):
                 message = f"{reference} needs a sensor that the vehicle does not have"
                 raise ConfigError("autopilot.parameters.EKF2_HGT_REF", message, f"[sensors.{sensor}] too")
 

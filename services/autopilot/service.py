@@ -14,7 +14,7 @@ from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Contr
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
 from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller, flies_px4_cascade
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters
-from lapwing.services.autopilot.custom.custom_blocks import controller_parts, estimator_parts
+from lapwing.services.autopilot.custom.custom_blocks import controller_blocks, estimator_blocks
 from lapwing.services.autopilot.encoders import imu_selection_wire, wires
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.correction import Correction
@@ -27,7 +27,7 @@ from lapwing.services.autopilot.estimator.blocks.inertial import STANDSTILL_EVER
 from lapwing.services.autopilot.estimator.blocks.navigation_state import blank
 from lapwing.services.autopilot.estimator.blocks.terrain_height import GroundReference
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
-from lapwing.services.autopilot.initial_estimate import before
+from lapwing.services.autopilot.initial_estimate import estimate_before_start
 from lapwing.services.autopilot.px4 import block as px4_block
 from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.px4.block import Px4Controller
@@ -79,11 +79,11 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     elif config.controller is None:
         control = [Block(f"{NAME}.control", common, Cell(block.start(common)), inputs, control_outputs)]
     else:
-        control = controller_parts(f"{NAME}.control", setup.modules, config, common, inputs, control_outputs)
+        control = controller_blocks(f"{NAME}.control", setup.modules, config, common, inputs, control_outputs)
     navigation = _navigation(setup, config, wakeup, outputs[ports.ESTIMATE], injection)
     service.parts = [*injection.before(NAME), *navigation, commander, *control, *injection.after(NAME, actuators)]
-    texts, status_texts = commander.phases.table, commander.status_texts.table
-    service.wires = wires(setup, config.estimate_every, config.status_every, texts, status_texts)
+    phases, status_texts = commander.phases.table, commander.status_texts.table
+    service.wires = wires(setup, config.estimate_every, config.status_every, phases, status_texts)
     if ports.AIRSPEED in sensor_ports:
         airspeed_port = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
         service.wires.append(encoder_of_airspeed(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
@@ -112,7 +112,7 @@ def _navigation(
     if config.own_estimator is not None:
         names = [port.name for port in setup.services["sensors"].ports] if "sensors" in setup.services else []
         sensors = {name: setup.port(name).period for name in names}
-        return estimator_parts(f"{NAME}.estimate", setup.modules, config, wakeup, sensors, (battery, flight), estimate)
+        return estimator_blocks(f"{NAME}.estimate", setup.modules, config, wakeup, sensors, (battery, flight), estimate)
     if p is None:
         inputs = (InputPort(ports.TRUTH), battery, flight)
         return [Block(f"{NAME}.estimate", TrueEstimate(wakeup), Cell(0.0), inputs, (estimate,))]
@@ -135,17 +135,9 @@ def _navigation(
         (ports.OPTICAL_FLOW, Correction(p)),
     ):
         if port in known_ports:
-            parts.append(
-                Block(
-                    f"{NAME}.{port}",
-                    fusion,
-                    state,
-                    (InputPort(injection.received(port)),),
-                    (),
-                    known_ports[port].period,
-                )
-            )
-    estimate_block = FilterEstimate(p, wakeup, before(config.start_world))
+            reading = InputPort(injection.received(port))
+            parts.append(Block(f"{NAME}.{port}", fusion, state, (reading,), (), known_ports[port].period))
+    estimate_block = FilterEstimate(p, wakeup, estimate_before_start(config.start_world))
     parts.append(Block(f"{NAME}.estimate", estimate_block, state, (battery, flight), (estimate,)))
     if ports.ESTIMATE_COVARIANCE in known_ports:  # not in logs of former versions
         covariance_port = known_ports[ports.ESTIMATE_COVARIANCE]

@@ -35,4 +35,4 @@ def _by(factor: float) -> str:
     if math.isnan(factor):
         return " at any gain"
     decibels = 20.0 * math.log(factor) / math.log(10.0)
-    return f", gain margin {-abs(decibels):.1f} dB: its gain is too {'high' if decibels > 0.0 else 'low'}"
+    return f", gain margin {-abs(decibels):.1f} dB: the gain is too {'high' if decibels > 0.0 else 'low'}"

@@ -1,1 +1,1 @@
-"""Control of quadrotors that carry a load together."""
+"""The formation service: control of quadrotors that carry a common load."""

@@ -1,1 +1,1 @@
-"""The dynamics plant: owns time, turns motor voltages into motion."""
+"""The plant service: clock owner and vehicle dynamics."""

@@ -1,4 +1,4 @@
-"""The plant's state as messages."""
+"""Topic encoders of the plant."""
 
 import math
 from typing import Any, NamedTuple
@@ -38,8 +38,8 @@ class PlantWiring(NamedTuple):
     """Contents of the plant's messages besides its state."""
 
     pose_every: int  # ticks between poses, transforms and clocks
-    odometry: bool  # whether there is odometry
-    cells: int  # of the battery, 0 without one
+    odometry: bool  # publish odometry
+    cells: int  # battery cells; 0 without a battery
     capacity: float  # [A s], NaN without a battery
     bodies: tuple[str, ...]  # names, in the order of the port
 
@@ -61,11 +61,11 @@ def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
         ports.BODIES: (topic.BODIES, _bodies, lambda _: _bodies_sample(wiring.bodies)),
         ports.CONTACT: (topic.CONTACT, _contact, _contact_sample),
     }
-    for name, (its_topic, fields, sample_of) in optional.items():
+    for name, (message_topic, fields, sample_of) in optional.items():
         if name in declared_ports:
             port = declared_ports[name]
             sample = sample_of(port.like)
-            result.append(TopicEncoder(its_topic, name, port.period, fields, lambda sample=sample: sample))
+            result.append(TopicEncoder(message_topic, name, port.period, fields, lambda sample=sample: sample))
     return result
 
 

@@ -22,8 +22,8 @@ from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
 
-PRESENCE, LOAD = "presence", "load"  # ports that plants of a fleet read of one another
-FASTEST = 0.5  # limit of cable frequency times communication step: the predicted load is then accurate to 2 %
+PRESENCE, LOAD = "presence", "load"  # ports exchanged between the plants of a fleet
+FASTEST = 0.5  # maximum cable frequency times communication step; the predicted load is then within 2 %
 
 
 def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
@@ -36,21 +36,21 @@ def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict
     Raises:
         ConfigError: vehicles touch at the start, disagree on their load, or cannot reach it.
     """
-    _check_apart(shares, keys)
+    _check_separation(shares, keys)
     interacting = [name for name, config in shares.items() if interacts(effects_of(config))]
     carriers = {name: sling for name in interacting if (sling := _sling(shares[name]))}
     owner = next(iter(carriers), "")
     result = dict(shares)
     for name in interacting:
-        read = [neighbour_port(other, PRESENCE) for other in interacting if other != name]
+        neighbours = [neighbour_port(other, PRESENCE) for other in interacting if other != name]
         load: dict[str, Any] = {}
         if name in carriers:
-            read.append(LOAD if name == owner else neighbour_port(owner, LOAD))
+            neighbours.append(LOAD if name == owner else neighbour_port(owner, LOAD))
         if name == owner:
             load = _load(shares, carriers, keys)
-        if read:
+        if neighbours:
             plant: PlantSetup = shares[name].parameters
-            others = FleetCoupling(tuple(read), presence(effects_of(shares[name])), **load)
+            others = FleetCoupling(tuple(neighbours), presence(effects_of(shares[name])), **load)
             result[name] = shares[name]._replace(parameters=plant._replace(others=others))
         if name in carriers and name != owner:
             result[name] = _without_bodies(result[name])
@@ -63,8 +63,8 @@ def effects_of(config: ServiceConfig) -> tuple:
     return core.vehicle.effects if isinstance(core, MultirotorPlant) else ()
 
 
-def _check_apart(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> None:
-    """Reject vehicles whose collision spheres touch at the start."""
+def _check_separation(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> None:
+    """Raise ConfigError if collision spheres touch at the start."""
     spheres = {
         name: (e.radius, config.parameters.start.vehicle.motion.position_world)
         for name, config in shares.items()
@@ -96,22 +96,22 @@ def _load(
     owner, *others = carriers
     first, core = carriers[owner], shares[owner].parameters.core
     for name in others:
-        for key, ours, theirs in (("mass", first.load_mass, carriers[name].load_mass),
+        for key, expected, actual in (("mass", first.load_mass, carriers[name].load_mass),
                                   ("drag_area", first.drag_area, carriers[name].drag_area)):  # fmt: skip
-            if ours != theirs:
-                message = f"got {theirs:g}, and {owner} has {ours:g}: they carry the same load"
-                raise ConfigError(f"{keys[name]}effects.shared_slung_load.{key}", message, f"{ours:g}")
+            if actual != expected:
+                message = f"got {actual:g}, and {owner} has {expected:g}: they carry the same load"
+                raise ConfigError(f"{keys[name]}effects.shared_slung_load.{key}", message, f"{expected:g}")
     hooks_world = {name: _hook(shares[name], sling) for name, sling in carriers.items()}
     x, y = (math.total(hook[i] for hook in hooks_world.values()) / len(carriers) for i in (0, 1))
     start = LoadMotion((x, y, surface(first.terrain, x, y)[0]), ZERO)
     for name, sling in carriers.items():
-        key, away = f"{keys[name]}effects.shared_slung_load", norm(subtract(hooks_world[name], start.load_position))
-        if away > sling.length:
-            message = f"got {sling.length:g} m, and the load is {away:.2f} m away, in the middle of its carriers"
-            raise ConfigError(f"{key}.length", message, f"at least {away:.3g} m, or vehicles closer together")
-        turn = frequency(sling, shares[name].parameters.core.vehicle.body.mass) * core.interval
-        if turn > FASTEST:
-            message = f"the load swings along the cable by {turn:.2g} rad in an exchange interval"
+        key, distance = f"{keys[name]}effects.shared_slung_load", norm(subtract(hooks_world[name], start.load_position))
+        if distance > sling.length:
+            message = f"got {sling.length:g} m, and the load is {distance:.2f} m away, in the middle of its carriers"
+            raise ConfigError(f"{key}.length", message, f"at least {distance:.3g} m, or vehicles closer together")
+        angle = frequency(sling, shares[name].parameters.core.vehicle.body.mass) * core.interval
+        if angle > FASTEST:
+            message = f"the load swings along the cable by {angle:.2g} rad in a communication step"
             raise ConfigError(f"{key}.stiffness", message, f"at most {FASTEST:g} rad: a softer cable, or a higher rate")
     field = hooks.all_fields(core.vehicle.effects, shares[owner].parameters.start.vehicle.memory, ZERO)
     method = integrators.get("rk4").Method()

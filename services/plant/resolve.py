@@ -1,4 +1,4 @@
-"""From a scene to the plant's set-up: by the model that `vehicle.model` names."""
+"""Resolution of a scene into the plant's configuration, by the model of `vehicle.model`."""
 
 import importlib
 from collections.abc import Mapping
@@ -45,7 +45,7 @@ def _with_contact(scene: Scene, config: ServiceConfig) -> ServiceConfig:
     if effect is None:
         message = "no effect of the scene computes contact forces"
         raise ConfigError(
-            "rates.contact_forces", message, "a multirotor with [effects.ground_contact], or to leave it out"
+            "rates.contact_forces", message, "a multirotor with [effects.ground_contact], or no such rate"
         )
     plant, zero = config.parameters, (ZERO,) * len(effect.feet)
     port = Port(ports.CONTACT, ContactForces(zero, zero), rate_ticks(scene, "contact_forces"))

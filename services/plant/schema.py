@@ -1,4 +1,4 @@
-"""The `[solver]` of a scene: the integrator and its step."""
+"""The `[solver]` table of a scene: integrator and step."""
 
 from typing import Any, ClassVar
 
@@ -11,16 +11,16 @@ from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.kernels import math
 from lapwing.services.common.communication_schema import Communication
 
-CONTACT_SHARE = 3e-5  # of solver.accuracy, for one part of a step in contact: bounces amplify its errors
+CONTACT_SHARE = 3e-5  # of solver.accuracy, for a substep in contact: bounces amplify its errors
 MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 
-PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # the same of systems with contacts of their own, and without an accuracy
+PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # for systems with their own contacts; tolerance without an accuracy
 LEAST_PART_TOLERANCE = 1e-12  # its shortest substep, 1e-14 s, still advances a time of 10 s
 
 
 def contact_tolerance(accuracy: float) -> float:
-    """Return the error of a part of a step in contact that leaves an accuracy to a whole flight."""
+    """Return the tolerance of a substep in contact for the accuracy of an entire flight."""
     share = CONTACT_SHARE * math.pow(min(1.0, accuracy / MANY_SUBSTEPS), 0.2)
     return max(share * accuracy, LEAST_CONTACT_TOLERANCE)
 
@@ -30,8 +30,8 @@ class Solver(SceneTable):
 
     TABLE: ClassVar[str] = "solver"
     integrator: str = "rk4_renormalised"  # a module of lapwing/dynamics/integrators
-    step: float = Field(default=0.001, ge=1e-9)  # [s], divides the exchange interval
-    accuracy: float | None = Field(default=None, ge=1e-12)  # error that step, and integrator unless set, are chosen for
+    step: float = Field(default=0.001, ge=1e-9)  # [s], divides the communication step
+    accuracy: float | None = Field(default=None, ge=1e-12)  # maximum error, for which step and integrator are selected
 
     @field_validator("integrator")
     @classmethod
@@ -51,12 +51,12 @@ class Solver(SceneTable):
 
     @property
     def contact_tolerance(self) -> float:
-        """Error of a part of a step in contact; the usual one without an accuracy."""
+        """Tolerance of a substep in contact; the default one without an accuracy."""
         return CONTACT_TOLERANCE if self.accuracy is None else contact_tolerance(self.accuracy)
 
     @property
     def part_tolerance(self) -> float:
-        """Return the error of a part of a step of systems that are no multirotors (`integrate_step_doubling`)."""
+        """Tolerance of a substep of systems other than multirotors (`integrate_step_doubling`)."""
         if self.accuracy is None:
             return PART_TOLERANCE
         return max(PART_SHARE * self.accuracy, LEAST_PART_TOLERANCE)
@@ -72,7 +72,7 @@ class Solver(SceneTable):
         interval = scene[Communication].interval
         n = self.steps(scene[Communication])
         if n < 1 or abs(n * self.step - interval) > 1e-9 * interval:
-            expected = f"a step that divides the exchange interval of {interval:g} s"
+            expected = f"a step that divides the communication step of {interval:g} s"
             raise ConfigError("solver.step", f"got {self.step:g} s", expected)
 
 
@@ -90,8 +90,7 @@ def method(scene: Scene) -> tuple[tuple, int, float]:
     """
     solver, exchange = scene[Solver], scene[Communication]
     if solver.undecided:
-        chosen = "what `lapwing run` chooses for it is to be handed to every service"
-        message = f"{chosen}: --set solver.integrator=... --set solver.step=..."
+        message = "no solver is selected; pass that of `lapwing run`: --set solver.integrator=... --set solver.step=..."
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path))
     steps = solver.steps(exchange)
     return integrators.get(solver.integrator).Method(), steps, exchange.interval / steps

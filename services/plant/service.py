@@ -35,7 +35,7 @@ def create(setup: RunConfig) -> Service:
     bodies = [port for port in config.ports if port.name == ports.BODIES]
     feet = tuple(port for port in config.ports if port.name == ports.CONTACT)
     truth_ports = tuple(port for port in config.ports if port not in bodies and port not in feet)
-    has_own_bodies = plant.model == "cooperative_load"  # the motion of the bodies comes with the plant's step
+    has_own_bodies = plant.model == "cooperative_load"  # the plant's block outputs the bodies
     part = Block(
         NAME,
         plant.core,
@@ -48,7 +48,7 @@ def create(setup: RunConfig) -> Service:
     if plant.events:
         parts.insert(0, PropellerFailures(plant))
     if plant.others:
-        parts = _among_others(plant, plant.others, parts, state, bodies)
+        parts = _with_neighbours(plant, plant.others, parts, state, bodies)
     if bodies and plant.bodies and not has_own_bodies:
         inputs = config.inputs[:1]
         parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
@@ -57,7 +57,7 @@ def create(setup: RunConfig) -> Service:
     return Service(NAME, parts, wires(setup, plant.wiring))
 
 
-def _among_others(
+def _with_neighbours(
     plant: PlantSetup, others: FleetCoupling, parts: list[Any], state: Cell, bodies: list[Port]
 ) -> list[Any]:
     """Return the plant's blocks between the effects of its neighbours and its own neighbour state."""
@@ -65,18 +65,18 @@ def _among_others(
     interaction = Interaction(vehicle.effects, interval)
     view = PresenceView(vehicle, others.presence, interval)
     result = [
-        Block(f"{NAME}.interaction", interaction, state, _a_tick_ago(PRESENCE, *others.ports)),
+        Block(f"{NAME}.interaction", interaction, state, _delayed_inputs(PRESENCE, *others.ports)),
         *parts,
         Block(f"{NAME}.{PRESENCE}", view, state, (InputPort(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
     ]
     if others.load:
         load_ports = (Port(LOAD, NeighbourState()), *bodies)
-        carriers = _a_tick_ago(*others.load_inputs)
+        carriers = _delayed_inputs(*others.load_inputs)
         result.append(Block(f"{NAME}.{LOAD}", others.load, Cell(others.load_start), carriers, load_ports))
     return result
 
 
-def _a_tick_ago(*names: str) -> tuple[InputPort, ...]:
+def _delayed_inputs(*names: str) -> tuple[InputPort, ...]:
     return tuple(InputPort(name, 1) for name in names)
 
 
@@ -86,18 +86,18 @@ def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
             return DivergedError(
                 f"the multirotor: {plant.wiring.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
-                'Euler angles end; multibody.coordinates = "se3" has no such place'
+                'Euler angles are singular; use multibody.coordinates = "se3"'
             )
         system = "the multirotor" if isinstance(x, MultirotorPlantState) else plant.model
         motion = x.vehicle.motion if isinstance(x, MultirotorPlantState) else x
         where = f"{system}: not finite at t = {t:g} s: {not_finite(motion)}"
-        return DivergedError(f"{where}; take a smaller step than {plant.core.step:g} s")
+        return DivergedError(f"{where}; use a smaller step than {plant.core.step:g} s")
 
     return error
 
 
 class PropellerFailures:
-    """Propellers that are locked, released or torn off in flight: another plant then continues with the state."""
+    """Replaces the plant when a propeller is locked, freed or torn off in flight; the state continues."""
 
     name = f"{NAME}.breakages"
     outputs = ()
@@ -106,7 +106,7 @@ class PropellerFailures:
         self._steps = {tick: tuple(events) for tick, events in groupby(plant.events, lambda event: event.tick)}
         self._form = multirotor_euler if plant.euler else multirotor_multibody
         self._core, self._bodies = plant.core, plant.bodies
-        self._blocks: dict[int, list[tuple[Block, BoundBlock]]] = {}  # by the tick at which they replace others
+        self._blocks: dict[int, list[tuple[Block, BoundBlock]]] = {}  # replacements by tick
 
     def bind(self, graph: BlockDiagram) -> None:
         """Compile the plants of all failures before the first tick."""
@@ -118,10 +118,10 @@ class PropellerFailures:
                 failures.append(Failure(event.time, p, event.becomes == "locked"))
             failing, core = FailingMultirotorPlant(core, tuple(failures)), core._replace(vehicle=p)
             view = self._bodies._replace(vehicle=p)
-            self._blocks[tick + 2] = [self._prepared(NAME, core)]
-            self._blocks[tick + 1] = [self._prepared(NAME, failing), self._prepared(f"{NAME}.bodies", view)]
+            self._blocks[tick + 2] = [self._prepare(NAME, core)]
+            self._blocks[tick + 1] = [self._prepare(NAME, failing), self._prepare(f"{NAME}.bodies", view)]
 
-    def _prepared(self, name: str, parameters: Any) -> tuple[Block, BoundBlock]:
+    def _prepare(self, name: str, parameters: Any) -> tuple[Block, BoundBlock]:
         part = replace(self._graph.part(name), parameters=parameters)
         return part, self._graph.prepare(part)
 

@@ -18,22 +18,22 @@ class PlantEvent(NamedTuple):
 class FleetCoupling(NamedTuple):
     """Fleet data of a plant's effects."""
 
-    ports: tuple[str, ...]  # of the others' presence, as this vehicle calls them; that of a load among them
-    presence: NeighbourState  # what these may know of its vehicle, with the numbers that do not change
-    load: Any = None  # parameters of the load that this plant moves beside its vehicle, None without it
+    ports: tuple[str, ...]  # neighbour-state ports that it reads, including that of a load
+    presence: NeighbourState  # prototype of its own neighbour state, with the constant fields
+    load: Any = None  # parameters of the load that this plant integrates, or None
     load_start: Any = None  # its state at tick 0
-    load_inputs: tuple[str, ...] = ()  # ports of its carriers' presence
+    load_inputs: tuple[str, ...] = ()  # neighbour-state ports of its carriers
 
 
 class PlantSetup(NamedTuple):
-    """A plant."""
+    """Configuration of a plant."""
 
-    model: str  # for people
-    core: Any  # parameters of a part of services/plant/cores
-    start: Any  # the state at tick 0
+    model: str  # name of the plant model
+    core: Any  # parameters of a block of services/plant/blocks
+    start: Any  # state at tick 0
     wiring: PlantWiring
     bodies: Any = None  # parameters of the block that publishes body states, or None
     events: tuple[PlantEvent, ...] = ()
-    euler: bool = False  # five bodies in Euler angles, which end where a pitch reaches 90 degrees
+    euler: bool = False  # five bodies in Euler angles, singular at a pitch of 90 degrees
     others: FleetCoupling | None = None
     contact: Any = None  # parameters of the block that publishes contact forces, or None

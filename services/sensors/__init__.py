@@ -1,1 +1,1 @@
-"""Sensors: from the true motion to what instruments say. One file each; a file with `PRESETS` is a sensor."""
+"""The sensor service: readings of instruments from the true state. Each module with `PRESETS` is a sensor."""

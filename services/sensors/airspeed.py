@@ -1,4 +1,4 @@
-"""Airspeed sensor, a pitot tube: the dynamic pressure of the air that comes along it (theory.md, eq. (3.39))."""
+"""Airspeed sensor (pitot tube): dynamic pressure of the flow along its axis (theory.md, eq. (3.39))."""
 
 import math
 from typing import Annotated, Any, NamedTuple
@@ -21,7 +21,7 @@ CHANNELS = ("pressure",)
 
 
 class Airspeed(NamedTuple):
-    """Parameters of a tube along the body's x axis."""
+    """Parameters of a pitot tube along the body's x axis."""
 
     noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
     turn_on_bias_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
@@ -29,16 +29,16 @@ class Airspeed(NamedTuple):
     range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
     resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
 class AirspeedState(NamedTuple):
-    """State of a tube."""
+    """State of a pitot tube."""
 
     scale: float
     turn_on_bias: float  # [Pa]
-    line: Line  # the first of the three
+    line: Line  # only the first component is used
 
 
 READING = AirspeedReading()
@@ -51,7 +51,7 @@ def blank() -> AirspeedState:
 
 @always_inline
 def _true_pressure(truth: Truth) -> float:
-    """Return the differential pressure [Pa]; flow from behind causes the same suction."""
+    """Return the differential pressure [Pa]; flow from behind causes a negative one of the same size."""
     along = rotate_back(truth.attitude, truth.air_velocity_world)[0]
     return 0.5 * truth.air_density * along * abs(along)
 
@@ -70,20 +70,20 @@ def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> 
     noise = error_models.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     measured = s.scale * _true_pressure(truth) + s.turn_on_bias + noise
     measured = error_models.quantise(error_models.limit(measured, p.range_pa), p.resolution_pa)
-    line, arrived, valid = apply_delay_and_faults(
+    line, delayed, valid = apply_delay_and_faults(
         p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0)
     )
     variance = error_models.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
-    return AirspeedState(s.scale, s.turn_on_bias, line), AirspeedReading(arrived[0], variance, valid)
+    return AirspeedState(s.scale, s.turn_on_bias, line), AirspeedReading(delayed[0], variance, valid)
 
 
 def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
-    """Return the encoder of its topic."""
+    """Return the encoder of the sensor's topic."""
     return [encoder_of_airspeed(topic.AIRSPEED, frame, port)]
 
 
 # Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Resolution: 20 counts a pascal, the scale
-# in PX4's and ArduPilot's drivers. Chosen: zero point, span and noise (the sheet's tables were not at hand).
+# in PX4's and ArduPilot's drivers. Chosen: zero point, span and noise (the sheet's tables were not available).
 SDP33 = Airspeed(noise_pa_per_sqrt_hz=0.05, turn_on_bias_pa=0.2, scale_error=0.03, range_pa=1500.0, resolution_pa=0.05)
 
 # TE 4525DO data sheet: 14 bits, 1 psi differential, total error band below 1 % of the span. Counts 1638 to 14745 for

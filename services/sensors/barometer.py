@@ -34,7 +34,7 @@ class StaticPressureError(NamedTuple):
 
 
 class Barometer(NamedTuple):
-    """Parameters."""
+    """Parameters of a barometer."""
 
     noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
     bias_instability_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] peak of the Allan deviation of the bias walk (weather)
@@ -44,11 +44,11 @@ class Barometer(NamedTuple):
     range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
     resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    static_pressure_error: StaticPressureError | None = None  # by wind and own motion; none if left out
-    wash_pa_per_n: Annotated[float, Ge(-10), Le(10)] = 0.0  # [Pa/N] of the rotors' thrust, added to the pressure
-    temperature_pa_per_k: Annotated[float, Ge(0)] = 0.0  # [Pa/K] what calibration leaves, one standard deviation
-    warm_up_rise: Annotated[float, Ge(-200), Le(200)] = 0.0  # [K] still to come at the start
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
+    static_pressure_error: StaticPressureError | None = None  # by wind and own motion; default: none
+    wash_pa_per_n: Annotated[float, Ge(-10), Le(10)] = 0.0  # [Pa/N] pressure change over the rotors' thrust
+    temperature_pa_per_k: Annotated[float, Ge(0)] = 0.0  # [Pa/K] residual after calibration, one standard deviation
+    warm_up_rise: Annotated[float, Ge(-200), Le(200)] = 0.0  # [K] temperature rise after the start
     warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
@@ -58,9 +58,9 @@ class BarometerState(NamedTuple):
 
     scale: float
     turn_on_bias: float  # [Pa]
-    walk: Vec3  # [Pa], the first of the three
-    line: Line  # the first of the three
-    cold: float  # [Pa] of the warm-up still to come
+    walk: Vec3  # [Pa] bias walk; only the first component is used
+    line: Line  # only the first component is used
+    warm_up: float  # [Pa] remaining warm-up error
 
 
 def blank() -> BarometerState:
@@ -70,7 +70,7 @@ def blank() -> BarometerState:
 
 @kernel
 def position_error(e: StaticPressureError | None, truth: Truth) -> float:
-    """Return what the flow around the vehicle adds to the static pressure [Pa] (theory.md, eq. (3.65))."""
+    """Return the static pressure error [Pa] of the flow around the vehicle (theory.md, eq. (3.65))."""
     if e is None:
         return 0.0
     x, y, z = rotate_back(truth.attitude, truth.air_velocity_world)
@@ -93,9 +93,9 @@ def initial(p: Barometer, key: Key, truth: Truth) -> BarometerState:
     scale = 1.0 + p.scale_error * draw[0]
     turn_on_bias = p.turn_on_bias_pa * draw[1]
     walk = error_models.walk_deviation(p.bias_instability_pa) * draw[2]
-    cold = p.warm_up_rise * p.temperature_pa_per_k * normal(key, TURN_ON, 1) if p.temperature_pa_per_k > 0.0 else 0.0
-    start = scale * true + turn_on_bias + walk - cold
-    return BarometerState(scale, turn_on_bias, (walk, 0.0, 0.0), new_delay_line((start, 0.0, 0.0)), cold)
+    warm_up = p.warm_up_rise * p.temperature_pa_per_k * normal(key, TURN_ON, 1) if p.temperature_pa_per_k > 0.0 else 0.0
+    start = scale * true + turn_on_bias + walk - warm_up
+    return BarometerState(scale, turn_on_bias, (walk, 0.0, 0.0), new_delay_line((start, 0.0, 0.0)), warm_up)
 
 
 @kernel
@@ -107,14 +107,14 @@ def sample(
     walk = error_models.walk(s.walk, deviation, p.bias_correlation_time, p.rate, (normal(key, tick, 0), 0.0, 0.0))
     noise = error_models.white_deviation(p.noise_pa_per_sqrt_hz, p.rate) * normal(key, tick, 1)
     true = _true_pressure(p, truth)
-    measured = s.scale * true + s.turn_on_bias + walk[0] + noise - s.cold
+    measured = s.scale * true + s.turn_on_bias + walk[0] + noise - s.warm_up
     measured = error_models.quantise(error_models.limit(measured, p.range_pa), p.resolution_pa)
-    line, arrived, valid = apply_delay_and_faults(
+    line, delayed, valid = apply_delay_and_faults(
         p.faults, s.line, p.latency_samples, 0, key, tick, (measured, 0.0, 0.0)
     )
     variance = error_models.sample_variance(p.noise_pa_per_sqrt_hz, p.resolution_pa, p.rate)
-    cold = s.cold * (1.0 - 1.0 / (p.rate * p.warm_up_time))
-    return BarometerState(s.scale, s.turn_on_bias, walk, line, cold), BarometerReading(arrived[0], variance, valid)
+    warm_up = s.warm_up * (1.0 - 1.0 / (p.rate * p.warm_up_time))
+    return BarometerState(s.scale, s.turn_on_bias, walk, line, warm_up), BarometerReading(delayed[0], variance, valid)
 
 
 # TE MS5611-01BA03 data sheet: 1.2 Pa RMS and 1 Pa resolution at the maximum oversampling, +-150 Pa, 1.2 bar. Here

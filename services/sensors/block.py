@@ -1,4 +1,4 @@
-"""One instrument, compiled: the true state in, its reading out at its own rate."""
+"""Compiled sensor block: true state in, readings out at the sensor's rate."""
 
 import sys
 from typing import Any, NamedTuple
@@ -16,10 +16,10 @@ from lapwing.services.sensors.sensor_inputs import ROTORS, Truth
 
 
 class Instrument(NamedTuple):
-    """A sensor that the vehicle carries."""
+    """Parameters of the block."""
 
     sensor: Any  # parameters: Imu, Gps, ...
-    key: Key  # of its random numbers
+    key: Key  # key of its random numbers
     gravity: float  # [m/s^2] at home, 0 without a gravity effect
     around: Environment
 
@@ -38,7 +38,7 @@ def _initial(p: types.Type, key: types.Type, truth: types.Type) -> Any:
 
 @generic(inline=True)
 def first_rotors(speed: types.Type) -> Any:
-    """Return the speeds of ROTORS rotors, 0 for those that the vehicle does not have."""
+    """Return the speeds of ROTORS rotors, 0 beyond the vehicle's number."""
     items = ", ".join(f"speed[{i}]" if i < len(speed) else "0.0" for i in range(ROTORS))
     return compile_source("first_rotors(speed)", {}, f"return ({items})")
 
@@ -50,12 +50,12 @@ def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> t
     ground, _ = surface(around.terrain, x.position_world[0], x.position_world[1])
     air = subtract(x.velocity_world, x.wind_world)
     current, thrust, speed = 0.0, 0.0, 0.0
-    for of_one in x.motor_current:
-        current += of_one
-    for of_one in x.rotor_thrust:
-        thrust += of_one
-    for of_one in x.rotor_speed:
-        speed += of_one
+    for value in x.motor_current:
+        current += value
+    for value in x.rotor_thrust:
+        thrust += value
+    for value in x.rotor_speed:
+        speed += value
     truth = Truth(
         x.position_world,
         x.attitude,

@@ -1,6 +1,6 @@
-"""The way from an instrument to the wire: latency in whole samples, and faults by schedule.
+"""Output stage of an instrument: latency in whole samples, and scheduled faults.
 
-A faulty instrument still sends: a reading that is lost says so with `valid = False`.
+A faulty instrument still outputs readings; lost ones have `valid = False`.
 """
 
 from typing import NamedTuple
@@ -9,7 +9,7 @@ from lapwing.dynamics.noise import Key, normal3, uniform
 from lapwing.dynamics.vector import ZERO, Vec3, add, multiply, scale
 from lapwing.kernels import always_inline, kernel
 
-DEPTH = 16  # samples that a line remembers
+DEPTH = 16  # [samples] length of a delay line
 Line = tuple[Vec3, ...]  # the last DEPTH values, newest first
 
 BLANK: Line = (ZERO,) * DEPTH
@@ -17,19 +17,19 @@ BLANK: Line = (ZERO,) * DEPTH
 KINDS = ("none", "dropout", "freeze", "bias", "spikes", "drift", "scale", "delay")
 NONE, DROPOUT, FREEZE, BIAS, SPIKES, DRIFT, SCALE, DELAY = range(len(KINDS))
 ALL_CHANNELS = -1
-_SPIKE_LANE = 100  # draws of spikes, clear of the instruments' own lanes
+_SPIKE_LANE = 100  # lane of the spikes' random numbers, above those of the instruments
 
 
 class Fault(NamedTuple):
-    """One fault as the kernels see it."""
+    """Compiled fault."""
 
     kind: int = NONE  # index into KINDS
     channel: int = ALL_CHANNELS
     start: int = 0  # [tick]
-    stop: int = 0  # [tick], the first one without the fault
+    stop: int = 0  # [tick] exclusive
     size: Vec3 = ZERO  # bias and spikes: unit of the channel; drift: that per tick; scale: factor
     probability: float = 0.0  # of a spike, per sample
-    samples: int = 0  # of delay, on top of the latency
+    samples: int = 0  # [samples] delay in addition to the latency
 
 
 @always_inline
@@ -48,19 +48,19 @@ def _push(line: Line, value: Vec3) -> Line:
 def apply_delay_and_faults(
     faults: tuple[Fault, ...] | None, line: Line, latency: int, channel: int, key: Key, tick: int, value: Vec3
 ) -> tuple[Line, Vec3, bool]:
-    """Send one value of a channel down its line.
+    """Return the output of a channel's delay line after a new value.
 
     Args:
         faults: tuple of `Fault`, or None (compiled away).
         line: the channel's `Line`.
         latency: [samples], less than DEPTH.
-        channel: index of the channel among its instrument's.
-        key: of the instrument's random stream.
-        tick: now.
-        value: what the instrument measured now.
+        channel: index of the channel in the instrument's `CHANNELS`.
+        key: key of the instrument's random stream.
+        tick: present tick.
+        value: measured value of this tick.
 
     Returns:
-        The line with the value in it, the value that arrives now, and whether one arrives.
+        The new delay line, the delayed value, and False if the reading is lost.
     """
     if faults is None:
         line = _push(line, value)

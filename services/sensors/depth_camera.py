@@ -63,7 +63,7 @@ def pixels(p: DepthCamera) -> tuple[np.ndarray, np.ndarray]:
 
 
 def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
-    """Return the encoder of its topic."""
+    """Return the encoder of the sensor's topic."""
     p: DepthCamera = instrument.sensor
     terrain = as_relief(instrument.around.terrain)
     directions, cosines = pixels(p)

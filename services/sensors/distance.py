@@ -10,14 +10,14 @@ from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, Line, apply_delay_and_faults, new_delay_line
 
 CHANNELS = ("range",)
-FARTHEST = 1000.0  # [m] that the ground is looked for
+FARTHEST = 1000.0  # [m] maximum length of a ray
 
 
 class DistanceState(NamedTuple):
-    """State of a sensor of distance."""
+    """State of a distance sensor."""
 
     scale: float
-    line: Line  # the first of the three
+    line: Line  # only the first component is used
 
 
 def blank() -> DistanceState:
@@ -36,8 +36,8 @@ def measure(p: Any, s: DistanceState, key: Key, tick: int, distance: float) -> t
     """Return the next state and the reading of a true distance [m]. See `imu.sample` for other arguments."""
     noise = error_models.white_deviation(p.noise_m_per_sqrt_hz, p.rate) * normal(key, tick, 0)
     true = (s.scale * distance + noise, 0.0, 0.0)
-    line, arrived, valid = apply_delay_and_faults(p.faults, s.line, p.latency_samples, 0, key, tick, true)
-    result = error_models.quantise(arrived[0], p.resolution)
+    line, delayed, valid = apply_delay_and_faults(p.faults, s.line, p.latency_samples, 0, key, tick, true)
+    result = error_models.quantise(delayed[0], p.resolution)
     if result > p.range_max:
         result = math.inf
     elif result < p.range_min:

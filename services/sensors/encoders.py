@@ -1,4 +1,4 @@
-"""Readings as messages. A reading that is not there is said in each type's own way, never by silence."""
+"""Topic encoders of the sensors. Lost readings are published by the convention of each message type, never omitted."""
 
 from collections.abc import Callable
 from functools import partial
@@ -36,10 +36,11 @@ _GPS_STATUS = np.array(
 )
 _NORMAL_95 = 1.959964  # standard deviations
 
-UNKNOWN = -1.0  # first element of a covariance: there is no such measurement
+UNKNOWN = -1.0  # first element of the covariance of a missing measurement
 
 
-PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)  # others make their own topics
+# Other sensors have their own encoders.
+PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)
 
 
 class SonarWiring(NamedTuple):
@@ -70,15 +71,17 @@ def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[T
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
     return [
-        TopicEncoder(which, port, port_of[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
-        for which, port, fields, sample in known
+        TopicEncoder(name, port, port_of[port].period, fields, lambda sample=sample: sample)  # type: ignore[misc]
+        for name, port, fields, sample in known
         if port in port_of
     ]
 
 
-def own_wire(frame: str, port: Port) -> TopicEncoder:
+def custom_sensor_encoder(frame: str, port: Port) -> TopicEncoder:
     """Return the encoder of a custom sensor."""
-    return TopicEncoder(topic.custom_sensor(port.name), port.name, port.period, _own, partial(_own_sample, frame, port))
+    return TopicEncoder(
+        topic.custom_sensor(port.name), port.name, port.period, _custom, partial(_custom_sample, frame, port)
+    )
 
 
 def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:
@@ -93,11 +96,11 @@ def _three(values: np.ndarray) -> np.ndarray:
     return np.repeat(np.asarray(values)[:, None], 3, axis=1)
 
 
-def _own_sample(frame: str, port: Port) -> Any:
+def _custom_sample(frame: str, port: Port) -> Any:
     return Reading(header(0, frame), port.name, (0.0,) * row_width(port.like))
 
 
-def _own(reading: Any, time_ns: np.ndarray) -> Fields:
+def _custom(reading: Any, time_ns: np.ndarray) -> Fields:
     """Return the numbers of a custom sensor's reading."""
 
     def leaves(part: Any) -> list[np.ndarray]:
@@ -130,9 +133,9 @@ def _magnetometer(r: MagnetometerReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def _late(r: GpsReading, time_ns: np.ndarray) -> np.ndarray:
+def _fix_times(r: GpsReading, time_ns: np.ndarray) -> np.ndarray:
     """Return the times [ns] for which the fixes are valid."""
-    # what was measured before the start is as true at the start: the vehicle stood there
+    # fixes from before the start are stamped with the start: the vehicle was at rest
     return np.maximum(time_ns - np.round(np.asarray(r.age) * 1e9).astype(np.int64), 0)
 
 
@@ -148,7 +151,7 @@ def _gps(fix: int, r: GpsReading, time_ns: np.ndarray) -> Fields:
     """Return a fix, stamped with the time for which it is valid; without a reading, no fix."""
     valid, kind = np.asarray(r.valid) != 0.0, np.asarray(r.fix).astype(int)
     return {
-        **stamp_columns(_late(r, time_ns)),
+        **stamp_columns(_fix_times(r, time_ns)),
         "status.status": np.where(valid, _NAV_SAT[kind] + (kind == 0) * fix, NavSatStatus.STATUS_NO_FIX),
         "latitude": r.latitude_deg,
         "longitude": r.longitude_deg,
@@ -166,11 +169,11 @@ def _details_sample(frame: str) -> Any:
 
 
 def _gps_details(r: GpsReading, time_ns: np.ndarray) -> Fields:
-    """Return kind of fix, satellites, dilution of precision and motion; uncertainties are of 95 %."""
+    """Return kind of fix, satellites, dilution of precision and motion; uncertainties are those of 95 % probability."""
     valid, kind = np.asarray(r.valid) != 0.0, np.asarray(r.fix).astype(int)
     velocity, variance = np.asarray(r.velocity_world), np.asarray(r.position_variance)
     hdop, vdop = np.asarray(r.hdop), np.asarray(r.vdop)
-    stamp = stamp_columns(_late(r, time_ns))
+    stamp = stamp_columns(_fix_times(r, time_ns))
     return {
         **stamp,
         **{f"status.{name}": value for name, value in stamp.items()},
@@ -196,7 +199,7 @@ def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
     """Return the velocity in the world frame; without a reading, the covariance starts with -1."""
     valid = np.asarray(r.valid) != 0.0
     return {
-        **stamp_columns(_late(r, time_ns)),
+        **stamp_columns(_fix_times(r, time_ns)),
         "twist.twist.linear": r.velocity_world,
         "twist.covariance": diagonal(_three(np.where(valid, r.velocity_variance, UNKNOWN)), size=6),
     }

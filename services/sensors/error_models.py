@@ -1,4 +1,4 @@
-"""Errors that instruments share: white noise, first-order bias walk, saturation, quantisation (theory.md, section 3.2).
+"""Error models of instruments: white noise, first-order bias walk, saturation, quantisation (theory.md, section 3.2).
 
 Densities are one-sided: a density n [u/sqrt(Hz)] sampled at f [Hz] gives the standard deviation n sqrt(f/2), and the
 Allan deviation n / sqrt(2 tau).

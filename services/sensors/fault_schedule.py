@@ -1,4 +1,4 @@
-"""Fault schedules: from a scene's tables to what the kernels read."""
+"""Compilation of fault schedules from a scene's tables."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,26 +11,26 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 from lapwing.services.sensors.delay_line import ALL_CHANNELS, DEPTH, DRIFT, KINDS, Fault
 
-SLOTS = 4  # faults of one sensor; the number is fixed, so that schedules share their machine code
+SLOTS = 4  # faults of a sensor; a fixed number, so that all schedules share their machine code
 _FOREVER = 2**62  # [tick]
 
 
 class FaultTable(BaseModel):
-    """One fault of a sensor, as a scene has it.
+    """Scene table of a sensor fault.
 
-    `dropout`: the reading says that there is none. `freeze`: the last value again. `bias`: plus `size`. `spikes`: with
-    `probability`, plus a normal draw of deviation `size`. `drift`: plus `size` for each second since `start`. `scale`:
-    times `size`. `delay`: by `samples` more.
+    `dropout`: invalid readings. `freeze`: the last value repeated. `bias`: `size` added. `spikes`: with `probability`,
+    a normal random number of standard deviation `size` added. `drift`: `size` added per second since `start`. `scale`:
+    multiplied by `size`. `delay`: `samples` added to the latency.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    kind: Literal["dropout", "freeze", "bias", "spikes", "drift", "scale", "delay"]  # what goes wrong
+    kind: Literal["dropout", "freeze", "bias", "spikes", "drift", "scale", "delay"]  # type of the fault
     start: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
-    stop: float = math.inf  # [s] simulation time; for good if left out
-    channel: str = "all"  # of the sensor; all of them if left out
+    stop: float = math.inf  # [s] simulation time; default: until the end of the run
+    channel: str = "all"  # channel of the sensor; default: all
     size: float | Annotated[list[float], Len(3, 3)] = 0.0  # SI unit of the channel; spikes: deviation; drift: per s
     probability: Annotated[float, Ge(0), Le(1)] = 0.1  # of a spike, per sample
-    samples: Annotated[int, Field(ge=0, lt=DEPTH)] = 0  # of delay, on top of the latency
+    samples: Annotated[int, Field(ge=0, lt=DEPTH)] = 0  # [samples] delay in addition to the latency
 
 
 def compile_faults(

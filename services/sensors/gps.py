@@ -1,4 +1,4 @@
-"""Satellite receiver: position on WGS 84 and velocity, late (theory.md, section 3.2)."""
+"""Satellite receiver: delayed position on WGS 84 and velocity (theory.md, section 3.2)."""
 
 from typing import Annotated, NamedTuple
 
@@ -44,23 +44,23 @@ class Outage(NamedTuple):
 
 
 class Gps(NamedTuple):
-    """Parameters; horizontal figures are per axis."""
+    """Parameters of a receiver; horizontal values are per axis."""
 
     noise_horizontal_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
     noise_vertical_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)]
     noise_velocity_m_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/s/sqrt(Hz)]
     correlated_error_horizontal: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation, correlated in time
     correlated_error_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
-    correlation_time: Annotated[float, Gt(0)] = 60.0  # [s] its correlation time
-    sky: tuple[Satellite, ...] | None = None  # satellites in view: position errors are theirs, not those above
-    constellation: Constellation | None = None  # satellites on their orbits, instead of `sky`
+    correlation_time: Annotated[float, Gt(0)] = 60.0  # [s] of the correlated errors
+    sky: tuple[Satellite, ...] | None = None  # fixed satellites in view, whose range errors replace the above
+    constellation: Constellation | None = None  # satellites on orbits, instead of `sky`
     range_noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] of the distance to a satellite
-    range_correlated_error: Annotated[float, Ge(0)] = 0.0  # [m] of the same, correlated in time
-    fix_status: Annotated[int, Ge(0), Le(2)] = 0  # of NavSatStatus: 0 alone, 1 SBAS, 2 with a ground station (RTK)
+    range_correlated_error: Annotated[float, Ge(0)] = 0.0  # [m] time-correlated error of the distance to a satellite
+    fix_status: Annotated[int, Ge(0), Le(2)] = 0  # NavSatStatus: 0 plain, 1 SBAS, 2 with a ground station (RTK)
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    antenna: Place | None = None  # [m] body; the centre of mass if left out
-    rtk: Rtk | None = None  # single, float and fixed solutions; always as `fix_status` says if left out
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
+    antenna: Place | None = None  # [m] body; default: centre of mass
+    rtk: Rtk | None = None  # single, float and fixed solutions; default: always `fix_status`
     time_to_first_fix: Annotated[float, Ge(0), Le(1e5)] = 0.0  # [s] from the start of the run
     outages: tuple[Outage, ...] | None = None  # [m] circles without a fix: { x, y, radius }
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
@@ -69,7 +69,7 @@ class Gps(NamedTuple):
 class GpsState(NamedTuple):
     """State of a receiver."""
 
-    wander: Vec3  # in standard deviations
+    wander: Vec3  # correlated errors, in standard deviations
     geometry: Mat3  # factor L of the covariance L L^T of a position, east, north, up, by distances of unit deviation
     position_line: Line
     velocity_line: Line
@@ -90,10 +90,10 @@ def _deviations(p: Gps) -> Vec3:
 
 
 @always_inline
-def _range_deviations(p: Gps, worse: float) -> tuple[float, float]:
+def _range_deviations(p: Gps, factor: float) -> tuple[float, float]:
     """Return the standard deviations of a distance [m]: white and correlated."""
     noise = error_models.white_deviation(p.range_noise_m_per_sqrt_hz, p.rate)
-    return noise, worse * p.range_correlated_error
+    return noise, factor * p.range_correlated_error
 
 
 def check(p: Gps) -> None:
@@ -102,23 +102,23 @@ def check(p: Gps) -> None:
     check_rtk(p.rtk)
     check_sky(p.sky)
     if p.sky is not None and p.constellation is not None:
-        raise ConfigError("constellation", "is given with sky", "one of them")
+        raise ConfigError("constellation", "cannot be combined with sky", "one of them")
 
 
 @always_inline
-def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3, fix: Solution, worse: float) -> tuple[Vec3, Vec3]:
-    """Return error [m] and variance [m^2], both east, north, up; correlated errors are `worse` times their figure."""
+def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3, fix: Solution, factor: float) -> tuple[Vec3, Vec3]:
+    """Return error [m] and variance [m^2], both east, north, up; correlated errors are multiplied by `factor`."""
     if p.constellation is not None:
-        noise, wandering = _range_deviations(p, worse)
+        noise, wandering = _range_deviations(p, factor)
         return fix.error, scale(noise * noise + wandering * wandering, fix.variance)
     if p.sky is None:
-        w = scale(worse, _deviations(p))
+        w = scale(factor, _deviations(p))
         across = error_models.white_deviation(p.noise_horizontal_m_per_sqrt_hz, p.rate)
         up = error_models.white_deviation(p.noise_vertical_m_per_sqrt_hz, p.rate)
         horizontal = across * across + w[0] * w[0]
         error = add(multiply(w, wander), multiply((across, across, up), white))
         return error, (horizontal, horizontal, up * up + w[2] * w[2])
-    (noise, wandering), L = _range_deviations(p, worse), s.geometry
+    (noise, wandering), L = _range_deviations(p, factor), s.geometry
     square = noise * noise + wandering * wandering
     east, north = L[0] * L[0], L[3] * L[3] + L[4] * L[4]
     variance = (square * east, square * north, square * (L[6] * L[6] + L[7] * L[7] + L[8] * L[8]))
@@ -136,20 +136,20 @@ def _antenna_motion(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
 
 
 @kernel
-def _under_sky(outages: tuple[Outage, ...] | None, position: Vec3) -> bool:
-    """Return True if there is a fix at this position."""
+def _outside_outages(outages: tuple[Outage, ...] | None, position: Vec3) -> bool:
+    """Return True if the position [m] is outside of all outages."""
     if outages is None:
         return True
-    free = True
+    outside = True
     for circle in outages:
-        free = free and math.hypot(position[0] - circle.x, position[1] - circle.y) >= circle.radius
-    return free
+        outside = outside and math.hypot(position[0] - circle.x, position[1] - circle.y) >= circle.radius
+    return outside
 
 
 @always_inline
 def _solution(p: Gps, s: GpsState, antenna: Vec3, truth: Truth, key: Key, tick: int) -> Solution:
-    """Return the fix by a constellation."""
-    fix = _fix_now(p.rtk, s.rtk, p.fix_status)
+    """Return the fix from the satellites of a constellation."""
+    fix = _fix_kind(p.rtk, s.rtk, p.fix_status)
     white, correlated = _range_deviations(p, ratio(p.rtk, fix))
     return solution(
         p.constellation, truth.home, truth.terrain, antenna, s.samples / p.rate, s.ranges, correlated, white,
@@ -158,21 +158,16 @@ def _solution(p: Gps, s: GpsState, antenna: Vec3, truth: Truth, key: Key, tick: 
 
 
 @kernel
-def _fix_now(rtk: Rtk | None, s: RtkState, fix_status: int) -> int:
+def _fix_kind(rtk: Rtk | None, s: RtkState, fix_status: int) -> int:
     """Return the kind of fix, as in `GpsReading`."""
     if rtk is None:
         return GPS_RTK if fix_status == RTK_STATUS else fix_status + 1
     return s.fix
 
 
-@always_inline
-def _has_satellites(c: Constellation | None, rtk: Rtk | None) -> bool:
-    return c is not None or rtk is not None
-
-
 @kernel
 def initial(p: Gps, key: Key, truth: Truth) -> GpsState:
-    """Return the state before the first sample: the receiver has run here for its latency."""
+    """Return the state before the first sample: the receiver has run here, at rest, for its latency."""
     wander = normal3(key, TURN_ON, 0)
     position, velocity = _antenna_motion(p.antenna, truth)
     ranges, rtk = first_errors(p.constellation, key, TURN_ON), RtkState(math.inf, 0.0, GPS_RTK)
@@ -196,34 +191,25 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
     position, velocity = _antenna_motion(p.antenna, truth)
     time = s.samples / p.rate
     s = GpsState(wander, s.geometry, s.position_line, s.velocity_line, ranges, s.rtk, s.samples)
-    kind, fix = _fix_now(p.rtk, s.rtk, p.fix_status), _solution(p, s, position, truth, key, tick)
-    on = time >= p.time_to_first_fix and fix.found and _under_sky(p.outages, truth.position_world)
-    rtk = update_solution(p.rtk, s.rtk, 1.0 / p.rate, time, fix.used, on)
+    kind, fix = _fix_kind(p.rtk, s.rtk, p.fix_status), _solution(p, s, position, truth, key, tick)
+    has_fix = time >= p.time_to_first_fix and fix.has_fix and _outside_outages(p.outages, truth.position_world)
+    rtk = update_solution(p.rtk, s.rtk, 1.0 / p.rate, time, fix.used, has_fix)
     error, variance = _position_error(p, s, wander, normal3(key, tick, 1), fix, ratio(p.rtk, kind))
     position = add(position, error)
     velocity = add(velocity, multiply((v, v, v), normal3(key, tick, 2)))
-    position_line, position, seen = apply_delay_and_faults(
+    position_line, position, position_valid = apply_delay_and_faults(
         p.faults, s.position_line, p.latency_samples, 0, key, tick, position
     )
-    velocity_line, velocity, moving = apply_delay_and_faults(
+    velocity_line, velocity, velocity_valid = apply_delay_and_faults(
         p.faults, s.velocity_line, p.latency_samples, 1, key, tick, velocity
     )
     latitude, longitude, height = enu_to_geodetic(truth.home, position)
+    valid = position_valid and velocity_valid and has_fix
+    reported_kind = kind if p.constellation is not None or p.rtk is not None else 0
     reading = GpsReading(
-        latitude,
-        longitude,
-        height,
-        variance,
-        velocity,
-        v * v,
-        p.latency_samples / p.rate,
-        seen and moving and on,
-        kind if _has_satellites(p.constellation, p.rtk) else 0,
-        fix.used,
-        fix.visible,
-        math.sqrt(fix.variance[0] + fix.variance[1]),
-        math.sqrt(fix.variance[2]),
-    )
+        latitude, longitude, height, variance, velocity, v * v, p.latency_samples / p.rate, valid, reported_kind,
+        fix.used, fix.visible, math.sqrt(fix.variance[0] + fix.variance[1]), math.sqrt(fix.variance[2]),
+    )  # fmt: skip
     return GpsState(wander, s.geometry, position_line, velocity_line, ranges, rtk, s.samples + 1), reading
 
 

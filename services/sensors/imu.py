@@ -23,7 +23,7 @@ from lapwing.services.sensors.triad import (
     Gyro,
     Triad,
     accelerometer_units,
-    g_shift,
+    gyro_coupling_bias,
     gyro_units,
     measure,
     new_triad,
@@ -37,22 +37,22 @@ _JITTER = 4  # lane of the draws of the sampling instants
 class Imu(NamedTuple):
     """Parameters of an inertial measurement unit."""
 
-    gyro: Gyro = Gyro()  # its gyroscopes
-    accelerometer: Accelerometer = Accelerometer()  # its accelerometers
+    gyro: Gyro = Gyro()  # errors of the gyroscopes
+    accelerometer: Accelerometer = Accelerometer()  # errors of the accelerometers
     rate: Annotated[float, Gt(0)] = 250.0  # [Hz]
-    instances: Annotated[int, Ge(1), Le(3)] = 1  # redundant units; the autopilot votes; `faults` are of the first
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    warm_up_rise: float = 0.0  # [K] still to come at the start, over the calibrated temperature
+    instances: Annotated[int, Ge(1), Le(3)] = 1  # redundant units, with a vote in the autopilot; `faults` of the first
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
+    warm_up_rise: float = 0.0  # [K] temperature rise from the start to the calibrated temperature
     warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
-    delta_output: bool = False  # readings are means since the one before: what it turned and sped up by, over the time
-    vibration: Vibration | None = None  # of the rotors; none if left out
+    delta_output: bool = False  # readings are means over the sampling interval (delta angle and velocity)
+    vibration: Vibration | None = None  # of the rotors, at their mean speed; default: none
     gyro_filter: LowPass | None = None  # between the gyroscopes and the output
     accelerometer_filter: LowPass | None = None  # between the accelerometers and the output
-    cross_coupling: CrossCoupling | None = None  # skewed axes, response to g, rectified vibration
-    rotor_vibration: RotorVibration | None = None  # of each rotor, at its own speed
-    sampling_jitter: Annotated[float, Ge(0), Le(1e-2)] = 0.0  # [s] standard deviation of the instant of a sample
-    saturation_recovery: Annotated[float, Ge(0), Le(1)] = 0.0  # [s] that an axis stays at its limit after it was beyond
-    position: Place | None = None  # [m] body, of the accelerometers; the centre of mass if left out
+    cross_coupling: CrossCoupling | None = None  # non-orthogonality, g-sensitivity, vibration rectification
+    rotor_vibration: RotorVibration | None = None  # of each rotor, at its speed; default: none
+    sampling_jitter: Annotated[float, Ge(0), Le(1e-2)] = 0.0  # [s] standard deviation of the sampling instant
+    saturation_recovery: Annotated[float, Ge(0), Le(1)] = 0.0  # [s] that an axis stays at its limit after saturation
+    position: Place | None = None  # [m] body, of the accelerometers; default: centre of mass
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -61,12 +61,12 @@ class ImuState(NamedTuple):
 
     gyro: Triad
     accelerometer: Triad
-    cold: float  # [K] of the warm-up still to come
+    warm_up: float  # [K] remaining warm-up
     phase: float  # [rad] of the vibration
-    attitude: Quaternion  # at the sample before
-    velocity_world: Vec3  # [m/s] of the accelerometers at the sample before
+    attitude: Quaternion  # at the previous sample
+    velocity_world: Vec3  # [m/s] of the accelerometers at the previous sample
     phases: Phases  # [rad] of the rotors
-    force: Vec3  # [m/s^2] true specific force at the sample before
+    force: Vec3  # [m/s^2] true specific force at the previous sample
 
 
 def check(p: Imu) -> None:
@@ -116,31 +116,31 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
         velocity_world = imu_motion.velocity_world(p.position, truth)
         if tick > 0:
             omega, force = imu_motion.means(p, s, truth, velocity_world)
-    true_force, late = force, 0.0
+    true_force, jitter = force, 0.0
     if p.sampling_jitter > 0.0:
-        late = p.sampling_jitter * normal(key, tick, _JITTER)
-        omega = add(omega, scale(late, truth.angular_acceleration_body))
-        force = add(force, scale(late * p.rate, subtract(force, s.force)))
+        jitter = p.sampling_jitter * normal(key, tick, _JITTER)
+        omega = add(omega, scale(jitter, truth.angular_acceleration_body))
+        force = add(force, scale(jitter * p.rate, subtract(force, s.force)))
     phase, shake = imu_motion.vibration_at(p.vibration, p.delta_output, p.rate, s.phase, truth)
     force = add(force, shake)
-    cold = s.cold * (1.0 - 1.0 / (p.rate * p.warm_up_time))
+    warm_up = s.warm_up * (1.0 - 1.0 / (p.rate * p.warm_up_time))
     g, a = gyro_units(p.gyro), accelerometer_units(p.accelerometer)
-    phases, shake, square = vibration(p.rotor_vibration, p.accelerometer_filter, p, s.phases, key, tick, truth, late)
-    turned = g_shift(p.cross_coupling, key, force, square)
-    gyro, omega, gyro_valid = measure(g, s.gyro, p, p.gyro_filter, cold, 0, key, tick, omega, turned, ZERO)
+    phases, shake, square = vibration(p.rotor_vibration, p.accelerometer_filter, p, s.phases, key, tick, truth, jitter)
+    gyro_bias = gyro_coupling_bias(p.cross_coupling, key, force, square)
+    gyro, omega, gyro_valid = measure(g, s.gyro, p, p.gyro_filter, warm_up, 0, key, tick, omega, gyro_bias, ZERO)
     accelerometer, force, force_valid = measure(
-        a, s.accelerometer, p, p.accelerometer_filter, cold, 1, key, tick, force,
+        a, s.accelerometer, p, p.accelerometer_filter, warm_up, 1, key, tick, force,
         rectification_bias(p.cross_coupling, square), shake,
     )  # fmt: skip
     omega_variance = error_models.sample_variance(g.noise, g.resolution, p.rate)
     force_variance = error_models.sample_variance(a.noise, a.resolution, p.rate)
     reading = ImuReading(omega, force, omega_variance, force_variance, gyro_valid and force_valid)
-    return ImuState(gyro, accelerometer, cold, phase, truth.attitude, velocity_world, phases, true_force), reading
+    return ImuState(gyro, accelerometer, warm_up, phase, truth.attitude, velocity_world, phases, true_force), reading
 
 
-# InvenSense PS-MPU-6000A: ranges and resolutions (500 deg/s and 8 g settings), temperature within 10 % of the raw drift
-# that calibration leaves. Noise 0.30 deg/sqrt(h), 4.6 deg/h, 0.24 mg/sqrt(Hz), 36 ug: measured Allan curves. What
-# calibration leaves of bias, scale and alignment: chosen.
+# InvenSense PS-MPU-6000A: ranges and resolutions (500 deg/s and 8 g settings), at most 10 % of the raw temperature
+# drift remains after calibration. Noise 0.30 deg/sqrt(h), 4.6 deg/h, 0.24 mg/sqrt(Hz), 36 ug: measured Allan curves.
+# Residual bias, scale and alignment after calibration: chosen.
 MPU6000 = Imu(
     Gyro(
         noise_dps_per_sqrt_hz=error_models.density_of_random_walk(0.30),
@@ -167,7 +167,7 @@ MPU6000 = Imu(
 
 # Bosch BST-BMI088-DS001: accelerometer 0.175 mg/sqrt(Hz) (160 in x and y, 190 in z), 0.2 mg/K and 0.015 deg/s/K before
 # calibration, of which a tenth is left. Gyroscope 0.016 deg/s/sqrt(Hz), 6.5 deg/h: measured Allan curves. Accelerometer
-# instability and what calibration leaves: chosen.
+# instability and residuals after calibration: chosen.
 BMI088 = Imu(
     Gyro(
         noise_dps_per_sqrt_hz=0.016,

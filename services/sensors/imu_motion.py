@@ -16,13 +16,13 @@ Amplitude = Annotated[float, Ge(0), Le(1e5)]
 class Vibration(NamedTuple):
     """Vibration of the accelerometers by unbalanced rotors, at their mean speed."""
 
-    amplitude_mg: tuple[Amplitude, Amplitude, Amplitude]  # [mg] body, goes with the square of the rotor speed
+    amplitude_mg: tuple[Amplitude, Amplitude, Amplitude]  # [mg] body, proportional to the square of the rotor speed
     rotor_speed: Annotated[float, Gt(0), Le(1e5)]  # [rad/s] of that amplitude
-    harmonic: Annotated[float, Gt(0), Le(16)] = 1.0  # of the rotor speed; blades pass at their number
+    harmonic: Annotated[float, Gt(0), Le(16)] = 1.0  # of the rotor speed; the number of blades for blade passage
 
 
 @kernel
-def _swung(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
+def _force_at(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
     """Return the specific force [m/s^2] at a position on the rotating body (theory.md, eq. (3.37))."""
     if position is None:
         return force
@@ -36,7 +36,7 @@ def true_values(p: Any, truth: Truth) -> tuple[Vec3, Vec3]:
     """Return rate [rad/s] and specific force [m/s^2], body, at the accelerometers."""
     a = truth.acceleration_world
     force = rotate_back(truth.attitude, (a[0], a[1], a[2] + truth.gravity))
-    return truth.omega_body, _swung(p.position, truth, force)
+    return truth.omega_body, _force_at(p.position, truth, force)
 
 
 @kernel
@@ -54,9 +54,9 @@ def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec
     The rate is the rotation vector from the previous attitude; the force is in that attitude. Both include coning and
     sculling.
     """
-    turned = log(multiply(conjugate(s.attitude), truth.attitude))
+    rotation = log(multiply(conjugate(s.attitude), truth.attitude))
     a = scale(p.rate, subtract(velocity_world, s.velocity_world))
-    return scale(p.rate, turned), rotate_back(s.attitude, (a[0], a[1], a[2] + truth.gravity))
+    return scale(p.rate, rotation), rotate_back(s.attitude, (a[0], a[1], a[2] + truth.gravity))
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Scanning lidar: distances of rays all around, as LaserScan (one ring) or PointCloud2 (several)."""
+"""Scanning lidar: distances along rings of rays, as LaserScan (one ring) or PointCloud2 (several)."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -24,10 +24,10 @@ MOST_RAYS = 200_000  # of one scan
 
 
 class Lidar(NamedTuple):
-    """Parameters."""
+    """Parameters of a lidar."""
 
     columns: Annotated[int, Gt(1), Le(20_000)] = 360  # rays of a ring
-    rings: Annotated[int, Gt(0), Le(256)] = 1  # rays one above the other
+    rings: Annotated[int, Gt(0), Le(256)] = 1  # rings, one above the other
     azimuth_deg: Annotated[float, Gt(0), Le(360)] = 360.0  # [deg] field of view about body x
     elevation_min_deg: Annotated[float, Ge(-90), Le(90)] = 0.0  # [deg] of the lowest ring over the body's xy plane
     elevation_max_deg: Annotated[float, Ge(-90), Le(90)] = 0.0  # [deg] of the highest ring
@@ -80,7 +80,7 @@ def rays(p: Lidar) -> np.ndarray:
 
 
 def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
-    """Return the encoder of its topic."""
+    """Return the encoder of the sensor's topic."""
     p: Lidar = instrument.sensor
     terrain, directions = as_relief(instrument.around.terrain), rays(p)
 

@@ -20,20 +20,20 @@ Disturbance = Annotated[float, Ge(-1e5), Le(1e5)]
 
 
 class Magnetometer(NamedTuple):
-    """Parameters; what is drawn once per vehicle is given as one standard deviation."""
+    """Parameters of a magnetometer; errors drawn once per vehicle are given as one standard deviation."""
 
     noise_nt_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [nT/sqrt(Hz)] one-sided density
     bias_instability_nt: Annotated[float, Ge(0)] = 0.0  # [nT] peak of the Allan deviation of the bias walk
     bias_correlation_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
-    hard_iron_nt: Annotated[float, Ge(0)] = 0.0  # [nT] what calibration leaves
+    hard_iron_nt: Annotated[float, Ge(0)] = 0.0  # [nT] residual after calibration
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
     misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
-    soft_iron: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, elements of the symmetric matrix left by calibration
+    soft_iron: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, elements of the residual symmetric matrix
     range_ut: Annotated[float, Gt(0)] = math.inf  # [uT]
     resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT]
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
-    current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, by the motors' current
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
+    current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, by the motors' total current
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -97,7 +97,7 @@ def sample(
 
 
 # PNI RM3100 user manual: 15 nT RMS and 13 nT per count at 200 cycle counts, +-800 uT; taken as the noise at 50 Hz.
-# Instability and what a good calibration far from the power leads leaves: chosen.
+# Instability and residuals after a good calibration far from the power leads: chosen.
 RM3100 = Magnetometer(
     noise_nt_per_sqrt_hz=3.0,
     bias_instability_nt=5.0,
@@ -109,7 +109,7 @@ RM3100 = Magnetometer(
 )
 
 # Honeywell HMC5883L data sheet: 0.2 uT noise floor, 0.073 uT per count in the +-88 uT range, 75 Hz at most. Instability
-# and what calibration leaves: chosen.
+# and residuals after calibration: chosen.
 HMC5883L = Magnetometer(
     noise_nt_per_sqrt_hz=40.0,
     bias_instability_nt=30.0,

@@ -14,7 +14,7 @@ from lapwing.kernels.codegen import generic
 SPEED_OF_LIGHT = 299_792_458.0  # [m/s]
 WAVELENGTH = SPEED_OF_LIGHT / 1575.42e6  # [m] of L1 and E1
 CHIP = SPEED_OF_LIGHT / 1.023e6  # [m] of the C/A code
-FARTHEST = 1000.0  # [m] that obstacles are looked for
+FARTHEST = 1000.0  # [m] maximum distance of obstacles
 
 
 class Reflections(NamedTuple):
@@ -22,7 +22,7 @@ class Reflections(NamedTuple):
 
     amplitude: Annotated[float, Gt(0), Lt(1)] = 0.5  # of the reflected signal over the direct one
     spacing: Annotated[float, Gt(0), Le(CHIP)] = 0.1 * CHIP  # [m] between early and late correlator
-    phase_deg: Annotated[float, Ge(-360), Le(360)] = 180.0  # [deg] by which a wall turns the carrier
+    phase_deg: Annotated[float, Ge(-360), Le(360)] = 180.0  # [deg] phase shift of the carrier at a wall
 
 
 @always_inline
@@ -43,7 +43,7 @@ def in_shadow(terrain: types.Type, position: types.Type, towards: types.Type, st
 
 @kernel
 def detour(box: Any, position: Vec3, towards: Vec3, across: bool) -> float:
-    """Return the further way [m] of a signal by a wall of a box; 0 without a reflection (theory.md, eq. (3.57)).
+    """Return the additional path [m] of a signal by a wall of a box; 0 without a reflection (theory.md, eq. (3.57)).
 
     Args:
         box: row of `Relief.boxes`.
@@ -69,25 +69,25 @@ def detour(box: Any, position: Vec3, towards: Vec3, across: bool) -> float:
 
 
 @kernel
-def code_delay(r: Reflections, further: float) -> float:
+def code_delay(r: Reflections, detour_length: float) -> float:
     """Return the error [m] of a code measurement by a reflection with this detour [m] (theory.md, eq. (3.58))."""
-    q = r.amplitude * math.cos(2.0 * math.pi * further / WAVELENGTH + math.radians(r.phase_deg))
+    q = r.amplitude * math.cos(2.0 * math.pi * detour_length / WAVELENGTH + math.radians(r.phase_deg))
     half = 0.5 * r.spacing
-    if further < (1.0 + q) * half:
-        return further * q / (1.0 + q)
-    if further < CHIP - (1.0 - q) * half:
+    if detour_length < (1.0 + q) * half:
+        return detour_length * q / (1.0 + q)
+    if detour_length < CHIP - (1.0 - q) * half:
         return q * half
-    if further < CHIP + half:
-        return q * (CHIP + half - further) / (2.0 - q)
+    if detour_length < CHIP + half:
+        return q * (CHIP + half - detour_length) / (2.0 - q)
     return 0.0
 
 
 @kernel
-def phase_delay(r: Reflections, further: float) -> float:
+def phase_delay(r: Reflections, detour_length: float) -> float:
     """Return the error [m] of a carrier phase by a reflection with this detour [m] (theory.md, eq. (3.59))."""
-    if further > CHIP:
+    if detour_length > CHIP:
         return 0.0
-    sine, cosine = math.sincos(2.0 * math.pi * further / WAVELENGTH + math.radians(r.phase_deg))
+    sine, cosine = math.sincos(2.0 * math.pi * detour_length / WAVELENGTH + math.radians(r.phase_deg))
     return WAVELENGTH / (2.0 * math.pi) * math.atan2(r.amplitude * sine, 1.0 + r.amplitude * cosine)
 
 
@@ -101,9 +101,9 @@ def _code_at_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3) 
     result = 0.0
     for i in range(terrain.boxes.shape[0]):
         for across in (False, True):
-            further = detour(terrain.boxes[i], position, towards, across)
-            if further > 0.0:
-                result += code_delay(r, further)
+            detour_length = detour(terrain.boxes[i], position, towards, across)
+            if detour_length > 0.0:
+                result += code_delay(r, detour_length)
     return result
 
 
@@ -112,9 +112,9 @@ def _phase_at_walls(r: Reflections, terrain: Any, position: Vec3, towards: Vec3)
     result = 0.0
     for i in range(terrain.boxes.shape[0]):
         for across in (False, True):
-            further = detour(terrain.boxes[i], position, towards, across)
-            if further > 0.0:
-                result += phase_delay(r, further)
+            detour_length = detour(terrain.boxes[i], position, towards, across)
+            if detour_length > 0.0:
+                result += phase_delay(r, detour_length)
     return result
 
 

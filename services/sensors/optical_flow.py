@@ -1,4 +1,4 @@
-"""Optical flow: how fast the ground turns past a camera that looks down (theory.md, eq. (3.41))."""
+"""Optical flow sensor: angular rate of the ground in a downward camera (theory.md, eq. (3.41))."""
 
 import math
 from typing import Annotated, Any, NamedTuple
@@ -26,16 +26,16 @@ CHANNELS = ("flow", "rate")
 
 
 class OpticalFlow(NamedTuple):
-    """Parameters of a camera at the body's origin that looks along -z of the body."""
+    """Parameters of a camera at the body's origin, along -z of the body."""
 
     noise_rad_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [rad/s/sqrt(Hz)] one-sided density of the flow
     gyro_noise_dps_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [deg/s/sqrt(Hz)] one-sided density of its gyroscopes
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation: focal length
-    flow_max: Annotated[float, Gt(0)] = math.inf  # [rad/s] faster, it loses the texture
-    range_min: Annotated[float, Ge(0)] = 0.0  # [m] nearer, it is out of focus
-    range_max: Annotated[float, Gt(0)] = math.inf  # [m] farther, there is no texture
+    flow_max: Annotated[float, Gt(0)] = math.inf  # [rad/s] maximum flow at which texture is tracked
+    range_min: Annotated[float, Ge(0)] = 0.0  # [m] shortest distance in focus
+    range_max: Annotated[float, Gt(0)] = math.inf  # [m] longest distance with visible texture
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -43,8 +43,8 @@ class OpticalFlowState(NamedTuple):
     """State of a camera."""
 
     scale: float
-    flow: Line  # the third is the distance
-    rate: Line  # the first two of the three
+    flow: Line  # flow about x and y [rad/s], distance [m]
+    rate: Line  # [rad/s] about x and y; the third component is unused
 
 
 READING = OpticalFlowReading()
@@ -83,11 +83,11 @@ def sample(
     flow = (s.scale * true[0] + noise * first[0], s.scale * true[1] + noise * first[1], true[2])
     omega = truth.omega_body
     rate = (omega[0] + gyro_noise * second[0], omega[1] + gyro_noise * second[1], 0.0)
-    flow_line, flow, seen = apply_delay_and_faults(p.faults, s.flow, p.latency_samples, 0, key, tick, flow)
-    rate_line, rate, turning = apply_delay_and_faults(p.faults, s.rate, p.latency_samples, 1, key, tick, rate)
-    sharp = p.range_min <= flow[2] <= p.range_max and max(abs(flow[0]), abs(flow[1])) <= p.flow_max
-    distance = flow[2] if sharp else math.inf
-    valid = seen and turning and sharp and distance < math.inf
+    flow_line, flow, flow_valid = apply_delay_and_faults(p.faults, s.flow, p.latency_samples, 0, key, tick, flow)
+    rate_line, rate, rate_valid = apply_delay_and_faults(p.faults, s.rate, p.latency_samples, 1, key, tick, rate)
+    in_range = p.range_min <= flow[2] <= p.range_max and max(abs(flow[0]), abs(flow[1])) <= p.flow_max
+    distance = flow[2] if in_range else math.inf
+    valid = flow_valid and rate_valid and in_range and distance < math.inf
     reading = OpticalFlowReading((flow[0], flow[1]), (rate[0], rate[1]), distance, noise * noise, valid)
     return OpticalFlowState(s.scale, flow_line, rate_line), reading
 
@@ -105,14 +105,14 @@ def _fields(r: OpticalFlowReading, time_ns: np.ndarray) -> Fields:
 
 
 def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
-    """Return the encoder of its topic."""
+    """Return the encoder of the sensor's topic."""
     return [
         TopicEncoder(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))
     ]
 
 
-# PixArt PMW3901MB data sheet, as PX4's driver cites it (src/drivers/optical_flow/pmw3901): 7.4 rad/s at the most, from
-# 80 mm on, no farthest distance; texture up to 30 m is that driver's assumption. Noise, focal length: chosen.
+# PixArt PMW3901MB data sheet, as PX4's driver cites it (src/drivers/optical_flow/pmw3901): at most 7.4 rad/s, from
+# 80 mm, no maximum distance; texture up to 30 m is that driver's assumption. Noise, focal length: chosen.
 PMW3901 = OpticalFlow(
     noise_rad_per_s_per_sqrt_hz=0.01,
     gyro_noise_dps_per_sqrt_hz=0.01,
@@ -122,7 +122,7 @@ PMW3901 = OpticalFlow(
     range_max=30.0,
 )
 
-# PixArt PAW3902, as PX4's page of the ARK Flow cites it: 7.4 rad/s at the most, from 80 mm to 30 m; gyroscopes of that
+# PixArt PAW3902, as PX4's page of the ARK Flow cites it: at most 7.4 rad/s, from 80 mm to 30 m; gyroscopes of that
 # board: BMI088 (`imu`). Noise, focal length: chosen, as above.
 PAW3902 = PMW3901._replace(gyro_noise_dps_per_sqrt_hz=0.016)
 

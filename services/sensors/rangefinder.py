@@ -26,7 +26,7 @@ __all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", 
 
 
 class Rangefinder(NamedTuple):
-    """Parameters."""
+    """Parameters of a laser rangefinder."""
 
     azimuth_deg: Annotated[float, Ge(-360), Le(360)] = 0.0  # [deg] of the ray, from body x towards y
     elevation_deg: Annotated[float, Ge(-90), Le(90)] = -90.0  # [deg] of the ray over the body's xy plane; -90: down
@@ -36,9 +36,9 @@ class Rangefinder(NamedTuple):
     range_min: Annotated[float, Ge(0)] = 0.0  # [m]
     range_max: Annotated[float, Gt(0)] = math.inf  # [m]
     resolution: Annotated[float, Ge(0)] = 0.0  # [m]
-    beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] full angle, told and not modelled
+    beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] full angle, published but not modelled
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -93,7 +93,7 @@ def _fields(r: DistanceReading, time_ns: np.ndarray) -> Fields:
 
 
 def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
-    """Return the encoder of its topic."""
+    """Return the encoder of the sensor's topic."""
     p: Rangefinder = instrument.sensor
 
     def message() -> Any:
@@ -108,16 +108,16 @@ def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     return [TopicEncoder(topic.RANGEFINDER, port.name, port.period, _fields, message)]
 
 
-# Garmin, LIDAR-Lite v3 Operation Manual and Technical Specifications, as others quote it (the manual itself was not at
-# hand): 40 m on a target that reflects 70 %, resolution 1 cm, +-2.5 cm up to 5 m and +-10 cm beyond, mean error at most
-# 1 % of the distance, 50 readings a second as delivered, beam of 8 mrad (also PX4's driver). From 5 cm on by sellers'
-# lists. Chosen: +-2.5 cm is two deviations of the noise, 1 % two of the scale.
+# Garmin, LIDAR-Lite v3 Operation Manual and Technical Specifications, as others quote it (the manual was not
+# available): 40 m on a target that reflects 70 %, resolution 1 cm, +-2.5 cm up to 5 m and +-10 cm beyond, mean error at
+# most 1 % of the distance, 50 readings a second as delivered, beam of 8 mrad (also PX4's driver). From 5 cm on by
+# sellers' lists. Chosen: +-2.5 cm is two deviations of the noise, 1 % two of the scale.
 LIDAR_LITE = Rangefinder(
     noise_m_per_sqrt_hz=0.0025, scale_error=5e-3, range_min=0.05, range_max=40.0, resolution=0.01, beam_deg=0.458
 )
 
 # Benewake TFmini, SJ-GU-TFmini-T-01: 0.3 to 12 m on a target that reflects 90 %, +-4 cm up to 6 m and +-6 cm up to
-# 12 m, steps of 5 mm, receiving half angle 1.15 degrees, 100 readings a second, of which every second one is taken.
+# 12 m, steps of 5 mm, receiving half angle 1.15 degrees, 100 readings a second, of which every second one is used.
 # Chosen: +-4 cm is two deviations of noise and, at 6 m, of the scale together, in equal shares.
 TFMINI = Rangefinder(
     noise_m_per_sqrt_hz=0.0028, scale_error=2.4e-3, range_min=0.3, range_max=12.0, resolution=0.005, beam_deg=2.3

@@ -37,7 +37,7 @@ def module_of(sensor: str, table: Mapping[str, Any]) -> ModuleType:
             raise ConfigError.unknown(sensor, "sensor", sensor, sensors())
         return sensors()[sensor]
     if sensor in sensors():
-        raise ConfigError(f"{sensor}.module", f"{sensor} is the name of a sensor that ships", "another name")
+        raise ConfigError(f"{sensor}.module", f"{sensor} is the name of a built-in sensor", "another name")
     result = importlib.import_module(table["module"])
     if missing := [name for name in ("PRESETS", "READING", "blank", "initial", "sample") if not hasattr(result, name)]:
         raise ConfigError(f"{sensor}.module", f"{table['module']} has no {', '.join(missing)}")
@@ -71,7 +71,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
             module.check(p)
         if not hasattr(p, "faults"):
             if faults:
-                raise ConfigError("faults", f"{sensor} knows none; leave them out")
+                raise ConfigError("faults", f"{sensor} has no fault model; remove them")
             return p
         return p._replace(faults=fault_schedule.compile_faults(faults, module.CHANNELS, tick))
     except ValidationError as error:

@@ -1,4 +1,4 @@
-"""From the `[sensors]` of a scene to its instruments."""
+"""Resolution of a scene's `[sensors]` into the service's configuration."""
 
 import math
 from collections.abc import Mapping
@@ -71,8 +71,8 @@ def _with_damage(scene: Scene, p: Imu) -> Imu:
     if damage is None or p.rotor_vibration is None:
         return p
     start = math.ceil(damage.get("time", 0.0) / scene[Communication].interval - 1e-9)
-    of_one = Damage(damage["rotor"] - 1, start, 1.0 - damage.get("remaining_thrust", 0.0))
-    return p._replace(rotor_vibration=p.rotor_vibration._replace(damage=of_one))
+    rotor_damage = Damage(damage["rotor"] - 1, start, 1.0 - damage.get("remaining_thrust", 0.0))
+    return p._replace(rotor_vibration=p.rotor_vibration._replace(damage=rotor_damage))
 
 
 def _with_terrain(scene: Scene, p: Gps) -> Gps:
@@ -116,11 +116,11 @@ def trial_reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
     except Exception as error:
         text = str(error).strip().partition("\n")[0]
         raise ConfigError(where, f"{type(error).__name__}: {text}") from error
-    for what, result, declared in (
+    for value_name, result, declared in (
         ("initial", state, module.blank()),
         ("sample's state", after, module.blank()),
         ("sample's reading", reading, module.READING),
     ):
         if numba.typeof(result) != numba.typeof(declared):
-            raise ConfigError(where, f"{what} is of another type than `blank` or `READING` declares")
+            raise ConfigError(where, f"{value_name} is of another type than `blank` or `READING` declares")
     return module.READING

@@ -13,7 +13,7 @@ from lapwing.services.sensors.triad import MG
 
 Phases = tuple[float, ...]  # [rad] of ROTORS rotors
 AT_REST: Phases = (0.0,) * ROTORS
-_LANE = 40  # draws of imbalances and phases, clear of the triads' lanes
+_LANE = 40  # lanes of the random imbalances and phases, above those of the triads
 
 
 class Damage(NamedTuple):
@@ -25,7 +25,7 @@ class Damage(NamedTuple):
 
 
 class RotorVibration(NamedTuple):
-    """Vibration of the accelerometers at the frequencies of each rotor; amplitudes go with the square of its speed."""
+    """Vibration of the accelerometers by each rotor; amplitudes are proportional to the square of its speed."""
 
     rotor_speed: Annotated[float, Gt(0), Le(1e5)]  # [rad/s] of these amplitudes
     imbalance_mg: Annotated[float, Ge(0), Le(1e5)] = 0.0  # [mg] body x and y, one standard deviation over rotors
@@ -46,8 +46,8 @@ def _lost_thrust(damage: Damage | None, tick: int, i: int) -> float:
 @kernel
 def _imbalance(v: RotorVibration, key: Key, tick: int, i: int) -> float:
     """Return the amplitude [mg] of a rotor at the reference speed."""
-    drawn = v.imbalance_mg * abs(normal3(key, TURN_ON, _LANE + i)[0])
-    return drawn + v.damage_mg * _lost_thrust(v.damage, tick, i)
+    amplitude = v.imbalance_mg * abs(normal3(key, TURN_ON, _LANE + i)[0])
+    return amplitude + v.damage_mg * _lost_thrust(v.damage, tick, i)
 
 
 @kernel
@@ -58,8 +58,8 @@ def _wave(low_pass: LowPass | None, averaged: bool, rate: float, omega: float, p
         half = 0.5 * omega / rate
         gain, phase = math.sin(half) / half, phase - half
     if low_pass is not None:
-        passed, turned = response(low_pass, omega)
-        gain, phase = gain * passed, phase + turned
+        attenuation, shift = response(low_pass, omega)
+        gain, phase = gain * attenuation, phase + shift
     return gain, phase
 
 
@@ -82,19 +82,19 @@ def initial_phases(v: RotorVibration | None, key: Key) -> Phases:
 @kernel
 def vibration(
     v: RotorVibration | None, low_pass: LowPass | None, p: Any, phases: Phases, key: Key, tick: int, truth: Truth,
-    late: float,
+    jitter: float,
 ) -> tuple[Phases, Vec3, Vec3]:  # fmt: skip
     """Return the next phases, the specific force [m/s^2] in the reading, and its mean square at the element [g^2].
 
     Args:
-        v: parameters; None costs nothing.
+        v: parameters; None: no vibration.
         low_pass: filter of the accelerometers.
         p: `Imu`, for `rate` and `delta_output`.
         phases: [rad] at the last sample.
         key: key of the instrument.
-        tick: now.
+        tick: present tick.
         truth: rotor speeds.
-        late: [s] after the nominal instant.
+        jitter: [s] delay after the nominal instant.
     """
     if v is None:
         return phases, ZERO, ZERO
@@ -109,11 +109,11 @@ def vibration(
         speed = truth.rotor_speeds[i]
         ratio = speed * speed / (v.rotor_speed * v.rotor_speed)
         size, push = _imbalance(v, key, tick, i) * ratio, v.blade_pass_mg * ratio
-        gain, phase = _wave(low_pass, p.delta_output, p.rate, speed, phases[i] + speed * late)
+        gain, phase = _wave(low_pass, p.delta_output, p.rate, speed, phases[i] + speed * jitter)
         sine, cosine = math.sincos(phase)
         x, y = x + gain * size * cosine, y + gain * size * sine
         passing = v.blades * speed
-        gain, phase = _wave(low_pass, p.delta_output, p.rate, passing, v.blades * (phases[i] + speed * late))
+        gain, phase = _wave(low_pass, p.delta_output, p.rate, passing, v.blades * (phases[i] + speed * jitter))
         z += gain * push * math.sin(phase)
         across, along = across + 0.5 * size * size, along + 0.5 * push * push
     return phases, (x * MG, y * MG, z * MG), (across * 1e-6, across * 1e-6, along * 1e-6)

@@ -13,17 +13,17 @@ class Gap(NamedTuple):
     """Time without corrections of the base station."""
 
     start: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
-    stop: Annotated[float, Ge(0)] = math.inf  # [s] simulation time; for good if left out
+    stop: Annotated[float, Ge(0)] = math.inf  # [s] simulation time; default: until the end of the run
 
 
 class Rtk(NamedTuple):
     """Solutions of the carrier phases; the receiver's correlated errors are those of the fixed one."""
 
-    float_ratio: Annotated[float, Ge(1), Le(1e5)] = 30.0  # of the correlated errors to those of the fixed solution
-    single_ratio: Annotated[float, Ge(1), Le(1e5)] = 150.0  # of the correlated errors without corrections
+    float_ratio: Annotated[float, Ge(1), Le(1e5)] = 30.0  # correlated errors over those of the fixed solution
+    single_ratio: Annotated[float, Ge(1), Le(1e5)] = 150.0  # correlated errors without corrections over the fixed ones
     convergence_time: Annotated[float, Ge(0), Le(1e5)] = 10.0  # [s] from float to fixed
-    satellites_min: Annotated[int, Ge(4), Le(24)] = 5  # of a fixed solution; matters with `constellation`
-    age_max: Annotated[float, Ge(0), Le(1e5)] = 60.0  # [s] of corrections that are still used
+    satellites_min: Annotated[int, Ge(4), Le(24)] = 5  # satellites of a fixed solution; only with `constellation`
+    age_max: Annotated[float, Ge(0), Le(1e5)] = 60.0  # [s] maximum age of corrections
     corrections_lost: tuple[Gap, ...] | None = None  # [s] times without corrections: { start, stop }
 
 
@@ -58,7 +58,7 @@ def update_solution(r: Rtk | None, s: RtkState, interval: float, time: float, us
     """Return the state of the solution at a sample.
 
     Args:
-        r: parameters; None costs nothing.
+        r: parameters; None: no such solutions.
         s: state at the last sample.
         interval: [s] since then.
         time: [s] of the simulation.

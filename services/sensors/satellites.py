@@ -14,12 +14,12 @@ from lapwing.services.sensors.multipath import Reflections, code_error, in_shado
 
 FEWEST = 4  # satellites of a fix
 WORST = 50.0  # dilution of precision of a fix
-FLATTEST = 1e-9  # determinant of the directions' spread from which a position is computed
+FLATTEST = 1e-9  # minimum determinant of the directions' spread for a position
 NO_POSITION: Mat3 = (math.nan,) * 9  # type: ignore[assignment]
 MOST = 24  # satellites of a constellation
 GRAVITATION = 3.986004418e14  # [m^3/s^2] of the Earth, WGS 84
 EARTH_RATE = 7.292115e-5  # [rad/s] WGS 84
-_RANGE_LANE, _NOISE_LANE = 16, 32  # draws of the distances' errors, clear of the receiver's own lanes
+_RANGE_LANE, _NOISE_LANE = 16, 32  # lanes of the range errors' random numbers, above the receiver's
 
 RangeErrors = tuple[Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3, Vec3]  # of MOST satellites, in standard deviations
 NO_ERRORS: RangeErrors = (ZERO,) * 8  # type: ignore[assignment]
@@ -42,18 +42,18 @@ class Constellation(NamedTuple):
     altitude: Annotated[float, Gt(0), Le(1e8)] = 23_222e3  # [m] over the equator
     time: Annotated[float, Ge(-1e6), Le(1e6)] = 0.0  # [s] since a satellite passed over the equator at longitude 0
     mask_deg: Annotated[float, Ge(0), Lt(90)] = 10.0  # [deg] elevation below which a satellite is not used
-    reflections: Reflections | None = None  # multipath at the walls of the terrain's boxes; none if left out
+    reflections: Reflections | None = None  # multipath at the walls of the terrain's boxes; default: none
     steepness: float = 0.0  # compiled from the scene's terrain
 
 
 class Solution(NamedTuple):
-    """Fix by the satellites in view."""
+    """Fix from the satellites in view."""
 
     error: Vec3 = ZERO  # [m] east, north, up
     variance: Vec3 = ZERO  # east, north, up, by distances of unit deviation
     used: int = 0  # satellites
-    visible: int = 0  # satellites over the mask, also in the shadow of an obstacle
-    found: bool = False  # there is a fix
+    visible: int = 0  # satellites above the mask, including shadowed ones
+    has_fix: bool = False
 
 
 @kernel
@@ -68,7 +68,7 @@ def geometry(sky: tuple[Satellite, ...] | None) -> Mat3:
         u = math.sin(elevation)
         x, y, z = x + e, y + n, z + u
         xx, xy, xz, yy, yz, zz = xx + e * e, xy + e * n, xz + e * u, yy + n * n, yz + n * u, zz + u * u
-    # what is common to all distances is the receiver's clock
+    # the common part of all distances is the receiver's clock error
     k = 1.0 / len(sky)
     xx, xy, xz = xx - k * x * x, xy - k * x * y, xz - k * x * z
     yy, yz, zz = yy - k * y * y, yz - k * y * z, zz - k * z * z
@@ -106,8 +106,8 @@ def direction(c: Constellation, home: Home, k: int, time: float) -> Vec3:
     each = c.satellites // c.planes
     plane, slot = k // each, k % each
     radius = SEMI_MAJOR + c.altitude
-    moved = math.sqrt(GRAVITATION / radius) / radius * time
-    along = 2.0 * math.pi * (slot / each + c.phasing * plane / c.satellites) + moved
+    motion = math.sqrt(GRAVITATION / radius) / radius * time
+    along = 2.0 * math.pi * (slot / each + c.phasing * plane / c.satellites) + motion
     sa, ca = math.sincos(along)
     sn, cn = math.sincos(2.0 * math.pi * plane / c.planes - EARTH_RATE * time)
     si, ci = math.sincos(math.radians(c.inclination_deg))
@@ -164,27 +164,27 @@ def solution(
     """Return the fix by least squares over the satellites in view (theory.md, eq. (3.56)).
 
     Args:
-        c: constellation; None costs nothing.
+        c: constellation; None: satellites are not modelled.
         home: origin of the world frame.
         terrain: Level or Relief.
         position: [m] of the antenna, world.
         time: [s] of the simulation.
-        errors: of the distances, in standard deviations.
+        errors: correlated errors of the distances, in standard deviations.
         correlated: [m] standard deviation of `errors`.
         white: [m] standard deviation of the white noise of a distance.
         carrier: True if the fix is by carrier phases, whose multipath is below a quarter of a wavelength.
-        key: of the receiver.
-        tick: now.
+        key: key of the receiver.
+        tick: present tick.
     """
     if c is None:
         return Solution(ZERO, ZERO, 0, 0, True)
     x = y = z = xx = xy = xz = yy = yz = zz = 0.0
     total = bx = by = bz = 0.0
     used, visible, lowest = 0, 0, math.sin(math.radians(c.mask_deg))
-    drawn = ZERO
+    noises = ZERO
     for k in range(c.satellites):
         if k % 3 == 0:
-            drawn = normal3(key, tick, _NOISE_LANE + k // 3)
+            noises = normal3(key, tick, _NOISE_LANE + k // 3)
         e, n, u = direction(c, home, k, c.time + time)
         if u < lowest:
             continue
@@ -192,11 +192,11 @@ def solution(
         if in_shadow(terrain, position, (e, n, u), c.steepness):
             continue
         used += 1
-        wrong = correlated * errors[k // 3][k % 3] + white * drawn[k % 3]
-        wrong += _multipath(c.reflections, terrain, position, (e, n, u), carrier)
-        x, y, z, total = x + e, y + n, z + u, total + wrong
+        range_error = correlated * errors[k // 3][k % 3] + white * noises[k % 3]
+        range_error += _multipath(c.reflections, terrain, position, (e, n, u), carrier)
+        x, y, z, total = x + e, y + n, z + u, total + range_error
         xx, xy, xz, yy, yz, zz = xx + e * e, xy + e * n, xz + e * u, yy + n * n, yz + n * u, zz + u * u
-        bx, by, bz = bx + e * wrong, by + n * wrong, bz + u * wrong
+        bx, by, bz = bx + e * range_error, by + n * range_error, bz + u * range_error
     if used < FEWEST:
         return Solution(ZERO, ZERO, used, visible, False)
     k1 = 1.0 / used
@@ -210,7 +210,7 @@ def solution(
         return Solution(ZERO, ZERO, used, visible, False)
     over = 1.0 / determinant
     variance = (a * over, d * over, h * over)
-    # a distance that reads too long moves the fix away from its satellite
+    # a distance measured too long moves the fix away from its satellite
     error = (
         -over * (a * bx + b * by + g * bz), -over * (b * bx + d * by + f * bz), -over * (g * bx + f * by + h * bz),
     )  # fmt: skip

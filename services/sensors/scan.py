@@ -1,6 +1,6 @@
-"""Scans of many rays: pose of the instrument as a port, ray casting when the messages are made (theory.md, eq. (3.52)).
+"""Scans of many rays: pose of the instrument as a port, ray casting in the encoder (theory.md, eq. (3.52)).
 
-The port holds the pose alone, so that a scan that is neither recorded nor subscribed to costs nothing.
+The port has only the pose, so that a scan that is neither recorded nor subscribed to is not computed.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +24,7 @@ class ScanPose(NamedTuple):
 
 
 class ScanState(NamedTuple):
-    """State of a scanning instrument: none."""
+    """State of a scanning instrument, unused."""
 
     tick: int
 
@@ -33,7 +33,7 @@ READING = ScanPose()
 
 
 def blank() -> ScanState:
-    """Return the state."""
+    """Return the unused state."""
     return ScanState(0)
 
 
@@ -52,10 +52,10 @@ def scan(
 
     Args:
         terrain: `Relief`.
-        key: of the instrument's random stream.
+        key: key of the instrument's random stream.
         noise: [m] standard deviation.
-        least: [m] nearer, a ray reads -inf.
-        most: [m] farther, a ray reads inf.
+        least: [m] minimum range; nearer distances are -inf.
+        most: [m] maximum range; farther distances are inf.
         step: [m] resolution; 0: none.
         steep: `steepness` of the terrain.
         rays: (n, 3) unit vectors, body.
@@ -66,13 +66,13 @@ def scan(
     """
     origin = (position[0], position[1], position[2])
     q = Quaternion(attitude[0], attitude[1], attitude[2], attitude[3])
-    drawn = ZERO
+    noises = ZERO
     for k in range(len(rays)):
         distance = cast(terrain, origin, rotate(q, (rays[k, 0], rays[k, 1], rays[k, 2])), steep, most)
         if noise > 0.0:
             if k % 3 == 0:
-                drawn = normal3(key, tick, k // 3)
-            distance += noise * drawn[k % 3]
+                noises = normal3(key, tick, k // 3)
+            distance += noise * noises[k % 3]
         if step > 0.0 and distance < math.inf:
             distance = step * np.floor(distance / step + 0.5)
         out[k] = math.inf if distance > most else -math.inf if distance < least else distance

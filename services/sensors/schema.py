@@ -1,4 +1,4 @@
-"""The `[sensors]` of a scene: a table for each sensor that the vehicle carries."""
+"""The `[sensors]` table of a scene, with a table for each sensor of the vehicle."""
 
 from typing import Any, ClassVar
 
@@ -15,7 +15,7 @@ class Sensors(NamedTables):
     TABLE: ClassVar[str] = "sensors"
 
     def lookup(self, keys: list[str]) -> Any:
-        """Return a parameter of a sensor, from the scene or else from its preset, such as "imu.rate"."""
+        """Return a parameter of a sensor, such as "imu.rate", from the scene or by default from its preset."""
         name, key = keys
         return getattr(parameters(name, self.tables[name], 1.0), key)
 
@@ -24,9 +24,7 @@ class Sensors(NamedTables):
         super().check(scene)
         for name, table in self.tables.items():
             if "module" in table and not name.isidentifier():
-                raise ConfigError(
-                    f"sensors.{name}", f"got {name!r}", "a name that a topic can have: letters, digits, _"
-                )
+                raise ConfigError(f"sensors.{name}", f"got {name!r}", "a valid topic name: letters, digits, _")
         self.load(scene)
         for name, table in self.tables.items():
             try:

@@ -11,12 +11,12 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
 
 Arm = Annotated[float, Ge(-10.0), Le(10.0)]
-ROTORS = 8  # whose speeds sensors know
-Place = tuple[Arm, Arm, Arm]  # [m] of an instrument, body coordinates
+ROTORS = 8  # rotors whose speeds are inputs of the sensors
+Place = tuple[Arm, Arm, Arm]  # [m] position of an instrument, body
 
 
 class Truth(NamedTuple):
-    """True state of a vehicle and what is around it."""
+    """True state of a vehicle, and its environment."""
 
     position_world: Vec3 = ZERO  # [m]
     attitude: Quaternion = NO_ROTATION  # wxyz, body to world

@@ -1,4 +1,4 @@
-"""The sensors as a service: the true state in, what each instrument reads out."""
+"""Sensor service: true state in, readings of each instrument out."""
 
 import sys
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.kernels.cell import Cell
 from lapwing.services.common import ports
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import PORTS, GpsWiring, SonarWiring, own_wire, wires
+from lapwing.services.sensors.encoders import PORTS, GpsWiring, SonarWiring, custom_sensor_encoder, wires
 
 NAME = "sensors"
 
@@ -19,7 +19,7 @@ class SensorsSetup(NamedTuple):
     """Resolved configuration of the service."""
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
-    sonar: SonarWiring | None  # None where no sonar is carried
+    sonar: SonarWiring | None  # None without a sonar
     gps: GpsWiring
 
 
@@ -31,18 +31,18 @@ def create(setup: RunConfig) -> Service:
         Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), config.inputs, (port,), port.period)
         for p, port in zip(s.instruments, config.ports, strict=True)
     ]
-    return Service(NAME, parts, _other_wires(setup, s) + wires(setup, s.sonar, s.gps))
+    return Service(NAME, parts, _module_encoders(setup, s) + wires(setup, s.sonar, s.gps))
 
 
-def _other_wires(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
+def _module_encoders(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
     """Return the encoders of sensors whose modules provide them, and of custom sensors."""
     result: list[TopicEncoder] = []
     for p, port in zip(s.instruments, setup.services[NAME].ports, strict=True):
         module = sys.modules[type(p.sensor).__module__]
         if port.name in PORTS:
             continue
-        ships = module.__package__ == __package__ and port.name not in ports.IMUS
-        result += module.wires(setup.vehicle, port, p) if ships else [own_wire(setup.vehicle, port)]
+        built_in = module.__package__ == __package__ and port.name not in ports.IMUS
+        result += module.wires(setup.vehicle, port, p) if built_in else [custom_sensor_encoder(setup.vehicle, port)]
     return result
 
 

@@ -1,4 +1,4 @@
-"""Sonar: an ultrasonic rangefinder that looks down (theory.md, section 3.2)."""
+"""Sonar: downward ultrasonic rangefinder (theory.md, section 3.2)."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -21,7 +21,7 @@ __all__ = ["CHANNELS", "PRESETS", "Sonar", "blank", "initial", "sample"]
 
 
 class Sonar(NamedTuple):
-    """Parameters of a range finder at the body's origin, along -z of the body."""
+    """Parameters of a sonar at the body's origin, along -z of the body."""
 
     noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation: speed of sound
@@ -29,13 +29,13 @@ class Sonar(NamedTuple):
     range_max: Annotated[float, Gt(0)] = math.inf  # [m]
     resolution: Annotated[float, Ge(0)] = 0.0  # [m]
     half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] the nearest ground within the beam returns the echo
-    tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # [deg] tilted more, the echo goes elsewhere
+    tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # [deg] maximum tilt with an echo
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
-    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # samples that a reading is late
+    latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
-RAYS = 8  # along the edge of the beam, for bodies off its axis
+RAYS = 8  # along the edge of the beam, for obstacles off its axis
 
 
 @generic(inline=True)
@@ -101,7 +101,7 @@ MB1202 = Sonar(
     tilt_max_deg=25.0,
 )
 
-# HC-SR04, as its sellers quote the data sheet (the sheet itself was not at hand): 40 kHz, 0.02 to 4 m, accuracy 3 mm,
+# HC-SR04, as sellers quote the data sheet (the sheet itself was not available): 40 kHz, 0.02 to 4 m, accuracy 3 mm,
 # resolution 0.3 cm, 15 degrees. Chosen: 3 mm is two deviations of a reading at 10 Hz, 15 degrees is the full beam;
 # speed of sound and lost echoes as above.
 HC_SR04 = Sonar(

@@ -57,9 +57,9 @@ class Phases(BaseModel):
     phase: Annotated[tuple[Phase, ...], Field(min_length=1, strict=False)]  # in the order of flight
 
     @model_validator(mode="after")
-    def _names_once(self) -> "Phases":
+    def _names_are_unique(self) -> "Phases":
         names = [phase.name for phase in self.phase]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ConfigError("phase", f"two phases are named {twice[0]!r}; use unique names")
+        duplicates = sorted({name for name in names if names.count(name) > 1})
+        if duplicates:
+            raise ConfigError("phase", f"two phases are named {duplicates[0]!r}; use unique names")
         return self

@@ -54,11 +54,11 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
     Raises:
         ConfigError: a leader does not exist or follows another vehicle.
     """
-    return {name: _followed_service(name, shares, keys[name]) if share.parameters.leader else share
+    return {name: _follower_config(name, shares, keys[name]) if share.parameters.leader else share
             for name, share in shares.items()}  # fmt: skip
 
 
-def _followed_service(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
+def _follower_config(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
     own = shares[name].parameters
     others = [other for other, share in shares.items() if other != name and not share.parameters.leader]
     if own.leader not in others:

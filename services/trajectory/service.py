@@ -1,4 +1,4 @@
-"""The trajectory service: references up to a bounded time ahead of the plant."""
+"""Trajectory service: outputs setpoints, up to a bounded time ahead of the plant."""
 
 from typing import Any, NamedTuple
 

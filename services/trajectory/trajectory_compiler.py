@@ -30,25 +30,25 @@ def compile(trajectory: Phases, origin_world: Vec3 = ZERO, origin_yaw: float = 0
     Raises:
         ConfigError: a phase is shorter than its segments, or a segment does not join its predecessor.
     """
-    joined: dict[str, list[tuple[float, Piece]]] = {channel: [] for channel in CHANNELS}
+    timeline: dict[str, list[tuple[float, Piece]]] = {channel: [] for channel in CHANNELS}
     value = dict.fromkeys(CHANNELS, 0.0)
     starts, now, final = [], 0.0, 0
     for index, phase in enumerate(trajectory.phase):
         starts.append(now)
         key = f"trajectory.phase.{index}"
-        moved = {channel: _pieces(phase, key, channel, value) for channel in CHANNELS}
-        length = {channel: math.total(piece.duration for piece in pieces) for channel, pieces in moved.items()}
+        pieces_of = {channel: _pieces(phase, key, channel, value) for channel in CHANNELS}
+        length = {channel: math.total(piece.duration for piece in pieces) for channel, pieces in pieces_of.items()}
         end = now + _phase_duration(phase, key, max(length.values()))
-        for channel, pieces in moved.items():
+        for channel, pieces in pieces_of.items():
             time = now
             for piece in pieces:
-                joined[channel].append((time, piece))
+                timeline[channel].append((time, piece))
                 time += piece.duration
-            joined[channel].append((min(time, end), Piece(0.0, (value[channel],))))
+            timeline[channel].append((min(time, end), Piece(0.0, (value[channel],))))
         now = end
         final = index + 1 if value["z"] > GROUNDED else final
     parameters = Parameters(
-        **{channel: _channel(joined[channel]) for channel in CHANNELS},
+        **{channel: _channel(timeline[channel]) for channel in CHANNELS},
         phase_start=np.array(starts),
         phase_release=np.array([float(phase.release) for phase in trajectory.phase]),
         origin_world=origin_world,
@@ -78,7 +78,7 @@ def _phase_duration(phase: Phase, key: str, longest: float) -> float:
     return phase.duration
 
 
-def _channel(joined: list[tuple[float, Piece]]) -> Channel:
+def _channel(timeline: list[tuple[float, Piece]]) -> Channel:
     # The last of several pieces with the same start wins: the others have no length.
-    pieces = dict(joined)
+    pieces = dict(timeline)
     return Channel(np.array(list(pieces)), np.array([piece.row() for piece in pieces.values()]))

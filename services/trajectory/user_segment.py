@@ -50,7 +50,7 @@ class UserSegment(Segment):
 
     def _segment(self, module: ModuleType) -> Segment:
         if self.kind in KINDS:
-            raise ConfigError("kind", f"{self.kind} is the name of a kind that ships", "another name")
+            raise ConfigError("kind", f"{self.kind} is the name of a built-in kind", "another name")
         classes = [
             c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Segment) and c is not Segment
         ]
@@ -64,7 +64,12 @@ class UserSegment(Segment):
 
 
 def load(scene: Scene, segments: Iterator[tuple[str, Segment]]) -> None:
-    """Import the modules of user segments, given with their keys. Raise ConfigError if one cannot be imported."""
+    """Import the modules of user segments; raise ConfigError if one cannot be imported.
+
+    Args:
+        scene: scene with the modules' texts.
+        segments: pairs of scene key and segment.
+    """
     texts = user_modules.texts(scene)
     for key, segment in segments:
         if isinstance(segment, UserSegment):

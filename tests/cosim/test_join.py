@@ -16,7 +16,7 @@ from lapwing.runs.single_process_run import fly_single
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.process_table import MAVLINK
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.services.security import says
+from lapwing.services.security import publish_permissions
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long
@@ -86,7 +86,7 @@ def test_participant_cannot_publish_for_others(tmp_path):
     keys, run = tmp_path / "keys", PublisherIds("test-access")
     make(keys, ["plant", "sensors"], 1)
     setup = resolve(load("delivery_mission"))
-    rules = by_certificate("test-access", says(setup, "test-access"))
+    rules = by_certificate("test-access", publish_permissions(setup, "test-access"))
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["plant"]).values())
     with (
         ZenohBus([end], gid=run.gid("plant"), security={**tls(keys, "plant"), **rules}) as plant,
@@ -118,7 +118,7 @@ def test_participant_cannot_publish_for_others(tmp_path):
 def test_viewer_reads_only_and_needs_certificate(tmp_path):
     keys, run = tmp_path / "keys", PublisherIds("test-viewer")
     make(keys, ["autopilot", VIEWER], 1)
-    rules = by_certificate("test-viewer", says(resolve(load("groundstation")), "test-viewer"))
+    rules = by_certificate("test-viewer", publish_permissions(resolve(load("groundstation")), "test-viewer"))
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["autopilot"]).values())
     gid, topic, bundles = run.gid("autopilot"), "test-viewer/drone1/status", f"test-viewer/{STEP_KEY}/autopilot"
     with (

@@ -114,7 +114,7 @@ def test_invalid_controller_is_one_line_scene_error(controller, text):
 def test_controller_options_need_class_and_autopilot():
     with pytest.raises(lapwing.SceneError, match="controller_options: a Faulty object takes no options"):
         lapwing.fly("hover", controller=Faulty(None), controller_options={"gain": 1.0})
-    with pytest.raises(lapwing.SceneError, match="the model gyrostat knows no such table"):
+    with pytest.raises(lapwing.SceneError, match="the model gyrostat has no such table"):
         lapwing.fly("gyrostat_chaotic", controller=Faulty(None))
 
 

@@ -8,7 +8,7 @@ from lapwing.services.common.ports import Setpoint
 
 
 class AltitudeFlight:
-    """Moves altitude and heading; the horizontal setpoint is the estimate, so the wind integral is kept."""
+    """Moves altitude and heading; the horizontal setpoint is the estimate, so the wind integral does not change."""
 
     def __init__(self, guidance: Guidance):
         s = guidance.smoothing
@@ -33,10 +33,10 @@ class AltitudeFlight:
         Args:
             constants: constants of the vehicle.
             view: input with the estimate of this tick.
-            guidance: guidance.
+            guidance: its smoothed setpoint is replaced.
             climb_rate: vertical speed [m/s].
             yaw_rate: [rad/s].
-            tilts: forward and to the left [rad].
+            tilts: tilts forward and to the left [rad].
         """
         s, limits, e = self._smoothing, guidance.limits, view.estimate
         s.move_at((0.0, 0.0, climb_rate), limits, view.dt)

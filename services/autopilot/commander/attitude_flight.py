@@ -9,17 +9,17 @@ from lapwing.services.autopilot.land_detector import CUT_HEIGHT
 from lapwing.services.common.ports import Setpoint
 
 _RISING = 0.01  # [m/s]
-LEAST_THRUST = 0.08  # over the maximum at the lower end of the stick, PX4's MPC_MANTHR_MIN
+LEAST_THRUST = 0.08  # of the maximum, at the lower end of the stick (PX4's MPC_MANTHR_MIN)
 
 
 def stick_thrust(constants: Constants, up: float) -> float:
-    """Return thrust over maximum thrust for a throttle stick of -1..1 with hover in the middle (MPC_THR_CURVE 0)."""
+    """Return the fraction of the maximum thrust for a throttle stick of -1..1, hover at 0 (MPC_THR_CURVE 0)."""
     least, hover = min(LEAST_THRUST, constants.hover_thrust), constants.hover_thrust
     return hover + up * ((1.0 - hover) if up > 0.0 else (hover - least))
 
 
 class AttitudeFlight:
-    """Converts attitudes and body rates into setpoints; the wind integral is kept."""
+    """Converts attitudes and body rates into setpoints; the wind integral does not change."""
 
     def __init__(self, view: CommanderInput):
         """Start from the estimated attitude."""
@@ -29,9 +29,9 @@ class AttitudeFlight:
     def turn(self, rates_body: Vec3, guidance: Guidance, dt: float) -> None:
         """Rotate the attitude at body rates [rad/s] for dt [s], up to the maximum tilt."""
         q = retract(from_roll_pitch_yaw(self.roll, self.pitch, self.yaw), tuple(dt * rate for rate in rates_body))
-        self.take(q, guidance)
+        self.set_attitude(q, guidance)
 
-    def take(self, attitude: Quaternion, guidance: Guidance) -> None:
+    def set_attitude(self, attitude: Quaternion, guidance: Guidance) -> None:
         """Set the attitude, limited to the maximum tilt."""
         limit = math.radians(guidance.parameters["MPC_TILTMAX_AIR"])
         roll, pitch, self.yaw = to_roll_pitch_yaw(attitude)
@@ -51,9 +51,9 @@ class AttitudeFlight:
         Args:
             constants: constants of the vehicle.
             view: input with the estimate of this tick.
-            guidance: guidance.
-            yaw_rate: of the attitude [rad/s].
-            thrust: over the maximum; NaN: the altitude changes at the climb rate.
+            guidance: its smoothed setpoint is replaced.
+            yaw_rate: yaw rate of the attitude [rad/s].
+            thrust: fraction of the maximum; NaN: the altitude changes at the climb rate.
             climb_rate: [m/s].
         """
         e, g = view.estimate, constants.gravity

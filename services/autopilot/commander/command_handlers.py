@@ -26,11 +26,11 @@ class Denied(ValueError):
 def handles(*kinds: str) -> Callable[[Handler], Handler]:
     """Register the handler of these kinds of commands."""
 
-    def declare(function: Handler) -> Handler:
+    def register(function: Handler) -> Handler:
         HANDLERS.update(dict.fromkeys(kinds, function))
         return function
 
-    return declare
+    return register
 
 
 def handle(context: Context, command: Any) -> None:
@@ -49,8 +49,8 @@ def handle(context: Context, command: Any) -> None:
             outbox.send_text(str(error))
         return
     pending = context.state.pending_arm
-    waits = pending is not None and pending.command is command
-    if command.kind not in STREAMS and not waits:
+    is_pending = pending is not None and pending.command is command
+    if command.kind not in STREAMS and not is_pending:
         outbox.acknowledge(command, CommandAck.ACCEPTED, "", _present_value(context, command))
 
 
@@ -113,7 +113,7 @@ def mission_start(context: Context, command: Any) -> None:
 @handles("manual")
 def manual(context: Context, command: Any) -> None:
     """Store the sticks of the manual modes."""
-    if not context.state.guidance.takes_sticks:
+    if not context.state.guidance.uses_sticks:
         return
     sticks = [max(-1.0, min(1.0, value(command.values, k))) for k in range(4)]
     inputs = context.state.guidance.inputs
@@ -124,13 +124,13 @@ def manual(context: Context, command: Any) -> None:
 def offboard(context: Context, command: Any) -> None:
     """Store an offboard setpoint, or the voltage of each motor [V]."""
     inputs, motors = context.state.guidance.inputs, context.constants.rotors
-    inputs.offboard_refused = ""
+    inputs.offboard_rejection = ""
     if any(math.isinf(v) for v in command.values):
-        inputs.offboard_refused = "expected finite setpoints"
+        inputs.offboard_rejection = "expected finite setpoints"
     elif command.kind == "offboard_motors" and (len(command.values) != motors or any(map(math.isnan, command.values))):
-        inputs.offboard_refused = f"expected {motors} voltages, got {list(command.values)}"
-    if inputs.offboard_refused:
-        raise Denied(f"offboard: {inputs.offboard_refused}")
+        inputs.offboard_rejection = f"expected {motors} voltages, got {list(command.values)}"
+    if inputs.offboard_rejection:
+        raise Denied(f"offboard: {inputs.offboard_rejection}")
     inputs.offboard_kind, inputs.offboard, inputs.offboard_age = command.kind, command.values, 0.0
 
 
@@ -146,22 +146,22 @@ def speed(context: Context, command: Any) -> None:
     """Change the speed [m/s] until disarmed; NaN: the parameter's."""
     requested = value(command.values, 0)
     if not (0.0 < requested < math.inf or math.isnan(requested)):
-        raise Denied(f"speed: expected one above 0 m/s, got {requested:g}")
+        raise Denied(f"speed: expected a speed above 0 m/s, got {requested:g}")
     context.state.guidance.speed = requested
 
 
 @handles("parameter")
 def parameter(context: Context, command: Any) -> None:
     """Change a parameter, effective at once."""
-    known = context.constants.parameters.get(command.text)
-    if known is None:
+    definition = context.constants.parameters.get(command.text)
+    if definition is None:
         raise Denied(f"unknown parameter {command.text}")
     requested = value(command.values, 0)
-    call_or_deny(known.check, requested)
+    call_or_deny(definition.check, requested)
     parameters = context.state.guidance.parameters
-    parameters[known.name] = requested
+    parameters[definition.name] = requested
     context.outbox.parameters = dict(parameters)
-    if known.name == SATELLITES:
+    if definition.name == SATELLITES:
         context.outbox.faults = with_satellites(context.state.faults, parameters)
 
 

@@ -86,12 +86,12 @@ class Commander:
 
 def _announce_imu_failures(context: Context) -> None:
     """Send a text for each unit that the vote has newly excluded."""
-    after, state = context.view.imu_selection, context.state
-    if after.failed != state.imu_selection.failed:
+    selection, state = context.view.imu_selection, context.state
+    if selection.failed != state.imu_selection.failed:
         for unit in range(1, context.constants.imus + 1):
-            if (after.failed & ~state.imu_selection.failed) >> (unit - 1) & 1:
-                context.outbox.send_text(status_texts.IMU_FAILED.format(unit, after.unit))
-        state.imu_selection = after
+            if (selection.failed & ~state.imu_selection.failed) >> (unit - 1) & 1:
+                context.outbox.send_text(status_texts.IMU_FAILED.format(unit, selection.unit))
+        state.imu_selection = selection
 
 
 def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
@@ -140,8 +140,8 @@ def _disarm_when_idle(context: Context) -> None:
     """Disarm after a time-out on the ground."""
     view, state, guidance = context.view, context.state, context.state.guidance
     amid_mission = guidance.has_flown and state.mode_name == "mission" and guidance.route.item is not None
-    waits = guidance.armed and not guidance.flying and not amid_mission  # as in PX4: the next item may take off
-    state.on_ground_time = state.on_ground_time + view.dt if waits else 0.0
+    idle = guidance.armed and not guidance.flying and not amid_mission  # as in PX4: the next item may take off
+    state.on_ground_time = state.on_ground_time + view.dt if idle else 0.0
     time_limit = guidance.parameters["COM_DISARM_LAND" if guidance.has_flown else "COM_DISARM_PRFLT"]
     if 0.0 < time_limit < state.on_ground_time:
         disarm(context, status_texts.AFTER_LANDING if guidance.has_flown else status_texts.NO_TAKEOFF)

@@ -14,15 +14,15 @@ _SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never replaces a
 _MANUAL = ("position_control", "altitude_control", "stabilized", "acro")
 _EXEMPTION = {"mission": 1, "offboard": 4} | dict.fromkeys(_MANUAL, 0)  # bit of COM_RCL_EXCEPT by mode
 _AUTO = 2  # bit of the other modes
-_WARNING_TIME = 1.0  # [s] of a condition before the operator is warned
+_WARNING_TIME = 1.0  # [s] from the start of a condition to the operator's warning
 
 
 class Failsafe(NamedTuple):
     """A condition, its delay, and the parameter of its action."""
 
     reason: str
-    holds: Callable[[Context], bool]
-    delay: Callable[[dict[str, float]], float]  # of the parameters [s]
+    is_active: Callable[[Context], bool]
+    delay: Callable[[dict[str, float]], float]  # [s] by the parameters
     action: str  # parameter
 
 
@@ -40,13 +40,13 @@ def _link_lost(context: Context) -> bool:
 def _sticks_lost(context: Context) -> bool:
     """Return True if sticks moved by a pilot since arming are lost, as in PX4 unless the mode is exempt.
 
-    Without a position manual modes end by themselves.
+    Without a position the manual modes change to descend.
     """
     guidance, parameters = context.state.guidance, context.state.guidance.parameters
-    if "NAV_RCL_ACT" not in parameters:  # of former logs
+    if "NAV_RCL_ACT" not in parameters:  # in logs of former versions
         return False
-    known = guidance.takes_sticks and math.isfinite(guidance.inputs.sticks_age)
-    if not known or guidance.sticks_fresh or context.view.position_lost:
+    used = guidance.uses_sticks and math.isfinite(guidance.inputs.sticks_age)
+    if not used or guidance.sticks_fresh or context.view.position_lost:
         return False
     return not _EXEMPTION.get(context.state.mode_name, _AUTO) & int(parameters["COM_RCL_EXCEPT"])
 
@@ -78,7 +78,7 @@ def update(context: Context) -> None:
     """Act on conditions that have lasted for their delay, once until they end."""
     view, state, parameters = context.view, context.state, context.state.guidance.parameters
     for failsafe in FAILSAFES:
-        if not failsafe.holds(context):
+        if not failsafe.is_active(context):
             state.failsafe_timers.pop(failsafe.reason, None)
             continue
         before, acted = state.failsafe_timers.get(failsafe.reason, FailsafeTimer(0.0, False))
@@ -92,9 +92,9 @@ def update(context: Context) -> None:
         state.failsafe_timers[failsafe.reason] = FailsafeTimer(elapsed, acted)
 
 
-def any_holds(context: Context) -> bool:
-    """Return True if a condition holds or a timer is running."""
-    return bool(context.state.failsafe_timers) or any(failsafe.holds(context) for failsafe in FAILSAFES)
+def any_active(context: Context) -> bool:
+    """Return True if a condition is active or a timer is running."""
+    return bool(context.state.failsafe_timers) or any(failsafe.is_active(context) for failsafe in FAILSAFES)
 
 
 def _act(context: Context, reason: str, mode: str | None) -> bool:

@@ -28,15 +28,15 @@ class Fence:
         """
         self.count = len(items)
         self.shapes: list[tuple[bool, Any]] = []  # True for inclusion; (x, y, radius) or corners
-        left = list(items)
-        while left:
-            first = left[0]
+        remaining = list(items)
+        while remaining:
+            first = remaining[0]
             count = 1
             if first.action in _POLYGONS:
                 count = int(first.values[0]) if first.values else 0
-                if count < 3 or len(left) < count or any(i.action != first.action for i in left[:count]):
+                if count < 3 or len(remaining) < count or any(i.action != first.action for i in remaining[:count]):
                     raise ValueError(f"fence: expected a polygon of {count} (at least 3) vertices in a row")
-                shape: Any = [(i.position.x, i.position.y) for i in left[:count]]
+                shape: Any = [(i.position.x, i.position.y) for i in remaining[:count]]
             elif first.action in _CIRCLES:
                 if not first.radius > 0.0:
                     raise ValueError(f"fence: expected a circle of a radius above 0 m, got {first.radius:g}")
@@ -45,10 +45,10 @@ class Fence:
                 raise ValueError(
                     f"fence: unknown action {first.action}; expected one of {', '.join(_POLYGONS + _CIRCLES)}"
                 )
-            if not all(map(math.isfinite, [p for i in left[:count] for p in (i.position.x, i.position.y)])):
-                raise ValueError("fence: a place is not finite")
+            if not all(map(math.isfinite, [p for i in remaining[:count] for p in (i.position.x, i.position.y)])):
+                raise ValueError("fence: a position is not finite")
             self.shapes.append((first.action in ("fence_inclusion", "fence_circle_in"), shape))
-            del left[:count]
+            del remaining[:count]
 
     def allows(self, x: float, y: float) -> bool:
         """Return True if the vehicle may be at world (x, y) [m]."""
@@ -66,5 +66,5 @@ def rally_points(items: Sequence[Any]) -> tuple[tuple[float, float, float], ...]
     """Return the rally points [m] of uploaded items. Raise ValueError if an item is invalid."""
     points = tuple((i.position.x, i.position.y, i.position.z) for i in items)
     if not all(math.isfinite(v) for point in points for v in point) or any(i.action != "rally" for i in items):
-        raise ValueError("rally: expected points of the action rally at finite places")
+        raise ValueError("rally: expected points of the action rally at finite positions")
     return points

@@ -6,45 +6,50 @@ from collections.abc import Iterator, Sequence
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.fence import Fence
 
-MARGIN = 2.0  # [m] kept from the fence
-CIRCLE_CORNERS = 12  # of the polygon around a circle
-MOST_CORNERS = 200  # a fence with more is not routed around
+MARGIN = 2.0  # [m] clearance from the fence
+CIRCLE_CORNERS = 12  # vertices of the polygon around a circle
+MOST_CORNERS = 200  # above which the path is straight
 
 Point = tuple[float, float]
 
 
 def route_around(fence: Fence, start: Point, goal: Point) -> list[Point]:
     """Return the corners [m] of the path to the goal, including it; the straight path if there is no other."""
-    if _free(fence, start, goal) or not fence.allows(*start) or not fence.allows(*goal):
+    if _is_clear(fence, start, goal) or not fence.allows(*start) or not fence.allows(*goal):
         return [goal]
     corners = [corner for corner in _corners(fence) if fence.allows(*corner)]
     points = [start, *corners, goal]
     last = len(points) - 1
     if len(corners) > MOST_CORNERS:
         return [goal]
-    length, before, done = {0: 0.0}, {0: 0}, set()
+    length, previous, visited = {0: 0.0}, {0: 0}, set()
     queue = [(math.dist(start, goal), 0)]
     while queue:
-        _, here = heapq.heappop(queue)
-        if here == last:
-            return _unwound(points, before, last)
-        if here in done:
+        _, node = heapq.heappop(queue)
+        if node == last:
+            return _path(points, previous, last)
+        if node in visited:
             continue
-        done.add(here)
-        for there, point in enumerate(points):
-            beyond = length[here] + math.dist(points[here], point)
-            if there not in done and beyond < length.get(there, math.inf) and _free(fence, points[here], point):
-                length[there], before[there] = beyond, here
-                heapq.heappush(queue, (beyond + math.dist(point, goal), there))
+        visited.add(node)
+        for neighbour, point in enumerate(points):
+            total = length[node] + math.dist(points[node], point)
+            if (
+                neighbour not in visited
+                and total < length.get(neighbour, math.inf)
+                and _is_clear(fence, points[node], point)
+            ):
+                length[neighbour], previous[neighbour] = total, node
+                heapq.heappush(queue, (total + math.dist(point, goal), neighbour))
     return [goal]
 
 
-def _unwound(points: Sequence[Point], before: dict[int, int], last: int) -> list[Point]:
-    way = []
+def _path(points: Sequence[Point], previous: dict[int, int], last: int) -> list[Point]:
+    """Return the points from after the start to `last`."""
+    path = []
     while last:
-        way.append(points[last])
-        last = before[last]
-    return way[::-1]
+        path.append(points[last])
+        last = previous[last]
+    return path[::-1]
 
 
 def _corners(fence: Fence) -> Iterator[Point]:
@@ -57,10 +62,10 @@ def _corners(fence: Fence) -> Iterator[Point]:
                 yield x - MARGIN * dx, y - MARGIN * dy
         elif not stay_in:
             x, y, radius = shape
-            far = (radius + MARGIN) / math.cos(math.pi / CIRCLE_CORNERS)
+            distance = (radius + MARGIN) / math.cos(math.pi / CIRCLE_CORNERS)
             for k in range(CIRCLE_CORNERS):
                 angle = 2.0 * math.pi * k / CIRCLE_CORNERS
-                yield x + far * math.cos(angle), y + far * math.sin(angle)
+                yield x + distance * math.cos(angle), y + distance * math.sin(angle)
 
 
 def _bisector(before: Point, corner: Point, after: Point) -> Point:
@@ -76,7 +81,7 @@ def _unit(start: Point, end: Point) -> Point:
     return (end[0] - start[0]) / length, (end[1] - start[1]) / length
 
 
-def _free(fence: Fence, a: Point, b: Point) -> bool:
+def _is_clear(fence: Fence, a: Point, b: Point) -> bool:
     """Return True if the straight path between two points respects the fence."""
     middle = 0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1])
     if not fence.allows(*middle):

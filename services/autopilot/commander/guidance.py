@@ -22,7 +22,7 @@ class OperatorInputs:
     sticks: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)  # forward, left, up, yaw rate, each from -1 to 1
     sticks_age: float = math.inf
     offboard_kind: str = ""  # offboard_position, offboard_attitude or offboard_motors
-    offboard_refused: str = ""  # reason for rejecting the last setpoint; "": accepted
+    offboard_rejection: str = ""  # reason for rejecting the last setpoint; "": accepted
     offboard: tuple[float, ...] = ()
     offboard_age: float = math.inf
     link_age: float = math.inf
@@ -46,7 +46,7 @@ class Guidance:
     has_flown: bool = False  # since it was armed
     speed: float = math.nan  # [m/s] for this flight; NaN: the parameter's
     home: Vec3 = (0.0, 0.0, 0.0)  # [m] world x, y and ground height, of the arming position or set by command
-    roi: Vec3 | None = None  # [m] region of interest that the nose points at
+    roi: Vec3 | None = None  # [m] region of interest, towards which the vehicle yaws
     released: bool = False  # open the gripper
     route: Route = field(default_factory=Route)
     fence: Fence = field(default_factory=Fence)
@@ -55,7 +55,7 @@ class Guidance:
 
     @property
     def limits(self) -> Limits:
-        """Present limits of the setpoint."""
+        """Limits of the setpoint."""
         p = self.parameters
         desired = p["MPC_XY_CRUISE"] if math.isnan(self.speed) else self.speed
         return Limits(
@@ -88,9 +88,9 @@ class Guidance:
 
     @property
     def home_distances(self) -> tuple[float, float]:
-        """Maximum horizontal and vertical distance from home [m]; 0: any."""
+        """Maximum horizontal and vertical distance from home [m]; 0: unlimited."""
         p = self.parameters
-        return p.get("GF_MAX_HOR_DIST", 0.0), p.get("GF_MAX_VER_DIST", 0.0)  # absent from former logs
+        return p.get("GF_MAX_HOR_DIST", 0.0), p.get("GF_MAX_VER_DIST", 0.0)  # not in logs of former versions
 
     def allows(self, constants: Constants, position_world: Vec3) -> bool:
         """Return True if the fence and the maximum distances from home allow a position [m]."""
@@ -107,14 +107,14 @@ class Guidance:
         return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
 
     @property
-    def takes_sticks(self) -> bool:
+    def uses_sticks(self) -> bool:
         """True if stick positions are used."""
-        return self.parameters.get("COM_RC_IN_MODE", 1.0) not in _WITHOUT_STICKS  # absent from former logs
+        return self.parameters.get("COM_RC_IN_MODE", 1.0) not in _WITHOUT_STICKS  # not in logs of former versions
 
     @property
     def sticks_fresh(self) -> bool:
         """True if stick positions are recent."""
-        return self.inputs.sticks_age < self.parameters.get("COM_RC_LOSS_T", 1.0)  # absent from former logs
+        return self.inputs.sticks_age < self.parameters.get("COM_RC_LOSS_T", 1.0)  # not in logs of former versions
 
     def stick(self, index: int) -> float:
         """Return a stick position, -1 to 1; 0 within the dead zone or without recent sticks."""

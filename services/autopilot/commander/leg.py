@@ -11,7 +11,7 @@ TOWARDS_TARGET, TOWARDS_HOME, AWAY_FROM_HOME, ALONG_VELOCITY, TURN_FIRST, STAY =
 _CLOSE = 0.5  # [m] distance below which a direction is undefined
 _SLOW = 0.5  # [m/s] speed below which a direction is undefined
 
-Place = tuple[Vec3, float]  # [m] position, [m] acceptance radius
+Waypoint = tuple[Vec3, float]  # [m] position, [m] acceptance radius
 
 
 def corner_speed(before: Vec3, corner: Vec3, after: Vec3, radius: float, limits: Limits) -> float:
@@ -23,19 +23,21 @@ def corner_speed(before: Vec3, corner: Vec3, after: Vec3, radius: float, limits:
     return math.sqrt(0.5 * limits.acceleration * radius / math.tan(0.5 * turn)) if turn > 1e-6 else math.inf
 
 
-def passing_speed(start: Vec3, places: Sequence[Place], limits: Limits) -> float:
-    """Return the speed [m/s] at the first place that allows a stop at the last."""
+def passing_speed(start: Vec3, waypoints: Sequence[Waypoint], limits: Limits) -> float:
+    """Return the speed [m/s] at the first waypoint that allows a stop at the last."""
     speed = 0.0
-    points = [start, *(place for place, _ in places)]
-    for k in range(len(places) - 1, 0, -1):
-        room = norm(subtract(points[k + 1], points[k])) + stopping_distance(speed, limits.acceleration)
-        corner = corner_speed(points[k - 1], points[k], points[k + 1], places[k - 1][1], limits)
-        speed = min(corner, braking_speed(room, limits.acceleration), max(limits.horizontal, limits.up, limits.down))
+    points = [start, *(position for position, _ in waypoints)]
+    for k in range(len(waypoints) - 1, 0, -1):
+        distance = norm(subtract(points[k + 1], points[k])) + stopping_distance(speed, limits.acceleration)
+        corner = corner_speed(points[k - 1], points[k], points[k + 1], waypoints[k - 1][1], limits)
+        speed = min(
+            corner, braking_speed(distance, limits.acceleration), max(limits.horizontal, limits.up, limits.down)
+        )
     return speed
 
 
 class Leg:
-    """A straight leg."""
+    """A straight leg of a route."""
 
     def __init__(self, start_world: Vec3, target_world: Vec3, passing_speed: float = 0.0):
         """Create a leg from start to target [m] with a speed [m/s] at its end."""

@@ -17,8 +17,8 @@ def mission_upload(context: Context, command: Any) -> None:
     state = context.state
     state.guidance.route = call_or_deny(Route, command.items)
     if state.mode_name == "mission" and not state.on_trajectory:
-        flies_on = state.guidance.route.items and state.guidance.flying
-        transitions.enter(context.constants, state, "mission" if flies_on else "hold")
+        continues = state.guidance.route.items and state.guidance.flying
+        transitions.enter(context.constants, state, "mission" if continues else "hold")
 
 
 @handles("mission_clear")
@@ -51,11 +51,11 @@ def rally_upload(context: Context, command: Any) -> None:
 
 @handles("set_home")
 def set_home(context: Context, command: Any) -> None:
-    """Set home. Values: x, y, z of the ground [m]; missing coordinates are the vehicle's."""
+    """Set home. Values: x, y, z of the ground [m]; missing coordinates are those of the vehicle."""
     x, y, z = context.view.estimate.position_world
     home = fill_in((x, y, z - context.constants.resting_height), vector(command.values, 0))
     if not all(map(math.isfinite, home)):
-        raise Denied("set home: expected a place")
+        raise Denied("set home: expected a position")
     context.state.guidance.home = home
 
 

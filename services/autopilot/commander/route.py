@@ -11,7 +11,7 @@ TO_PLACES = ("waypoint", "loiter_time", "loiter", "loiter_to_alt")  # actions wi
 INSTANT = ("speed", "roi", "set_home", "gripper")  # actions that take no time
 GRAB = 1.0  # value of the action gripper; 0: release
 ACTIONS = (*TO_PLACES, *INSTANT, "takeoff", "land", "return", "delay", "condition", "jump", "yaw")
-_PLACED = ("waypoint",)
+
 MAXIMUM_TAKEOFF_HEIGHT = 1000.0  # [m]
 
 
@@ -20,16 +20,18 @@ def check_items(items: Sequence[Any]) -> None:
     for number, item in enumerate(items):
         if item.action not in ACTIONS:
             raise ValueError(f"item {number}: unknown action {item.action}; expected one of {', '.join(ACTIONS)}")
-        if item.action in _PLACED and not all(map(math.isfinite, item.position)):
-            raise ValueError(f"item {number}: {item.action} needs a place")
+        if item.action == "waypoint" and not all(map(math.isfinite, item.position)):
+            raise ValueError(f"item {number}: {item.action} needs a position")
         if item.action == "takeoff" and MAXIMUM_TAKEOFF_HEIGHT < item.position.z < math.inf:
             raise ValueError(f"item {number}: expected a take-off to at most {MAXIMUM_TAKEOFF_HEIGHT:g} m")
         if math.isinf(item.yaw) or not (math.isfinite(item.hold_time) and item.hold_time >= 0.0):
             raise ValueError(f"item {number}: expected a finite yaw, and a time of 0 s or more")
         if item.action == "jump" and not (len(item.values) > 1 and 0 <= item.values[0] < len(items)):
-            raise ValueError(f"item {number}: expected a jump to an item from 0 to {len(items) - 1}, and how often")
+            raise ValueError(
+                f"item {number}: expected a jump to an item from 0 to {len(items) - 1}, and a number of repetitions"
+            )
         if item.action == "speed" and not (item.values and (item.values[0] > 0.0 or math.isnan(item.values[0]))):
-            raise ValueError(f"item {number}: expected a speed above 0 m/s, or none for the usual one")
+            raise ValueError(f"item {number}: expected a speed above 0 m/s, or NaN for that of the parameters")
 
 
 class Route:

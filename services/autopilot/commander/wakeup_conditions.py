@@ -31,9 +31,9 @@ def time_without_changes(context: Context) -> float:
     """
     state = context.state
     guidance = state.guidance
-    counts = state.pending_arm is not None or bool(guidance.route.items)  # mission_state depends on flying
-    moves_away = any(guidance.home_distances)  # any tick may be the first outside
-    if not state.on_trajectory or counts or moves_away or failsafes.any_holds(context):
+    timers_run = state.pending_arm is not None or bool(guidance.route.items)  # mission_state depends on flying
+    distance_limited = any(guidance.home_distances)  # the vehicle may be outside at any tick
+    if not state.on_trajectory or timers_run or distance_limited or failsafes.any_active(context):
         return 0.0
     inputs, parameters = guidance.inputs, guidance.parameters
     link_left = parameters["COM_DL_LOSS_T"] - inputs.link_age if inputs.linked else math.inf

@@ -21,7 +21,7 @@ from lapwing.services.autopilot.custom.controller_output import (
     parse_controller_output,
 )
 from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
-from lapwing.services.autopilot.mixer import at_rest
+from lapwing.services.autopilot.mixer import zero_thrust
 from lapwing.services.common.ports import PerRotor
 
 
@@ -56,15 +56,15 @@ class CustomState(NamedTuple):
 
 def start(p: CustomController) -> CustomState:
     """Return the initial state."""
-    detector = read(p.common.failure_detector)
-    held, watched = motors_off(len(detector.roll_arm)), python_function(motor_failure.start)(detector)
-    return CustomState(INITIAL_LANDED_STATE, p.own_start, held, watched, 0, float("nan"))
+    parameters = read(p.common.failure_detector)
+    held, detector = motors_off(len(parameters.roll_arm)), python_function(motor_failure.start)(parameters)
+    return CustomState(INITIAL_LANDED_STATE, p.own_start, held, detector, 0, float("nan"))
 
 
 @always_inline
-def _parse_output(given: tuple, none: PerRotor) -> tuple[Any, ControllerOutput]:
-    """Return state and parsed output of the user's step."""
-    return given[0], parse_controller_output(given[1], none)
+def _parse_output(result: tuple, no_voltage: PerRotor) -> tuple[Any, ControllerOutput]:
+    """Return the state and the parsed output of the user's step."""
+    return result[0], parse_controller_output(result[1], no_voltage)
 
 
 @generic(inline=True)
@@ -75,14 +75,14 @@ def _call_user_step(
     estimate: types.Type,
     setpoint: types.Type,
     by_port: types.Type,
-    none: types.Type,
+    no_voltage: types.Type,
 ) -> Callable:
     """Call `step` of the user's module, or read the port."""
     if p.instance_class is PythonControllerProxy:
-        return lambda p, s, time, estimate, setpoint, by_port, none: (s, by_port[0].value)
-    result = sys.modules[p.instance_class.__module__].step
-    return lambda p, s, time, estimate, setpoint, by_port, none: _parse_output(
-        result(p, s, time, estimate, setpoint), none
+        return lambda p, s, time, estimate, setpoint, by_port, no_voltage: (s, by_port[0].value)
+    user_step = sys.modules[p.instance_class.__module__].step
+    return lambda p, s, time, estimate, setpoint, by_port, no_voltage: _parse_output(
+        user_step(p, s, time, estimate, setpoint), no_voltage
     )
 
 
@@ -94,17 +94,19 @@ def step(
     c = p.common
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
     setpoint = inputs[3].value if order.follow else order.setpoint
-    landed, watched, still_from = s.landed_state, s.failure_detector, s.still_from
+    landed, detector, still_from = s.landed_state, s.failure_detector, s.still_from
     if order.restart_at == tick:
         landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
-        watched = motor_failure.start(c.failure_detector.value)
+        detector = motor_failure.start(c.failure_detector.value)
     charge = battery.value.charge if battery.due else s.charge
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
-    own, held, none = s.own, s.held, at_rest(c.law.value.shares[0])
+    own, held, no_voltage = s.own, s.held, zero_thrust(c.law.value.shares[0])
     if landed.name != FLYING:
-        own, held = p.own_start, ControllerOutput(True, none, NO_WRENCH, (0.0, 0.0))
+        own, held = p.own_start, ControllerOutput(True, no_voltage, NO_WRENCH, (0.0, 0.0))
     elif tick % p.every == 0:
-        own, held = _call_user_step(p.own, own, tick * c.interval, e, setpoint, inputs[4:], none)
-    given = command(c.law.value, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, landed.name, watched.failed)
-    watched, outputs = block_outputs(c, watched, still_from, charge, order, e, setpoint, landed.name, given)
-    return CustomState(landed, own, held, watched, still_from, charge), outputs, CONTINUE
+        own, held = _call_user_step(p.own, own, tick * c.interval, e, setpoint, inputs[4:], no_voltage)
+    motor_command = command(
+        c.law.value, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, landed.name, detector.failed
+    )
+    detector, outputs = block_outputs(c, detector, still_from, charge, order, e, setpoint, landed.name, motor_command)
+    return CustomState(landed, own, held, detector, still_from, charge), outputs, CONTINUE

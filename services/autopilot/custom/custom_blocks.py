@@ -25,7 +25,7 @@ from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common.user_code import load_object
 
 
-def controller_parts(
+def controller_blocks(
     name: str,
     texts: Mapping[str, str],
     config: AutopilotSetup,
@@ -36,29 +36,29 @@ def controller_parts(
     """Return the Python block of the controller, if it is not compiled, and the block that outputs the motor command.
 
     Args:
-        name: name of the latter.
+        name: name of the output block.
         texts: module texts of the run configuration.
         config: configuration of the autopilot.
-        common: parameters in common with the cascaded PID.
+        common: parameters shared with the cascaded PID.
         inputs: estimate, commander output, battery and reference.
-        outputs: outputs of the latter.
+        outputs: outputs of the output block.
     """
     code, vehicle = config.controller, config.vehicle
     assert code is not None
     assert vehicle is not None
     module, user_code = load_object(CONTROLLER, code.name, texts)
-    per_demand = lift(config.airframe), moments(config.airframe)
+    per_control = lift(config.airframe), moments(config.airframe)
     if is_compiled(user_code):
         parameters, start = compile_controller(module, user_code, vehicle, code.options)
-        p = CustomController(common, parameters, start, code.every, *per_demand, vehicle.voltage_max)
+        p = CustomController(common, parameters, start, code.every, *per_control, vehicle.voltage_max)
         return [Block(name, p, Cell(block.start(p)), inputs, outputs, trusted=False)]
     construct = constructor(CONTROLLER, module, user_code, vehicle, code.options)
     python_block = PythonControllerBlock(code, module, construct, inputs[3].port, vehicle)
-    p = CustomController(common, PythonControllerProxy(0.0), 0.0, code.every, *per_demand, vehicle.voltage_max)
+    p = CustomController(common, PythonControllerProxy(0.0), 0.0, code.every, *per_control, vehicle.voltage_max)
     return [python_block, Block(name, p, Cell(block.start(p)), (*inputs, InputPort(CONTROLLER_OUTPUT)), outputs)]
 
 
-def estimator_parts(
+def estimator_blocks(
     name: str,
     texts: Mapping[str, str],
     config: AutopilotSetup,
@@ -70,7 +70,7 @@ def estimator_parts(
     """Return the Python block of the estimator and the block that outputs its estimate at every tick.
 
     Args:
-        name: name of the latter.
+        name: name of the output block.
         texts: module texts of the run configuration.
         config: configuration of the autopilot.
         wakeup: wake-up parameters of the commander.

@@ -6,7 +6,7 @@ from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.services.autopilot.service_config import CustomCode
 
 
-class PeriodicPart(ABC):
+class PeriodicBlock(ABC):
     """Block that calls user code at multiples of its period."""
 
     _code: CustomCode

@@ -10,7 +10,7 @@ from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import python_function
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER
 from lapwing.services.autopilot.custom.controller_output import CONTROLLER_OUTPUT, motors_off, parse_controller_output
-from lapwing.services.autopilot.custom.periodic import PeriodicPart
+from lapwing.services.autopilot.custom.periodic import PeriodicBlock
 from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
 from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common import ports
@@ -19,7 +19,7 @@ from lapwing.services.common.controller_api import VehicleModel
 _update_landed_state = python_function(update_landed_state)
 
 
-class PythonControllerBlock(PeriodicPart):
+class PythonControllerBlock(PeriodicBlock):
     """Calls the controller and writes its output to the port `controller_output`."""
 
     name = "autopilot.controller"
@@ -42,7 +42,7 @@ class PythonControllerBlock(PeriodicPart):
             vehicle: vehicle parameters.
         """
         self.outputs = (Port(CONTROLLER_OUTPUT, motors_off(len(vehicle.rotor_positions_body)), LATCHED),)
-        self._none = self.outputs[0].like.volts
+        self._no_voltage = self.outputs[0].like.volts
         self._code, self._module, self._construct = code, module, construct
         self._reference, self._resting_height = reference, vehicle.resting_height
         self._controller: Any = None
@@ -64,7 +64,7 @@ class PythonControllerBlock(PeriodicPart):
         time = tick * graph.setup.interval
         try:
             self._controller = self._controller or self._construct()
-            output = parse_controller_output(self._controller.step(time, estimate, setpoint), self._none)
+            output = parse_controller_output(self._controller.step(time, estimate, setpoint), self._no_voltage)
         except FAULTS as error:
             raise LockStepError(f"{self._blame(error)} at t = {time:.3f} s") from error
         graph.put(CONTROLLER_OUTPUT, tick, output)

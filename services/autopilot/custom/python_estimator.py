@@ -10,7 +10,7 @@ from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels import always_inline
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters, wakeup_due
-from lapwing.services.autopilot.custom.periodic import PeriodicPart
+from lapwing.services.autopilot.custom.periodic import PeriodicBlock
 from lapwing.services.autopilot.service_config import CustomCode
 from lapwing.services.common.estimator_api import validate_estimate
 from lapwing.services.common.ports import StateEstimate
@@ -18,7 +18,7 @@ from lapwing.services.common.ports import StateEstimate
 HELD = "held_estimate"  # port within the autopilot
 
 
-class PythonEstimatorBlock(PeriodicPart):
+class PythonEstimatorBlock(PeriodicBlock):
     """Calls the estimator with new readings and writes its estimate to the port `held_estimate`."""
 
     name = "autopilot.estimator"

@@ -1,6 +1,6 @@
 """State estimator: an error-state Kalman filter of pure functions (theory.md, section 3.3)."""
 
-from lapwing.services.autopilot.estimator.covariance_inflation import forget_imu
+from lapwing.services.autopilot.estimator.covariance_inflation import reset_imu_biases
 from lapwing.services.autopilot.estimator.filter_parameters import PRESETS, Estimator
 from lapwing.services.autopilot.estimator.filter_state import NAMES, SOURCES, State, estimate, initial, new_memory
 from lapwing.services.autopilot.estimator.flow_fusion import update_flow
@@ -18,10 +18,10 @@ __all__ = [
     "State",
     "estimate",
     "follow_ground",
-    "forget_imu",
     "initial",
     "new_memory",
     "predict",
+    "reset_imu_biases",
     "update_barometer",
     "update_flow",
     "update_gps",

@@ -1,6 +1,6 @@
 """Covariance inflation after repeated rejections of a source (theory.md, section 3.4).
 
-When readings are rejected for long, the estimate may be wrong. Its covariance grows until they are accepted again.
+Readings that are rejected for a long time indicate a wrong estimate. Its covariance grows until they are accepted.
 """
 
 import numpy as np
@@ -29,26 +29,26 @@ from lapwing.services.autopilot.estimator.filter_state import (
     State,
 )
 
-_MOTION = 0.3  # [s] of rejected position and velocity, after which the IMU states are inflated
-_LONE = 3.0  # [s] of rejected position of a receiver without velocity
-_LONG = 10.0  # [s] of rejection of any other source
+_MOTION = 0.3  # [s] of rejected position and velocity before the IMU states are inflated
+_POSITION_ONLY = 3.0  # [s] of rejected position, for a receiver without velocity
+_LONG = 10.0  # [s] of rejection, for any other source
 
 
 @always_inline
-def _widen(c: np.ndarray, start: int, deviation: float) -> None:
+def _inflate(c: np.ndarray, start: int, deviation: float) -> None:
     for i in range(start, start + 3):
         c[i, i] += deviation * deviation
 
 
 @always_inline
-def doubt_imu(m: Memory) -> None:
-    """Inflate what follows from the IMU, and forget the trend of innovations."""
+def inflate_imu_states(m: Memory) -> None:
+    """Inflate the covariance of the states that depend on the IMU, and reset the innovation trend."""
     c = m.covariance
-    _widen(c, THETA, 0.02)
-    _widen(c, VELOCITY, 0.3)
-    _widen(c, POSITION, 0.1)
-    _widen(c, GYRO, 5e-3)
-    _widen(c, ACCELEROMETER, 0.1)
+    _inflate(c, THETA, 0.02)
+    _inflate(c, VELOCITY, 0.3)
+    _inflate(c, POSITION, 0.1)
+    _inflate(c, GYRO, 5e-3)
+    _inflate(c, ACCELEROMETER, 0.1)
     m.trend[:] = 0.0
 
 
@@ -56,25 +56,25 @@ def doubt_imu(m: Memory) -> None:
 def inflate_covariance(p: Estimator, m: Memory, source: int) -> None:
     """Inflate the covariance after the gate rejected a reading of `source`."""
     c = m.covariance
-    for_long = m.since[source] * p.interval > _LONG
+    rejected_long = m.since[source] * p.interval > _LONG
     if source == GPS_VELOCITY:
-        imu_doubted = m.refused[GPS] == 1 and min(m.since[GPS_VELOCITY], m.since[GPS]) * p.interval > _MOTION
+        inflate_imu = m.rejected[GPS] == 1 and min(m.since[GPS_VELOCITY], m.since[GPS]) * p.interval > _MOTION
     else:
-        lone = m.since[GPS_VELOCITY] == NEVER and m.since[GPS] * p.interval > _LONE
-        imu_doubted = source == GPS and lone
-    if imu_doubted:
-        doubt_imu(m)
-    elif source == GPS and for_long:
-        _widen(c, POSITION, 3.0)
-    elif source == BARO and for_long:
+        position_only = m.since[GPS_VELOCITY] == NEVER and m.since[GPS] * p.interval > _POSITION_ONLY
+        inflate_imu = source == GPS and position_only
+    if inflate_imu:
+        inflate_imu_states(m)
+    elif source == GPS and rejected_long:
+        _inflate(c, POSITION, 3.0)
+    elif source == BARO and rejected_long:
         c[BAROMETER, BAROMETER] += 1.0
-    elif source == MAG and for_long:
-        _widen(c, IRON, 2e-6)
+    elif source == MAG and rejected_long:
+        _inflate(c, IRON, 2e-6)
 
 
 @kernel
-def forget_imu(p: Estimator, s: State) -> State:
-    """Return the state with unknown inertial biases, as of another unit.
+def reset_imu_biases(p: Estimator, s: State) -> State:
+    """Return the state with unknown inertial biases, for a change to another unit.
 
     Args:
         p: `Estimator`.

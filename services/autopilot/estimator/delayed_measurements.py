@@ -19,7 +19,7 @@ class Noise(NamedTuple):
 
 
 @always_inline
-def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
+def delayed_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Fill the row of the position `delay` seconds ago, with the receiver's correlated error (theory.md, eq. (3.30)).
 
     `force_world` is the specific force during the delay, weighted by its effect on the position.
@@ -32,7 +32,7 @@ def late_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
 
 
 @always_inline
-def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
+def delayed_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Fill the row of the velocity `delay` seconds ago; `force_world` is the mean specific force since."""
     clear(m)
     m.row[VELOCITY + axis] = 1.0
@@ -40,7 +40,7 @@ def late_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: f
 
 
 @noinline
-def late_innovation_variances(
+def delayed_innovation_variances(
     m: Memory, axis: int, since: Noise, variance: float, force_world: Vec3
 ) -> tuple[float, float]:
     """Return the innovation variances for gain and gate of a delayed row (theory.md, eqs. (3.35) and (3.36)).

@@ -18,7 +18,8 @@ THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 1
 HEADING, BAROMETER, SCALE = 21, 22, 23
 CONSIDERED = 16  # constant errors of instruments that are considered and not estimated (theory.md, eq. (3.60))
 GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT, LIFT = 0, 3, 6, 9, 11  # LIFT: accelerometers, eq. (3.66)
-VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2  # rows of `considered`: theirs, of H, covariance with the innovation
+# Rows of `considered`: variances, row of H, covariance with the innovation
+VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2
 
 SOURCES = ("imu", "gps", "gps_velocity", "barometer", "sonar", "magnetometer")
 IMU, GPS, GPS_VELOCITY, BARO, SONAR, MAG = range(len(SOURCES))
@@ -32,7 +33,7 @@ NEVER = -1
 
 
 class Nominal(NamedTuple):
-    """Best estimate."""
+    """Nominal state, about which the error state is defined."""
 
     attitude: Quaternion
     velocity_world: Vec3  # [m/s]
@@ -55,8 +56,8 @@ class Inertial(NamedTuple):
     force_world: Vec3  # [m/s^2] specific force, bias removed
     velocity_gain: Vec3  # [m/s] acceleration integrated since the start, never corrected
     distance_gain: Vec3  # [m] velocity_gain integrated
-    held: bool  # the last reading was rejected and its predecessor reused
-    cut: int  # [readings] since the motors stopped over the ground; 0: they have not
+    spike: bool  # the last reading was rejected as a spike and its predecessor reused
+    cut: int  # [readings] since the motors stopped over the ground; 0: running
 
 
 class Memory(NamedTuple):
@@ -69,12 +70,12 @@ class Memory(NamedTuple):
     considered: np.ndarray  # (27, 16) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
     history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, noise added to velocity and attitude
     since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
-    refused: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
+    rejected: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
     repeats: np.ndarray  # (WATCHED,) number of consecutive equal readings
     last: np.ndarray  # (WATCHED, 6) last reading of each source
     trend: np.ndarray  # (2, 2) of horizontal innovations of GPS position and velocity (theory.md, eq. (3.64))
     nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
-    packed: np.ndarray  # (1, PACKED) upper triangle of the covariance and `nis`, as they are sent
+    packed: np.ndarray  # (1, PACKED) upper triangle of the covariance and `nis`, as published
 
 
 class State(NamedTuple):
@@ -151,7 +152,7 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     m.correction[:] = m.row[:] = m.product[:] = 0.0
     m.history[:] = 0.0
     m.since[:] = NEVER
-    m.refused[:] = m.repeats[:] = 0
+    m.rejected[:] = m.repeats[:] = 0
     m.last[:] = math.nan
     m.nis[:] = 0.0
     alignment = p.accelerometer_alignment_std * p.accelerometer_alignment_std
@@ -211,14 +212,14 @@ def _deviation_along(covariance: np.ndarray, axis_world: Vec3) -> float:
 def _health(p: Estimator, m: Memory, position_std: Vec3, attitude_std: Vec3) -> tuple[int, int]:
     health = 0
     rejected = 0
-    carried = m.since[FLOW] != NEVER and m.since[FLOW] * p.interval < p.patience
+    flow_replaces_gps = m.since[FLOW] != NEVER and m.since[FLOW] * p.interval < p.patience
     for i in range(len(SOURCES)):
-        if m.refused[i] == 1:
+        if m.rejected[i] == 1:
             rejected |= 1 << i
-        lost = m.refused[i] == 1 or m.since[i] * p.interval > p.patience
-        if lost and not (carried and i in (GPS, GPS_VELOCITY)):
+        lost = m.rejected[i] == 1 or m.since[i] * p.interval > p.patience
+        if lost and not (flow_replaces_gps and i in (GPS, GPS_VELOCITY)):
             health |= 1 << i
-    if m.refused[FLOW] == 1:
+    if m.rejected[FLOW] == 1:
         rejected |= 1 << FLOW
     if max(position_std[0], position_std[1], position_std[2]) > p.position_std:
         health |= 64
@@ -239,17 +240,8 @@ def estimate(p: Estimator, s: State) -> StateEstimate:
         _deviation_along(c, (r[2], r[5], r[8])),
     )
     health, rejected = _health(p, s.memory, position_std, attitude_std)
+    acceleration = (i.force_world[0], i.force_world[1], i.force_world[2] - p.gravity)
     return StateEstimate(
-        n.position_world,
-        n.attitude,
-        n.velocity_world,
-        subtract(i.omega, n.gyro_bias),
-        (i.force_world[0], i.force_world[1], i.force_world[2] - p.gravity),
-        n.gyro_bias,
-        n.accelerometer_bias,
-        position_std,
-        _deviations(c, VELOCITY),
-        attitude_std,
-        health,
-        rejected,
-    )
+        n.position_world, n.attitude, n.velocity_world, subtract(i.omega, n.gyro_bias), acceleration,
+        n.gyro_bias, n.accelerometer_bias, position_std, _deviations(c, VELOCITY), attitude_std, health, rejected,
+    )  # fmt: skip

@@ -86,20 +86,20 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
     for i in range(0, SIZE, 4):
         store(m.correction, i, load(m.correction, i) + load(m.product, i) * y * inverse)
     for i in range(SIZE):
-        one = m.product[i]
+        gain = m.product[i]
         for j in range(0, SIZE, 4):
-            change = (one * load(m.product, j)) * inverse  # exactly symmetric
+            change = (gain * load(m.product, j)) * inverse  # exactly symmetric
             store(m.covariance, SIZE * i + j, load(m.covariance, SIZE * i + j) - change)
     first = load(m.considered, CONSIDERED * PRODUCT) * inverse
     second = load(m.considered, CONSIDERED * PRODUCT + 4) * inverse
     third = load(m.considered, CONSIDERED * PRODUCT + 8) * inverse
     fourth = load(m.considered, CONSIDERED * PRODUCT + 12) * inverse
     for i in range(SIZE):
-        one, place = m.product[i], CONSIDERED * i
-        store(m.considered, place, load(m.considered, place) - one * first)
-        store(m.considered, place + 4, load(m.considered, place + 4) - one * second)
-        store(m.considered, place + 8, load(m.considered, place + 8) - one * third)
-        store(m.considered, place + 12, load(m.considered, place + 12) - one * fourth)
+        gain, offset = m.product[i], CONSIDERED * i
+        store(m.considered, offset, load(m.considered, offset) - gain * first)
+        store(m.considered, offset + 4, load(m.considered, offset + 4) - gain * second)
+        store(m.considered, offset + 8, load(m.considered, offset + 8) - gain * third)
+        store(m.considered, offset + 12, load(m.considered, offset + 12) - gain * fourth)
     return y * y * inverse
 
 

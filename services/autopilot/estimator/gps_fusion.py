@@ -4,12 +4,12 @@ from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, scale, subtract
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.services.autopilot.estimator.covariance_inflation import doubt_imu, inflate_covariance
+from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance, inflate_imu_states
 from lapwing.services.autopilot.estimator.delayed_measurements import (
     Noise,
-    late_innovation_variances,
-    late_position_row,
-    late_velocity_row,
+    delayed_innovation_variances,
+    delayed_position_row,
+    delayed_velocity_row,
 )
 from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
@@ -42,12 +42,12 @@ def _past(p: Estimator, s: State, age: int) -> tuple[Vec3, Vec3, float, Vec3, Ve
     delay = age * p.interval
     moment = subtract(scale(delay, i.velocity_gain), subtract(i.distance_gain, distance_gain))
     position = add(subtract(s.nominal.position_world, scale(delay, s.nominal.velocity_world)), moment)
-    gained = subtract(i.velocity_gain, velocity_gain)
-    velocity = subtract(s.nominal.velocity_world, gained)
+    velocity_change = subtract(i.velocity_gain, velocity_gain)
+    velocity = subtract(s.nominal.velocity_world, velocity_change)
     if delay == 0.0:
         return position, velocity, delay, i.force_world, i.force_world
     upward = (0.0, 0.0, p.gravity)
-    weighted, mean = add(scale(2.0 / (delay * delay), moment), upward), add(scale(1.0 / delay, gained), upward)
+    weighted, mean = add(scale(2.0 / (delay * delay), moment), upward), add(scale(1.0 / delay, velocity_change), upward)
     return position, velocity, delay, weighted, mean
 
 
@@ -58,13 +58,13 @@ def _noise_since(p: Estimator, s: State, age: int) -> Noise:
     age = min(age, tick, HISTORY - 1)
     v = vp = pp = av = ap = 0.0
     for k in range(age):
-        q, turned = history[(tick - k) % HISTORY, 6], history[(tick - k) % HISTORY, 7]
+        q, q_attitude = history[(tick - k) % HISTORY, 6], history[(tick - k) % HISTORY, 7]
         v += q
         vp += q * (k * p.interval)
         pp += q * math.square(k * p.interval)
-        before = math.square((age - k) * p.interval)  # [s^2] of the delay, before this tick
-        av += turned * before
-        ap += turned * before * before / 4.0
+        earlier = math.square((age - k) * p.interval)  # [s^2] part of the delay before this tick
+        av += q_attitude * earlier
+        ap += q_attitude * earlier * earlier / 4.0
     return Noise(v, vp, pp, av, ap)
 
 
@@ -79,9 +79,9 @@ def _white_variance(p: Estimator, variance: Vec3, axis: int) -> float:
 def _row(m: Memory, source: int, force: Vec3, r: Mat3, axis: int, delay: float) -> None:
     """Write the measurement row of a delayed position or velocity."""
     if source == GPS:
-        late_position_row(m, force, r, axis, delay)
+        delayed_position_row(m, force, r, axis, delay)
     else:
-        late_velocity_row(m, force, r, axis, delay)
+        delayed_velocity_row(m, force, r, axis, delay)
 
 
 @always_inline
@@ -101,27 +101,27 @@ def _fuse(
         age: delay [ticks].
     """
     m, since, r = s.memory, _noise_since(p, s, age), rotation_matrix(s.nominal.attitude)
-    accepted, drifts, nis, row = True, False, 0.0, source - GPS
+    accepted, is_drifting, nis, row = True, False, 0.0, source - GPS
     for axis in range(3):
         _row(m, source, force, r, axis, delay)
-        _, largest = late_innovation_variances(m, axis, since, variance[axis], force)
+        _, largest = delayed_innovation_variances(m, axis, since, variance[axis], force)
         ratio = innovation[axis] * innovation[axis] / largest
         nis += ratio
         accepted = accepted and ratio < p.gate * p.gate
-        if axis < 2:  # other sources of height may be wrong
+        if axis < 2:  # without the height, whose other sources may be wrong
             m.trend[row, axis] = _TREND * m.trend[row, axis] + _REST * innovation[axis] / math.sqrt(largest)
-            drifts = drifts or math.fabs(m.trend[row, axis]) > p.gate
-    drifts = drifts and accepted  # beyond the gate the reading is wrong, not the estimate
-    accepted = accepted and not drifts
+            is_drifting = is_drifting or math.fabs(m.trend[row, axis]) > p.gate
+    is_drifting = is_drifting and accepted  # beyond the gate the reading is wrong, not the estimate
+    accepted = accepted and not is_drifting
     if accepted:
         nis = 0.0
         for axis in range(3):
             _row(m, source, force, r, axis, delay)
-            s_gain, _ = late_innovation_variances(m, axis, since, variance[axis], force)
+            s_gain, _ = delayed_innovation_variances(m, axis, since, variance[axis], force)
             nis += apply_update(m, innovation[axis], s_gain)
     record_gate_result(m, source, accepted, nis)
-    if drifts:
-        doubt_imu(m)
+    if is_drifting:
+        inflate_imu_states(m)
     elif not accepted:
         m.trend[row, :] = 0.0
         inflate_covariance(p, m, source)

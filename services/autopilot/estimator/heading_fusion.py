@@ -50,11 +50,11 @@ def update_magnetometer(p: Estimator, s: State, field_body: Vec3, variance: floa
         m.row[IRON + i] = (by * r[i] - bx * r[3 + i]) / horizontal
         m.considered[ROW, MAG_SCALE + i] = m.row[IRON + i] * field[i]
     iron = three(m.row, IRON)
-    turned = cross(field, iron)  # (a x field) . iron = a . (field x iron)
-    m.considered[ROW, MAG_ALIGNMENT] = turned[0]
-    m.considered[ROW, MAG_ALIGNMENT + 1] = turned[1]
-    m.row[HEADING] = -turned[2]
-    innovation = turn + turned[2] * s.nominal.heading_bias
+    by_iron = cross(field, iron)  # (a x field) . iron = a . (field x iron)
+    m.considered[ROW, MAG_ALIGNMENT] = by_iron[0]
+    m.considered[ROW, MAG_ALIGNMENT + 1] = by_iron[1]
+    m.row[HEADING] = -by_iron[2]
+    innovation = turn + by_iron[2] * s.nominal.heading_bias
     nis = innovation * innovation / innovation_variance(m, variance / horizontal)
     accepted = nis < p.gate * p.gate
     if accepted:

@@ -23,7 +23,7 @@ _GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] variation of the ground 
 
 @kernel
 def _scalar(p: Estimator, s: State, source: int, innovation: float, variance: float) -> State:
-    """Gate and fuse the row."""
+    """Gate and fuse the measurement of the row."""
     m = s.memory
     nis = innovation * innovation / innovation_variance(m, variance)
     accepted = nis < p.gate * p.gate
@@ -76,7 +76,7 @@ def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid
         return s
     height = s.nominal.position_world[2] - p.ground_height
     if math.isinf(distance) or height > p.sonar_height_max:
-        m.refused[SONAR] = 0
+        m.rejected[SONAR] = 0
         m.since[SONAR] = 0
         return s
     cosine = rotation_matrix(s.nominal.attitude)[8]

@@ -6,8 +6,8 @@ from lapwing.services.autopilot.estimator.filter_state import Memory
 
 
 @kernel
-def is_stuck(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, often: int) -> bool:
-    """Return True if a noisy instrument has repeated the same numbers `often` times: it is stuck.
+def is_stuck(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, limit: int) -> bool:
+    """Return True if a noisy instrument is stuck: it has repeated the same numbers `limit` times.
 
     Args:
         m: `Memory`, changed in place.
@@ -15,7 +15,7 @@ def is_stuck(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, oft
         first: three numbers of the reading.
         second: three more.
         noisy: the reading has a positive variance; ideal instruments may repeat at rest.
-        often: number of repetitions that noise excludes; coarse rounding needs more.
+        limit: number of repetitions that noise excludes; larger for coarse rounding.
     """
     same = noisy
     for i in range(3):
@@ -23,13 +23,13 @@ def is_stuck(m: Memory, source: int, first: Vec3, second: Vec3, noisy: bool, oft
         m.last[source, i] = first[i]
         m.last[source, 3 + i] = second[i]
     m.repeats[source] = m.repeats[source] + 1 if same else 0
-    return m.repeats[source] >= often
+    return m.repeats[source] >= limit
 
 
 @kernel
 def record_gate_result(m: Memory, source: int, accepted: bool, nis: float) -> None:
     """Record the gate result of a reading."""
-    m.refused[source] = 0 if accepted else 1
+    m.rejected[source] = 0 if accepted else 1
     m.nis[source] = nis
     if accepted:
         m.since[source] = 0

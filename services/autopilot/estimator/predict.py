@@ -22,21 +22,61 @@ from lapwing.services.autopilot.estimator.filter_state import (
 )
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck
 
-_STRAIGHT = 0.1  # fraction of a jolt up to which the change between two readings counts as linear
+_LINEAR = 0.1  # fraction of a jolt up to which the change between two readings counts as linear
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
-_REBOUND = (
-    12.0  # [m^2/s^3] variance by time of the velocity after the motors have stopped: 0.7 m/s after a drop of 40 ms
-)
-_TIPPING = 2.5e-3  # [rad^2/s] the same of the attitude
+_REBOUND = 12.0  # [m^2/s^3] variance rate of the velocity after motor stop: 0.7 m/s after a drop of 40 ms
+_TIPPING = 2.5e-3  # [rad^2/s] variance rate of the attitude after motor stop
 _BOUNCE = 1.0  # [s] after which the vehicle rests
 
 
 @always_inline
-def _held(p: Estimator, i: Inertial, omega: Vec3, force: Vec3) -> bool:
-    """Return True for a spike: a jump from a reading that was trusted."""
-    return not i.held and (
+def _is_spike(p: Estimator, i: Inertial, omega: Vec3, force: Vec3) -> bool:
+    """Return True for a spike: a jump from an accepted reading."""
+    return not i.spike and (
         norm(subtract(omega, i.omega)) > p.jolt_rate or norm(subtract(force, i.force)) > p.jolt_force
     )
+
+
+@always_inline
+def _process_noise(
+    p: Estimator,
+    q_theta: float,
+    q_velocity: float,
+    twist: float,
+    jolt: float,
+    first: bool,
+    spike: bool,
+    cut_readings: int,
+    reused: bool,
+) -> tuple[float, float]:
+    """Return the variances of attitude [rad^2] and velocity [(m/s)^2] that an interval adds.
+
+    Args:
+        p: `Estimator`.
+        q_theta: variance by the gyroscopes' white noise [rad^2].
+        q_velocity: variance by the accelerometers' white noise [(m/s)^2].
+        twist: change between two gyroscope readings [rad/s].
+        jolt: change between two accelerometer readings [m/s^2].
+        first: True for the first reading.
+        spike: True if the reading is rejected as a spike.
+        cut_readings: readings since the motors stopped over the ground; 0: running.
+        reused: True if the previous reading is used again.
+    """
+    dt = p.interval
+    if not first:  # error of the trapezoidal rule between distant readings
+        q_theta += math.square(dt * max(twist - _LINEAR * p.jolt_rate, 0.0) / 6.0)
+        q_velocity += math.square(dt * max(jolt - _LINEAR * p.jolt_force, 0.0) / 6.0)
+    if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
+        q_velocity += math.square(max(0.5 * dt * jolt, _IMPACT))
+    if not first and (twist > p.jolt_rate or spike):
+        q_theta += math.square(0.5 * dt * twist)
+    if 0 < cut_readings * dt < _BOUNCE:  # the vehicle drops, and an impact may be shorter than the interval
+        q_velocity += dt * _REBOUND * math.square(math.square(1.0 - cut_readings * dt / _BOUNCE))
+        q_theta += dt * _TIPPING * math.square(math.square(1.0 - cut_readings * dt / _BOUNCE))
+    if reused:  # error of reused readings during a manoeuvre
+        q_velocity += dt * 1.0
+        q_theta += dt * 0.1
+    return q_theta, q_velocity
 
 
 @kernel
@@ -66,7 +106,7 @@ def predict(
     dt = p.interval
     first = i.tick == 0
     frozen = valid and is_stuck(m, IMU, omega_body, specific_force_body, omega_variance > 0.0, p.frozen)
-    spike = valid and not first and _held(p, i, omega_body, specific_force_body)
+    spike = valid and not first and _is_spike(p, i, omega_body, specific_force_body)
     usable = valid and not spike and not frozen
     omega = omega_body if usable else i.omega
     force = specific_force_body if usable else i.force
@@ -98,22 +138,11 @@ def predict(
 
     jolt = norm(subtract(specific_force_body, i.force))
     twist = norm(subtract(omega_body, i.omega))
-    q_theta = dt * dt * omega_variance
-    q_velocity = dt * dt * specific_force_variance
-    if not first:  # error of the trapezoidal rule between distant readings
-        q_theta += math.square(dt * max(twist - _STRAIGHT * p.jolt_rate, 0.0) / 6.0)
-        q_velocity += math.square(dt * max(jolt - _STRAIGHT * p.jolt_force, 0.0) / 6.0)
-    if not first and (jolt > p.jolt_force or spike):  # an impact on the ground is shorter than the interval
-        q_velocity += math.square(max(0.5 * dt * jolt, _IMPACT))
-    if not first and (twist > p.jolt_rate or spike):
-        q_theta += math.square(0.5 * dt * twist)
-    cut_for = i.cut + 1 if cut else 0
-    if 0 < cut_for * dt < _BOUNCE:  # the vehicle drops, and an impact may be shorter than the interval
-        q_velocity += dt * _REBOUND * math.square(math.square(1.0 - cut_for * dt / _BOUNCE))
-        q_theta += dt * _TIPPING * math.square(math.square(1.0 - cut_for * dt / _BOUNCE))
-    if not valid or frozen:  # old readings are wrong by as much as a manoeuvre changes them
-        q_velocity += dt * 1.0
-        q_theta += dt * 0.1
+    cut_readings = i.cut + 1 if cut else 0
+    q_theta, q_velocity = _process_noise(
+        p, dt * dt * omega_variance, dt * dt * specific_force_variance, twist, jolt, first, spike, cut_readings,
+        not valid or frozen,
+    )  # fmt: skip
     m.history[tick % HISTORY, 6] = q_velocity
     m.history[tick % HISTORY, 7] = q_theta
     for k in range(3):
@@ -129,7 +158,7 @@ def predict(
     for k in range(WATCHED):
         if m.since[k] >= 0:
             m.since[k] += 1
-    m.refused[IMU] = 0 if usable else 1
+    m.rejected[IMU] = 0 if usable else 1
     if usable:
         m.since[IMU] = 0
     nominal = Nominal(
@@ -144,4 +173,4 @@ def predict(
         n.barometer_bias,
         n.sonar_scale,
     )
-    return State(nominal, Inertial(tick, omega, force, f1, velocity_gain, distance_gain, spike, cut_for), m)
+    return State(nominal, Inertial(tick, omega, force, f1, velocity_gain, distance_gain, spike, cut_readings), m)

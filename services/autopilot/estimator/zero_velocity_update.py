@@ -9,7 +9,7 @@ from lapwing.services.autopilot.estimator.fuse import acceleration_row, clear, f
 _VELOCITY_VARIANCE = 0.01 * 0.01  # [(m/s)^2] compliance of the feet
 _OMEGA_VARIANCE = 1e-3 * 1e-3  # [(rad/s)^2]
 _ACCELERATION_VARIANCE = 0.02 * 0.02  # [(m/s^2)^2]
-_SHAKEN = 64  # readings from which the vibration at rest is known
+_VIBRATION_READINGS = 64  # readings for the variance of the vibration at rest
 
 
 @kernel
@@ -23,16 +23,16 @@ def shake_variance(p: Estimator, s: State, axis: int, specific_force_variance: f
         specific_force_variance: [(m/s^2)^2] of the readings' white noise, which is not part of the result.
     """
     tick, h = s.inertial.tick, s.memory.history
-    count = min(tick - 1, _SHAKEN, HISTORY - 2)
+    count = min(tick - 1, _VIBRATION_READINGS, HISTORY - 2)
     if count < 2:
         return 0.0
     total, squares = 0.0, 0.0
     for k in range(count):
-        gained = h[(tick - k) % HISTORY, axis] - h[(tick - k - 1) % HISTORY, axis]
-        total += gained
-        squares += gained * gained
+        gain = h[(tick - k) % HISTORY, axis] - h[(tick - k - 1) % HISTORY, axis]
+        total += gain
+        squares += gain * gain
     variance = (squares - total * total / count) / ((count - 1) * math.square(p.interval))
-    # a gain is the mean of two readings, which halves the variance of what is white
+    # a gain is the mean of two readings, which halves the variance of white noise
     return max(2.0 * variance - specific_force_variance, 0.0)
 
 
@@ -58,6 +58,6 @@ def update_standstill(p: Estimator, s: State, omega_variance: float, specific_fo
         clear(m)
         acceleration_row(m, i.force_world, r, axis, 1.0)
         acceleration = i.force_world[axis] - (p.gravity if axis == 2 else 0.0)
-        shaken = max(shake_variance(p, s, axis, specific_force_variance), _ACCELERATION_VARIANCE)
-        fuse(m, -acceleration, specific_force_variance + shaken)
+        vibration = max(shake_variance(p, s, axis, specific_force_variance), _ACCELERATION_VARIANCE)
+        fuse(m, -acceleration, specific_force_variance + vibration)
     return apply_correction(s)

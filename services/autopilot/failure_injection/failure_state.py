@@ -20,7 +20,7 @@ class Memory(NamedTuple):
 
 
 @always_inline
-def silent(kind: int, key: Key, lane: int, count: int) -> bool:
+def is_dropped(kind: int, key: Key, lane: int, count: int) -> bool:
     """Return True if this reading is dropped; `lane` distinguishes two instruments in one reading."""
     if kind == INTERMITTENT:
         return uniform(key, count // BURST, lane) < 0.5

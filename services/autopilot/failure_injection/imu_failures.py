@@ -6,7 +6,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline
-from lapwing.services.autopilot.failure_injection.failure_state import Memory, garbage, silent
+from lapwing.services.autopilot.failure_injection.failure_state import Memory, garbage, is_dropped
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
 from lapwing.services.common.ports import ImuReading
 
@@ -49,8 +49,8 @@ def step(p: ImuInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...])
         garbage(p.key, tick, _ACCELEROMETER, FULL_PUSH) if accelerometer == GARBAGE else push,
     )  # fmt: skip
     valid = late.valid and before.due if DELAYED in (gyro, accelerometer) else r.valid
-    valid = valid and not silent(gyro, p.key, _GYRO, s.readings)
-    valid = valid and not silent(accelerometer, p.key, _ACCELEROMETER, s.readings)
+    valid = valid and not is_dropped(gyro, p.key, _GYRO, s.readings)
+    valid = valid and not is_dropped(accelerometer, p.key, _ACCELEROMETER, s.readings)
     last = ImuReading(
         omega if gyro == STUCK else turn,
         force if accelerometer == STUCK else push,

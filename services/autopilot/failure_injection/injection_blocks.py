@@ -48,12 +48,12 @@ class Injection:
     """Failure injection of a run; inactive without a cell of `Faults`."""
 
     def __init__(self, faults: Cell | None, setup: RunConfig, read: Collection[str], motor: Motor):
-        """Create the injection; `read` has the sensor ports that the autopilot reads."""
+        """Create the injection; `read` has the names of the sensor ports that the autopilot reads."""
         self.faults, self._motor = faults, motor
         rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
         self.released = DirectMotorControl(False, (0.0,) * rotors)  # the controller's command reaches the motors
         self.direct = None if faults is None else Cell(self.released)
-        self._setup, self._known = setup, setup.ports
+        self._setup, self._ports = setup, setup.ports
         self._sensors = [name for name in _SENSORS if name in read] if faults is not None else []
 
     @property
@@ -76,20 +76,22 @@ class Injection:
         """Return the blocks between sensors and estimator and after the battery."""
         blocks = []
         for port in self._sensors:
-            known = self._known[port]
-            memory = Cell(Memory(known.like, 0))
-            received_port = known._replace(name=self.received(port))
+            sensor_port = self._ports[port]
+            memory = Cell(Memory(sensor_port.like, 0))
+            received_port = sensor_port._replace(name=self.received(port))
             key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
-            late = known.period * max(1, round(DELAY / self._setup.interval / known.period))
+            late = sensor_port.period * max(1, round(DELAY / self._setup.interval / sensor_port.period))
             inputs = InputPort(port), InputPort(port, late)
             parameters = _SENSORS[port](self.faults, key)
-            blocks.append(Block(f"{name}.inject.{port}", parameters, memory, inputs, (received_port,), known.period))
+            blocks.append(
+                Block(f"{name}.inject.{port}", parameters, memory, inputs, (received_port,), sensor_port.period)
+            )
         if self.faults is not None:
-            known = self._known[ports.BATTERY]
-            received_port = known._replace(name=self.received(ports.BATTERY))
-            battery, memory = BatteryInjection(self.faults), Cell(known.like)
+            sensor_port = self._ports[ports.BATTERY]
+            received_port = sensor_port._replace(name=self.received(ports.BATTERY))
+            battery, memory = BatteryInjection(self.faults), Cell(sensor_port.like)
             reads = (InputPort(ports.BATTERY),)
-            blocks.append(Block(f"{name}.inject.battery", battery, memory, reads, (received_port,), known.period))
+            blocks.append(Block(f"{name}.inject.battery", battery, memory, reads, (received_port,), sensor_port.period))
         return blocks
 
     def after(self, name: str, actuators: Port) -> list[Block]:

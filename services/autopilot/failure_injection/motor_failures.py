@@ -29,7 +29,7 @@ class MotorInjection(NamedTuple):
 
 
 @always_inline
-def _heard(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int, k: int) -> float:
+def _received_voltage(kinds: tuple[int, ...], before: PerRotor, volts: PerRotor, count: int, k: int) -> float:
     """Return the voltage command of motor k: the last one if stuck, one in `SLOWED` if slow."""
     if kinds[k] == STUCK or (kinds[k] == SLOW and count % SLOWED != 0):
         return before[k]
@@ -50,6 +50,6 @@ def step(p: MotorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ...
     c, d, kinds = inputs[0].value, p.direct.value, p.faults.value.motors
     commanded = d.motor_voltage if d.on else c.motor_voltage
     thrust = thrusts_at(p.motor, commanded) if d.on else c.thrust
-    received = map_index(_heard, commanded, kinds, s.last, commanded, s.readings)
+    received = map_index(_received_voltage, commanded, kinds, s.last, commanded, s.readings)
     volts = map_tuple(_motor_voltage, 0.0, kinds, received)
     return Memory(received, s.readings + 1), (MotorCommand(volts, c.armed, thrust, c.attitude_reference),), CONTINUE

@@ -9,7 +9,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import compile_source, generic
-from lapwing.services.autopilot.failure_injection.failure_state import Memory, silent
+from lapwing.services.autopilot.failure_injection.failure_state import Memory, is_dropped
 from lapwing.services.autopilot.failure_injection.reading_failures import FAILURES
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
 
@@ -29,7 +29,7 @@ def kind_of(faults: types.Type, r: types.Type) -> Callable:
 
 
 @generic(inline=True)
-def wrong(r: types.Type) -> Any:
+def wrong_reading(r: types.Type) -> Any:
     """Return the reading of a wrong sensor."""
     return FAILURES[r.instance_class].wrong
 
@@ -41,10 +41,10 @@ def garbage_reading(r: types.Type, key: types.Type, tick: types.Type) -> Any:
 
 
 @generic(inline=True)
-def lost(r: types.Type) -> Callable:
+def invalid_reading(r: types.Type) -> Callable:
     """Return the reading marked as invalid."""
     fields = ", ".join("False" if field == "valid" else f"r.{field}" for field in r.fields)
-    return compile_source("lost(r)", {"Reading": r.instance_class}, f"return Reading({fields})")
+    return compile_source("invalid_reading(r)", {"Reading": r.instance_class}, f"return Reading({fields})")
 
 
 @always_inline
@@ -55,11 +55,11 @@ def step(p: SensorInjection, s: Memory, tick: int, inputs: tuple[InputSample, ..
     last = s.last if kind == STUCK else r
     x = last
     if kind == WRONG:
-        x = wrong(r)
+        x = wrong_reading(r)
     elif kind == GARBAGE:
         x = garbage_reading(r, p.key, tick)
     elif kind == DELAYED:
         x = late.value
-    if silent(kind, p.key, 0, s.readings) or (kind == DELAYED and not late.due):
-        x = lost(r)
+    if is_dropped(kind, p.key, 0, s.readings) or (kind == DELAYED and not late.due):
+        x = invalid_reading(r)
     return Memory(last, s.readings + 1), (x,), CONTINUE

@@ -15,7 +15,7 @@ from lapwing.services.autopilot.land_detector import (
     LandedState,
     update_landed_state,
 )
-from lapwing.services.autopilot.mixer import at_rest
+from lapwing.services.autopilot.mixer import zero_thrust
 from lapwing.services.autopilot.px4 import law
 
 
@@ -38,8 +38,8 @@ class Px4State(NamedTuple):
 
 def start(p: Px4Controller) -> Px4State:
     """Return the initial state."""
-    watched = python_function(motor_failure.start)(read(p.common.failure_detector))
-    return Px4State(INITIAL_LANDED_STATE, law.START, watched, 0, float("nan"))
+    detector = python_function(motor_failure.start)(read(p.common.failure_detector))
+    return Px4State(INITIAL_LANDED_STATE, law.START, detector, 0, float("nan"))
 
 
 @always_inline
@@ -48,16 +48,16 @@ def step(p: Px4Controller, s: Px4State, tick: int, inputs: tuple[InputSample, ..
     c = p.common
     e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
     setpoint = inputs[3].value if order.follow else order.setpoint
-    landed, watched, still_from = s.landed_state, s.failure_detector, s.still_from
+    landed, detector, still_from = s.landed_state, s.failure_detector, s.still_from
     if order.restart_at == tick:
         landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
-        watched = motor_failure.start(c.failure_detector.value)
+        detector = motor_failure.start(c.failure_detector.value)
     charge = battery.value.charge if battery.due else s.charge
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     if landed.name == FLYING:
-        controlled, command = law.step(p.law.value, s.law, c.interval, e, setpoint, watched.failed)
+        control_state, command = law.step(p.law.value, s.law, c.interval, e, setpoint, detector.failed)
     else:
-        off = at_rest(c.law.value.shares[0])
-        controlled, command = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
-    watched, outputs = block_outputs(c, watched, still_from, charge, order, e, setpoint, landed.name, command)
-    return Px4State(landed, controlled, watched, still_from, charge), outputs, CONTINUE
+        off = zero_thrust(c.law.value.shares[0])
+        control_state, command = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
+    detector, outputs = block_outputs(c, detector, still_from, charge, order, e, setpoint, landed.name, command)
+    return Px4State(landed, control_state, detector, still_from, charge), outputs, CONTINUE

@@ -1,4 +1,4 @@
-"""The whole PX4 cascade, from setpoint to motor voltages, and its parameters by PX4's names."""
+"""The complete PX4 cascade, from setpoint to motor voltages, and its parameters by PX4's names."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -59,7 +59,7 @@ START = State(ZERO, ZERO, ZERO, ZERO, ZERO, ZERO)
 def normalisation(airframe: Airframe) -> Vec3:
     """Return the virtual controls of normalised torques of 1 about body x, y, z.
 
-    As in PX4's control allocation: the thrusts that a unit torque demands of the rotors are scaled to a root mean
+    As in PX4's control allocation: the rotor thrusts of a unit torque are scaled to a root mean
     square of 1/sqrt(2) for the larger of roll and pitch, which share the scale, and to at most 1 for yaw.
     """
     table, effects = shares(airframe)[0], moments(airframe)
@@ -89,27 +89,27 @@ def build(values: Mapping[str, float], airframe: Airframe) -> Parameters:
         airframe: nominal vehicle parameters.
     """
 
-    def of_axes(pattern: str) -> Vec3:
+    def by_axis(pattern: str) -> Vec3:
         x, y, z = (values[pattern.format(axis)] for axis in AXES)
         return x, y, z
 
-    def of_velocity(term: str) -> Vec3:
+    def velocity_gains(term: str) -> Vec3:
         xy = values[f"MPC_XY_VEL_{term}_ACC"]
         return xy, xy, values[f"MPC_Z_VEL_{term}_ACC"]
 
     def product(a: Vec3, b: Vec3) -> Vec3:
         return a[0] * b[0], a[1] * b[1], a[2] * b[2]
 
-    k, thrust_model = of_axes("MC_{}RATE_K"), values["THR_MDL_FAC"]
+    k, thrust_model = by_axis("MC_{}RATE_K"), values["THR_MDL_FAC"]
     hover = hover_collective(airframe, thrust_model) if values["MPC_USE_HTE"] else values["MPC_THR_HOVER"]
-    limits = of_axes("MC_{}RATE_MAX")
+    limits = by_axis("MC_{}RATE_MAX")
     return Parameters(
         position=position.Parameters(
             position_xy=values["MPC_XY_P"],
             position_z=values["MPC_Z_P"],
-            velocity_p=of_velocity("P"),
-            velocity_i=of_velocity("I"),
-            velocity_d=of_velocity("D"),
+            velocity_p=velocity_gains("P"),
+            velocity_i=velocity_gains("I"),
+            velocity_d=velocity_gains("D"),
             speed_xy=values["MPC_XY_VEL_MAX"],
             climb=values["MPC_Z_VEL_MAX_UP"],
             sink=values["MPC_Z_VEL_MAX_DN"],
@@ -121,15 +121,15 @@ def build(values: Mapping[str, float], airframe: Airframe) -> Parameters:
             gravity=airframe.gravity,
         ),
         attitude=attitude.Parameters(
-            of_axes("MC_{}_P"),
+            by_axis("MC_{}_P"),
             values["MC_YAW_WEIGHT"],
             (math.radians(limits[0]), math.radians(limits[1]), math.radians(limits[2])),
         ),
         rates=rates.Parameters(
-            product(k, of_axes("MC_{}RATE_P")),
-            product(k, of_axes("MC_{}RATE_I")),
-            product(k, of_axes("MC_{}RATE_D")),
-            of_axes("MC_{}RATE_FF"),
+            product(k, by_axis("MC_{}RATE_P")),
+            product(k, by_axis("MC_{}RATE_I")),
+            product(k, by_axis("MC_{}RATE_D")),
+            by_axis("MC_{}RATE_FF"),
             (values["MC_RR_INT_LIM"], values["MC_PR_INT_LIM"], values["MC_YR_INT_LIM"]),
             values["IMU_DGYRO_CUTOFF"],
         ),

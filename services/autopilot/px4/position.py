@@ -22,7 +22,7 @@ class Parameters(NamedTuple):
     hover: float  # collective that carries the weight, fraction
     thrust_min: float  # collective, fraction
     thrust_max: float  # collective, fraction
-    margin_xy: float  # collective that stays for horizontal control when the vertical demand is high, fraction
+    margin_xy: float  # collective reserved for horizontal control at a high vertical demand, fraction
     gravity: float  # [m/s^2]
 
 
@@ -107,12 +107,12 @@ def velocity_integral(p: Parameters, integral: Vec3, error: Vec3, acceleration: 
         thrust: `thrust_setpoint` of it.
         dt: length of the tick [s].
     """
-    given_x, given_y = p.gravity / p.hover * thrust[0], p.gravity / p.hover * thrust[1]
+    achieved_x, achieved_y = p.gravity / p.hover * thrust[0], p.gravity / p.hover * thrust[1]
     ex, ey, ez = error
     ax, ay = acceleration[0], acceleration[1]
-    if ax * ax + ay * ay > given_x * given_x + given_y * given_y:
+    if ax * ax + ay * ay > achieved_x * achieved_x + achieved_y * achieved_y:
         back = 2.0 / p.velocity_p[0]
-        ex, ey = ex - back * (ax - given_x), ey - back * (ay - given_y)
+        ex, ey = ex - back * (ax - achieved_x), ey - back * (ay - achieved_y)
     collective = math.sqrt(thrust[0] * thrust[0] + thrust[1] * thrust[1] + thrust[2] * thrust[2])
     if (collective <= p.thrust_min and ez < 0.0) or (collective >= p.thrust_max - 1e-9 and ez > 0.0):
         ez = 0.0

@@ -65,7 +65,7 @@ def _growth(gain: float, error: float, cut: float, dt: float) -> float:
 def rate_integral(p: Parameters, integral: Vec3, error: Vec3, cut: Vec3, dt: float) -> Vec3:
     """Return the integral term after dt [s].
 
-    It holds where it would increase saturation, and grows less with large errors, as after a flip.
+    It is constant where it would increase saturation, and grows less with large errors, such as after a flip.
 
     Args:
         p: parameters.

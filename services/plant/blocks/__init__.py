@@ -1,1 +1,1 @@
-"""The plants, compiled: one file each, with the class of its parameters and its `step`."""
+"""Compiled plant blocks: one file each, with the class of its parameters and its `step`."""

@@ -1,4 +1,4 @@
-"""The single bodies of a multirotor of five, with the forces in their hinges."""
+"""Output of the five bodies of a multirotor, with the forces in their hinges."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,10 +17,10 @@ from lapwing.services.common.ports import BodyMotions, PerRotor
 
 
 class FiveBodiesView(NamedTuple):
-    """The vehicle with the bodies."""
+    """Parameters of the block."""
 
     vehicle: MultirotorParameters
-    interval: float  # [s] a tick
+    interval: float  # [s] length of a tick
     off: PerRotor  # [V] before the first command
 
 

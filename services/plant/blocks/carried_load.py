@@ -1,6 +1,6 @@
-"""The load that vehicles of a fleet carry together: a point mass under the pull of their cables.
+"""Load that several vehicles of a fleet carry: a point mass under the tension of their cables.
 
-While a cable can come taut or slack, or the load touches the ground, steps are under error control.
+The step error is controlled while a cable may become taut or slack, or the load touches the ground.
 """
 
 from typing import Any, NamedTuple
@@ -19,19 +19,19 @@ from lapwing.services.common.ports import BodyMotions
 
 
 class LoadPlant(NamedTuple):
-    """The load and how it is integrated; tuples have an entry for each cable."""
+    """Parameters of the block: the load and its integration; tuples have an entry for each cable."""
 
     slings: tuple[Sling, ...]
-    field: Vec3  # [m/s^2] of gravity
+    field: Vec3  # [m/s^2] gravity
     method: Any  # `Method()` of an integrator
     step: float  # [s]
-    steps: int  # of a tick
-    interval: float  # [s] a tick
-    tolerance: float  # of a part of a step while forces switch, relative to 1 + size
+    steps: int  # per tick
+    interval: float  # [s] length of a tick
+    tolerance: float  # of a substep while forces switch, relative to 1 + size
 
 
 class LoadMotion(NamedTuple):
-    """World frame ENU."""
+    """Motion of the load, world frame ENU."""
 
     load_position: Vec3  # [m]
     load_velocity: Vec3  # [m/s]
@@ -41,33 +41,33 @@ class LoadDrive(NamedTuple):
     """Forces on the load over a communication step."""
 
     load: LoadPlant
-    carriers: tuple[NeighbourState, ...]  # at its beginning
-    start: float  # [s]
+    carriers: tuple[NeighbourState, ...]  # states at its start
+    start: float  # [s] start of the communication step
 
 
 @always_inline
-def _from_hook(x: LoadMotion, ahead: float, carrier: NeighbourState) -> LoadMotion:
+def _relative_to_hook(x: LoadMotion, elapsed: float, carrier: NeighbourState) -> LoadMotion:
     """Return the load's motion relative to a hook with a constant acceleration."""
-    velocity = add(carrier.hook_velocity, scale(ahead, carrier.hook_acceleration))
-    way = scale(ahead, add(carrier.hook_velocity, scale(0.5 * ahead, carrier.hook_acceleration)))
-    hook = add(carrier.hook_world, way)
+    velocity = add(carrier.hook_velocity, scale(elapsed, carrier.hook_acceleration))
+    displacement = scale(elapsed, add(carrier.hook_velocity, scale(0.5 * elapsed, carrier.hook_acceleration)))
+    hook = add(carrier.hook_world, displacement)
     return LoadMotion(subtract(x.load_position, hook), subtract(x.load_velocity, velocity))
 
 
 @always_inline
 def _pull(c: Any, sling: Sling, carrier: NeighbourState) -> Vec3:
     """Return the force [N] of a cable on its hook."""
-    x, ahead = c
-    away, speed_away = _from_hook(x, ahead, carrier)
-    force, _ = tension(sling, away, speed_away)
+    x, elapsed = c
+    offset, offset_rate = _relative_to_hook(x, elapsed, carrier)
+    force, _ = tension(sling, offset, offset_rate)
     return force
 
 
 @always_inline
 def _slackens(c: Any, before: bool, sling: Sling, carrier: NeighbourState) -> bool:
-    x, ahead, h = c
-    away, speed_away = _from_hook(x, ahead, carrier)
-    return before or slackens(sling, away, speed_away, h)
+    x, elapsed, h = c
+    offset, offset_rate = _relative_to_hook(x, elapsed, carrier)
+    return before or slackens(sling, offset, offset_rate, h)
 
 
 @always_inline
@@ -91,7 +91,7 @@ RATES[LoadDrive] = rate
 
 @always_inline
 def _switches(p: LoadDrive, t: float, x: LoadMotion, h: float) -> bool:
-    """Return True unless all cables stay taut and the load off the ground for h [s]."""
+    """Return True if a cable may slacken or the load may land within h [s]."""
     landing = lands(p.load.slings[0], x.load_position, x.load_velocity, h)
     return reduce_tuple(_slackens, (x, t - p.start, h), landing, p.load.slings, p.carriers)
 
@@ -103,14 +103,14 @@ def move_load(p: LoadDrive, x: LoadMotion) -> LoadMotion:
     for i in range(load.steps):
         t = p.start + i * load.step
         if _switches(p, t, x, load.step):
-            exact = StepDoubling(load.method, load.tolerance)
-            return integrate_step_doubling(exact, p, t, x, load.step, p.start + load.interval)
+            adaptive = StepDoubling(load.method, load.tolerance)
+            return integrate_step_doubling(adaptive, p, t, x, load.step, p.start + load.interval)
         x = step_of_method(load.method, p, t, x, load.step)
     return x
 
 
 @always_inline
-def _presence(_: float, received: InputSample, same: InputSample) -> NeighbourState:
+def _neighbour_state(_: float, received: InputSample, same: InputSample) -> NeighbourState:
     return received.value
 
 
@@ -121,13 +121,13 @@ def step(
     """Advance the load to `tick` from its carriers' states of the previous tick; output it with the cables' force."""
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
-        drive = LoadDrive(p, map_tuple(_presence, 0.0, inputs, inputs), (tick - 1) * p.interval)
+        drive = LoadDrive(p, map_tuple(_neighbour_state, 0.0, inputs, inputs), (tick - 1) * p.interval)
         x = move_load(drive, x)
         acceleration = rate(drive, tick * p.interval, x).load_velocity
         force = scale(-1.0, pulls(drive, tick * p.interval, x))
-    place, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)
+    position, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)
     sample = NeighbourState(
-        place, velocity, ZERO, p.slings[0].load_mass, 0.0, 0.0, 0.0, 0.0, ZERO, place, velocity, acceleration, ZERO,
-        tick * p.interval, True,
+        position, velocity, ZERO, p.slings[0].load_mass, 0.0, 0.0, 0.0, 0.0, ZERO, position, velocity, acceleration,
+        ZERO, tick * p.interval, True,
     )  # fmt: skip
-    return x, (sample, BodyMotions((place,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), CONTINUE
+    return x, (sample, BodyMotions((position,), (NO_ROTATION,), (velocity,), zero, (force,), zero)), CONTINUE

@@ -1,4 +1,4 @@
-"""The forces on the single feet of a multirotor, where a scene asks for them."""
+"""Output of the ground force on each foot of a multirotor, if the scene has `rates.contact_forces`."""
 
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from lapwing.services.common.ports import ContactForces
 
 
 class ContactView(NamedTuple):
-    """The vehicle with the feet."""
+    """Parameters of the block."""
 
     vehicle: MultirotorParameters
 

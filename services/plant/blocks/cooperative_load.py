@@ -1,4 +1,4 @@
-"""The plant of quadrotors that carry a point mass by rigid links: thrusts and moments in, all bodies' states out."""
+"""Plant of quadrotors that carry a point mass by rigid links: thrusts and moments in, states of all bodies out."""
 
 from typing import Any, NamedTuple
 
@@ -21,15 +21,15 @@ from lapwing.services.plant.blocks.termination import termination_status
 
 
 class CooperativePlant(NamedTuple):
-    """The formation and how it is integrated."""
+    """Parameters of the block: the formation and its integration."""
 
-    formation: CooperativeLoadParameters  # its drive is the command before the first one
+    formation: CooperativeLoadParameters  # its drive is replaced by the received command
     method: Any  # `Method()` of an integrator
-    steps: int  # of a tick
+    steps: int  # per tick
     step: float  # [s]
-    interval: float  # [s] a tick
-    last: int  # tick of the run
-    off: RotorWrenches  # before the first command
+    interval: float  # [s] length of a tick
+    last: int  # last tick of the run
+    off: RotorWrenches  # output of the controller before its first command
 
 
 @always_inline
@@ -41,7 +41,7 @@ def _zero(values: tuple, i: int) -> Vec3:
 def step(
     p: CooperativePlant, s: CooperativeLoadState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[CooperativeLoadState, tuple[TrueState, BodyMotions], int]:
-    """Integrate to `tick` under the received command; the load represents the vehicle's own motion."""
+    """Integrate to `tick` under the received command; the true state is that of the load."""
     g = p.formation
     lift = inputs[0].value if inputs[0].due else p.off
     g = CooperativeLoadParameters(

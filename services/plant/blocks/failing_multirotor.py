@@ -1,4 +1,4 @@
-"""The plant of a multirotor of five bodies in a communication step in which propellers fail."""
+"""Plant of a five-body multirotor in a communication step in which propellers fail."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,7 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlant, Multirotor
 
 
 class FailingMultirotorPlant(NamedTuple):
-    """The plant before the failures, and the failures."""
+    """Parameters of the block: the plant before the failures, and the failures."""
 
     core: MultirotorPlant
     failures: tuple[Failure, ...]  # of this communication step, ascending in time

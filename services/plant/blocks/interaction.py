@@ -1,4 +1,4 @@
-"""Effect of the other vehicles of a fleet on a multirotor, before it steps."""
+"""Effects of the other vehicles of a fleet on a multirotor, applied before it steps."""
 
 from typing import Any, NamedTuple
 
@@ -11,14 +11,14 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 
 
 class Interaction(NamedTuple):
-    """The vehicle that the others act on."""
+    """Parameters of the block."""
 
-    effects: tuple  # its own, as its plant has them
-    interval: float  # [s] a tick
+    effects: tuple  # effects of the vehicle's plant
+    interval: float  # [s] length of a tick
 
 
 @always_inline
-def _presence(inputs: tuple[InputSample, ...], i: int) -> NeighbourState:
+def _neighbour_state(inputs: tuple[InputSample, ...], i: int) -> NeighbourState:
     return inputs[i].value
 
 
@@ -27,7 +27,7 @@ def step(p: Interaction, s: MultirotorPlantState, tick: int, inputs: tuple[Input
     """Update the plant's effects with the neighbours' states of the previous tick, its own state first."""
     vehicle = s.vehicle
     if inputs[0].due:
-        others = map_index(_presence, inputs[1:], inputs[1:])
+        others = map_index(_neighbour_state, inputs[1:], inputs[1:])
         memory = all_interactions(p.effects, vehicle.memory, inputs[0].value, others, p.interval)
         vehicle = MultirotorState(vehicle.motion, memory)
     return MultirotorPlantState(vehicle, s.last), (), CONTINUE

@@ -1,4 +1,4 @@
-"""The plant of a multirotor, as one rigid body or as five: motor voltages in, the true state out."""
+"""Plant of a multirotor with one rigid body or five bodies: motor voltages in, true state out."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -19,34 +19,34 @@ from lapwing.services.common.ports import BatteryReading, PerRotor, TrueState
 from lapwing.services.plant.blocks.termination import termination_status
 
 for _name in effects.names():
-    effects.get(_name)  # registers its hooks: a set-up names an effect by the class of its parameters alone
+    effects.get(_name)  # registers its hooks: a run configuration has only the class of an effect's parameters
 
 
 class MultirotorPlant(NamedTuple):
-    """A vehicle and how it is integrated."""
+    """Parameters of the block: a vehicle and its integration."""
 
     method: Any  # `Method()` of an integrator
     vehicle: MultirotorParameters
-    key: Key  # of its random numbers
+    key: Key  # key of its random numbers
     step: float  # [s]
-    steps: int  # of a tick
-    interval: float  # [s] a tick
+    steps: int  # per tick
+    interval: float  # [s] length of a tick
     off: PerRotor  # [V] before the first command
-    settle: int  # ticks recorded after the mission has ended
+    settle: int  # [ticks] from the end of the mission to the end of the run
 
 
 class MultirotorPlantState(NamedTuple):
     """State of the block."""
 
     vehicle: MultirotorState
-    last: int  # tick of the run
+    last: int  # last tick of the run
 
 
 @always_inline
 def step(
     p: MultirotorPlant, s: MultirotorPlantState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:
-    """Advance to `tick` under the command given; at tick 0 leave the vehicle where it is.
+    """Advance to `tick` under the received command; output the initial state at tick 0.
 
     The inputs are actuators, status, and the named inputs of effects.
     """
@@ -80,7 +80,7 @@ def output(
     command: PerRotor,
     status: InputSample,
 ) -> tuple[MultirotorPlantState, tuple[TrueState, BatteryReading], int]:
-    """Return what `step` returns for a vehicle with these parameters after its motion to `tick`."""
+    """Return the result of `step` for a vehicle with these parameters after its motion to `tick`."""
     motion = motion_of(parameters.layout, vehicle.motion)
     o = observe(parameters, tick, p.interval, vehicle, command)
     last = min(s.last, tick + p.settle) if status.due and status.value.finished else s.last
@@ -89,15 +89,15 @@ def output(
         motion.rotor_speed, o.motor_voltage, o.motor_current, o.motor_power, o.thrust, o.torque,
         o.wind_world, o.air_density, o.in_contact, o.angular_acceleration_body,
     )  # fmt: skip
-    gauge = BatteryReading(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
-    sound = finite(vehicle.motion)
-    return MultirotorPlantState(vehicle, last), (truth, gauge), termination_status(tick, last, sound)
+    battery = BatteryReading(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
+    is_finite = finite(vehicle.motion)
+    return MultirotorPlantState(vehicle, last), (truth, battery), termination_status(tick, last, is_finite)
 
 
 @generic(inline=True)
 def release_payload(effects: types.BaseTuple, memory: types.BaseTuple) -> Callable:
     """Return the effects' discrete state after the release of the payload; unchanged without a payload."""
     carried = [getattr(kind, "instance_class", None) is PayloadRelease for kind in effects]
-    parts = "".join("gone, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
+    parts = "".join("released, " if payload else f"memory[{k}], " for k, payload in enumerate(carried))
     body = f"return ({parts})" if any(carried) else "return memory"
-    return compile_source("release_payload(effects, memory)", {"gone": RELEASED}, body)
+    return compile_source("release_payload(effects, memory)", {"released": RELEASED}, body)

@@ -1,4 +1,4 @@
-"""State of a multirotor for the other vehicles of a fleet, after it has stepped."""
+"""Output of a multirotor's state for the other vehicles of a fleet, after it has stepped."""
 
 from typing import Any, NamedTuple
 
@@ -15,11 +15,11 @@ from lapwing.kernels import always_inline
 
 
 class PresenceView(NamedTuple):
-    """The vehicle with this state."""
+    """Parameters of the block."""
 
     vehicle: MultirotorParameters
-    like: NeighbourState  # with the numbers that do not change
-    interval: float  # [s] a tick
+    like: NeighbourState  # prototype with the constant fields
+    interval: float  # [s] length of a tick
 
 
 @always_inline

@@ -1,4 +1,4 @@
-"""The load on the cable of a multirotor, with the force of the cable."""
+"""Output of a multirotor's slung load, with the force of its cable."""
 
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from lapwing.services.common.ports import BodyMotions
 
 
 class SlungLoadView(NamedTuple):
-    """The vehicle that carries the load."""
+    """Parameters of the block."""
 
     layout: RotorLayout
 

@@ -5,8 +5,8 @@ from lapwing.kernels import always_inline
 
 
 @always_inline
-def termination_status(tick: int, last: int, sound: bool) -> int:
+def termination_status(tick: int, last: int, is_finite: bool) -> int:
     """Return the plant's step status at `tick` of a run with last tick `last`."""
-    if not sound:
+    if not is_finite:
         return NON_FINITE
     return FINISHED if tick >= last else CONTINUE

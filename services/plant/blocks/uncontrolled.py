@@ -1,4 +1,4 @@
-"""A plant without commands: a system of lapwing/dynamics/vehicles that any integrator advances from tick to tick."""
+"""Plant without inputs: a system of lapwing/dynamics/vehicles, advanced by any integrator."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -14,18 +14,18 @@ from lapwing.services.plant.blocks.termination import termination_status
 
 
 class AutonomousPlant(NamedTuple):
-    """The system and how it is integrated."""
+    """Parameters of the block: the system and its integration."""
 
     system: Any  # parameters, a class of lapwing.dynamics.integrators.RATES
-    method: Any  # `Method()` of an integrator, or one whose error is `StepDoubling`
-    steps: int  # of a tick
+    method: Any  # `Method()` of an integrator, or `StepDoubling` with error control
+    steps: int  # per tick
     step: float  # [s]
-    interval: float  # [s] a tick
-    last: int  # tick of the run
+    interval: float  # [s] length of a tick
+    last: int  # last tick of the run
 
 
 OUTPUT_FUNCTIONS = DispatchTable()
-"""The compiled function of `outputs_of` by the class of a system's parameters."""
+"""Function of `outputs_of` by class of a system's parameters."""
 
 
 @generic(inline=True)

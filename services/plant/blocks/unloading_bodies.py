@@ -1,4 +1,4 @@
-"""The bodies of the crate that unloads its pack: pack, door, rollers and ground, with the contact force on each."""
+"""Output of the unloading crate's bodies: pack, door, rollers and ground, with the contact force on each."""
 
 from typing import NamedTuple
 
@@ -14,10 +14,10 @@ NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(unloading_contact_poi
 
 
 class UnloadingView(NamedTuple):
-    """The crate with the bodies."""
+    """Parameters of the block."""
 
     carrier: UnloadingParameters
-    interval: float  # [s] a tick
+    interval: float  # [s] length of a tick
 
 
 @always_inline

@@ -1,7 +1,7 @@
-"""Plant models: one file per value of `vehicle.model`, found by scanning this folder.
+"""Plant models: one file per value of `vehicle.model`, discovered in this folder.
 
-A model file has `check(scene)`, which rejects a scene that lacks what the model needs, and `resolve(scene)`, which
-returns the service's configuration. A scene table of the model is a `SceneTable` in the same file. If the plant is a
+A model file has `check(scene)`, which raises ConfigError for an unsuitable scene, and `resolve(scene)`, which returns
+the service's configuration. A scene table of the model is a `SceneTable` in the same file. If the plant is a
 system of `lapwing.dynamics.integrators.RATES`, `system(scene)` returns its parameters and initial state.
 """
 
@@ -22,12 +22,12 @@ def names() -> tuple[str, ...]:
 
 
 def get(name: str) -> ModuleType:
-    """Return the module of a model. Raise ConfigError with the choices if there is none."""
+    """Return the module of a model. Raise ConfigError with the choices if it does not exist."""
     if name not in names():
         raise ConfigError.unknown("vehicle.model", "model", name, names())
     return importlib.import_module(f"{__name__}.{name}")
 
 
 def check(scene: Scene) -> None:
-    """Raise ConfigError if the model does not exist, or the scene lacks a table or has a wrong one for it."""
+    """Raise ConfigError if the model does not exist, or the scene's tables do not fit it."""
     get(scene[Vehicle].model).check(scene)

@@ -52,18 +52,18 @@ def bodies_port(scene: Scene, n: int) -> Port:
     )
 
 
-def needs(scene: Scene, *tables: str) -> None:
+def require_tables(scene: Scene, *tables: str) -> None:
     """Raise ConfigError if a scene lacks one of these optional tables."""
     for name in tables:
         if not scene.has(name):
             raise ConfigError(name, "missing", f"a table [{name}], which the model {scene[Vehicle].model} needs")
 
 
-def can_have(scene: Scene, *tables: str) -> None:
-    """Raise ConfigError if a scene has a model-dependent table other than `tables`."""
+def reject_other_tables(scene: Scene, *tables: str) -> None:
+    """Raise ConfigError if a scene has a model-dependent table that is not in `tables`."""
     for name in sorted({"effects", "sensors", "autopilot", "trajectory"}.difference(tables)):
         if scene.has(name) and (scene.section(name).OPTIONAL or scene.tables(name)):
-            raise ConfigError(name, f"the model {scene[Vehicle].model} knows no such table; leave it out")
+            raise ConfigError(name, f"the model {scene[Vehicle].model} has no such table; remove it")
 
 
 def autonomous(
@@ -73,7 +73,7 @@ def autonomous(
     truth: TrueState,
     bodies: Any = None,
     names: tuple[str, ...] = (),
-    controlled: bool = False,
+    error_control: bool = False,
 ) -> ServiceConfig:
     """Return the configuration of a plant without commands.
 
@@ -82,12 +82,12 @@ def autonomous(
         p: parameters of the system.
         start: its state at tick 0.
         truth: prototype of its output.
-        bodies: parameters of the block of its bodies, or None.
+        bodies: parameters of the block that outputs its bodies, or None.
         names: names of the bodies.
-        controlled: control the error of each step, for systems with contacts.
+        error_control: control the error of each step, for systems with contacts.
     """
     solver, steps, step = method(scene)
-    if controlled:
+    if error_control:
         solver = integrators.StepDoubling(solver, scene[Solver].part_tolerance)
     core = AutonomousPlant(p, solver, steps, step, scene[Communication].interval, last_tick(scene))
     outputs = (Port(ports.TRUTH, truth), *([bodies_port(scene, len(names))] if bodies else []))
@@ -104,14 +104,16 @@ def noise_key(seed: int, vehicle: str) -> Key:
 def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     """Return the configuration of a multirotor with parameters p and the state form of module `form`."""
     exchange, frame = scene[Communication], airframe(scene)
-    n = (0.0,) * len(frame.rotors.position)
-    how, steps, step = method(scene)
+    zero = (0.0,) * len(frame.rotors.position)
+    solver, steps, step = method(scene)
     key = noise_key(scene[Run].seed, scene[Vehicle].name)
     settle = round(scene[Run].stop_delay * exchange.rate)
     p = p._replace(tolerance=scene[Solver].contact_tolerance)
-    core = MultirotorPlant(how, p, key, step, steps, exchange.interval, n, settle)
+    core = MultirotorPlant(solver, p, key, step, steps, exchange.interval, zero, settle)
     start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
-    truth = TrueState(rotor_speed=n, motor_voltage=n, motor_current=n, motor_power=n, rotor_thrust=n, rotor_torque=n)
+    truth = TrueState(
+        rotor_speed=zero, motor_voltage=zero, motor_current=zero, motor_power=zero, rotor_thrust=zero, rotor_torque=zero
+    )
     delay, external = exchange.loop_delay, effect_inputs.ports_of(scene, p.effects)
     return ServiceConfig(
         PlantSetup("rigid_body", core, start, message_contents(scene, odometry=True, battery=frame.battery)),
@@ -137,6 +139,6 @@ def check_system(scene: Scene, p: Any, start: Any) -> None:
 def check_integrator(scene: Scene, p: Any, start: Any) -> None:
     """Raise ConfigError if the integrator does not support parameters p and such states."""
     name, model = scene[Solver].integrator, scene[Vehicle].model
-    if why := integrators.incompatibility(name, p, start):
+    if reason := integrators.incompatibility(name, p, start):
         others = ", ".join(integrators.compatible_methods(p, start))
-        raise ConfigError("solver.integrator", f"{name} does not fit the model {model}: {why}", f"one of {others}")
+        raise ConfigError("solver.integrator", f"{name} does not fit the model {model}: {reason}", f"one of {others}")

@@ -1,4 +1,4 @@
-"""Quadrotors that carry a point mass by rigid links: thrusts and moments in, the state of every body out."""
+"""Quadrotors that carry a point mass by rigid links: thrusts and moments in, states of all bodies out."""
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
@@ -14,26 +14,25 @@ from lapwing.services.common.run_schema import CooperativeLoad
 from lapwing.services.plant.blocks.cooperative_load import CooperativePlant
 from lapwing.services.plant.models._common import (
     bodies_port,
-    can_have,
     check_system,
     last_tick,
     message_contents,
-    needs,
+    reject_other_tables,
+    require_tables,
 )
 from lapwing.services.plant.schema import method
 from lapwing.services.plant.service_config import PlantSetup
 
-NOTHING = (0.0, 0.0, 0.0)
 LOAD = "load"
 
 
 def check(scene: Scene) -> None:
     """Check that the scene describes the formation and controls it at every tick."""
-    needs(scene, "cooperative_load", "formation")
-    can_have(scene)
+    require_tables(scene, "cooperative_load", "formation")
+    reject_other_tables(scene)
     rate = scene[Communication].rate
     if scene[Rates].body_states != rate:
-        expected = f"communication.rate = {rate} Hz, at which the control works"
+        expected = f"communication.rate = {rate} Hz, the rate of the control"
         raise ConfigError("rates.body_states", f"got {scene[Rates].body_states} Hz", expected)
     check_system(scene, *system(scene))
 
@@ -56,7 +55,7 @@ def system(scene: Scene) -> tuple[CooperativeLoadParameters, CooperativeLoadStat
     """Return the parameters with the rotors off, and the initial state."""
     c = scene[CooperativeLoad]
     n = len(c.link_length)
-    off = LiftCommand((0.0,) * n, (NOTHING,) * n)
+    off = LiftCommand((0.0,) * n, (ZERO,) * n)
     p = CooperativeLoadParameters(c.quad_mass, c.quad_inertia, c.link_length, c.load_mass, c.gravity, off)
-    links = tuple(Swing(direction, NOTHING) for direction in c.link_start)
-    return p, CooperativeLoadState(c.load_start, c.load_velocity_start, (NO_ROTATION,) * n, (NOTHING,) * n, links)
+    links = tuple(Swing(direction, ZERO) for direction in c.link_start)
+    return p, CooperativeLoadState(c.load_start, c.load_velocity_start, (NO_ROTATION,) * n, (ZERO,) * n, links)

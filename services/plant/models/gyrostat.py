@@ -1,6 +1,7 @@
-"""The gyrostat satellite: four cases by which numbers are zero, and a control towards an attitude.
+"""Gyrostat satellite with optional attitude control.
 
-Rotors blocked: no `rotor_momentum`. Spinning: with it. Friction: with `damping`. Feedback: with gains.
+The parameters that are not zero select the case: blocked rotors (no `rotor_momentum`), spinning rotors
+(`rotor_momentum`), friction (`damping`) or feedback (gains).
 """
 
 from typing import ClassVar
@@ -11,14 +12,14 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
+from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
-from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
-NOTHING = (0.0, 0.0, 0.0)
-Turn = tuple[float, float, float, float]
+Wxyz = tuple[float, float, float, float]
 
 
 class Gyrostat(SceneTable):
@@ -27,24 +28,24 @@ class Gyrostat(SceneTable):
     TABLE: ClassVar[str] = "gyrostat"
     OPTIONAL: ClassVar[bool] = True
     inertia: Triple  # [kg m^2] principal moments of the platform with its rotors
-    rotor_momentum: Triple = NOTHING  # [kg m^2/s] of the rotors, the third its mean
+    rotor_momentum: Triple = ZERO  # [kg m^2/s] of the rotors; mean value of the third
     forcing_amplitude: float = 0.0  # ratio to the mean of the third rotor's speed
     forcing_frequency: float = Field(default=0.0, ge=0.0)  # [rad/s]
     damping: float = Field(default=0.0, ge=0.0)  # [N m s] about z
-    linear_gain: Triple = NOTHING  # [N m s]
-    cubic_gain: Triple = NOTHING  # [N m s^3]
+    linear_gain: Triple = ZERO  # [N m s]
+    cubic_gain: Triple = ZERO  # [N m s^3]
     desired_rate: float = 0.0  # [rad/s] about each axis
     attitude_gain: float = Field(default=0.0, ge=0.0)  # [N m] towards `target_rotation`
     rate_gain: float = Field(default=0.0, ge=0.0)  # [N m s]
-    target_rotation: Triple = NOTHING  # [rad] rotation vector of the wanted attitude
-    initial_attitude: Turn = Field(default=(1.0, 0.0, 0.0, 0.0), strict=False)  # quaternion w, x, y, z
+    target_rotation: Triple = ZERO  # [rad] rotation vector of the desired attitude
+    initial_attitude: Wxyz = Field(default=(1.0, 0.0, 0.0, 0.0), strict=False)  # quaternion w, x, y, z
     initial_rate: Triple  # [rad/s] body frame
 
 
 def check(scene: Scene) -> None:
     """Check that the scene describes a valid satellite and has no table that it cannot use."""
-    needs(scene, "gyrostat")
-    can_have(scene)
+    require_tables(scene, "gyrostat")
+    reject_other_tables(scene)
     check_system(scene, *system(scene))
 
 

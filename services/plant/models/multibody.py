@@ -1,4 +1,4 @@
-"""A multirotor as five bodies, chassis and propellers on hinges, with the effects and commands of `rigid_body`."""
+"""Multirotor of five bodies, chassis and propellers on hinges, with the effects and commands of `rigid_body`."""
 
 import math
 from types import ModuleType
@@ -31,7 +31,7 @@ class Event(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     time: float = Field(ge=0.0)  # [s]
     propeller: int = Field(ge=1, le=4)  # in the order of the airframe
-    failure: Literal["locked", "free", "torn_off"]  # locked to the chassis, free of its motor, or gone
+    failure: Literal["locked", "free", "torn_off"]  # locked to the chassis, disconnected from its motor, or torn off
 
 
 class Multibody(SceneTable):
@@ -42,13 +42,13 @@ class Multibody(SceneTable):
     coordinates: Literal["se3", "euler"] = "se3"  # a pose in SE(3) for each body, or positions and Euler angles
     stabilisation: Literal["projection", "partitioning", "baumgarte", "none"] = "projection"  # of constraints
     drive: Literal["torque", "speed"] = "torque"  # motors apply a torque, or prescribe the rotor speed
-    event: Annotated[tuple[Event, ...], Field(strict=False)] = ()  # what becomes of propellers in flight
+    event: Annotated[tuple[Event, ...], Field(strict=False)] = ()  # propeller failures in flight
 
     def check(self, scene: Scene) -> None:
         """Check that the model has five bodies, and that no event affects a lost part or lies after the run."""
         if scene[Vehicle].model != "multibody":
             raise ConfigError(
-                "multibody", f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "multibody"'
+                "multibody", f'the model {scene[Vehicle].model} has no such table; set vehicle.model = "multibody"'
             )
         duration, lost = scene[Run].duration, dict[int, float]()
         for i, event in sorted(enumerate(self.event), key=lambda item: item[1].time):
@@ -56,8 +56,9 @@ class Multibody(SceneTable):
                 expected = f"a time within run.duration = {duration:g} s"
                 raise ConfigError(f"multibody.event.{i}.time", f"got {event.time:g}", expected)
             if event.propeller in lost:
-                gone = f"propeller {event.propeller} is torn off at {lost[event.propeller]:g} s"
-                message = f"{gone}; nothing can become of it after that"
+                message = (
+                    f"propeller {event.propeller} is torn off at {lost[event.propeller]:g} s and cannot fail again"
+                )
                 raise ConfigError(f"multibody.event.{i}.propeller", message)
             if event.failure == "torn_off":
                 lost[event.propeller] = event.time
@@ -80,7 +81,7 @@ def check(scene: Scene) -> None:
 
 
 def longest_step(scene: Scene) -> float:
-    """Return the step [s] in which no propeller turns further than LARGEST_TURN."""
+    """Return the longest step [s] in which no propeller turns further than LARGEST_TURN."""
     motor = airframe(scene).motor
     return LARGEST_TURN * motor.rotor_constant / motor.max_voltage
 

@@ -1,4 +1,4 @@
-"""The OS4 quadrotor with rotors at given speeds, or driven by motors at given voltages; it has no autopilot."""
+"""OS4 quadrotor without autopilot, with constant rotor speeds or motors at constant voltages."""
 
 import math
 from typing import ClassVar
@@ -8,18 +8,18 @@ from pydantic import BaseModel, ConfigDict, Field
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
 from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
-from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
-NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
-Four = tuple[float, float, float, float]  # one for each rotor: front +x, left +y, rear -x, right -y
+Four = tuple[float, float, float, float]  # per rotor: front +x, left +y, rear -x, right -y
 
 
 class Motors(BaseModel):
-    """Motors of one kind."""
+    """Four equal motors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     voltage: Four = Field(strict=False)  # [V]
@@ -39,15 +39,15 @@ class Os4(SceneTable):
     drag_constant: float = Field(gt=0.0)  # [N m s^2]
     rotor_inertia: float = Field(ge=0.0)  # [kg m^2]
     gravity: float = 9.81  # [m/s^2]
-    translational_drag: Triple = NOTHING  # [N s/m] along the world axes
-    rotor_speed_rpm: Four = Field(strict=False)  # [rpm] kept, or with motors the start
-    motors: Motors | None = None  # without them the rotors keep their speed
+    translational_drag: Triple = ZERO  # [N s/m] along the world axes
+    rotor_speed_rpm: Four = Field(strict=False)  # [rpm] constant; with motors the initial speeds
+    motors: Motors | None = None  # without motors the rotor speeds are constant
 
 
 def check(scene: Scene) -> None:
     """Check that the scene describes the quadrotor and has no table that it cannot use."""
-    needs(scene, "os4")
-    can_have(scene)
+    require_tables(scene, "os4")
+    reject_other_tables(scene)
     check_system(scene, *system(scene))
 
 
@@ -67,4 +67,4 @@ def system(scene: Scene) -> tuple[Os4Parameters, Os4State]:
     )  # fmt: skip
     first, second, third, fourth = q.rotor_speed_rpm
     speed = (first * RPM, second * RPM, third * RPM, fourth * RPM)
-    return p, Os4State(NOTHING, NO_ROTATION, NOTHING, NOTHING, speed)
+    return p, Os4State(ZERO, NO_ROTATION, ZERO, ZERO, speed)

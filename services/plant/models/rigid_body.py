@@ -1,4 +1,4 @@
-"""A multirotor as one rigid body with rotors: motor voltages in, the vehicle's true state out."""
+"""Multirotor of one rigid body with rotors: motor voltages in, true state out."""
 
 from types import ModuleType
 from typing import Any
@@ -8,15 +8,15 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.vehicle_schema import active, airframe
-from lapwing.services.plant.models._common import check_integrator, multirotor_plant, needs
+from lapwing.services.plant.models._common import check_integrator, multirotor_plant, require_tables
 
 
 def check(scene: Scene) -> None:
     """Raise ConfigError for an invalid airframe, a missing autopilot or an unsuitable integrator."""
     airframe(scene)
-    needs(scene, "autopilot")
+    require_tables(scene, "autopilot")
     if not scene.lookup("autopilot.accept_commands") and not flown_by_firmware(scene):
-        needs(scene, "trajectory")
+        require_tables(scene, "trajectory")
     p = multirotor.parameters(airframe(scene))
     check_integrator(scene, p, multirotor.initial_state(p).motion)
 

@@ -1,4 +1,4 @@
-"""A multirotor that carries a load on a cable, under the same effects and commands as `rigid_body`."""
+"""Multirotor that carries a load on a cable, with the effects and commands of `rigid_body`."""
 
 from types import ModuleType
 from typing import Any, ClassVar
@@ -24,31 +24,29 @@ from lapwing.services.common.vehicle_schema import (
 )
 from lapwing.services.plant.blocks.slung_load import SlungLoadView
 from lapwing.services.plant.models import rigid_body
-from lapwing.services.plant.models._common import bodies_port, multirotor_plant, needs
+from lapwing.services.plant.models._common import bodies_port, multirotor_plant, require_tables
 from lapwing.services.plant.schema import Solver
 
 NAME = "slung_load"
-FASTEST = 1.0  # frequency of the cable times the step: explicit methods of order 4 are exact to 1e-2 a turn
+FASTEST = 1.0  # maximum cable frequency times step; methods of order 4 are then accurate to 1e-2 per period
 
 
 class SlungLoad(SceneTable):
-    """Cable and load; the autopilot does not know either."""
+    """Cable and load, which the autopilot's vehicle model does not include."""
 
     TABLE: ClassVar[str] = NAME
     OPTIONAL: ClassVar[bool] = True
-    mass: float = Field(gt=0.0)  # [kg] of the load, not part of the vehicle's
+    mass: float = Field(gt=0.0)  # [kg] of the load, in addition to the vehicle's
     length: float = Field(gt=0.0)  # [m] of the cable without tension
     stiffness: float = Field(default=2000.0, gt=0.0)  # [N/m] of the cable
     damping_ratio: float = Field(default=0.1, ge=0.0, lt=2.0)  # ratio, of the load on the taut cable
-    hook: Vec3 = Field(default=(0.0, 0.0, 0.0), strict=False)  # [m] body, where it is fastened
+    hook: Vec3 = Field(default=(0.0, 0.0, 0.0), strict=False)  # [m] body, attachment of the cable
     drag_area: float = Field(default=0.0, ge=0.0)  # [m^2] of the load, drag coefficient times area
 
     def check(self, scene: Scene) -> None:
         """Check that the vehicle can carry the load, and that the step is short enough for the cable."""
         if scene[Vehicle].model != NAME:
-            raise ConfigError(
-                NAME, f'the model {scene[Vehicle].model} knows no such table; set vehicle.model = "{NAME}"'
-            )
+            raise ConfigError(NAME, f'the model {scene[Vehicle].model} has no such table; set vehicle.model = "{NAME}"')
         _check_weight(scene)
         fastest = multirotor_slung.frequency(_sling(scene), airframe(scene).mass.total)
         if scene[Solver].step * fastest > FASTEST:
@@ -79,7 +77,7 @@ def _sling(scene: Scene) -> Sling:
 
 def check(scene: Scene) -> None:
     """Check the rigid-body model's needs, and that the scene has a load."""
-    needs(scene, NAME)
+    require_tables(scene, NAME)
     rigid_body.check(scene)
 
 

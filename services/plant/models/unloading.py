@@ -15,11 +15,10 @@ from lapwing.services.common.ports import TrueState
 from lapwing.services.common.run_schema import Triple
 from lapwing.services.plant.blocks import unloading_bodies
 from lapwing.services.plant.blocks.unloading_bodies import UnloadingView
-from lapwing.services.plant.models._common import autonomous, can_have, check_system, needs
+from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
-NOTHING = (0.0, 0.0, 0.0)
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
-STIFFNESS, DAMPING = 2.0e4, 60.0  # [N/m], [N s/m] of one place of contact
+STIFFNESS, DAMPING = 2.0e4, 60.0  # [N/m], [N s/m] of a contact point
 Pair = tuple[float, float]  # static and dynamic friction
 
 
@@ -38,20 +37,20 @@ class Unloading(SceneTable):
     roller_radius: float = Field(gt=0.0)  # [m]
     roller_spacing: float = Field(gt=0.0)  # [m]
     roller_rpm: float  # [rpm] at the end of the ramp
-    ramp_start: float = Field(ge=0.0)  # [s] when the rollers start and the door is unlocked
+    ramp_start: float = Field(ge=0.0)  # [s] start of the rollers, and unlocking of the door
     ramp_duration: float = Field(gt=0.0)  # [s]
     door_length: float = Field(gt=0.0)  # [m]
     door_mass: float = Field(gt=0.0)  # [kg]
     door_spring: float = Field(ge=0.0)  # [N m/rad]
-    door_preload: float = Field(ge=0.0)  # [rad] that the spring is wound up when the door is shut
+    door_preload: float = Field(ge=0.0)  # [rad] twist of the spring with the door shut
     door_damping: float = Field(ge=0.0)  # [N m s/rad]
     door_lock: float = Field(default=50.0, gt=0.0)  # [N m/rad] of the lock and of the stop
     edge_radius: float = Field(default=0.003, gt=0.0)  # [m]
-    pickup: float = Field(gt=0.0)  # [s] when the pack is taken away
+    pickup: float = Field(gt=0.0)  # [s] removal of the pack
     gravity: float = Field(default=9.81, ge=0.0)  # [m/s^2]
     roller_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on rollers
-    door_friction: Pair = Field(strict=False)  # the same, of pack on door
-    ground_friction: Pair = Field(strict=False)  # the same, of pack on ground
+    door_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on door
+    ground_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on ground
 
     def check(self, scene: Scene) -> None:
         """Check that sizes are positive, the pack fits into the crate, and friction is lower in motion."""
@@ -71,8 +70,8 @@ class Unloading(SceneTable):
 
 def check(scene: Scene) -> None:
     """Check that the scene describes the crate and has no table that it cannot use."""
-    needs(scene, "unloading")
-    can_have(scene)
+    require_tables(scene, "unloading")
+    reject_other_tables(scene)
     check_system(scene, *system(scene))
 
 
@@ -80,7 +79,7 @@ def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of the crate's plant."""
     p, start = system(scene)
     view = UnloadingView(p, scene[Communication].interval)
-    return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES, controlled=True)
+    return autonomous(scene, p, start, TrueState(), view, unloading_bodies.NAMES, error_control=True)
 
 
 def _surface(friction: Pair) -> Surface:

@@ -7,7 +7,7 @@ from lapwing.services.trajectory.segments.segment import Positive, Segment
 
 
 class Hold(Segment):
-    """Constant at the value reached for `duration`."""
+    """Constant at the start value for `duration`."""
 
     kind: Literal["hold"] = "hold"
     duration: Positive  # [s]

@@ -1,4 +1,4 @@
-"""Sine about the value reached."""
+"""Sine about the start value."""
 
 from typing import Literal
 

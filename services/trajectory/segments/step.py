@@ -7,7 +7,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Segment
 
 
 class Step(Segment):
-    """Jump to the value `to` in no time."""
+    """Instantaneous jump to the value `to`."""
 
     kind: Literal["step"] = "step"
     to: Finite  # [u]

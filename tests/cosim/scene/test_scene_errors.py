@@ -117,7 +117,7 @@ def test_choices_are_listed():
         ("vehicle.name=1x", "--set vehicle.name: expected a text of the form"),
         ("communication.rate=300", "--set communication.rate: expected a rate with a whole number of ns"),
         ("rates.pose=33", "--set rates.pose: expected a rate that divides communication.rate = 250 Hz (250, 125, 50"),
-        ("solver.step=0.003", "--set solver.step: expected a step that divides the exchange interval of 0.004 s"),
+        ("solver.step=0.003", "--set solver.step: expected a step that divides the communication step of 0.004 s"),
         ("published.rmse.q=3", "--set published.rmse.q: expected 'x', 'y'"),
         ("trajectory.phase=[]", "--set trajectory.phase: expected at least 1"),
         ("trajectory.phase.9.duration=1", "--set trajectory.phase.9.duration=1: expected an index from 0 to 3, got 9"),

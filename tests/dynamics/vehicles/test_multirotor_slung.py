@@ -127,7 +127,7 @@ def test_damped_cable_pulls_and_never_pushes():
         ({"slung_load.stiffness": 2e6}, r"solver.step: the load on the taut cable swings along it with 2828 rad/s"),
         (
             {"vehicle.model": "rigid_body"},
-            'slung_load: the model rigid_body knows no such table; set vehicle.model = "slung_load"',
+            'slung_load: the model rigid_body has no such table; set vehicle.model = "slung_load"',
         ),
         ({"slung_load.mass": 0.0}, "slung_load.mass: expected a number above 0"),
     ],

@@ -1,4 +1,4 @@
-"""A minimal plant around the controller: rigid body, four rotors with a lag, wind on the centre of mass, a stand."""
+"""Minimal plant for closed-loop tests: rigid body, four rotors with a lag, wind at the centre of mass, ground stand."""
 
 import math
 from typing import NamedTuple
@@ -61,13 +61,13 @@ MISSION = {
 
 
 class Plant(NamedTuple):
-    """The true vehicle, which may differ from the airframe that the controller believes in."""
+    """True vehicle, which may differ from the nominal airframe of the controller."""
 
     mass: float
     inertia: Vec3
     torque_per_thrust: float
     thrust_coefficient: float
-    delay: int  # whole ticks between command and effect: 0 or 1
+    delay: int  # [ticks] between command and effect: 0 or 1
 
 
 class Body(NamedTuple):
@@ -80,7 +80,7 @@ class Body(NamedTuple):
 
 @kernel
 def move(plant, b, speed_command, wind_world, h):
-    """Half-explicit Euler step of h [s]."""
+    """Return the state after a half-explicit Euler step of h [s]."""
     k = 1.0 - math.exp(-h / MOTOR.time_constant)
     s0, s1, s2, s3 = b.speed
     u0, u1, u2, u3 = speed_command
@@ -99,7 +99,7 @@ def move(plant, b, speed_command, wind_world, h):
     w = add(b.omega_body, scale(h, turn))
     x = add(b.position_world, scale(h, v))
     q = normalise(retract(b.attitude, scale(h, w)))
-    if x[2] <= AIRFRAME.resting_height:  # the stand: no sinking, no sliding, no tipping
+    if x[2] <= AIRFRAME.resting_height:  # on the stand the vehicle does not sink, slide or tip
         x, v, w = (
             (b.position_world[0], b.position_world[1], AIRFRAME.resting_height),
             (0.0, 0.0, max(v[2], 0.0)),
@@ -111,9 +111,11 @@ def move(plant, b, speed_command, wind_world, h):
 
 @kernel
 def fly(p, trajectory, plant, white, noise):
-    """Fly len(white) ticks; white: unit noise (ticks, 3 wind + 12 estimate); noise: sigma of position, velocity,
-    angle, rate of the estimate. Columns of the log: time, position, roll, pitch, yaw, references of these six, largest
-    thrust, stage."""
+    """Fly len(white) ticks and return the log.
+
+    `white` is unit noise (ticks, 3 wind + 12 estimate), `noise` the deviations of position, velocity, angle and rate of
+    the estimate. Columns: time, position, roll, pitch, yaw, references of these six, largest thrust, landed state.
+    """
     b = Body((0.0, 0.0, AIRFRAME.resting_height), NO_ROTATION, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
     s = START
     log = np.zeros((len(white), 15))
@@ -155,7 +157,7 @@ TRUTH = (0.0, 0.0, 0.0, 0.0)
 
 
 def mission(parameters, plant=NOMINAL, seed=1, noise=TRUTH, spec=MISSION):
-    """Log of a flight of the delivery mission (see `fly`)."""
+    """Return the log of a flight of the delivery mission. See `fly`."""
     trajectory = compile(Phases.model_validate(spec), (0.0, 0.0, AIRFRAME.resting_height))
     ticks = round(trajectory.duration / TICK)
     white = np.random.default_rng(seed).standard_normal((ticks, 15))
@@ -163,7 +165,7 @@ def mission(parameters, plant=NOMINAL, seed=1, noise=TRUTH, spec=MISSION):
 
 
 def rmse(log):
-    """RMSE of x, y, z [m], roll, pitch, yaw [rad] while the motors ran."""
+    """Return the RMSE of x, y, z [m], roll, pitch, yaw [rad] while the motors ran."""
     flight = log[log[:, 14] != LANDED]
     difference = flight[:, 7:13] - flight[:, 1:7]
     difference[:, 5] = [wrap(d) for d in difference[:, 5]]

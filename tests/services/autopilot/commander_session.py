@@ -1,4 +1,4 @@
-"""A commander by itself, told what a test says."""
+"""Session of a commander without a controller, with inputs set by a test."""
 
 import math
 
@@ -13,35 +13,35 @@ from lapwing.services.scene_resolver import load
 DT = 0.004  # [s]
 CONSTANTS = Constants(table(load("hover")), 0.35, 9.8, 0.4, False, True)
 HIGH = EXACT._replace(position_world=(1.0, 2.0, 5.0))
-"""An estimate in the air, at rest."""
+"""Return an estimate at rest in the air."""
 VIEW = CommanderInput(
     DT, HIGH, 0.0, math.nan, 0, Setpoint((1.0, 2.0, 5.0), (0.0,) * 3, (0.0,) * 3, 0.3, 0.0), 1.0, False
 )
 
 
 class Session:
-    """A commander and the views that it is shown."""
+    """A commander and its inputs."""
 
     def __init__(self, constants=CONSTANTS):
         self.commander = Commander(constants)
         self.texts, self.acknowledgements = [], []
 
-    def step(self, **told):
-        """The request after a tick of which this is told, and else that of a vehicle that hovers."""
-        request = self.commander.step(VIEW._replace(**told))
-        self.texts += request.texts
-        self.acknowledgements += request.acknowledgements
-        return request
+    def step(self, **inputs):
+        """Return the output after a tick with these inputs; the others are those of a hovering vehicle."""
+        output = self.commander.step(VIEW._replace(**inputs))
+        self.texts += output.texts
+        self.acknowledgements += output.acknowledgements
+        return output
 
-    def run(self, seconds, **told):
-        """The last request after so long."""
+    def run(self, seconds, **inputs):
+        """Return the last output after a time [s]."""
         for _ in range(round(seconds / DT)):
-            request = self.step(**told)
-        return request
+            output = self.step(**inputs)
+        return output
 
 
 class Flight(Session):
-    """A session whose vehicle is where its setpoint is, stands on the ground at first, and feels it again."""
+    """Session of a vehicle that follows its setpoint exactly, from the ground to a landing."""
 
     def __init__(self, *commands, parameters=(), constants=CONSTANTS):
         super().__init__(constants)
@@ -49,9 +49,10 @@ class Flight(Session):
         self.setpoint = Setpoint((0.0, 0.0, 0.35), (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
         self.track, self.statuses = [], []
         self.time = 0.0
-        self.told(*commands)
+        self.send(*commands)
 
-    def told(self, *commands):
+    def send(self, *commands):
+        """Step one tick with these commands."""
         self._advance(commands)
         return self
 
@@ -63,23 +64,24 @@ class Flight(Session):
             attitude=from_roll_pitch_yaw(0.0, 0.0, self.setpoint.yaw),
         )
         down = self.setpoint.velocity_world[2] < 0.0 and z <= 0.36
-        request = self.step(estimate=estimate, motors_cut=down, commands=tuple(commands))
-        self.setpoint, self.status, self.time = request.setpoint, request.status, self.time + DT
+        output = self.step(estimate=estimate, motors_cut=down, commands=tuple(commands))
+        self.setpoint, self.status, self.time = output.setpoint, output.status, self.time + DT
         self.track.append((self.setpoint, self.status))
 
-    def until(self, true, seconds=120.0):
-        """Fly on until something is so of the status; says whether it is."""
+    def until(self, condition, seconds=120.0):
+        """Fly until a condition on the status holds. Return False if it never does."""
         end = self.time + seconds
-        while not true(self.status) and self.time < end:
+        while not condition(self.status) and self.time < end:
             self._advance()
-        return true(self.status)
+        return condition(self.status)
 
-    def on(self, seconds):
+    def fly_for(self, seconds):
+        """Fly for a time [s]."""
         self.until(lambda status: False, seconds)
         return self
 
     def speeds(self, near, within):
-        """Horizontal speeds [m/s] near a place."""
+        """Return the horizontal speeds [m/s] near a position."""
         return [
             math.hypot(*s.velocity_world[:2]) for s, _ in self.track if math.dist(s.position_world[:2], near) < within
         ]

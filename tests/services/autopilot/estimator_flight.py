@@ -1,4 +1,4 @@
-"""A smooth flight with exact derivatives, measured by the real sensors and followed by the estimator, all compiled."""
+"""Smooth flight with exact derivatives, measured by the sensor models and tracked by the estimator, all compiled."""
 
 import math
 from typing import NamedTuple
@@ -29,7 +29,7 @@ COLUMNS = COVARIANCE + 81
 
 @always_inline
 def bump(amplitude, frequency, t):
-    """amplitude (1 - cos)^2 and its first two derivatives: starts from rest, without a step in acceleration."""
+    """Return amplitude (1 - cos)^2 and its first two derivatives: starts at rest, without a step in acceleration."""
     c, s = math.cos(frequency * t), math.sin(frequency * t)
     return (
         amplitude * (1.0 - c) ** 2,
@@ -40,7 +40,7 @@ def bump(amplitude, frequency, t):
 
 @always_inline
 def attitude_at(t, agility):
-    """Upright along the thrust that the path needs, turned by a smooth yaw."""
+    """Return the attitude with body z along the thrust of the path and a smooth yaw."""
     tau = max(t - STAND, 0.0)
     ax, ay, az = (
         bump(1.2, 0.8 * agility, tau)[2],
@@ -58,7 +58,7 @@ def attitude_at(t, agility):
 
 @kernel
 def truth_at(t, agility):
-    """True state at a time; agility 1 tilts by some 20 degrees."""
+    """Return the true state at a time [s]; agility 1 tilts by about 20 degrees."""
     tau = max(t - STAND, 0.0)
     x = bump(1.2, 0.8 * agility, tau)
     y = bump(0.9, 0.7 * agility, tau)
@@ -89,7 +89,7 @@ def truth_at(t, agility):
 
 @kernel
 def fly(p, memory, instruments, keys, ticks, agility, start, use_velocity, out):
-    """Fly and write one row per GPS period; returns the last estimate."""
+    """Fly and write one row per GPS period. Return the last estimate."""
     imu_p, mag_p, gps_p, baro_p, sonar_p = instruments
     imu_k, mag_k, gps_k, baro_k, sonar_k = keys
     truth = truth_at(0.0, agility)
@@ -129,7 +129,7 @@ def fly(p, memory, instruments, keys, ticks, agility, start, use_velocity, out):
 
 @always_inline
 def write(row, p, s, truth):
-    """Errors and their consistency now."""
+    """Write the present errors and their consistency."""
     n = s.nominal
     error = quaternion.log(quaternion.multiply(truth.attitude, quaternion.conjugate(n.attitude)))
     for k in range(3):
@@ -150,41 +150,41 @@ NO_FAULTS = (Fault(),) * SLOTS  # empty slots, so that flights with and without 
 NAMES = ("imu", "magnetometer", "gps", "barometer", "sonar")
 
 
-def equipment(**presets):
-    """Parameters of the sensors, those of the default scene where not named otherwise."""
+def sensor_parameters(**presets):
+    """Return the parameters of the sensors; by default those of the default scene."""
     chosen = {name: next(iter(sensors()[name].PRESETS.values())) for name in NAMES} | presets
     return tuple(p if p.faults else p._replace(faults=NO_FAULTS) for p in chosen.values())
 
 
-DEFAULT = equipment()
+DEFAULT = sensor_parameters()
 
 
 class Flight(NamedTuple):
     """Records of a flight at 10 Hz."""
 
     error: np.ndarray  # (n, 9) rotation vector [rad], velocity [m/s], position [m]: truth less estimate
-    covariance: np.ndarray  # (n, 9, 9) of these, as the filter believes
+    covariance: np.ndarray  # (n, 9, 9) covariance of these in the filter
     nis: np.ndarray  # (n, 6)
     health: np.ndarray  # (n,)
     rejected: np.ndarray  # (n,)
 
     @property
     def nees(self):
-        """Normalised estimation error squared (n,)."""
+        """Return the normalised estimation error squared (n,)."""
         return np.einsum("...i,...i", self.error, np.linalg.solve(self.covariance, self.error[..., None])[..., 0])
 
     @property
     def std(self):
-        """Standard deviations (n, 9)."""
+        """Return the standard deviations (n, 9)."""
         return np.sqrt(np.diagonal(self.covariance, axis1=-2, axis2=-1))
 
 
 def flight(seed=1, instruments=DEFAULT, p=estimator.PRESETS["rtk"], duration=40.0, agility=1.0, velocity=True):
-    """One flight."""
+    """Return the record of a flight."""
     ticks = round(duration / INTERVAL)
     out = np.zeros((ticks // 25, COLUMNS))
     keys = tuple(stream_key(seed, "drone1", name) for name in NAMES)
-    draw = normal3(keys[0], TURN_ON, 999)  # the first guess is as wrong as the filter is told
+    draw = normal3(keys[0], TURN_ON, 999)  # the initial errors have the filter's initial deviations
     guess = (p.start_std * draw[0], p.start_std * draw[1], REST + p.start_std * draw[2])
     fly(p, estimator.new_memory(), instruments, keys, ticks, agility, guess, velocity, out)
     covariance = out[:, COVARIANCE:].reshape(-1, 9, 9)

@@ -22,7 +22,7 @@ def item(action, x=NAN, y=NAN, z=NAN, yaw=NAN, radius=NAN, hold=0.0, values=()):
 
 
 def scripted(script):
-    """An operator of {time [s]: commands}; a key (start, end) repeats them at 10 Hz."""
+    """Return an operator of {time [s]: commands}; a key (start, end) repeats them at 10 Hz."""
 
     def operator(tick):
         result = []
@@ -39,7 +39,7 @@ def scripted(script):
 
 
 def fly(seconds, script, *overrides, operated=True):
-    """The recorded flight."""
+    """Return the recorded flight."""
     sets = [*(OPERATED if operated else []), f"run.duration={seconds}", *overrides]
     return memory_log.fly(load(SCENE, sets), scripted(script))
 
@@ -48,7 +48,7 @@ ENABLED = "autopilot.parameters.SYS_FAILURE_EN=1"
 
 
 def inject(unit, kind, motor=0, id=7):
-    """A failure of `lapwing.services.common.failure_types`."""
+    """Return the command of a failure of `lapwing.services.common.failure_types`."""
     return command("inject_failure", UNITS.index(unit), kind, motor, id=id)
 
 
@@ -56,47 +56,47 @@ UP_BY_SENSORS = {0.04: [command("takeoff", 4.0), command("arm", NAN, 10.0)]}
 
 
 def fly_by_sensors(seconds, script, *overrides):
-    """The recorded flight of the ground station's vehicle, which climbs to 4 m; in wind, by its sensors."""
+    """Return the recorded flight of the vehicle of `groundstation`, which climbs to 4 m in wind, on its sensors."""
     scene = load("groundstation", ["autopilot.follow_trajectory=false", f"run.duration={seconds}", *overrides])
     return memory_log.fly(scene, scripted(UP_BY_SENSORS | script))
 
 
 def error(flight, start):
-    """Largest distance [m] of the estimate from the truth from a time on."""
-    known, true = (flight.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "ground_truth"))
+    """Return the largest error [m] of the estimated position from a time on."""
+    estimated, true = (flight.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "ground_truth"))
     times, true_times = flight.times("estimate"), flight.times("ground_truth")
     nearest = true[np.searchsorted(true_times, times).clip(0, len(true) - 1)]
-    return np.linalg.norm(known - nearest, axis=1)[times >= start].max()
+    return np.linalg.norm(estimated - nearest, axis=1)[times >= start].max()
 
 
 def at(flight, topic, t, value):
-    """`value` of the last message of a topic at or before t [s]."""
+    """Return `value` of the last message of a topic at or before t [s]."""
     times = flight.times(topic)
     return flight.column(topic, value)[times <= t + 1e-9][-1]
 
 
 def height(flight, t):
-    """True height [m] of the vehicle's origin at t [s]."""
+    """Return the true height [m] of the vehicle's origin at t [s]."""
     return at(flight, "ground_truth", t, lambda m: m.pose.position.z)
 
 
 def place(flight, t):
-    """True position [m] at t [s]."""
+    """Return the true position [m] at t [s]."""
     return tuple(at(flight, "ground_truth", t, lambda m: tuple(m.pose.position)))
 
 
 def mode(flight, t):
-    """Mode at t [s]."""
+    """Return the mode at t [s]."""
     return at(flight, "status", t, lambda m: m.mode)
 
 
-def said(flight):
-    """Everything that was told to the pilot."""
+def sent_texts(flight):
+    """Return all status texts."""
     return [text for texts in _all(flight, lambda m: m.text) for text in texts]
 
 
 def results(flight):
-    """Results of the answers, by id."""
+    """Return the results of the acknowledgements by id."""
     return {a.id: a.result for answers in _all(flight, lambda m: m.acks) for a in answers}
 
 

@@ -1,4 +1,4 @@
-"""MC_AIRMODE: priorities under saturation, against linear programs, and the torques of the rotors at no throttle."""
+"""MC_AIRMODE: priorities under saturation against linear programs, and rotor torques at zero throttle."""
 
 import math
 
@@ -39,7 +39,7 @@ ALL = AIRMODE_DISABLED, AIRMODE_ROLL_PITCH, AIRMODE_ROLL_PITCH_YAW
 
 
 def largest(shares, q, mode):
-    """Parts of roll and pitch and of yaw by priority: the solution of a linear program for each."""
+    """Return the feasible parts of roll and pitch, and of yaw, by a linear program for each priority."""
     s, c = np.array(shares), max(q.collective, 0.0)
     bounds = (None, None) if mode else (0.0, c)
 
@@ -116,13 +116,13 @@ def test_torques_at_no_throttle(sign):
         assert roll == pytest.approx(wrench(mix(SHARES, rolling))[1][0])
 
 
-def test_airmode_of_parameters_is_that_of_former_logs_by_default():
+def test_default_airmode_is_that_of_former_logs():
     assert airmode({}) == AIRMODE_ROLL_PITCH
     assert [airmode({"MC_AIRMODE": float(k)}) for k in range(3)] == list(ALL)
 
 
 def tumbling(roll):
-    """Estimate of a vehicle that rolls far above its setpoint, and the setpoint: no lift is desired."""
+    """Return the estimate of a rolling vehicle far above its setpoint, and the setpoint: no lift is desired."""
     estimate = StateEstimate(
         position_world=(0.0, 0.0, 80.0),
         velocity_world=(0.0, 0.0, 5.0),
@@ -165,7 +165,7 @@ def test_px4_cascade_has_same_airmodes():
 
 @pytest.mark.long
 def test_airmode_is_changed_in_flight():
-    """Free fall with a desired pitch that moves to and fro."""
+    """Free fall with an oscillating desired pitch."""
 
     def fall(*angles):
         steps = enumerate(angles)
@@ -174,9 +174,9 @@ def test_airmode_is_changed_in_flight():
 
     def lift(mode):
         enter = {5.9: [command("parameter", mode, text="MC_AIRMODE", id=1)], 6.04: [command("offboard", id=2)]}
-        flown = fly(6.6, UP | enter | fall(0.0, 0.3, -0.3, 0.3, -0.3))
-        assert [results(flown)[k] for k in (1, 2)] == [ACCEPTED, ACCEPTED]
-        return max(at(flown, "actuators", t, lambda m: math.fsum(m.thrust)) for t in np.arange(6.2, 6.6, 0.02))
+        flight = fly(6.6, UP | enter | fall(0.0, 0.3, -0.3, 0.3, -0.3))
+        assert [results(flight)[k] for k in (1, 2)] == [ACCEPTED, ACCEPTED]
+        return max(at(flight, "actuators", t, lambda m: math.fsum(m.thrust)) for t in np.arange(6.2, 6.6, 0.02))
 
     assert lift(0) < 0.2 * lift(1)
     assert lift(2) >= lift(1)

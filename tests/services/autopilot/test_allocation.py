@@ -22,7 +22,7 @@ HALF = 0.5 * np.pi
 
 
 def ring(angles, spins, radius=0.3):
-    """Effectiveness of rotors on a circle."""
+    """Return the effectiveness of rotors on a circle."""
     x, y = radius * np.cos(angles), radius * np.sin(angles)
     return effectiveness(tuple(x), tuple(y), tuple(YAW * np.array(spins)))
 
@@ -79,9 +79,10 @@ def test_allocation_without_failed_rotor_keeps_lift_roll_pitch(name):
         assert result[:3] == pytest.approx(np.eye(4)[:3], abs=1e-12)
 
 
-def test_which_failures_leave_yaw_to_hexacopter_is_as_published():
-    """Du, Quan, Yang, Cai, J. Guidance, Control, and Dynamics 38 (2015) 978: turning PNPNPN it is uncontrollable
-    without any one rotor; turning PPNNPN it is controllable without one of the first four."""
+def test_hexacopter_yaw_after_failures_is_as_published():
+    """Du, Quan, Yang, Cai, J. Guidance, Control, and Dynamics 38 (2015) 978: with spin directions PNPNPN the vehicle is
+    uncontrollable after the loss of any rotor, with PPNNPN it is controllable after the loss of one of the first four.
+    """
     yaw = [any(share[3] for share in shares) for shares in tables(HEXA_X)[1:]]
     assert yaw == [True, True, True, True, False, False]
     assert not any(any(share[3] for share in shares) for shares in tables(ROTORS["hexa +"])[1:])
@@ -95,13 +96,13 @@ def test_no_failure_tables_without_redundant_rotor(name):
 @pytest.mark.parametrize(
     "B",
     [
-        ring(circle(3), [1, -1, 1]),  # three numbers cannot be four
-        ring(circle(4), [1, 1, 1, 1]),  # yaw comes with lift
+        ring(circle(3), [1, -1, 1]),  # three rotors, four controls
+        ring(circle(4), [1, 1, 1, 1]),  # yaw is coupled to lift
         effectiveness((0.3, 0.2, -0.3, 0.1), (0.0, 0.0, 0.0, 0.0), (YAW, -YAW, YAW, -YAW)),  # in a row
         effectiveness((0.3, 0.1, 0.1, 0.3), (0.2, 0.2, -0.2, -0.2), (YAW, -YAW, YAW, -YAW)),  # all in front
     ],
 )
-def test_rotors_that_cannot_balance_vehicle_are_refused(B):
+def test_unbalanced_rotors_are_rejected(B):
     with pytest.raises(ValueError, match="cannot be balanced; expected lift from each"):
         tables(B)
 
@@ -112,7 +113,7 @@ ANY = st.floats(-30.0, 30.0)
 @pytest.mark.long
 @example(
     6.0, 1.0, 4.0, 1.0, ((1.0, 1.0, -1.0, 1.0), (1.0, 1.0, 1.0, -1.0), (1.0, -1.0, 1.0, 1.0), (1.0, -1.0, -1.0, -1.0))
-)  # possible with yaw only
+)  # feasible only with yaw
 @given(ANY, ANY, ANY, ANY, st.sampled_from([tables(B)[-1] for B in ROTORS.values()]))
 @settings(deadline=None, max_examples=300)
 def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, roll, pitch, yaw, shares):

@@ -25,7 +25,7 @@ def test_rates_of_angles_are_their_difference_quotients(roll, pitch, omega):
 
 @given(TILT, TILT, st.floats(-3.0, 3.0), RATES)
 @settings(deadline=None)
-def test_on_so3_error_turns_attitude_onto_reference(roll, pitch, yaw, turn):
+def test_so3_error_rotates_attitude_onto_reference(roll, pitch, yaw, turn):
     reference = (0.2, -0.3, 1.0)
     attitude = from_roll_pitch_yaw(roll, pitch, yaw)
     error, _ = error_on_so3(attitude, reference, ZERO, ZERO)
@@ -51,5 +51,5 @@ def test_attitude_errors_agree_for_small_angles():
 @pytest.mark.parametrize(
     ("angle", "wrapped"), [(3.5, 3.5 - 2 * math.pi), (-3.5, 2 * math.pi - 3.5), (1.0, 1.0), (7.0, 7.0 - 2 * math.pi)]
 )
-def test_yaw_goes_short_way_round(angle, wrapped):
+def test_wrapped_yaw_is_shortest_turn(angle, wrapped):
     assert wrap(angle) == pytest.approx(wrapped)

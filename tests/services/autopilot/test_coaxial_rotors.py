@@ -1,4 +1,4 @@
-"""Rotors over one another under `coaxial_interference`: what the autopilot takes them for is what the plant does."""
+"""Coaxial rotors with `coaxial_interference`: the autopilot's model equals the plant."""
 
 import json
 import math
@@ -32,21 +32,21 @@ X8 = {
 
 
 def wrench(scene, thrust):
-    """(force along body z [N], torque [N m]) of the plant at rest in the air, of thrusts that each would have alone."""
-    known, frame = known_airframe(scene), airframe(scene)
+    """Return force along body z [N] and torque [N m] of the hovering plant for thrusts of isolated rotors."""
+    nominal, frame = known_airframe(scene), airframe(scene)
     tables = {
         name: table for name, table in scene[Effects].tables.items() if name in ("rotor_thrust", "coaxial_interference")
     }
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     state = multirotor.initial_state(p, (0.0, 0.0, 50.0))
-    speeds = tuple(map(float, np.sqrt(np.asarray(thrust) / known.motor.thrust_coefficient)))
+    speeds = tuple(map(float, np.sqrt(np.asarray(thrust) / nominal.motor.thrust_coefficient)))
     motion = state.motion._replace(rotor_speed=speeds)
     drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * len(speeds))
     _, _, force, torque = python_function(evaluate)(drive, 0.0, motion)
     return np.array([force[2], *torque])
 
 
-def test_autopilot_knows_slopes_of_plants_force_and_torques():
+def test_coaxial_effectiveness_is_slope_of_plant_wrench():
     scene = load("hover", X8)
     result = controller_parameters.rotor_effectiveness(known_airframe(scene))
     for k, column in enumerate(result.T):
@@ -55,21 +55,21 @@ def test_autopilot_knows_slopes_of_plants_force_and_torques():
 
 
 def test_hover_is_balanced_at_one_speed_of_all_rotors():
-    """The thrust of hovering that is fed forward carries the weight in the plant, which took 1.39 times as much."""
+    """The feed-forward thrust carries the weight in the plant; without the wakes it is too small by 1.39."""
     scene = load("hover", X8)
-    known = known_airframe(scene)
-    assert [share[0] for share in controller_parameters.shares(known)[0]] == pytest.approx([1.0] * 8)
-    force, *torque = wrench(scene, [controller_parameters.hover_thrust(known)] * 8)
-    assert force == pytest.approx(known.mass * known.gravity, rel=1e-12)
+    nominal = known_airframe(scene)
+    assert [share[0] for share in controller_parameters.shares(nominal)[0]] == pytest.approx([1.0] * 8)
+    force, *torque = wrench(scene, [controller_parameters.hover_thrust(nominal)] * 8)
+    assert force == pytest.approx(nominal.mass * nominal.gravity, rel=1e-12)
     assert torque == pytest.approx([0.0] * 3, abs=1e-9)
     without = {key: value for key, value in X8.items() if key != "effects.coaxial_interference"}
     alone = controller_parameters.hover_thrust(known_airframe(load("hover", without)))
-    assert controller_parameters.hover_thrust(known) / alone == pytest.approx(1.39, abs=0.01)
+    assert controller_parameters.hover_thrust(nominal) / alone == pytest.approx(1.39, abs=0.01)
 
 
-def test_demands_act_on_their_own_axis_alone():
-    known = known_airframe(load("hover", X8))
-    B, shares = controller_parameters.rotor_effectiveness(known), np.array(controller_parameters.shares(known)[0])
+def test_coaxial_virtual_controls_are_decoupled():
+    nominal = known_airframe(load("hover", X8))
+    B, shares = controller_parameters.rotor_effectiveness(nominal), np.array(controller_parameters.shares(nominal)[0])
     assert B @ shares == pytest.approx(np.diag(virtual_control_effectiveness(B)), abs=1e-12)
 
 
@@ -77,22 +77,22 @@ def test_coaxial_motor_failure_is_not_identified():
     assert len(controller_parameters.shares(known_airframe(load("hover", X8)))) == 1
 
 
-def test_vehicle_that_only_lost_thrust_would_carry_is_refused():
+def test_weight_above_thrust_in_wakes_is_rejected():
     heavy = {**X8, "airframe.mass.total": 30.0}
     assert resolve(load("hover", {k: v for k, v in heavy.items() if k != "effects.coaxial_interference"}))
     with pytest.raises(ValueError, match=r"per rotor is below the .* N needed to hover"):
         resolve(load("hover", heavy))
 
 
-def test_card_of_scene_and_its_autopilot_agree_on_hover(tmp_path):
-    """But for the voltage that the motors' resistance takes, which the autopilot leaves to its loops."""
+def test_performance_card_and_autopilot_agree_on_hover(tmp_path):
+    """Except for the voltage drop in the motors' resistance, which the control loops compensate."""
     table = "\n".join(f"{key.removeprefix('airframe.')} = {json.dumps(X8[key])}" for key in X8 if "airframe" in key)
     scene = tmp_path / "x8.toml"
     text = load("hover").path.read_text()
     scene.write_text(f"{text}\n[effects.coaxial_interference]\n[airframe]\n{table}\n")
-    known = known_airframe(load(scene))
-    assert known == known_airframe(load("hover", X8))
-    ideal = python_function(thrust_at)(known.motor, known.voltage_max) / controller_parameters.hover_thrust(known)
+    nominal = known_airframe(load(scene))
+    assert nominal == known_airframe(load("hover", X8))
+    ideal = python_function(thrust_at)(nominal.motor, nominal.voltage_max) / controller_parameters.hover_thrust(nominal)
     computed = {row.name: row.computed for row in card(scene)}["thrust over weight"]
     assert 0.85 * ideal < computed < ideal
 
@@ -100,15 +100,15 @@ def test_card_of_scene_and_its_autopilot_agree_on_hover(tmp_path):
 @pytest.mark.long
 def test_tuner_uses_nominal_airframe():
     scene = load("hover", X8)
-    result, known = hover(scene), known_airframe(scene)
+    result, nominal = hover(scene), known_airframe(scene)
     assert result.rotor_speed == pytest.approx(
-        math.sqrt(controller_parameters.hover_thrust(known) / known.motor.thrust_coefficient), rel=1e-3
+        math.sqrt(controller_parameters.hover_thrust(nominal) / nominal.motor.thrust_coefficient), rel=1e-3
     )
-    assert result.altitude == pytest.approx(controller_parameters.lift(known) / known.mass, rel=1e-3)
-    moments = controller_parameters.moments(known)
+    assert result.altitude == pytest.approx(controller_parameters.lift(nominal) / nominal.mass, rel=1e-3)
+    moments = controller_parameters.moments(nominal)
     for axis, k in (("roll", 0), ("pitch", 1), ("yaw", 2)):
-        assert getattr(result, axis) == pytest.approx(moments[k] / known.inertia_body[k], rel=0.02), axis
-    assert result.spin_up_zero == pytest.approx(known.spin_up_zero, rel=0.15)
+        assert getattr(result, axis) == pytest.approx(moments[k] / nominal.inertia_body[k], rel=0.02), axis
+    assert result.spin_up_zero == pytest.approx(nominal.spin_up_zero, rel=0.15)
 
 
 def test_corner_of_tuner_has_more_thrust_of_every_rotor():

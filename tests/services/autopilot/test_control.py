@@ -64,12 +64,12 @@ def test_tilts_turns_and_rates_are_opposed(name, geometric):
         return torque(command(name, (0.0, 0.0, 10.1), from_roll_pitch_yaw(*angles), 0.0, geometric, 1, omega).thrust)
 
     for axis in range(3):
-        turned = tuple(0.02 if k == axis else 0.0 for k in range(3))
-        assert reaction(angles=turned)[axis] < -1e-3
-        assert reaction(omega=turned)[axis] < -1e-3
+        error_angles = tuple(0.02 if k == axis else 0.0 for k in range(3))
+        assert reaction(angles=error_angles)[axis] < -1e-3
+        assert reaction(omega=error_angles)[axis] < -1e-3
 
 
-def test_yaw_takes_short_way_across_seam():
+def test_yaw_error_wraps_at_180_degrees():
     u = command("tuned", attitude=from_roll_pitch_yaw(0.0, 0.0, 3.1), yaw=-3.1, ticks=1)
     assert torque(u.thrust)[2] > 0.0
 
@@ -124,7 +124,7 @@ def test_tuned_gains_tolerate_wrong_mass_inertia_and_thrust():
                 assert (rmse(log) < TABLE_7 / 3.0).all()
 
 
-def test_tuned_stays_below_third_on_noisy_estimate():
+def test_tuned_gains_have_third_of_error_on_noisy_estimate():
     log = mission(build(load("tuned"), AIRFRAME), noise=(0.02, 0.05, 0.005, 0.02))
     assert (rmse(log) < TABLE_7 / 3.0).all()
 

@@ -1,8 +1,8 @@
-"""Voltages of the motors from outside, in the place of the controller's."""
+"""Direct motor voltages from an operator instead of those of the controller."""
 
 import numpy as np
 import pytest
-from flights import ACCEPTED, OPERATED, RATE, REJECTED, UP, command, fly, results, said, scripted
+from flights import ACCEPTED, OPERATED, RATE, REJECTED, UP, command, fly, results, scripted, sent_texts
 
 from lapwing.cosim.log import LogReader
 from lapwing.runs.resimulate import resimulate
@@ -51,13 +51,13 @@ def test_direct_voltages_hold_are_limited_and_time_out(tmp_path):
     assert np.array_equal(np.unique(actuators["motor_voltage"][direct], axis=0), [[7.0, 8.0, 0.0, highest]])
     assert not np.array_equal(actuators["motor_voltage"][times == 3_100_000_000][0], [7.0, 8.0, 0.0, highest])
     assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # it has been pushed hard
-    assert np.abs(truth["velocity"][-1]).max() < 0.1  # and stands again
+    assert np.abs(truth["velocity"][-1]).max() < 0.1  # and rests again
     assert resimulate(log) == (stated, stated)
 
 
 def test_missing_voltages_trigger_failsafe():
     flight = fly(8, UP | {(3.0, 3.5): [motors(*[9.0] * 4)], 3.2: [command("offboard")]})
-    assert "the offboard setpoints are lost: hold" in said(flight)
+    assert "the offboard setpoints are lost: hold" in sent_texts(flight)
 
 
 def test_vehicle_at_rest_with_motors_off_has_landed():
@@ -70,11 +70,11 @@ def test_vehicle_at_rest_with_motors_off_has_landed():
 def test_invalid_voltages_are_rejected(volts):
     flight = fly(1, {0.1: [motors(*volts)], 0.2: [command("offboard", id=3)]})
     assert results(flight)[3] == REJECTED
-    assert any("the last was rejected: expected 4 voltages, got [5.0" in text for text in said(flight))
+    assert any("the last was rejected: expected 4 voltages, got [5.0" in text for text in sent_texts(flight))
 
 
 @pytest.mark.long
-def test_six_motors_take_six():
+def test_hexacopter_accepts_six_voltages():
     sets = [*OPERATED, "run.duration=1", "autopilot.estimator=ground_truth"]
     script = {0.0: [motors(*range(1, 7)), *START], (0.1, 1.0): [motors(*range(1, 7))]}
     flight = memory_log.fly(load("hexacopter", sets), scripted(script))

@@ -43,7 +43,7 @@ def test_levelled_attitude(angles):
 
 
 def test_prediction_follows_turning_climb():
-    """Constant acceleration in the world while turning at a constant rate: exact but for the trapezoidal rule."""
+    """Constant world acceleration at a constant rate of rotation: exact except for the trapezoidal rule."""
     omega, acceleration = (0.0, 0.0, 0.8), (1.0, -0.5, 0.3)
     s = at_rest()
     for tick in range(501):
@@ -86,7 +86,7 @@ def test_covariance_propagation_against_dense_matrices():
 
 
 def dense_joint(rng):
-    """Draw memory with a positive definite joint covariance of errors and considered parameters, and return both."""
+    """Return memory with a random joint covariance of errors and considered parameters, and that covariance."""
     m, n = at_rest().memory, filter_state.SIZE + filter_state.CONSIDERED
     a = rng.normal(size=(n, n))
     a[filter_state.SIZE :] = np.diag(rng.uniform(0.5, 2.0, filter_state.CONSIDERED)) @ np.eye(n)[filter_state.SIZE :]
@@ -98,7 +98,7 @@ def dense_joint(rng):
 
 
 def test_considered_propagation_against_dense_matrices():
-    """Gyroscopes read M omega with M of (3.14), accelerometers M f of lift f: the joint covariance, F P F^T."""
+    """Joint covariance F P F^T for gyroscopes that read M omega, M of (3.14), and accelerometers that read M f."""
     rng = np.random.default_rng(2)
     m, joint = dense_joint(rng)
     n, f, omega, dt = len(joint), rng.normal(size=3), rng.normal(size=3), 0.01
@@ -148,7 +148,7 @@ def test_considered_update_against_joseph_form():
 
 
 def test_scalar_updates_one_by_one_equal_joint_update():
-    """Three rows in turn against the textbook gain, and the sum of their ratios against the joint NIS."""
+    """Three sequential rows against the textbook gain, and the sum of their ratios against the joint NIS."""
     rng = np.random.default_rng(1)
     m = at_rest().memory
     m.covariance[:] = random_covariance(rng)
@@ -167,7 +167,7 @@ def test_scalar_updates_one_by_one_equal_joint_update():
 
 @pytest.mark.parametrize("axis", range(3))
 def test_rows_of_acceleration_against_differences(axis):
-    """Turn the estimate by a small angle and shift the bias: the row tells how the true acceleration then differs."""
+    """The row is the change of the true acceleration by a small rotation of the estimate and a bias."""
     attitude, force = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([0.4, -0.3, 9.0])
     m = at_rest().memory
     fuse.clear(m)
@@ -176,8 +176,8 @@ def test_rows_of_acceleration_against_differences(axis):
     h = 1e-6
     for i in range(3):
         small = np.eye(3)[i] * h
-        turned = np.array(rotation_matrix(multiply(exp(tuple(small)), attitude))).reshape(3, 3)
-        assert m.row[filter_state.THETA + i] == pytest.approx((turned @ force - r @ force)[axis] / h, abs=1e-5)
+        rotation = np.array(rotation_matrix(multiply(exp(tuple(small)), attitude))).reshape(3, 3)
+        assert m.row[filter_state.THETA + i] == pytest.approx((rotation @ force - r @ force)[axis] / h, abs=1e-5)
         assert m.row[filter_state.ACCELEROMETER + i] == pytest.approx(
             (r @ (force - small) - r @ force)[axis] / h, abs=1e-5
         )
@@ -187,7 +187,7 @@ def test_rows_of_acceleration_against_differences(axis):
 
 
 def heading_innovation(attitude, iron):
-    """Innovation of the magnetometer when the truth is level north and the estimate is not."""
+    """Return the magnetometer's innovation for a level truth with heading north and a perturbed estimate."""
     s = at_rest()
     s = s._replace(nominal=s.nominal._replace(attitude=attitude, magnetometer_bias=iron))
     s.memory.covariance[:] = np.eye(filter_state.SIZE) * 1e-30
@@ -206,7 +206,7 @@ def test_row_of_heading_against_differences():
 
     for i in range(3):
         small = np.eye(3)[i] * h
-        # An error theta of the estimate: the estimate is the truth turned back by it.
+        # error theta of the estimate: the estimate is the truth rotated by -theta
         assert row[filter_state.THETA + i] == pytest.approx(innovation(exp(tuple(-small)), ZERO) / h, abs=1e-5)
         tesla = 1e-12
         change = innovation(NO_ROTATION, tuple(-np.eye(3)[i] * tesla)) / tesla
@@ -214,7 +214,7 @@ def test_row_of_heading_against_differences():
 
 
 def test_considered_row_of_heading_against_differences():
-    """Turn the reading as M of (3.14) does, and compare the change of the heading's innovation with the row."""
+    """Compare the change of the heading innovation by M of (3.14) with the row."""
     attitude = from_roll_pitch_yaw(0.3, -0.2, 1.0)
     true_body = np.array(rotate_back(attitude, STANDARD.magnetic_field_world))
     bx, by, _ = STANDARD.magnetic_field_world
@@ -238,7 +238,7 @@ def test_considered_row_of_heading_against_differences():
 
 
 def ensemble(**arguments):
-    """Flights of 100 seeds, stacked along a first axis."""
+    """Return the flights of 100 seeds, stacked along a first axis."""
     flights = [ef.flight(seed=seed, **arguments) for seed in range(SEEDS)]
     return ef.Flight(*(np.array(part) for part in zip(*flights, strict=True)))
 
@@ -253,23 +253,23 @@ def test_position_is_good_to_three_centimetres_on_rtk():
     assert np.mean(np.linalg.norm(error, axis=2) < 0.03) > 0.97
 
 
-def test_same_bits_again():
+def test_estimator_flight_is_repeatable_bit_for_bit():
     for first, second in zip(ef.flight(seed=5, duration=8.0), ef.flight(seed=5, duration=8.0), strict=True):
         np.testing.assert_array_equal(first, second)
 
 
-def inside(values, degrees):
-    """Share of the instants at which the mean over the seeds lies within its 95 % bounds; whether their mean does."""
+def share_within_bounds(values, degrees):
+    """Return the share of instants with the mean over seeds within its 95 % bounds, and True if the total mean is."""
     low, high = chi2.ppf([0.025, 0.975], degrees * len(values)) / len(values)
     mean = values.mean(axis=0)
     return np.mean((mean > low) & (mean < high)), low < mean.mean() < high
 
 
 def textbook():
-    """Sensors that have only the errors that the filter models, and a filter that is told their exact sizes."""
+    """Sensors with the modelled errors only, and a filter with their exact parameters."""
     i, m = ef.DEFAULT[0], ef.DEFAULT[1]
     exact = {"scale_error": 0.0, "misalignment_deg": 0.0}
-    instruments = ef.equipment(
+    instruments = ef.sensor_parameters(
         imu=i._replace(
             gyro=i.gyro._replace(temperature_dps_per_k=0.0, **exact),
             accelerometer=i.accelerometer._replace(temperature_mg_per_k=0.0, **exact),
@@ -295,14 +295,16 @@ def textbook():
 
 
 def test_instruments_without_errors_give_estimate_without_errors():
-    """Zero variances are no trouble, and a vehicle at rest that repeats its readings is not taken for frozen."""
-    flight = ef.flight(instruments=ef.equipment(**{name: ef.sensors()[name].PRESETS["ideal"] for name in ef.NAMES}))
+    """Zero variances are accepted, and repeated readings of a vehicle at rest do not count as stuck."""
+    flight = ef.flight(
+        instruments=ef.sensor_parameters(**{name: ef.sensors()[name].PRESETS["ideal"] for name in ef.NAMES})
+    )
     assert np.abs(flight.error[10:, ef.P]).max() < 5e-3
     assert np.abs(flight.error[10:, ef.THETA]).max() < 1e-3
     assert not flight.health.any()
 
 
-SETTLED = slice(60, None)  # the look at the standing vehicle is told to be less sure than it could be
+SETTLED = slice(60, None)  # the zero-velocity update has larger variances than necessary
 DEGREES = {
     filter_state.GPS: 3,
     filter_state.GPS_VELOCITY: 3,
@@ -316,11 +318,11 @@ DEGREES = {
 def test_consistent_in_world_as_modelled(agility):
     """NEES of attitude, velocity and position, and NIS of every source, within their 95 % bounds over 100 seeds."""
     flights = ensemble(agility=agility, **textbook())
-    share, mean_inside = inside(flights.nees[:, SETTLED], 9)
+    share, mean_inside = share_within_bounds(flights.nees[:, SETTLED], 9)
     assert mean_inside
     assert share > 0.75
     for source, degrees in DEGREES.items():
-        share, mean_inside = inside(flights.nis[:, SETTLED, source], degrees)
+        share, mean_inside = share_within_bounds(flights.nis[:, SETTLED, source], degrees)
         assert mean_inside, source
         assert source == filter_state.SONAR or share > 0.9, source  # above 5 m no echo is used: the last NIS stays
     assert np.mean(flights.rejected > 0) < 1e-4
@@ -330,16 +332,16 @@ def test_consistent_in_world_as_modelled(agility):
 def test_consistent_on_presets(agility):
     """Consistency with all errors of the presets; scale and alignment are considered and not estimated."""
     flights = ensemble(agility=agility)
-    _, mean_inside = inside(flights.nees[:, SETTLED], 9)
+    _, mean_inside = share_within_bounds(flights.nees[:, SETTLED], 9)
     assert mean_inside
     for source, degrees in DEGREES.items():
-        assert inside(flights.nis[:, SETTLED, source], degrees)[1], source
+        assert share_within_bounds(flights.nis[:, SETTLED, source], degrees)[1], source
     assert np.mean(np.abs(flights.error) < 3.0 * flights.std) > 0.99
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
 def test_ordinary_receiver_leaves_truth_within_three_sigma():
-    instruments = ef.equipment(gps=ef.gps.STANDARD)
+    instruments = ef.sensor_parameters(gps=ef.gps.STANDARD)
     flights = ensemble(instruments=instruments, p=estimator.PRESETS["standard"])
     error = flights.error[:, 20:, ef.P]
     assert np.mean(np.abs(error) < 3 * flights.std[:, 20:, ef.P]) > 0.99
@@ -347,13 +349,13 @@ def test_ordinary_receiver_leaves_truth_within_three_sigma():
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
-def test_position_alone_will_do():
+def test_filter_is_accurate_without_gps_velocity():
     assert np.all(rms(ensemble(velocity=False).error[:, 50:, ef.P]) < (0.015, 0.015, 0.01))
 
 
 @pytest.mark.parametrize(("signs", "inflates"), [((1, 1), True), ((1, -1), False)])
 def test_small_innovations_of_one_sign_inflate_covariance(signs, inflates):
-    """theory.md, eq. (3.64): 2.5 deviations are no reason to reject a reading, but ten such readings are a drift."""
+    """theory.md, eq. (3.64): a reading of 2.5 deviations is accepted, but ten such readings are a drift."""
     s, largest = at_rest(), 0.0
     for k in range(20):
         spread = math.sqrt(s.memory.covariance[filter_state.VELOCITY, filter_state.VELOCITY] + 0.05**2)
@@ -367,7 +369,7 @@ def test_small_innovations_of_one_sign_inflate_covariance(signs, inflates):
 def test_rejected_reading_is_no_drift():
     s = at_rest()
     s = estimator.update_gps_velocity(P, s, (30.0, 0.0, 0.0), 0.05**2, 0, True)
-    assert s.memory.refused[filter_state.GPS_VELOCITY]
+    assert s.memory.rejected[filter_state.GPS_VELOCITY]
     before = s.memory.covariance[filter_state.GYRO, filter_state.GYRO]
     s = estimator.update_gps_velocity(P, s, (0.01, 0.0, 0.0), 0.05**2, 0, True)
     assert s.memory.covariance[filter_state.GYRO, filter_state.GYRO] <= before

@@ -1,4 +1,4 @@
-"""Each fault on each sensor in flight: the right source is refused, the flight goes on, and afterwards all is well."""
+"""Each fault of each sensor in flight: the source is rejected, the flight continues, and the source is used again."""
 
 import estimator_flight as ef
 import numpy as np
@@ -9,7 +9,7 @@ from lapwing.services.sensors import registry
 
 START, STOP = 16.0, 22.0  # [s]
 
-# sensor, fault, sources of which one must be refused (none: nothing to be seen), largest position error meanwhile [m]
+# sensor, fault, sources of which one must be rejected (none: no effect), largest position error meanwhile [m]
 CASES = [
     ("gps", {"kind": "dropout"}, {"gps"}, 0.5),
     ("gps", {"kind": "freeze"}, {"gps"}, 0.5),
@@ -54,13 +54,13 @@ CASES = [
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("sensor", "fault", "refused", "largest"), CASES)
-def test_fault(sensor, fault, refused, largest):
+@pytest.mark.parametrize(("sensor", "fault", "rejected", "largest"), CASES)
+def test_sensor_fault_is_rejected_and_recovers(sensor, fault, rejected, largest):
     p = registry.parameters(sensor, {"faults": [{"start": START, "stop": STOP, **fault}]}, ef.INTERVAL)
-    flight = ef.flight(seed=3, instruments=ef.equipment(**{sensor: p}))
+    flight = ef.flight(seed=3, instruments=ef.sensor_parameters(**{sensor: p}))
     bits = np.bitwise_or.reduce(flight.rejected[round(START * 10) : round(STOP * 10) + 5])
     named = {name for i, name in enumerate(estimator.SOURCES) if bits >> i & 1}
-    assert named >= refused
+    assert named >= rejected
     if sensor not in ("imu", "gps"):
         assert named <= {sensor}
     distance = np.linalg.norm(flight.error[:, ef.P], axis=1)
@@ -73,7 +73,7 @@ def test_fault(sensor, fault, refused, largest):
 @pytest.mark.long
 def test_health_reports_loss_and_recovery():
     p = registry.parameters("gps", {"faults": [{"kind": "dropout", "start": START, "stop": STOP}]}, ef.INTERVAL)
-    health = ef.flight(seed=3, instruments=ef.equipment(gps=p)).health
+    health = ef.flight(seed=3, instruments=ef.sensor_parameters(gps=p)).health
     lost = 1 << estimator.SOURCES.index("gps") | 1 << estimator.SOURCES.index("gps_velocity")
     assert np.all(health[165:215] == lost)
     assert not health[100:158].any()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from flights import ACCEPTED, REJECTED, UP, at, command, fly, height, item, mode, place, results, said
+from flights import ACCEPTED, REJECTED, UP, at, command, fly, height, item, mode, place, results, sent_texts
 
 from lapwing.services.scene_resolver import load
 from tests.cosim import memory_log
@@ -14,7 +14,7 @@ pytestmark = pytest.mark.long
 
 
 def airframe(tmp_path, capacity):
-    """The delivery drone with a battery of another capacity [A s]: its file, as an override."""
+    """Return the override of a delivery drone's file with another battery capacity [A s]."""
     text = Path("lapwing/scenes/vehicles/delivery_drone.toml").read_text(encoding="utf-8")
     path = tmp_path / "small.toml"
     path.write_text(text.replace("capacity = 36000.0", f"capacity = {capacity}"), encoding="utf-8")
@@ -33,7 +33,7 @@ def test_emptying_battery_warns_then_returns_then_lands(tmp_path):
         "autopilot.parameters.RTL_RETURN_ALT=3.0",
     ]
     flight = fly(80, script, *small)
-    reported = said(flight)
+    reported = sent_texts(flight)
     order = [reported.index(t) for t in ("the battery is low", "the battery is critical: return", "landed")]
     assert order == sorted(order)
     charge = flight.column("battery", lambda m: m.percentage)
@@ -48,7 +48,7 @@ def test_nearly_empty_battery_lands_immediately(tmp_path):
     script = UP | {6: [command("goto", 30.0, 0.0, 3.0)]}
     low = [airframe(tmp_path, 4000.0), "effects.battery.initial_charge=0.18", "autopilot.parameters.FS_BAT_CRIT_ACT=0"]
     flight = fly(40, script, *low)
-    assert "the battery is nearly empty: land" in said(flight)
+    assert "the battery is nearly empty: land" in sent_texts(flight)
     assert place(flight, 40.0)[0] > 5.0
     assert height(flight, 40.0) == pytest.approx(0.35, abs=0.05)
 
@@ -57,7 +57,7 @@ def test_critical_battery_prevents_arming():
     script = {0.04: [command("arm", id=1)]}
     flight = fly(0.5, script, "effects.battery.initial_charge=0.06")
     assert results(flight)[1] == REJECTED
-    assert "arming refused: the battery is low: 6%" in said(flight)
+    assert "arming refused: the battery is low: 6%" in sent_texts(flight)
     flight = fly(0.5, script)
     assert np.all(np.isnan(flight.column("battery", lambda m: m.percentage)))
     assert results(flight)[1] == 0
@@ -68,7 +68,7 @@ def test_damaged_rotor_is_named_and_vehicle_lands(rotor):
     damage = [f"effects.rotor_damage.rotor={rotor}", "effects.rotor_damage.time=8.0"]
     damage += ["effects.rotor_damage.remaining_thrust=0.55", "effects.rotor_damage.remaining_torque=0.55"]
     flight = fly(20, UP, *damage)
-    assert "a motor has failed: land" in said(flight)
+    assert "a motor has failed: land" in sent_texts(flight)
     failed = flight.column("status", lambda m: m.failed_motor)
     times = flight.times("status")
     assert set(failed[times < 8.0]) == {0}
@@ -76,7 +76,7 @@ def test_damaged_rotor_is_named_and_vehicle_lands(rotor):
     assert not at(flight, "status", 20.0, lambda m: m.armed)
 
 
-def test_lost_rotor_is_noticed_before_vehicle_has_fallen():
+def test_lost_rotor_is_detected_before_fall():
     damage = ["effects.rotor_damage.rotor=3", "effects.rotor_damage.time=8.0"]
     flight = fly(9, {0.04: [command("takeoff", 10.0), command("arm")]}, *damage)
     failed, times = flight.column("status", lambda m: m.failed_motor), flight.times("status")
@@ -93,8 +93,8 @@ SENSORS = [
 
 def test_lost_position_warns_then_descends():
     flight = fly(30, UP | {1.0: [command("takeoff", 3.0), command("arm")]}, *SENSORS, GPS_LOST % (10.0, 1e9))
-    assert "the position is lost: descend in 2 s" in said(flight)
-    assert "the position is lost: descend" in said(flight)
+    assert "the position is lost: descend in 2 s" in sent_texts(flight)
+    assert "the position is lost: descend" in sent_texts(flight)
     assert mode(flight, 11.5) == "hold"
     assert mode(flight, 15.5) == "descend"
     assert height(flight, 30.0) == pytest.approx(0.35, abs=0.05)
@@ -105,14 +105,14 @@ def test_position_loss_hands_over_to_manual_control():
     sticks = {(9.0, 20.0): [command("manual", 0.3, 0.0, 0.0, 0.0)], 16.0: [command("goto", 5.0, 0.0, 3.0, id=1)]}
     script = UP | {1.0: [command("takeoff", 3.0), command("arm")]} | sticks
     flight = fly(26, script, *SENSORS, GPS_LOST % (10.0, 24.0))
-    assert "the position is lost: altitude_control" in said(flight)
+    assert "the position is lost: altitude_control" in sent_texts(flight)
     assert mode(flight, 18.0) == "altitude_control"
     assert height(flight, 18.0) == pytest.approx(3.0, abs=0.3)
     assert results(flight)[1] == REJECTED
-    assert "goto: the position is lost" in said(flight)
+    assert "goto: the position is lost" in sent_texts(flight)
     assert place(flight, 20.0)[0] > 2.0  # forward
-    assert mode(flight, 23.0) == "descend"  # the sticks were let go of
-    assert mode(flight, 26.0) == "return"  # there is a position again, but no sticks
+    assert mode(flight, 23.0) == "descend"  # the sticks are lost
+    assert mode(flight, 26.0) == "return"  # the position is known again, but the sticks are lost
 
 
 STICKS = UP | {(5.0, 7.0): [command("manual", 0.0, 0.0, 0.0, 0.0)]}  # centred
@@ -123,7 +123,7 @@ STICKS = UP | {(5.0, 7.0): [command("manual", 0.0, 0.0, 0.0, 0.0)]}  # centred
     [
         ("position_control", [], "return"),
         ("position_control", ["COM_RC_LOSS_T=3.0"], "position_control"),
-        ("position_control", ["NAV_RCL_ACT=3", "COM_RCL_EXCEPT=31"], "land"),  # it needs sticks
+        ("position_control", ["NAV_RCL_ACT=3", "COM_RCL_EXCEPT=31"], "land"),  # this mode needs sticks
         ("hold", ["NAV_RCL_ACT=3"], "land"),
         ("hold", ["COM_RCL_EXCEPT=5"], "return"),
         ("hold", ["COM_RCL_EXCEPT=2"], "hold"),
@@ -134,7 +134,7 @@ def test_lost_sticks_act_by_mode(mode_name, settings, after):
     flight = fly(9, STICKS | {4.9: [command(mode_name)]}, *[f"autopilot.parameters.{text}" for text in settings])
     assert mode(flight, 7.8) == mode_name
     assert mode(flight, 8.4) == ("land" if after == "return" else after)  # home is below
-    assert (f"the sticks are lost: {after}" in said(flight)) == (after != mode_name)
+    assert (f"the sticks are lost: {after}" in sent_texts(flight)) == (after != mode_name)
 
 
 @pytest.mark.parametrize(("exempt", "after"), [(0, "return"), (6, "return"), (1, "mission")])
@@ -161,7 +161,7 @@ def test_maximum_distances_from_home_are_fence():
     }
     flight = fly(12, UP | places | {(5.2, 12.0): [command("manual", 0.6, 0.0, 0.0, 0.0)]}, *limits)
     assert [results(flight)[k] for k in (1, 2, 3)] == [REJECTED, REJECTED, ACCEPTED]
-    assert "the vehicle has left the fence: hold" in said(flight)
+    assert "the vehicle has left the fence: hold" in sent_texts(flight)
     assert 5.0 < np.hypot(*place(flight, 12.0)[:2]) < 9.0
     rising = UP | {5.1: [command("position_control")], (5.2, 12.0): [command("manual", 0.0, 0.0, 0.5, 0.0)]}
     assert 6.35 < height(fly(12, rising, *limits), 12.0) < 8.0
@@ -181,7 +181,7 @@ def test_trajectory_ends_when_position_returns_without_operator():
     assert modes == ["mission", "descend", "land", "hold"]
     assert height(flight, 20.0) == pytest.approx(0.35, abs=0.05)
     assert flight.landed
-    assert at(flight, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # what it follows, not the trajectory
+    assert at(flight, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # its own setpoint, not the trajectory
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

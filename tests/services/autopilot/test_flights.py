@@ -1,4 +1,4 @@
-"""Flights by command: the modes do what they are called after, and what is lost is noticed."""
+"""Flights by command: behaviour of the modes, and detection of losses."""
 
 import math
 
@@ -17,7 +17,7 @@ from flights import (
     mode,
     place,
     results,
-    said,
+    sent_texts,
 )
 
 from lapwing.dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.long
 
 
 def angles(flight, t):
-    """True roll, pitch and yaw [rad] at t [s]."""
+    """Return true roll, pitch and yaw [rad] at t [s]."""
     q = at(flight, "ground_truth", t, lambda m: tuple(m.pose.orientation))
     return to_roll_pitch_yaw(Quaternion(q[3], *q[:3]))
 
@@ -50,7 +50,7 @@ def test_takeoff_goto_land_and_disarm():
     assert at(flight, "estimate", 14.0, lambda m: m.pose.orientation.z) == pytest.approx(0.479, abs=0.01)  # sin(1/2)
     assert place(flight, 25.0) == pytest.approx((4.0, 0.0, 0.35), abs=0.1)
     assert not at(flight, "status", 25.0, lambda m: m.armed)
-    assert said(flight) == ["armed", "landed", "disarmed: landed"]
+    assert sent_texts(flight) == ["armed", "landed", "disarmed: landed"]
     assert results(flight) == {0: ACCEPTED, 1: ACCEPTED, 2: ACCEPTED}
 
 
@@ -69,7 +69,7 @@ def test_mission_with_speed_jump_delay_and_return():
     reached = [int(r) for r in flight.column("status", lambda m: m.mission_reached)]
     order = [r for i, r in enumerate(reached) if r != 65535 and (i == 0 or r != reached[i - 1])]
     assert order[:2] in ([0, 1], [1, 2])
-    assert order.count(2) + order.count(3) >= 3  # the jump led back once
+    assert order.count(2) + order.count(3) >= 3  # one jump back
     assert flight.landed
     assert flight.times("ground_truth")[-1] < 60.0
     assert place(flight, 60.0) == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
@@ -90,8 +90,8 @@ def test_rejections_name_reason():
     }
     flight = fly(0.5, script)
     assert results(flight) == {1: REJECTED, 2: REJECTED, 3: REJECTED, 4: DENIED, 5: 3, 6: DENIED, 7: ACCEPTED}
-    assert "mission: there is none; upload one first" in said(flight)
-    assert any("MPC_XY_CRUISE: expected a number from 0.1 to 20" in text for text in said(flight))
+    assert "mission: no mission is uploaded; upload one first" in sent_texts(flight)
+    assert any("MPC_XY_CRUISE: expected a number from 0.1 to 20" in text for text in sent_texts(flight))
 
 
 def test_offboard_follows_setpoints_and_holds_after_loss():
@@ -102,7 +102,7 @@ def test_offboard_follows_setpoints_and_holds_after_loss():
     assert mode(flight, 9.5) == "offboard"
     assert mode(flight, 10.3) == "hold"
     assert at(flight, "ground_truth", 14.0, lambda m: m.velocity.x) == pytest.approx(0.0, abs=0.05)
-    assert "the offboard setpoints are lost: hold" in said(flight)
+    assert "the offboard setpoints are lost: hold" in sent_texts(flight)
 
 
 def test_lost_ground_station_returns_in_simulation_time():
@@ -113,7 +113,7 @@ def test_lost_ground_station_returns_in_simulation_time():
     assert at(flight, "status", 9.3, lambda m: m.failsafe)
 
 
-def test_sticks_ask_for_velocities_along_heading():
+def test_sticks_command_velocities_along_heading():
     script = UP | {5.9: [command("position_control")], (6, 9): [command("manual", 0.2, 0.0, 0.0, 0.0)]}
     flight = fly(9, script)
     assert at(flight, "ground_truth", 9.0, lambda m: m.velocity.x) == pytest.approx(0.2 * 5.0, abs=0.05)
@@ -124,14 +124,14 @@ def test_fence_turns_vehicle_back():
     sticks = command("manual", 0.6, 0.0, 0.0, 0.0)
     script = UP | {5: [command("fence_upload", items=ring), command("position_control")], (5.1, 12): [sticks]}
     flight = fly(12, script, "autopilot.parameters.FS_FENCE_ACT=1")
-    assert "the vehicle has left the fence: hold" in said(flight)
+    assert "the vehicle has left the fence: hold" in sent_texts(flight)
     assert 5.0 < place(flight, 12.0)[0] < 9.0
 
 
 def test_disarmed_vehicle_rejects_return_and_land():
     flight = fly(1.0, {0.04: [command("return", id=1), command("land", id=2)]})
     assert results(flight) == {1: REJECTED, 2: REJECTED}
-    assert said(flight) == ["return: the vehicle does not fly", "land: the vehicle does not fly"]
+    assert sent_texts(flight) == ["return: the vehicle does not fly", "land: the vehicle does not fly"]
     assert mode(flight, 1.0) == "hold"
 
 
@@ -144,7 +144,7 @@ def test_setpoint_is_recorded_after_leaving_trajectory():
     assert place(flight, 9.9) == pytest.approx((2.0, 0.0, 1.5), abs=0.1)
 
 
-def test_polygons_are_kept_out_of_and_in():
+def test_inclusion_and_exclusion_polygons():
     def polygon(action, *corners):
         return [item(action, x, y, 0.0, values=(len(corners),)) for x, y in corners]
 
@@ -159,7 +159,7 @@ def test_polygons_are_kept_out_of_and_in():
     }
     flight = fly(14, script, "autopilot.parameters.FS_FENCE_ACT=1")
     assert [results(flight)[k] for k in (1, 2, 3, 4, 5)] == [ACCEPTED, REJECTED, REJECTED, ACCEPTED, DENIED]
-    assert "the vehicle has left the fence: hold" in said(flight)
+    assert "the vehicle has left the fence: hold" in sent_texts(flight)
     assert 6.0 < place(flight, 14.0)[0] < 8.0  # it stopped behind the edge of the tower
 
 
@@ -184,10 +184,10 @@ def test_offboard_attitude_tilts_by_angle_along_heading():
     east, north, up = (at(flight, "ground_truth", 8.5, lambda m: tuple(m.velocity))[k] for k in range(3))
     assert math.atan2(north, east) == pytest.approx(yaw, abs=0.1)
     assert math.hypot(east, north) == pytest.approx(9.80665 * math.tan(angle) * 2.3, rel=0.1)
-    assert up == pytest.approx(0.0, abs=0.05)  # no thrust is given: the altitude is held
+    assert up == pytest.approx(0.0, abs=0.05)  # without thrust the altitude is held
 
 
-def test_by_hand_from_ground_in_stabilized_and_acro():
+def test_manual_takeoff_in_stabilized_and_acro():
     sticks = {
         (0.5, 3.0): [command("manual", 0.0, 0.0, 0.15, 0.0)],
         (3.1, 4.0): [command("manual", 0.25, 0.0, 0.0, 0.0)],
@@ -201,8 +201,8 @@ def test_by_hand_from_ground_in_stabilized_and_acro():
     assert math.degrees(pitch(flight, 3.9)) == pytest.approx(0.25 * 20.0, abs=1.0)  # nose down
     assert math.degrees(pitch(flight, 4.9)) == pytest.approx(0.0, abs=1.0)
     assert at(flight, "estimate", 5.0, lambda m: m.pose.orientation.z) == pytest.approx(math.sin(0.18), abs=0.03)
-    assert math.degrees(roll(flight, 7.0)) == pytest.approx(-0.15 * 100.0 * 0.55, abs=3.0)  # to the left, and kept
-    assert mode(flight, 9.4) == "return"  # nobody holds the sticks
+    assert math.degrees(roll(flight, 7.0)) == pytest.approx(-0.15 * 100.0 * 0.55, abs=3.0)  # to the left, and held
+    assert mode(flight, 9.4) == "return"  # the sticks are lost
 
 
 def test_body_rate_setpoints_tilt_and_turn():
@@ -213,9 +213,9 @@ def test_body_rate_setpoints_tilt_and_turn():
     assert results(flight)[1] == ACCEPTED
     assert pitch(flight, 6.9) == pytest.approx(0.2 * 0.8, abs=0.05)
     assert pitch(flight, 8.5) == pytest.approx(0.0, abs=0.03)
-    turned = 2.0 * math.asin(at(flight, "estimate", 8.5, lambda m: m.pose.orientation.z))
-    assert turned == pytest.approx(0.3 * 2.4, abs=0.06)
-    assert height(flight, 8.5) == pytest.approx(3.0, abs=0.3)  # no thrust is given: the altitude is held
+    yaw_change = 2.0 * math.asin(at(flight, "estimate", 8.5, lambda m: m.pose.orientation.z))
+    assert yaw_change == pytest.approx(0.3 * 2.4, abs=0.06)
+    assert height(flight, 8.5) == pytest.approx(3.0, abs=0.3)  # without thrust the altitude is held
 
 
 def test_altitude_control_takes_off_from_ground():
@@ -245,12 +245,12 @@ def test_gains_change_in_flight_and_act():
 def test_estimate_is_valid_after_landing_and_second_flight():
     sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
     sets = ["autopilot.estimator=kalman", *[f"sensors.{each}" for each in sensors]]
-    # with 3, 8, 11 and 16 the receiver was refused for 10 s; a fix of before the touch-down was fused as if after it
+    # seeds 3, 8, 11, 16 once rejected the receiver for 10 s: a fix before the touch-down was fused as if after it
     for seed in (1, 2, 3, 8, 11, 16):
         again = {16: [command("takeoff", 2.0, id=5), command("arm", id=6)]}
         script = {1: UP[0.04], 7: [command("land")]} | again
         flight = fly(20, script, *sets, f"run.seed={seed}")
-        assert said(flight)[:3] == ["armed", "landed", "disarmed: landed"]
+        assert sent_texts(flight)[:3] == ["armed", "landed", "disarmed: landed"]
         assert results(flight)[6] == ACCEPTED
         refused = {source for m in flight.messages("estimate") for source in m.rejected_sources}
         assert not refused & {"gps", "gps_velocity"}
@@ -263,7 +263,7 @@ def test_estimate_is_valid_after_landing_and_second_flight():
         assert height(flight, 20.0) > 1.5
 
 
-def test_gripper_lets_payload_go():
+def test_gripper_releases_payload():
     items = [item("takeoff", z=3.0), item("waypoint", 1.0, 0.0, 3.0, hold=1.0), item("gripper", values=(0.0,)),
              item("waypoint", 2.0, 0.0, 3.0, hold=3.0)]  # fmt: skip
     script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}

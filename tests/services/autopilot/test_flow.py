@@ -5,7 +5,7 @@ import math
 import estimator_flight as ef
 import numpy as np
 import pytest
-from flights import ENABLED, error, fly_by_sensors, inject, mode, place, said
+from flights import ENABLED, error, fly_by_sensors, inject, mode, place, sent_texts
 
 import lapwing
 from lapwing.dynamics.lie.quaternion import exp, from_roll_pitch_yaw, multiply, rotation_matrix
@@ -23,31 +23,31 @@ P = estimator.PRESETS["rtk"]
 
 @pytest.mark.parametrize("axis", range(2))
 def test_row_against_differences_and_sensor(axis):
-    """Errors of attitude and velocity by the truth: the row tells how the flow that a camera sees differs."""
+    """The row is the change of a camera's flow by errors of attitude and velocity."""
     attitude, velocity, distance = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([2.0, -1.0, 0.5]), 4.0
     memory = ef.estimator.initial(
         P, ef.estimator.new_memory(), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81), P.magnetic_field_world
     ).memory
     r = tuple(rotation_matrix(attitude))
 
-    def seen(q, v):
+    def camera_flow(q, v):
         ahead, left, _ = np.array(rotation_matrix(q)).reshape(3, 3).T @ v
         return (left / distance, -ahead / distance)[axis]
 
     expected = flow_fusion.flow_row(memory, r, tuple(velocity), axis, distance)
-    assert expected == pytest.approx(seen(attitude, velocity))
+    assert expected == pytest.approx(camera_flow(attitude, velocity))
     h = 1e-6
     for i in range(3):
         small = np.eye(3)[i] * h
-        turned = seen(multiply(exp(tuple(small)), attitude), velocity)
-        assert memory.row[filter_state.THETA + i] == pytest.approx((turned - expected) / h, abs=1e-5)
-        faster = seen(attitude, velocity + small)
-        assert memory.row[filter_state.VELOCITY + i] == pytest.approx((faster - expected) / h, abs=1e-5)
+        after_rotation = camera_flow(multiply(exp(tuple(small)), attitude), velocity)
+        assert memory.row[filter_state.THETA + i] == pytest.approx((after_rotation - expected) / h, abs=1e-5)
+        after_acceleration = camera_flow(attitude, velocity + small)
+        assert memory.row[filter_state.VELOCITY + i] == pytest.approx((after_acceleration - expected) / h, abs=1e-5)
 
 
 @kernel
 def fly(p, memory, instruments, keys, start, sees, out):
-    """The smooth flight of `estimator_flight` without a receiver from OUTAGE on; ten rows a second."""
+    """The smooth flight of `estimator_flight` without a receiver from OUTAGE; ten rows per second."""
     imu_p, mag_p, gps_p, sonar_p, flow_p = instruments
     imu_k, mag_k, gps_k, sonar_k, flow_k = keys
     truth = ef.truth_at(0.0, 1.0)
@@ -85,7 +85,7 @@ def fly(p, memory, instruments, keys, start, sees, out):
 
 
 def flights(sees):
-    """Errors (SEEDS, n, 9), what the filter believes of them (SEEDS, n, 9, 9) and its health (SEEDS, n)."""
+    """Return errors (SEEDS, n, 9), their covariance in the filter (SEEDS, n, 9, 9) and its health (SEEDS, n)."""
     names = ("imu", "magnetometer", "gps", "sonar", "optical_flow")
     chosen = (imu.PRESETS["mpu6000"], next(iter(magnetometer.PRESETS.values())), gps.PRESETS["rtk"])
     instruments = (*chosen, next(iter(sonar.PRESETS.values())), optical_flow.PMW3901)
@@ -103,7 +103,7 @@ def test_flow_without_gps_bounds_drift_consistently():
     with_flow, covariance, health = flights(True)
     without, _, health_without = flights(False)
     before, out = slice(60, 145), slice(160, None)
-    assert np.array_equal(with_flow[:, before], without[:, before])  # while there is a receiver it is not asked
+    assert np.array_equal(with_flow[:, before], without[:, before])  # not used with a receiver
     drift, drift_without = (np.sqrt(np.mean(e[:, -1, 6:8] ** 2)) for e in (with_flow, without))
     assert drift < 0.2 * drift_without
     std = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
@@ -121,20 +121,20 @@ def test_flow_without_gps_bounds_drift_consistently():
 def test_flight_continues_on_optical_flow_without_gps():
     script = {9: [inject("gps", OFF)]}
     seeing = fly_by_sensors(24, script, ENABLED, "sensors.optical_flow.preset=pmw3901")
-    assert not any("position is lost" in text for text in said(seeing))
+    assert not any("position is lost" in text for text in sent_texts(seeing))
     assert mode(seeing, 24.0) == "hold"
     assert math.dist(place(seeing, 24.0), place(seeing, 9.0)) < 1.5
     blind = fly_by_sensors(18, script, ENABLED)
-    assert any("position is lost" in text for text in said(blind))
+    assert any("position is lost" in text for text in sent_texts(blind))
     assert error(seeing, 9.0) < 0.5 * error(blind, 9.0)
 
 
 @pytest.mark.long
 def test_under_bridge_flow_carries_flight():
-    """The scene that ships, and the same with a camera that sees nothing."""
+    """The shipped scene, and the same with a camera without texture."""
 
     def drift(flight):
-        """(longest time without a fix [s], largest horizontal error of the estimate meanwhile [m])."""
+        """Return the longest time without a fix [s] and the largest horizontal error of the estimate meanwhile [m]."""
         fix = flight.topic("gps/fix")
         lost = fix.times[fix["status.status"] < 0]
         estimate, truth = flight.estimate, flight.truth

@@ -5,7 +5,7 @@ from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import FOLDER, load, names
 
 
-def test_paper_s_set_is_table_6():
+def test_paper_gains_are_table_6():
     gains = load("paper")
     assert gains.altitude == (28.0, 22.0, 18.0)
     assert gains.yaw == (129.1, 181.2, 97.17)
@@ -15,7 +15,7 @@ def test_paper_s_set_is_table_6():
     assert not gains.feed_forward
 
 
-def test_every_set_that_ships_builds_and_path_serves_as_well(tmp_path):
+def test_shipped_gain_sets_build_by_name_and_path(tmp_path):
     assert {"paper", "tuned"} <= set(names())
     for name in names():
         build(load(name), AIRFRAME)
@@ -47,6 +47,6 @@ def test_error_is_one_line(tmp_path):
         load("papr")
 
 
-def test_vehicle_too_heavy_to_hover_is_refused():
+def test_vehicle_too_heavy_to_hover_is_rejected():
     with pytest.raises(ValueError, match=r"below the 49.0 N"):
         build(load("paper"), AIRFRAME._replace(mass=20.0))

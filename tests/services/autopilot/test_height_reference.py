@@ -1,4 +1,4 @@
-"""EKF2_HGT_REF: which sensor the height comes from, in flight; and the ground that is followed."""
+"""EKF2_HGT_REF: source of the height in flight, and height above a sloping ground."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from lapwing.services.common.failure_types import OFF, WRONG
 from lapwing.services.scene_resolver import load
 
 SONAR = "autopilot.parameters.EKF2_HGT_REF=2"
-# the ground station's, whose plant over a slope is compiled anyway
+# the scene `groundstation`, whose plant over a slope is compiled for other tests
 EFFECTS = [f"effects.{name}={{}}" for name in ("air_density", "gyroscopic_torque", "battery")]
 WIND = ["effects.random_wind_force.mean=[3.0,1.0,0.0]", "effects.random_wind_force.sigma=1.0"]
 AHEAD = {0.04: [command("takeoff", 3.0), command("arm", NAN, 10.0)], 8: [command("goto", 14.0, 0.0, 3.0, 0.0, 2.0)]}
@@ -25,12 +25,12 @@ def test_height_source_follows_parameter(reference, least, most):
     sets = [f"EKF2_HGT_REF={reference}", "MPC_TKO_SPEED=3"]
     flight = fly_by_sensors(20, up, *[f"autopilot.parameters.{each}" for each in sets])
     spread = flight.column("estimate", lambda m: m.position_std.z)[flight.times("estimate") > 17.0].mean()
-    assert least < spread < most  # the barometer knows less, and carries on where the sonar ends
+    assert least < spread < most  # the barometer is less accurate, and continues beyond the sonar's range
     assert error(flight, 15.0) < 0.3
 
 
-def test_ground_moves_height_and_leaves_barometers_sum_alone():
-    """z counts from the ground, z + b_h does not: its variance, and that of all else, stays."""
+def test_ground_variation_leaves_barometer_sum_unchanged():
+    """The ground's variation changes only the variance of z, not of z + b_h or of other states."""
     p, rng = estimator.PRESETS["rtk"], np.random.default_rng(3)
     s = estimator.initial(p, estimator.new_memory(), (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
     s = s._replace(nominal=s.nominal._replace(velocity_world=(3.0, 4.0, 1.0)))

@@ -1,11 +1,11 @@
-"""Redundant inertial measurement units: the vote, flights with a failed unit, and the command that runs one."""
+"""Redundant inertial measurement units: the vote, flights with a failed unit, and `lapwing run` with one."""
 
 import subprocess
 import sys
 
 import numpy as np
 import pytest
-from flights import ENABLED, fly_by_sensors, inject, said
+from flights import ENABLED, fly_by_sensors, inject, sent_texts
 
 import lapwing
 from lapwing.cosim.diagram.compiled_block import InputSample
@@ -54,7 +54,7 @@ def test_vehicle_with_two_units_lands_with_missing_or_stuck_unit(fault):
 
 
 @pytest.mark.long
-def test_units_have_errors_of_their_own_and_first_is_unchanged():
+def test_redundant_units_have_independent_errors():
     single, several = fly(1), fly(3)
     assert texts(several) == []
     second, third = (several.topic(f"custom_sensor/imu{unit}")["values"][:500, :3].mean(axis=0) for unit in (2, 3))
@@ -74,18 +74,18 @@ def sound_position():
     return last_position(fly_with_injections({}))
 
 
-def last_position(flown):
-    return flown.column("ground_truth", lambda m: (m.pose.position.x, m.pose.position.y, m.pose.position.z))[-1]
+def last_position(flight):
+    return flight.column("ground_truth", lambda m: (m.pose.position.x, m.pose.position.y, m.pose.position.z))[-1]
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE])
 @pytest.mark.long
 def test_injected_failure_of_one_instance_is_named_and_harmless(kind, sound_position):
     script = {7.0: [inject("gyro", kind, 1), inject("accelerometer", kind, 4, id=8)]}
-    flown = fly_with_injections(script)
-    assert "inject failure: there is no accelerometer 4; expected 1 to 3, 0 for all" in said(flown)
-    assert "IMU 1 has failed, IMU 2 is in use" in said(flown)
-    assert last_position(flown) == pytest.approx(sound_position, abs=0.1)
+    flight = fly_with_injections(script)
+    assert "inject failure: accelerometer 4 does not exist; expected 1 to 3, 0 for all" in sent_texts(flight)
+    assert "IMU 1 has failed, IMU 2 is in use" in sent_texts(flight)
+    assert last_position(flight) == pytest.approx(sound_position, abs=0.1)
 
 
 @pytest.mark.long
@@ -112,12 +112,15 @@ def vote(rows):
     return result
 
 
-def changing(k):
+def varying_reading(k):
     return 1e-3 * np.sin(float(k))
 
 
 def test_deviating_unit_is_replaced_at_once_and_fails_after_ten_readings():
-    rows = [[reading(changing(k) + 0.2), reading(changing(k + 1)), reading(changing(k + 2))] for k in range(20)]
+    rows = [
+        [reading(varying_reading(k) + 0.2), reading(varying_reading(k + 1)), reading(varying_reading(k + 2))]
+        for k in range(20)
+    ]
     result = vote(rows)
     assert {selection.unit for selection in result} == {2}
     assert [selection.switched for selection in result[:2]] == [True, False]
@@ -126,7 +129,11 @@ def test_deviating_unit_is_replaced_at_once_and_fails_after_ten_readings():
 
 def test_unit_in_use_stays_after_repair_of_first_unit():
     rows = [
-        [reading(changing(k), valid=not 5 <= k < 20), reading(changing(k + 1)), reading(changing(k + 2))]
+        [
+            reading(varying_reading(k), valid=not 5 <= k < 20),
+            reading(varying_reading(k + 1)),
+            reading(varying_reading(k + 2)),
+        ]
         for k in range(300)
     ]
     result = vote(rows)

@@ -1,4 +1,4 @@
-"""Failures that an operator injects: each flown, and what the estimator and the failsafes make of it."""
+"""Injected failures in flight: reactions of the estimator and of the failsafes."""
 
 import math
 
@@ -21,8 +21,8 @@ from flights import (
     mode,
     place,
     results,
-    said,
     scripted,
+    sent_texts,
 )
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
@@ -48,11 +48,11 @@ from tests.cosim import memory_log
 pytestmark = pytest.mark.long
 
 SENSORS = ("imu", "magnetometer", "gps", "barometer", "sonar", "optical_flow", "airspeed")
-LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33"]  # what the scene does not carry
+LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33"]  # not in the scene
 
 
 def rejected(flight, start, source):
-    """Share of the estimates from a time on in which a source was refused or missing."""
+    """Return the share of estimates from a time on with a rejected or missing source."""
     result = flight.column("estimate", lambda m: source in m.rejected_sources)[flight.times("estimate") >= start]
     return float(np.mean(result))
 
@@ -73,12 +73,12 @@ def test_injection_needs_parameter_and_present_unit():
     refused = dict.fromkeys((1, 4, 5, 8, 9, 10, 12), DENIED)
     expected = dict.fromkeys((2, 3, 6, 7, 11), ACCEPTED) | refused
     assert {k: v for k, v in results(flight).items() if k} == expected
-    assert said(flight)[:8] == [
+    assert sent_texts(flight)[:8] == [
         "inject failure: SYS_FAILURE_EN is 0; set it to 1 first", "injected: motor off",
-        "inject failure: there is no gps", "inject failure: battery can be sound, off, stuck, wrong",
+        "inject failure: the vehicle has no gps", "inject failure: battery can be sound, off, stuck, wrong",
         "inject failure: motor can be sound, off, stuck, wrong, slow",
-        "inject failure: there is no motor 5; expected 1 to 4, 0 for all", "injected: motor 1, 3 off",
-        "inject failure: there is no motor 5; expected 1 to 4, 0 for all",
+        "inject failure: motor 5 does not exist; expected 1 to 4, 0 for all", "injected: motor 1, 3 off",
+        "inject failure: motor 5 does not exist; expected 1 to 4, 0 for all",
     ]  # fmt: skip
 
 
@@ -97,20 +97,20 @@ def received(kind, seconds=4.0, start=1.0):
     for name in SENSORS:
         period = graph.ports[name].period
         rows = [graph.history(port, period) for port in (name, f"{name}.received")]
-        first = -(-round(start * RATE) // period) + 1  # the first reading that is surely hit
+        first = -(-round(start * RATE) // period) + 1  # the first reading that is certainly affected
         yield name, round(DELAY * RATE / period), first, *rows
 
 
-# Numbers that a reading begins with
+# Number of leading values of a reading
 VALUES = {"imu": 6, "magnetometer": 3, "gps": 3, "barometer": 1, "sonar": 1, "optical_flow": 2, "airspeed": 1}
-# Column of `valid` where it is not the last
+# Column of `valid` if it is not the last
 VALID = {"gps": 11}
 
 
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT], ids=KINDS[1:])
 def test_received_reading_follows_failure_type(kind):
     for name, late, first, sent, actual in received(kind):
-        assert np.array_equal(sent[: first - 1], actual[: first - 1])  # sound before
+        assert np.array_equal(sent[: first - 1], actual[: first - 1])  # valid before
         there, numbers = actual[first:, VALID.get(name, -1)] > 0.0, slice(0, VALUES[name])
         sent_then, got_then = sent[first:, numbers], actual[first:, numbers]
         if kind == OFF:
@@ -128,7 +128,7 @@ def test_received_reading_follows_failure_type(kind):
             assert np.array_equal(got_then[there], sent_then[there])
         elif kind == GARBAGE:
             assert there.all()
-            assert len(np.unique(got_then)) == got_then.size  # nothing comes twice
+            assert len(np.unique(got_then)) == got_then.size  # no repeated reading
             assert np.median(np.abs(got_then - sent_then)) > 10.0 * np.median(np.abs(sent_then - sent_then.mean(0)))
         else:
             assert there.all()
@@ -137,14 +137,14 @@ def test_received_reading_follows_failure_type(kind):
 
 def test_battery_off_failure_reads_empty_and_lands():
     flight = fly(8, UP | {6: [inject("battery", OFF)]}, ENABLED)
-    assert "the battery is nearly empty: land" in said(flight)
+    assert "the battery is nearly empty: land" in sent_texts(flight)
     assert at(flight, "status", 8.0, lambda m: m.battery_warning) == 3
 
 
 def test_motor_off_failure_is_detected():
     flight = fly(6.6, UP | {6: [inject("motor", OFF, 3)]}, ENABLED)
     assert at(flight, "status", 6.5, lambda m: m.failed_motor) == 3
-    assert any("a motor has failed" in text for text in said(flight))
+    assert any("a motor has failed" in text for text in sent_texts(flight))
     volts = voltages(flight, 6.1)
     assert set(volts[:, 2]) == {0.0}
     assert volts[:, 0].max() > 1.0
@@ -166,10 +166,10 @@ def test_stuck_motor_keeps_speed_and_others_compensate():
 
 def test_weak_motor_is_detected_and_vehicle_lands_upright():
     flight = fly(16, UP | {6: [inject("motor", WRONG, 3)]}, ENABLED)
-    assert "a motor has failed: land" in said(flight)
+    assert "a motor has failed: land" in sent_texts(flight)
     assert at(flight, "status", 6.5, lambda m: m.failed_motor) == 3
     sound = flight.column("actuators", lambda m: tuple(m.motor_voltage))[flight.times("actuators") < 5.9][-1]
-    assert voltages(flight, 6.02)[0, 2] < 0.9 * sound[2]  # what it gets; the controller asks for more
+    assert voltages(flight, 6.02)[0, 2] < 0.9 * sound[2]  # its voltage; the controller commands more
     assert height(flight, 7.0) > 2.0
     assert math.dist(place(flight, 16.0)[:2], (0.0, 0.0)) < 0.5
     assert not at(flight, "status", 16.0, lambda m: m.armed)
@@ -183,7 +183,7 @@ def test_slow_motor_follows_every_twentieth_command():
     assert height(flight, 8.0) > 2.0
 
 
-def test_repaired_motors_follow_at_once():
+def test_repaired_motors_respond_immediately():
     flight = fly(8, UP | {6: [inject("motor", STUCK)], 6.1: [inject("motor", SOUND, 2, id=8)]}, ENABLED)
     volts = voltages(flight, 6.2)
     assert len(set(volts[:, 0])) == 1
@@ -197,15 +197,15 @@ def test_repaired_motors_follow_at_once():
 def test_wrong_battery_reports_charge_of_parameter(level, text):
     flight = fly(7, UP | {6: [inject("battery", WRONG)]}, ENABLED, f"autopilot.parameters.SYS_FAIL_BAT_LVL={level}")
     assert at(flight, "status", 6.9, lambda m: m.battery_warning) == level
-    assert text in said(flight)
+    assert text in sent_texts(flight)
 
 
 def test_stuck_battery_does_not_warn():
     emptying = [ENABLED, "effects.battery.initial_charge=0.1502"]
     sound, stuck = fly(12, UP, *emptying), fly(12, UP | {0.1: [inject("battery", STUCK)]}, *emptying)
-    assert "the battery is low" in said(sound)
-    assert "the battery is low" not in said(stuck)
-    assert at(stuck, "battery", 12.0, lambda m: m.percentage) < 0.15  # as the pack's own topic shows
+    assert "the battery is low" in sent_texts(sound)
+    assert "the battery is low" not in sent_texts(stuck)
+    assert at(stuck, "battery", 12.0, lambda m: m.percentage) < 0.15  # as published by the pack
 
 
 def test_each_of_six_motors_can_fail():
@@ -228,7 +228,7 @@ def test_lost_gps_descends_then_holds_on_recovery():
     flight = fly_by_sensors(
         31, script, ENABLED, "autopilot.parameters.MPC_LAND_SPEED=0.2", "autopilot.parameters.MIS_TAKEOFF_ALT=4"
     )
-    reported = said(flight)
+    reported = sent_texts(flight)
     assert reported.index("injected: gps off") < reported.index("the position is lost: descend in 9 s")
     assert mode(flight, 24.5) == "descend"
     assert mode(flight, 30.5) == "hold"
@@ -244,7 +244,7 @@ def test_lost_gps_descends_then_holds_on_recovery():
     ],
     ids=lambda value: value if isinstance(value, str) else KINDS[value],
 )
-def test_sensor_that_fails_is_refused_and_others_carry_on(unit, kind):
+def test_failed_sensor_is_rejected_and_flight_continues(unit, kind):
     flight = fly_by_sensors(13, {9: [inject(unit, kind)]}, ENABLED)
     assert results(flight)[7] == ACCEPTED
     assert rejected(flight, 10.0, {"distance_sensor": "sonar"}.get(unit, unit)) > 0.5
@@ -267,14 +267,14 @@ def test_remaining_readings_are_fused(units, kind):
 def test_vehicle_drifts_without_inertial_sensor(unit, kind):
     flight = fly_by_sensors(15.5, {9: [inject(unit, kind)]}, ENABLED)
     assert math.dist(place(flight, 15.5), place(flight, 9.0)) > 1.0
-    if unit == "gyro" or kind in (OFF, SLOW):  # it tumbles
-        reported = said(flight)
+    if unit == "gyro" or kind in (OFF, SLOW):  # the vehicle tumbles
+        reported = sent_texts(flight)
         after = reported[reported.index(f"injected: {unit} {KINDS[kind]}") + 1 :]
         assert {"a motor has failed: land", "the position is lost: descend in 9 s"} & set(after)
 
 
 @pytest.mark.parametrize("unit", ["accelerometer", "gyro"])
-def test_inertial_bias_is_noticed_and_outage_bridged(unit):
+def test_imu_bias_is_detected_and_outage_bridged(unit):
     biased = fly_by_sensors(13, {9: [inject(unit, WRONG)]}, ENABLED)
     assert 0.05 < error(biased, 9.0) < 3.0
     assert place(biased, 13.0)[2] > 2.0

@@ -1,4 +1,4 @@
-"""Declination: the autopilot knows the World Magnetic Model at home, and no local anomaly."""
+"""Declination: the autopilot has the World Magnetic Model at home, without local anomalies."""
 
 import math
 import subprocess
@@ -14,12 +14,12 @@ from lapwing.studies.flight_data import FlightData
 ANOMALY = "environment.magnetic_anomaly=[2e-6,-1e-6,3e-6]"
 
 
-def test_sensors_feel_anomaly_that_autopilot_does_not_know():
+def test_magnetic_anomaly_affects_sensors_only():
     services = resolve(load("quad_x", [ANOMALY])).services
     felt = services["sensors"].parameters.instruments[0].around.magnetic_field_world
-    known = services["autopilot"].parameters.estimator.magnetic_field_world
-    assert known == STANDARD.magnetic_field_world
-    assert np.subtract(felt, known) == pytest.approx((2e-6, -1e-6, 3e-6))
+    model_field = services["autopilot"].parameters.estimator.magnetic_field_world
+    assert model_field == STANDARD.magnetic_field_world
+    assert np.subtract(felt, model_field) == pytest.approx((2e-6, -1e-6, 3e-6))
 
 
 def yaw(q):
@@ -30,7 +30,7 @@ def yaw(q):
 @pytest.mark.long
 @pytest.mark.parametrize("values", [[], [ANOMALY]])
 def test_command_flies_with_heading_wrong_by_unknown_declination(tmp_path, values):
-    """The heading is wrong by the angle between the horizontal fields: that of the model less that of the place."""
+    """The heading error is the angle of the model's horizontal field less that of the local field."""
     ideal = [f"sensors.{name}.preset=ideal" for name in ("imu", "magnetometer")]  # a tilt would turn the field, too
     sets = [*values, *ideal, "run.duration=1.0", "success.require=[]"]
     command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process"]

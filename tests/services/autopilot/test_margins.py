@@ -20,7 +20,7 @@ def test_integrator_with_delay_is_closed_form():
     assert m.reduction == 0.0
 
 
-def test_double_integrator_with_pid_can_also_be_too_weak():
+def test_pid_on_double_integrator_has_minimum_gain():
     p, i, d = 4.0, 2.0, 3.0
     s = 1j * FREQUENCIES
     m = margins((p + i / s + d * s) / s**2)
@@ -35,11 +35,11 @@ def test_gain_never_one_has_no_crossover(gain, crossover):
 
 
 def discrete_radius(pid, gain, delay):
-    """Largest closed-loop eigenvalue of a PID on 1/s^2 behind the motor's lag, exactly discretised."""
+    """Return the largest closed-loop eigenvalue of a PID on 1/s^2 behind the motor's lag, exactly discretised."""
     a = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0 / AIRFRAME.motor.time_constant]])
     b = np.array([[0.0], [0.0], [1.0 / AIRFRAME.motor.time_constant]])
     A, B, *_ = cont2discrete((a, b, np.eye(3), np.zeros((3, 1))), TICK)
-    n = 4 + delay  # position, velocity, acceleration, integral, commands on their way
+    n = 4 + delay  # position, velocity, acceleration, integral, delayed commands
     M = np.zeros((n, n))
     M[:3, :3] = A
     M[3, 0], M[3, 3] = TICK, 1.0
@@ -65,7 +65,7 @@ def test_gain_margin_is_where_discrete_loop_becomes_unstable(name, delay):
         ("pitch", p.pitch_inner, arm / AIRFRAME.inertia_body[1]),
     ):
         m = margins(open_loops(p, AIRFRAME, TICK, delay)[loop])
-        # Half a tick stands for the sample-and-hold: an approximation that is good well below Nyquist's frequency.
+        # Half a tick approximates the zero-order hold, well below the Nyquist frequency.
         assert discrete_radius(pid, effect * 0.85 * m.gain, delay) < 1.0
         assert discrete_radius(pid, effect * 1.15 * m.gain, delay) > 1.0
 

@@ -15,7 +15,7 @@ ANY = st.floats(-100.0, 100.0)
 
 
 def wrench(thrust):
-    """Total force and torque of the rotors, each at its place, from the cross product."""
+    """Return the total force and torque of the rotors by cross products of their positions."""
     force, torque = np.zeros(3), np.zeros(3)
     for f, x, y, turn in zip(thrust, AIRFRAME.rotor_x, AIRFRAME.rotor_y, AIRFRAME.reaction_sign, strict=True):
         force += (0.0, 0.0, f)
@@ -25,7 +25,7 @@ def wrench(thrust):
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_each_demand_turns_about_its_own_axis_only(axis):
+def test_virtual_controls_are_decoupled(axis):
     demands = [0.0, 0.0, 0.0, 0.0]
     demands[1 + axis] = 2.0
     force, torque = wrench(mix(SHARES, VirtualControls(*demands)))
@@ -42,8 +42,8 @@ def test_lift_causes_no_torque():
 
 @given(ANY, ANY, ANY, ANY)
 @settings(deadline=None)
-@example(2.0, -2.0, -2.0, -2.0)  # possible with this yaw only: the collective makes room for the tilt alone
-def test_saturated_thrusts_are_possible_and_possible_ones_stay(collective, roll, pitch, yaw):
+@example(2.0, -2.0, -2.0, -2.0)  # only this yaw is feasible: the collective makes room for the tilt alone
+def test_saturation_keeps_feasible_thrusts(collective, roll, pitch, yaw):
     expected = VirtualControls(collective, roll, pitch, yaw)
     given_ = saturate(SHARES, expected, TOP, AIRMODE_ROLL_PITCH)
     thrust = mix(SHARES, given_)
@@ -62,7 +62,7 @@ def test_yaw_gets_remaining_range(collective, roll, pitch, yaw):
     assert given_[1:3] == pytest.approx((roll, pitch), abs=1e-12)
     bare = mix(SHARES, given_._replace(yaw=0.0))
     shares = [s[3] for s in SHARES]
-    best = linprog(  # the most yaw towards what is wanted that keeps every thrust possible
+    best = linprog(  # the largest yaw towards the desired one with feasible thrusts
         [-np.sign(yaw) or -1.0],
         A_ub=[[s] for s in shares] + [[-s] for s in shares],
         b_ub=[max(TOP - b, 0.0) for b in bare] + [max(b, 0.0) for b in bare],

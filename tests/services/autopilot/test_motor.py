@@ -13,5 +13,5 @@ def test_voltage_follows_belt_and_speed_constant():
 
 
 @pytest.mark.parametrize("thrust", [0.0, 1e-3, 24.6, 48.0])
-def test_thrust_at_its_voltage_is_thrust(thrust):
+def test_thrust_at_inverts_voltage(thrust):
     assert thrust_at(MOTOR, voltage(MOTOR, thrust)) == pytest.approx(thrust, rel=1e-14)

@@ -1,4 +1,4 @@
-"""The watch over the motors against a body that is integrated here: signs, shares, patience."""
+"""Motor failure detector against a body integrated here: signs, fractions of thrust, detection time."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ HOVER = 0.25 * FRAME.mass * FRAME.gravity
 
 
 def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0, values=None, impact=-1.0):
-    """State of the watch over a body whose rotors give the shares `left` of what a shaking command asks for."""
+    """Return the detector's state for a body whose rotors produce the fractions `left` of a varying command."""
     p, omega = watch.build(FRAME, values or {}), np.zeros(3)
     s = python_function(watch.start)(p)
     random = np.random.default_rng(seed)
@@ -38,7 +38,7 @@ def campaign_setup(left, seconds=0.6, push=(0.0, 0.0), height=5.0, seed=0, value
 
 @pytest.mark.parametrize("rotor", [1, 2, 3, 4])
 @pytest.mark.parametrize("share", [0.0, 0.5])
-def test_rotor_that_lacks_thrust_is_named(rotor, share):
+def test_rotor_with_thrust_loss_is_identified(rotor, share):
     left = np.ones(4)
     left[rotor - 1] = share
     assert campaign_setup(left).failed == rotor
@@ -56,7 +56,7 @@ def test_equal_thrust_loss_is_no_motor_failure():
     assert campaign_setup(np.full(4, 0.6)).failed == 0
 
 
-def test_push_along_axis_blames_no_motor():
+def test_push_along_axis_is_no_motor_failure():
     assert campaign_setup(np.ones(4), push=(6.0, 0.0)).failed == 0
     assert campaign_setup(np.ones(4), push=(0.0, -6.0)).failed == 0
 
@@ -82,8 +82,8 @@ def test_excess_is_zero_in_flight_and_weight_on_ground():
     assert watch.excess(p, (half,) * 4, (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) == pytest.approx(0.5, abs=1e-12)
 
 
-def test_disturbance_is_angular_acceleration_that_lacks():
-    left = np.array([0.8, 1.0, 1.0, 1.0])  # too little to be blamed
+def test_disturbance_is_missing_angular_acceleration():
+    left = np.array([0.8, 1.0, 1.0, 1.0])  # too small a loss
     s = campaign_setup(left)
     assert s.failed == 0
     expected = -0.2 * HOVER * ARM / FRAME.inertia_body[0], 0.2 * HOVER * ARM / FRAME.inertia_body[1]

@@ -42,10 +42,14 @@ P = parameters()
 
 
 def test_every_gain_of_tuning_page_has_px4_default():
-    known = table(load("quad_x", [PX4]))
-    assert set(TUNING_PAGE.split()) <= set(known)
-    assert not [name for name in known if name.startswith("PID_")]
-    assert [known[name].default for name in ("MC_ROLLRATE_P", "MC_YAWRATE_I", "MPC_Z_VEL_P_ACC")] == [0.15, 0.1, 4.0]
+    px4_table = table(load("quad_x", [PX4]))
+    assert set(TUNING_PAGE.split()) <= set(px4_table)
+    assert not [name for name in px4_table if name.startswith("PID_")]
+    assert [px4_table[name].default for name in ("MC_ROLLRATE_P", "MC_YAWRATE_I", "MPC_Z_VEL_P_ACC")] == [
+        0.15,
+        0.1,
+        4.0,
+    ]
     assert "MC_ROLLRATE_P" not in table(load("quad_x"))
 
 
@@ -64,7 +68,7 @@ def test_tilt_and_collective_keep_their_limits():
     assert (x / math.hypot(x, y), y / math.hypot(x, y)) == pytest.approx((0.6, 0.8))
     x, y, z = position.thrust_setpoint(P.position, (5.0, 0.0, 50.0))
     assert norm((x, y, z)) == pytest.approx(1.0)
-    assert x == pytest.approx(P.position.margin_xy)  # kept for the horizontal
+    assert x == pytest.approx(P.position.margin_xy)  # reserved for the horizontal component
     assert norm(position.thrust_setpoint(P.position, (0.0, 0.0, -20.0))) == pytest.approx(P.position.thrust_min)
 
 
@@ -81,7 +85,7 @@ def test_attitude_setpoint_has_thrust_axis_and_yaw(tilt, yaw):
     q = attitude.attitude_setpoint(thrust, yaw)
     assert rotate(q, (0.0, 0.0, 1.0)) == pytest.approx(scale(1.0 / norm(thrust), thrust), abs=1e-9)
     across = rotate(q, (1.0, 0.0, 0.0))[0] * -math.sin(yaw) + rotate(q, (1.0, 0.0, 0.0))[1] * math.cos(yaw)
-    assert across == pytest.approx(0.0, abs=1e-9)  # body x lies in the plane of the heading
+    assert across == pytest.approx(0.0, abs=1e-9)  # body x is in the vertical plane of the heading
 
 
 def test_small_attitude_errors_give_gain_times_angle():
@@ -148,7 +152,7 @@ def test_hover_thrust_is_parameter_without_its_estimate():
     assert P.position.hover == pytest.approx(0.72, abs=0.02)  # of the Iris
 
 
-def flown(scene, *overrides, script=lambda tick: ()):
+def fly_px4(scene, *overrides, script=lambda tick: ()):
     return memory_log.fly(load(scene, [PX4, *overrides]), script)
 
 
@@ -169,20 +173,20 @@ def test_default_gains_fly_delivery_mission():
 
 @pytest.mark.long
 def test_hover_returns_from_offset():
-    """A step of 1 m in each axis dies out: no loop oscillates."""
+    """The response to a step of 1 m in each axis decays: no loop oscillates."""
     sets = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false", "run.duration=30"]
     script = {
         10: [command("takeoff", 4.0), command("arm", math.nan, 10.0)],
         2500: [command("goto", 1.0, 1.0, 5.0, 0.5)],
     }
-    flight = flown("hover", *sets, script=lambda tick: script.get(tick, ()))
+    flight = fly_px4("hover", *sets, script=lambda tick: script.get(tick, ()))
     path = np.array(flight.column("ground_truth", lambda m: tuple(m.pose.position)))
     assert np.ptp(path[-200:], axis=0) == pytest.approx(0.0, abs=0.02)
     assert path[-1][:2] == pytest.approx((1.0, 1.0), abs=0.05)
 
 
 @pytest.mark.long
-def test_command_line_flies_it(tmp_path):
+def test_run_command_flies_px4_cascade(tmp_path):
     log = tmp_path / "px4.mcap"
     run = [sys.executable, "-m", "lapwing", "run", "hover", "--mode", "single-process", "--log", str(log), "--set", PX4]
     result = subprocess.run(run, capture_output=True, text=True)
@@ -191,6 +195,6 @@ def test_command_line_flies_it(tmp_path):
     assert "MC_ROLLRATE_P" in values.stdout
 
 
-def test_its_options_are_rejected():
+def test_px4_controller_rejects_options():
     with pytest.raises(SceneError, match="controller_options"):
         load("hover", [PX4, "autopilot.controller_options.gain=1.0"])

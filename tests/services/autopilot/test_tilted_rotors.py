@@ -1,4 +1,4 @@
-"""Rotors with axes of their own: what the autopilot takes them for is what the plant does, and it flies."""
+"""Tilted rotors: the autopilot's model equals the plant, and the vehicle flies."""
 
 import numpy as np
 import pytest
@@ -19,16 +19,16 @@ from lapwing.studies.tune.linearise import hover
 SCENE = "hexacopter_tilted"
 
 
-def test_autopilot_knows_force_and_torques_of_plant():
+def test_tilted_rotor_model_equals_plant():
     scene = load(SCENE, {"airframe.mass.centre": [0.01, -0.02, 0.03]})
-    known, frame = known_airframe(scene), airframe(scene)
+    nominal, frame = known_airframe(scene), airframe(scene)
     thrust = np.array([3.0, 4.0, 5.0, 2.0, 3.5, 4.5])
-    loads = Loads(tuple(map(float, thrust)), tuple(map(float, known.torque_per_thrust * thrust)))
+    loads = Loads(tuple(map(float, thrust)), tuple(map(float, nominal.torque_per_thrust * thrust)))
     force, torque = python_function(thrust_wrench)(multirotor.parameters(frame).layout, loads)
-    assert controller_parameters.rotor_effectiveness(known) @ thrust == pytest.approx([force[2], *torque], rel=1e-12)
+    assert controller_parameters.rotor_effectiveness(nominal) @ thrust == pytest.approx([force[2], *torque], rel=1e-12)
 
 
-def test_axes_along_z_are_those_of_rotors_without_axes():
+def test_vertical_axes_equal_untilted_rotors():
     x, y, z, reaction = (0.3, -0.2, 0.1), (0.1, 0.4, -0.3), (0.05, 0.0, -0.1), (0.02, -0.02, 0.02)
     tilted = tilted_effectiveness(tuple(zip(x, y, z, strict=True)), ((0.0, 0.0, 1.0),) * 3, reaction)
     assert np.array_equal(tilted, effectiveness(x, y, reaction))
@@ -59,12 +59,12 @@ def test_spin_up_reaction_is_that_of_plant():
 @pytest.mark.parametrize(
     ("model", "axis", "message"),
     [
-        ("rigid_body", [[0.0, 3.0, 1.0]] * 4, "maximum thrust"),  # 72 degrees to the side: cannot hover
+        ("rigid_body", [[0.0, 3.0, 1.0]] * 4, "maximum thrust"),  # tilted by 72 degrees to the side: cannot hover
         ("rigid_body", [[0.0, 0.0, 0.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
         ("rigid_body", [[0.0, 0.0, -1.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
         ("multibody", [[0.1, 0.0, 1.0]] * 4, "rotors.axis: the five bodies need rotors that push along body z"),
     ],
 )
-def test_refused(model, axis, message):
+def test_unflyable_rotor_axes_are_rejected(model, axis, message):
     with pytest.raises(SceneError, match=message):
         resolve(load("hover", {"airframe.rotors.axis": axis, "vehicle.model": model}))

@@ -1,4 +1,4 @@
-"""A load under several autopilots: against the model that integrates vehicle and load as one, and against statics."""
+"""Shared load of several vehicles: against the monolithic model `slung_load`, and against statics."""
 
 import math
 
@@ -56,13 +56,13 @@ def setup(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def flown(setup):
+def recorded_flight(setup):
     return fly(setup)
 
 
 @pytest.mark.long
 def test_one_carrier_equals_slung_load_model(tmp_path):
-    """`slung_load` integrates vehicle and load together, and looks at nothing from ahead."""
+    """`slung_load` integrates vehicle and load together, without prediction."""
     alone = '[vehicle]\nairframe = "delivery_drone"\n'
     together = alone + 'model = "slung_load"\n'
     scenes = (
@@ -77,41 +77,41 @@ def test_one_carrier_equals_slung_load_model(tmp_path):
     assert np.abs(vehicles[0] - vehicles[1]).max() < 0.002
 
 
-def hook(truth):
+def hook_position(truth):
     """Return the final position of the cable's attachment [m], world."""
     x, y, z, w = map(float, truth.orientation[-1])
     return truth.position[-1] + rotate((w, x, y, z), (0.1, 0.0, -0.1))
 
 
 @pytest.mark.long
-def test_static_cables_carry_weight(flown):
+def test_static_cables_carry_weight(recorded_flight):
     reported, left, right = (
-        flown.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth")
+        recorded_flight.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth")
     )
-    assert reported.force[-1, 0] == pytest.approx((0.0, 0.0, 2.0 * 9.80665), abs=0.5)  # it swings a little along x
+    assert reported.force[-1, 0] == pytest.approx((0.0, 0.0, 2.0 * 9.80665), abs=0.5)  # small swing along x
     assert reported.force[-1, 0, 2] == pytest.approx(2.0 * 9.80665, abs=0.05)
     place = reported.position[-1, 0]
     assert place[2] > 1.0
-    hooks = [hook(truth) for truth in (left, right)]
+    hooks = [hook_position(truth) for truth in (left, right)]
     lengths = [np.linalg.norm(hook - place) for hook in hooks]
     down = (hooks[0][2] - place[2]) / lengths[0]
-    stretch = 0.5 * 2.0 * 9.80665 / down / 2000.0  # of each cable, by Hooke
+    stretch = 0.5 * 2.0 * 9.80665 / down / 2000.0  # of each cable, by Hooke's law
     assert lengths == pytest.approx([2.0 + stretch] * 2, abs=5e-4)
     # mirrored about the plane between the two
     assert left.position[-1] * (1, -1, 1) == pytest.approx(right.position[-1], abs=1e-6)
     assert left.position[-1, 1] < 0.999  # pulled inwards
 
 
-def test_first_carrier_publishes_load(flown):
-    assert "left/body_states" in flown.topics
-    assert "right/body_states" not in flown.topics
+def test_first_carrier_publishes_load(recorded_flight):
+    assert "left/body_states" in recorded_flight.topics
+    assert "right/body_states" not in recorded_flight.topics
 
 
-def test_carried_load_is_equal_with_diagram_per_service(setup, flown):
-    assert fly_apart(setup, None).digest == flown.digest
+def test_carried_load_is_equal_with_diagram_per_service(setup, recorded_flight):
+    assert fly_apart(setup, None).digest == recorded_flight.digest
 
 
-def test_set_up_survives_text(setup):
+def test_configuration_survives_json(setup):
     assert first_difference(from_json(to_json(setup)), setup) is None
     assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
 

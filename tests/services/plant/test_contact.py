@@ -1,4 +1,4 @@
-"""Forces on the single feet: Newton's second law on what the same flight tells of itself, and standing still."""
+"""Ground forces on the feet: Newton's second law in the recorded flight, and equilibrium at rest."""
 
 import numpy as np
 import pytest
@@ -14,16 +14,16 @@ STANDING = {
     "autopilot.follow_trajectory": False,
     "run.duration": 1.0,
     **ASKED,
-}  # nobody arms it
+}  # never armed
 
 
 def up_of_body(orientation):
-    """Body z in world coordinates, shape (n, 3), of quaternions x, y, z, w."""
+    """Return body z in world coordinates, shape (n, 3), of quaternions x, y, z, w."""
     x, y, z, w = orientation.T
     return np.column_stack([2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)])
 
 
-def missing(flight):
+def force_residual(flight):
     """Return thrust, weight and foot forces minus mass times acceleration [N], shape (n, 3)."""
     truth, reported, mass = (
         flight.truth,
@@ -39,10 +39,10 @@ def missing(flight):
 @pytest.mark.long
 @pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
 def test_forces_sum_to_mass_times_acceleration(friction):
-    """Bounces of the landing included, in which the ground does more than carry the weight."""
+    """Including the bounces of the landing, with forces above the weight."""
     flight = lapwing.fly("hover", {**ASKED, "effects.ground_contact.friction": friction})
     force = flight.topic("contact_forces").force
-    assert abs(missing(flight)).max() < 1e-6
+    assert abs(force_residual(flight)).max() < 1e-6
     assert np.ptp(force[:, :, 2].sum(axis=1)) > 50.0
     airborne = ~flight.truth.ground_contact
     assert airborne.any()
@@ -66,12 +66,12 @@ def test_on_slope_friction_and_normal_forces_make_weight():
     reported, mass = flight.topic("contact_forces"), flight.origin.scene["airframe"]["mass"]["total"]
     assert reported.force[100].sum(axis=0) == pytest.approx([0.0, 0.0, mass * G], abs=1e-3)
     lower, upper = reported.force[100, [1, 2], 2].sum(), reported.force[100, [0, 3], 2].sum()
-    assert lower > 1.05 * upper  # the centre of mass is over the lower feet
+    assert lower > 1.05 * upper  # the centre of mass is nearer to the lower feet
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("model", ["multibody", "slung_load"])
-def test_of_vehicles_of_several_bodies_too(model):
+def test_foot_forces_of_several_bodies_carry_weight(model):
     scene = {"multibody": "hover", "slung_load": "slung_load"}[model]
     flight = lapwing.fly(scene, {**STANDING, "vehicle.model": model, "run.duration": 0.2})
     mass = flight.origin.scene["airframe"]["mass"]["total"]
@@ -92,6 +92,6 @@ def test_contact_topic_needs_contact_effect(scene):
         resolve(load(scene, {"rates.contact_forces": 50}))
 
 
-def test_their_rate_divides_exchange_rate():
+def test_contact_rate_must_divide_communication_rate():
     with pytest.raises(SceneError, match=r"rates.contact_forces: expected a rate that divides communication.rate"):
         load("hover", {"rates.contact_forces": 70})

@@ -1,4 +1,4 @@
-"""Vehicles of a fleet that touch one another, and feel the air that others move."""
+"""Interactions between vehicles of a fleet: collisions and downwash."""
 
 import numpy as np
 import pytest
@@ -54,46 +54,48 @@ def setup(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def flown(setup):
+def recorded_flight(setup):
     return fly(setup)
 
 
 @pytest.mark.long
-def test_downwash_acts_only_below(flown):
-    above, below = (flown.view(f"{name}/ground_truth").wind for name in ("above", "below"))
-    assert -0.2 < above[-1, 2] < 0.0  # what the one below draws down
+def test_downwash_acts_only_below(recorded_flight):
+    above, below = (recorded_flight.view(f"{name}/ground_truth").wind for name in ("above", "below"))
+    assert -0.2 < above[-1, 2] < 0.0  # the other vehicle's inflow
     assert below[-1, 2] < -2.0
-    assert np.abs(below[:200]).max() < 0.05  # 3 m beside
-    height = flown.view("below/ground_truth").position[:, 2]
+    assert np.abs(below[:200]).max() < 0.05  # 3 m to the side
+    height = recorded_flight.view("below/ground_truth").position[:, 2]
     assert height[-1] < height[500] - 0.02  # pushed down
 
 
 @pytest.mark.long
-def test_interaction_is_equal_with_diagram_per_service(setup, flown):
-    assert fly_apart(setup, None).digest == flown.digest
+def test_interaction_is_equal_with_diagram_per_service(setup, recorded_flight):
+    assert fly_apart(setup, None).digest == recorded_flight.digest
 
 
 @pytest.mark.long
 def test_isolated_vehicle_equals_flight_without_effects(tmp_path, setup):
-    """No wash and no contact: the same bits as if they knew nothing of one another."""
+    """Without downwash and contact the flights are bit-for-bit those without interactions."""
     far = ["vehicle.1.initial_position=[0.0, 500.0]", "run.duration=1.0"]
     there = fly(resolve(scene(tmp_path, *far)))
-    alone = fly(members(resolve(scene(tmp_path, *far)))[1]._replace(services=_unacquainted(setup, tmp_path, far)))
+    alone = fly(
+        members(resolve(scene(tmp_path, *far)))[1]._replace(services=_without_interaction(setup, tmp_path, far))
+    )
     assert there.payloads("below/ground_truth") == alone.payloads("ground_truth")
 
 
-def _unacquainted(setup, tmp_path, far):
+def _without_interaction(setup, tmp_path, far):
     return resolve(scene(tmp_path, *far).vehicles[1]).services
 
 
-def test_set_up_survives_text_and_another_seed(setup, tmp_path):
+def test_configuration_survives_json_and_reseed(setup, tmp_path):
     assert first_difference(from_json(to_json(setup)), setup) is None
     assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
     assert first_difference(reseed(setup, 7), resolve(scene(tmp_path, "run.seed=7"))) is None
 
 
 @pytest.mark.long
-def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
+def test_colliding_vehicles_bounce(tmp_path):
     meeting = fly(resolve(scene(tmp_path, "vehicle.0.trajectory.phase.0.z.to=1.0")))
     a, b = (meeting.view(f"{name}/ground_truth").position for name in ("above", "below"))
     gap = np.linalg.norm(a - b, axis=1)
@@ -103,7 +105,7 @@ def test_two_that_fly_into_one_another_bounce_and_keep_apart(tmp_path):
 
 
 @pytest.mark.parametrize(("start", "away"), [("[0.0, 0.0]", "0"), ("[0.0, 0.9]", "0.9")])
-def test_vehicles_that_touch_at_start_are_refused(tmp_path, start, away):
+def test_touching_vehicles_are_rejected_at_start(tmp_path, start, away):
     output = f"vehicle.1.initial_position: expected at least 1.55 m between them, got a position {away} m from above"
     with pytest.raises(ValueError, match=output):
         resolve(scene(tmp_path, f"vehicle.1.initial_position={start}"))

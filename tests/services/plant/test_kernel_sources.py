@@ -9,7 +9,7 @@ from lapwing.kernels.compiler.source_digest import _all
 from lapwing.services.process_table import create
 from lapwing.services.scene_resolver import load, resolve
 
-SHARED = {"lapwing.dynamics.effects.payload_release"}  # what hangs below is weighed in any scene
+SHARED = {"lapwing.dynamics.effects.payload_release"}  # the mass of a load is an input of every scene
 
 
 def test_plant_sources_contain_named_effects_only():

@@ -1,4 +1,4 @@
-"""A shared load that comes onto its cable and onto the ground within a step, against the closed form."""
+"""Shared load whose cable tightens, or which lands, within a step, against the closed form."""
 
 import pytest
 
@@ -21,23 +21,23 @@ SECONDS, INTERVAL = 0.5, 4e-3
 
 
 @kernel
-def moved(p, x, carrier, ticks):
+def move_load_for(p, x, carrier, ticks):
     for tick in range(1, ticks + 1):
         x = carried_load.step(p, x, tick, (InputSample(True, carrier),))[0]
     return x
 
 
-def flown(hook, start, velocity, steps):
-    """The height and the vertical speed of a load without weight under a hook that does not move."""
+def closed_form(hook, start, velocity, steps):
+    """Return height and vertical speed of a weightless load under a fixed hook."""
     p = LoadPlant((SLING,), ZERO, RK4, INTERVAL / steps, steps, INTERVAL, 1e-10)
     carrier = NeighbourState(hook_world=(0.0, 0.0, hook))
-    x = moved(p, LoadMotion((0.0, 0.0, start), (0.0, 0.0, velocity)), carrier, round(SECONDS / INTERVAL))
+    x = move_load_for(p, LoadMotion((0.0, 0.0, start), (0.0, 0.0, velocity)), carrier, round(SECONDS / INTERVAL))
     return x.load_position[2], x.load_velocity[2]
 
 
 @pytest.mark.parametrize("steps", [1, 4])
 def test_load_rebounds_from_taut_cable_as_damped_spring(steps):
-    height, velocity = flown(LENGTH + 1.0, 1.0 + SLACK, -SPEED, steps)
+    height, velocity = closed_form(LENGTH + 1.0, 1.0 + SLACK, -SPEED, steps)
     beyond, rate = rebound(SLACK, SPEED, FREQUENCY, RATIO, SECONDS)
     assert 1.0 - height == pytest.approx(beyond, abs=1e-7)
     assert -velocity == pytest.approx(rate, abs=1e-7)
@@ -45,8 +45,8 @@ def test_load_rebounds_from_taut_cable_as_damped_spring(steps):
 
 @pytest.mark.parametrize("steps", [1, 4])
 def test_load_rebounds_from_ground_as_damped_spring(steps):
-    """Its cable stays slack."""
-    height, velocity = flown(0.5 * LENGTH, SLACK, -SPEED, steps)
+    """The cable stays slack."""
+    height, velocity = closed_form(0.5 * LENGTH, SLACK, -SPEED, steps)
     beyond, rate = rebound(SLACK, SPEED, GROUND_FREQUENCY, GROUND_DAMPING, SECONDS)
     assert -height == pytest.approx(beyond, abs=1e-7)
     assert -velocity == pytest.approx(rate, abs=1e-7)

@@ -1,4 +1,4 @@
-"""Plant models beyond the multirotor: a scene flown tick by tick is the library's own motion, bit for bit."""
+"""Plant models other than multirotors: a scene's motion is bit-for-bit that of the library."""
 
 import json
 import subprocess
@@ -24,12 +24,12 @@ LOAD, CRATE = SCENES / "cooperative_load.toml", SCENES / "unload.toml"
 
 
 def ticks(scene, count):
-    """The plant's truth at the first `count` ticks, of a scene that nobody controls."""
+    """Return the true states at the first `count` ticks of a scene without control."""
     return memory_log.fly(scene, last=count - 1).messages("ground_truth")
 
 
 @pytest.mark.parametrize(("path", "model"), [(SATELLITE, gyrostat), (OS4, os4)])
-def test_scene_moves_as_library_does(path, model):
+def test_scene_motion_equals_library(path, model):
     scene = load(path)
     count, solver = 20, scene.lookup("solver")
     steps = round(1.0 / scene.lookup("communication.rate") / solver.step)
@@ -62,14 +62,14 @@ def test_motors_reach_speed_at_which_torque_and_drag_balance():
     assert 0.0205 * current == pytest.approx(7.5e-7 * speed**2, rel=1e-6)
 
 
-def carry(scene, count):
-    """(bodies, lift) of each tick, plant and control in turn."""
+def formation_steps(scene, count):
+    """Return (bodies, lift) of each tick; plant and control step alternately."""
     flight = memory_log.fly(scene, last=count - 1)
     return list(zip(flight.messages("body_states"), flight.messages("rotor_wrench"), strict=True))
 
 
 def three(path):
-    """The formation with a third quadrotor across."""
+    """Return the formation with a third quadrotor."""
     text = LOAD.read_text()
     text = text.replace("[0.755, 0.755]", "[0.755, 0.755, 0.6]").replace("[0.6, 0.8]", "[0.6, 0.8, 0.7]")
     text = text.replace("0.1377]]", "0.1377], [0.0820, 0.0845, 0.1377]]")
@@ -84,7 +84,7 @@ def three(path):
 @pytest.mark.parametrize("number", [2, 3])
 def test_links_keep_their_lengths_and_load_its_path(number, tmp_path):
     scene = load(LOAD) if number == 2 else three(tmp_path / "three.toml")
-    flight = carry(scene, 2001)
+    flight = formation_steps(scene, 2001)
     lengths = scene.lookup("cooperative_load.link_length")
     for bodies, _ in flight[::50]:
         places = [np.array(p.position) for p in bodies.pose]
@@ -95,7 +95,7 @@ def test_links_keep_their_lengths_and_load_its_path(number, tmp_path):
     assert len(lift.thrust) == number
 
 
-def test_formation_flies_alike_in_processes_and_in_one(tmp_path):
+def test_formation_is_equal_in_processes_and_single_process(tmp_path):
     digests = set()
     for mode in ("multi-process", "single-process"):
         figures = tmp_path / f"{mode}.json"
@@ -113,7 +113,7 @@ WRONG = {
         "vehicle.model: unknown model 'gyro'; did you mean gyrostat? expected one of",
     ),
     "another model's table": (SATELLITE, "vehicle.model=os4", "os4: missing; expected a table [os4], which the mod"),
-    "effects": (SATELLITE, "effects.gravity={}", "effects: the model gyrostat knows no such table"),
+    "effects": (SATELLITE, "effects.gravity={}", "effects: the model gyrostat has no such table"),
     "no rotation": (
         SATELLITE,
         "gyrostat.initial_attitude=[1.0, 0.1, 0.0, 0.0]",
@@ -152,18 +152,18 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_wrong_scene_is_refused_with_its_key(name):
+def test_invalid_scene_error_names_key(name):
     path, override, message = WRONG[name]
     with pytest.raises(SceneError) as error:
         load(path, [override])
     assert message in str(error.value)
 
 
-def test_numbers_that_run_away_are_named_with_their_time():
+def test_divergence_error_names_value_and_time():
     scene = load(
         OS4, ["solver.step=0.004", "os4.translational_drag=[1e4, 1e4, 1e4]", "os4.rotor_speed_rpm=[9e3, 0, 0, 0]"]
     )
-    with pytest.raises(LockStepError, match=r"os4: not finite at t = [\d.]+ s: \w+.*take a smaller step than 0.004 s"):
+    with pytest.raises(LockStepError, match=r"os4: not finite at t = [\d.]+ s: \w+.*use a smaller step than 0.004 s"):
         ticks(scene, 5000)
 
 

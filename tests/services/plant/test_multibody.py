@@ -1,4 +1,4 @@
-"""`vehicle.model = "multibody"`: what a scene may say of it; and the mission begins as with the reduced model."""
+"""`vehicle.model = "multibody"`: its scene tables, and a climb that equals that of the rigid-body model."""
 
 import math
 import re
@@ -20,12 +20,12 @@ FLOWN = "vehicle.model=multibody"
 CALM = ["effects.random_wind_force.mean=[0.0, 0.0, 0.0]", "effects.random_wind_force.sigma=0.0"]
 
 
-def full(tick):
+def full_voltage(tick):
     return (44.4,) * 4
 
 
-def lifted(overrides, ticks=50, volts=full):
-    """(truth, bodies) after ticks of 4 ms, 0.2 s, at these voltages, full ones unless given."""
+def lift_off(overrides, ticks=50, volts=full_voltage):
+    """Return (truth, bodies) after ticks of 4 ms up to 0.2 s at these voltages, by default the maximum."""
     plant = Alone(load(MISSION, overrides), "plant")
     for tick in range(ticks + 1):
         plant.step(actuators=MotorCommand(volts(tick), True, (0.0,) * 4, (0.0,) * 3))
@@ -33,12 +33,12 @@ def lifted(overrides, ticks=50, volts=full):
 
 
 def test_multibody_climb_equals_reduced_model():
-    one, _ = lifted(CALM)
-    several, bodies = lifted([FLOWN, *CALM])
+    one, _ = lift_off(CALM)
+    several, bodies = lift_off([FLOWN, *CALM])
     assert several.pose.position.z == pytest.approx(one.pose.position.z, abs=1e-6)
     assert several.rotor_speed == pytest.approx(one.rotor_speed, rel=1e-3)
     assert list(bodies.name) == ["chassis", "propeller1", "propeller2", "propeller3", "propeller4"]
-    # hinges pull the chassis up with the thrust, less what the propellers' own weight and rise take
+    # hinges lift the chassis with the thrust less the weight and inertia of the propellers
     assert sum(f.z for f in bodies.force[1:]) == pytest.approx(-bodies.force[0].z)
     assert 0.99 * sum(several.rotor_thrust) < bodies.force[0].z < sum(several.rotor_thrust)
 
@@ -52,11 +52,11 @@ BROKEN = f"multibody.event=[{event(0.1, 1, 'locked')}, {event(0.1, 2, 'free')}, 
 
 @pytest.mark.parametrize("coordinates", ["se3", "euler"])
 def test_propellers_break_in_flight(coordinates):
-    """At 0.1 s the first locks and the second loses its motor, at 0.15 s the third goes; the fourth goes on."""
+    """At 0.1 s the first locks and the second is freed, at 0.15 s the third is torn off; the fourth keeps running."""
     flight = [FLOWN, BROKEN, *CALM, f"multibody.coordinates={coordinates}"]
-    just_before, _ = lifted(flight, ticks=25)
-    at_once, _ = lifted(flight, ticks=26)
-    later, bodies = lifted(flight, ticks=45)
+    just_before, _ = lift_off(flight, ticks=25)
+    at_once, _ = lift_off(flight, ticks=26)
+    later, bodies = lift_off(flight, ticks=45)
     assert min(just_before.rotor_speed) > 100.0
     assert at_once.rotor_speed[0] == pytest.approx(0.0, abs=1e-9)
     assert at_once.rotor_speed[1] == pytest.approx(just_before.rotor_speed[1], rel=0.1)
@@ -70,11 +70,13 @@ def test_propellers_break_in_flight(coordinates):
 
 @pytest.mark.parametrize("coordinates", ["se3", "euler"])
 def test_failure_between_ticks_acts_at_its_own_time(coordinates):
-    """Half a tick later half of the impulse of the lost thrust; the two of one tick one after the other."""
+    """A failure half a tick later changes half of the impulse; two failures in one tick act in sequence."""
     failures = [[event(time, 1, "locked"), event(0.103, 2, "torn_off")] for time in (0.1, 0.102, 0.104)]
     failures[2].reverse()
     flight = [
-        lifted([FLOWN, *CALM, f"multibody.coordinates={coordinates}", f"multibody.event=[{', '.join(f)}]"], ticks=26)[0]
+        lift_off([FLOWN, *CALM, f"multibody.coordinates={coordinates}", f"multibody.event=[{', '.join(f)}]"], ticks=26)[
+            0
+        ]
         for f in failures
     ]
     early, between, late = (f.angular_velocity.x for f in flight)
@@ -85,26 +87,26 @@ def test_failure_between_ticks_acts_at_its_own_time(coordinates):
 
 
 def test_pitch_of_90_degrees_ends_only_euler_angles():
-    """Two rotors on one side only, once it has risen; the angles' divisor is looked at before it is divided by."""
+    """Only two rotors on one side run after a climb; the divisor of the Euler rates is checked before the division."""
 
-    def thrown(tick):
-        return full(tick) if tick < 100 else (0.0, 44.4, 44.4, 0.0)
+    def upside_down_volts(tick):
+        return full_voltage(tick) if tick < 100 else (0.0, 44.4, 44.4, 0.0)
 
     with pytest.raises(LockStepError) as error:
-        lifted([FLOWN, "multibody.coordinates=euler", *CALM], 155, thrown)
+        lift_off([FLOWN, "multibody.coordinates=euler", *CALM], 155, upside_down_volts)
     assert re.search(
-        r"the multirotor: \w+: pitch reached 90 degrees by t = 0\.56\d* s, where Euler angles end; "
-        'multibody.coordinates = "se3" has no such place',
+        r"the multirotor: \w+: pitch reached 90 degrees by t = 0\.56\d* s, where Euler angles are singular; "
+        'use multibody.coordinates = "se3"',
         str(error.value),
     )
-    truth, _ = lifted([FLOWN, *CALM], 155, thrown)
+    truth, _ = lift_off([FLOWN, *CALM], 155, upside_down_volts)
     q = truth.pose.orientation
     assert 2.0 * (q.y * q.y + q.x * q.x) > 1.0  # past the vertical: the z axis points down
 
 
 def test_divergence_of_euler_angles_names_cause():
-    with pytest.raises(LockStepError, match=r"not finite at t = 0.004 s: .*; take a smaller step than 0.001 s"):
-        lifted([FLOWN, "multibody.coordinates=euler", *CALM], 1, lambda tick: (math.nan,) * 4)
+    with pytest.raises(LockStepError, match=r"not finite at t = 0.004 s: .*; use a smaller step than 0.001 s"):
+        lift_off([FLOWN, "multibody.coordinates=euler", *CALM], 1, lambda tick: (math.nan,) * 4)
 
 
 WRONG = {
@@ -131,17 +133,17 @@ WRONG = {
     "what is gone already": (
         [FLOWN],
         f"multibody.event=[{event(2.0, 1, 'free')}, {event(1.0, 1, 'torn_off')}]",
-        "multibody.event.0.propeller: propeller 1 is torn off at 1 s; nothing can become of it after that",
+        "multibody.event.0.propeller: propeller 1 is torn off at 1 s and cannot fail again",
     ),
     "the reduced model": (
         [],
         f"multibody.event=[{event(1.0, 1, 'free')}]",
-        'multibody: the model rigid_body knows no such table; set vehicle.model = "multibody"',
+        'multibody: the model rigid_body has no such table; set vehicle.model = "multibody"',
     ),
     "a table for nobody": (
         [],
         "multibody.drive=speed",
-        'the model rigid_body knows no such table; set vehicle.model = "mul',
+        'the model rigid_body has no such table; set vehicle.model = "mul',
     ),
     "unknown coordinates": ([FLOWN], "multibody.coordinates=so3", "multibody.coordinates: expected"),
     "a long step": (
@@ -153,7 +155,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_wrong_scene_is_refused_with_its_key(name):
+def test_invalid_scene_error_names_key(name):
     before, override, message = WRONG[name]
     with pytest.raises(SceneError) as error:
         load(MISSION, [*before, override])

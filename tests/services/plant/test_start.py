@@ -1,4 +1,4 @@
-"""The vehicle starts at rest on whatever ground and feet the scene gives it: nothing accelerates, nothing moves."""
+"""The vehicle starts in equilibrium for any ground and feet: no acceleration, no motion."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ STANDING = {
     "autopilot.accept_commands": True,
     "autopilot.follow_trajectory": False,
     "run.duration": 0.2,
-}  # nobody arms it
+}  # never armed
 UNEVEN = [[0.20, 0.25, -0.30], [-0.20, 0.20, -0.35], [-0.20, -0.25, -0.36], [0.25, -0.25, -0.32]]
 CASES = {
     "level": {},
@@ -25,7 +25,7 @@ CASES = {
 
 
 @pytest.mark.parametrize("overrides", CASES.values(), ids=CASES)
-def test_vehicle_rests_from_first_tick(overrides):
+def test_vehicle_is_in_equilibrium_at_first_tick(overrides):
     truth = lapwing.fly("hover", {**STANDING, **overrides}).truth
     assert abs(truth.acceleration).max() < 1e-6
     assert abs(truth.angular_velocity).max() < 1e-8

@@ -94,7 +94,7 @@ RECORD = {
 
 
 def record(sensor, p, samples, seed=1, vehicle="drone1", truth=REST):
-    """Readings (samples, channels) of a vehicle that does not move."""
+    """Return the readings (samples, channels) of a vehicle at rest."""
     function, width = RECORD[sensor]
     out = np.empty((samples, width))
     function(p, stream_key(seed, vehicle, sensor), truth, out)
@@ -102,12 +102,12 @@ def record(sensor, p, samples, seed=1, vehicle="drone1", truth=REST):
 
 
 def allan_deviation(x, m):
-    """Overlapping Allan deviation of each column over clusters of m samples (IEEE Std 952, annex C)."""
+    """Return the overlapping Allan deviation of each column over clusters of m samples (IEEE Std 952, annex C)."""
     sums = np.cumsum(np.vstack([np.zeros(x.shape[1]), x - x.mean(axis=0)]), axis=0)
     mean = (sums[m:] - sums[:-m]) / m
     return np.sqrt(0.5 * np.mean((mean[m:] - mean[:-m]) ** 2, axis=0))
 
 
-def together(deviations):
-    """One figure for like axes."""
+def rms_of_axes(deviations):
+    """Return the root mean square over equal axes."""
     return float(np.sqrt(np.mean(np.square(deviations))))

@@ -1,10 +1,10 @@
-"""The noise of every preset against its stated figures, by Allan deviation; and the same whatever the sample rate."""
+"""Noise of every preset against its stated values by Allan deviation, at several sample rates."""
 
 import math
 
 import numpy as np
 import pytest
-from record import REST, allan_deviation, record, together
+from record import REST, allan_deviation, record, rms_of_axes
 
 from lapwing.services.sensors import error_models, gps, imu, registry
 from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
@@ -18,7 +18,7 @@ GPSS = {name: p for name, p in gps.PRESETS.items() if name != "ideal"}
 
 
 def at_peak(sensor, p, correlation_time, samples=1_000_000):
-    """Allan deviation where that of the wandering bias is largest."""
+    """Return the Allan deviation at the peak of that of the bias walk."""
     m = 40
     p = p._replace(rate=m / (error_models.ALLAN_PEAK_TIME * correlation_time))
     return allan_deviation(record(sensor, p, samples), m)
@@ -26,21 +26,21 @@ def at_peak(sensor, p, correlation_time, samples=1_000_000):
 
 @pytest.mark.parametrize("name", IMUS)
 def test_imu_white_noise(name):
-    """At the preset's own rate, quantised as it is: n / sqrt(2 tau) for a one-sided density n."""
+    """At the preset's rate and resolution: n / sqrt(2 tau) for a one-sided density n."""
     p = IMUS[name]._replace(warm_up_rise=0.0)
     m = 25
     tau = m / p.rate
     deviation = allan_deviation(record("imu", p, 100_000), m)
     gyro, force = p.gyro.noise_dps_per_sqrt_hz * DPS, p.accelerometer.noise_mg_per_sqrt_hz * MG
-    assert together(deviation[:3]) == pytest.approx(gyro / math.sqrt(2 * tau), rel=0.05)
-    assert together(deviation[3:]) == pytest.approx(force / math.sqrt(2 * tau), rel=0.05)
+    assert rms_of_axes(deviation[:3]) == pytest.approx(gyro / math.sqrt(2 * tau), rel=0.05)
+    assert rms_of_axes(deviation[3:]) == pytest.approx(force / math.sqrt(2 * tau), rel=0.05)
 
 
 def test_stated_random_walk_of_mpu6000():
-    """0.30 deg/sqrt(h): the Allan deviation of the white noise, carried on to one hour, in deg/h."""
+    """0.30 deg/sqrt(h): the Allan deviation of the white noise, extrapolated to one hour, in deg/h."""
     x = record("imu", imu.MPU6000._replace(warm_up_rise=0.0), 100_000)
     m = 25
-    at_one_hour = together(allan_deviation(x, m)[:3]) * math.sqrt(m / 250.0 / 3600.0)
+    at_one_hour = rms_of_axes(allan_deviation(x, m)[:3]) * math.sqrt(m / 250.0 / 3600.0)
     assert at_one_hour / DPS * 3600.0 == pytest.approx(0.30, rel=0.05)
 
 
@@ -49,19 +49,17 @@ def test_imu_bias_instability(name):
     p = IMUS[name]
     p = p._replace(
         warm_up_rise=0.0,
-        gyro=p.gyro._replace(
-            resolution_dps=0.0
-        ),  # at one sample a minute rounding would hide the noise that dithers it
+        gyro=p.gyro._replace(resolution_dps=0.0),  # at one sample a minute rounding would hide the noise
         accelerometer=p.accelerometer._replace(resolution_mg=0.0),
     )
     deviation = at_peak("imu", p, p.gyro.bias_correlation_time)
-    assert together(deviation[:3]) == pytest.approx(p.gyro.bias_instability_deg_per_h * DPS / 3600.0, rel=0.05)
-    assert together(deviation[3:]) == pytest.approx(p.accelerometer.bias_instability_ug * 1e-3 * MG, rel=0.05)
+    assert rms_of_axes(deviation[:3]) == pytest.approx(p.gyro.bias_instability_deg_per_h * DPS / 3600.0, rel=0.05)
+    assert rms_of_axes(deviation[3:]) == pytest.approx(p.accelerometer.bias_instability_ug * 1e-3 * MG, rel=0.05)
 
 
 def white(sensor, p, density, columns):
     m = 5
-    deviation = together(allan_deviation(record(sensor, p, 100_000), m)[columns])
+    deviation = rms_of_axes(allan_deviation(record(sensor, p, 100_000), m)[columns])
     return deviation / (density / math.sqrt(2 * m / p.rate))
 
 
@@ -71,7 +69,7 @@ def test_magnetometer(name):
     fine = p._replace(resolution_nt=0.0)
     assert white("magnetometer", fine, p.noise_nt_per_sqrt_hz * 1e-9, slice(3)) == pytest.approx(1.0, rel=0.05)
     quiet = fine._replace(noise_nt_per_sqrt_hz=0.0)
-    assert together(at_peak("magnetometer", quiet, p.bias_correlation_time)) == pytest.approx(
+    assert rms_of_axes(at_peak("magnetometer", quiet, p.bias_correlation_time)) == pytest.approx(
         p.bias_instability_nt * 1e-9, rel=0.05
     )
 
@@ -80,7 +78,7 @@ def test_barometer():
     p = BAROMETERS["ms5611"]
     fine = p._replace(resolution_pa=0.0)
     assert white("barometer", fine, p.noise_pa_per_sqrt_hz, slice(1)) == pytest.approx(1.0, rel=0.05)
-    assert together(at_peak("barometer", fine, p.bias_correlation_time)) == pytest.approx(
+    assert rms_of_axes(at_peak("barometer", fine, p.bias_correlation_time)) == pytest.approx(
         p.bias_instability_pa, rel=0.05
     )
     assert 1.0 <= p.noise_pa_per_sqrt_hz * math.sqrt(p.rate / 2) <= 3.0  # [Pa] in samples at 20 to 50 Hz
@@ -100,8 +98,10 @@ def test_gps(name):
     assert white("gps", still, p.noise_vertical_m_per_sqrt_hz, slice(2, 3)) == pytest.approx(1.0, rel=0.05)
     assert white("gps", still, p.noise_velocity_m_per_s_per_sqrt_hz, slice(3, 6)) == pytest.approx(1.0, rel=0.05)
     deviation = at_peak("gps", p, p.correlation_time)
-    assert together(deviation[:2]) == pytest.approx(error_models.ALLAN_PEAK * p.correlated_error_horizontal, rel=0.05)
-    assert together(deviation[2:3]) == pytest.approx(error_models.ALLAN_PEAK * p.correlated_error_vertical, rel=0.05)
+    assert rms_of_axes(deviation[:2]) == pytest.approx(
+        error_models.ALLAN_PEAK * p.correlated_error_horizontal, rel=0.05
+    )
+    assert rms_of_axes(deviation[2:3]) == pytest.approx(error_models.ALLAN_PEAK * p.correlated_error_vertical, rel=0.05)
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
@@ -109,7 +109,7 @@ def test_same_physical_noise_at_any_rate(rate):
     p = imu.BMI088
     p = p._replace(rate=rate, warm_up_rise=0.0, gyro=p.gyro._replace(resolution_dps=0.0))
     tau = 0.1
-    deviation = together(allan_deviation(record("imu", p, round(400 * rate)), round(tau * rate))[:3])
+    deviation = rms_of_axes(allan_deviation(record("imu", p, round(400 * rate)), round(tau * rate))[:3])
     assert deviation == pytest.approx(p.gyro.noise_dps_per_sqrt_hz * DPS / math.sqrt(2 * tau), rel=0.05)
 
 
@@ -117,13 +117,13 @@ def test_same_physical_noise_at_any_rate(rate):
 def test_same_bias_walk_at_any_rate(rate):
     p = imu.Imu(gyro=imu.Gyro(bias_instability_deg_per_h=4.6, bias_correlation_time=100.0), rate=rate)
     m = round(error_models.ALLAN_PEAK_TIME * 100.0 * rate)
-    deviation = together(allan_deviation(record("imu", p, 300_000), m)[:3])
+    deviation = rms_of_axes(allan_deviation(record("imu", p, 300_000), m)[:3])
     # With nine or more samples a cluster their mean is the cluster's within 1 %.
     assert deviation == pytest.approx(4.6 * DPS / 3600.0, rel=0.05)
 
 
 def test_every_noise_has_mean_zero():
-    """Within four standard errors, without the wandering part, whose mean takes hours to settle."""
+    """Within four standard errors, without the bias walk, whose mean converges over hours."""
     sensors = {
         "imu": imu.Imu(gyro=imu.Gyro(noise_dps_per_sqrt_hz=0.01), accelerometer=imu.Accelerometer(0.2)),
         "magnetometer": MAGNETOMETERS["ideal"]._replace(noise_nt_per_sqrt_hz=30.0),

@@ -1,4 +1,4 @@
-"""Each fault alone on an ideal magnetometer in a growing field, and what a schedule may not say."""
+"""Each fault alone on an ideal magnetometer in a growing field, and invalid schedules."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ TICK = 0.1  # [s]
 
 
 def fly(fault, sensor="magnetometer", ticks=30):
-    """Readings of the x axis of an ideal magnetometer in a field that grows by 1 T a tick; fault from 1 s to 2 s."""
+    """Return the x readings of an ideal magnetometer in a field that grows by 1 T per tick; fault from 1 s to 2 s."""
     module = registry.sensors()[sensor]
     p = registry.parameters(sensor, {"preset": "ideal", "faults": [{"start": 1.0, "stop": 2.0, **fault}]}, TICK)
     key = stream_key(1, "drone1", sensor)
@@ -106,5 +106,5 @@ def test_too_many_faults():
         compile_faults([{"kind": "freeze"}] * 5, magnetometer.CHANNELS, TICK)
 
 
-def test_no_faults_are_none():
+def test_empty_schedule_compiles_to_none():
     assert compile_faults([], imu.CHANNELS, TICK) is None

@@ -1,4 +1,4 @@
-"""The sensors' messages: what they say besides the reading."""
+"""Sensor messages: fields other than the reading."""
 
 import numpy as np
 import pytest

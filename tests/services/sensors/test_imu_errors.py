@@ -1,4 +1,4 @@
-"""IMU errors between axes, of the internal filter, of sampling, and of the rotors, against closed forms."""
+"""IMU errors by cross-coupling, internal filter, sampling and rotors, against closed forms."""
 
 import math
 import subprocess
@@ -27,7 +27,7 @@ TURNING = REST._replace(rotor_speeds=(500.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
 
 @kernel
 def record(p, key, truth, push, spin, out):
-    """Readings while the vehicle is pushed along x and turned about z by given histories."""
+    """Return the readings for histories of acceleration along x and rotation about z."""
     s = imu.initial(p, key, truth)
     for k in range(len(out)):
         push_world, spin_body = (push[k], 0.0, 0.0), (0.0, 0.0, spin[k])
@@ -50,7 +50,7 @@ def readings(p, truth=REST, push=None, spin=None, samples=400, key=KEY):
 
 
 def spectrum(x, rate, frequency):
-    """Amplitude of a line in a record of whole periods."""
+    """Return the amplitude of a spectral line in a record of whole periods."""
     t = np.arange(len(x)) / rate
     return 2.0 * abs(np.mean((x - x.mean()) * np.exp(-2j * math.pi * frequency * t)))
 
@@ -90,18 +90,18 @@ def test_matrix_and_response_to_g():
     p = imu.Imu(cross_coupling=CrossCoupling(gyro_matrix=rows))
     result = readings(p, spin=np.full(4, 2.0), samples=4)[3, :3]
     np.testing.assert_allclose(result, 2.0 * np.array([0.0, 0.0, 0.99]), atol=1e-15)
-    drawn = [
+    matrices = [
         readings(
             imu.Imu(cross_coupling=CrossCoupling(g_sensitivity_dps_per_g=0.1)), samples=1, key=stream_key(k, "", "imu")
         )
         for k in range(300)
     ]
-    spread = np.degrees(np.std(np.array(drawn)[:, 0, :3], axis=0))
+    spread = np.degrees(np.std(np.array(matrices)[:, 0, :3], axis=0))
     np.testing.assert_allclose(spread, 0.1, rtol=4.0 / math.sqrt(600))
 
 
 def test_skewed_axes_are_symmetric():
-    """The part that no rotation can undo: x reads of y what y reads of x."""
+    """Non-orthogonality is symmetric: the sensitivity of x to y equals that of y to x."""
     p = imu.Imu(cross_coupling=CrossCoupling(non_orthogonality_deg=1.0))
     m = np.array(imu.initial(p, KEY, REST).accelerometer.matrix).reshape(3, 3)
     np.testing.assert_array_equal(m, m.T)
@@ -148,7 +148,7 @@ def test_vibration_is_rectified():
     assert np.degrees(result[0]) == pytest.approx(0.5 * square, rel=1e-9)
 
 
-def test_damage_begins_with_scene_s_effect():
+def test_damage_begins_with_rotor_damage_effect():
     v = RotorVibration(rotor_speed=500.0, damage_mg=100.0, damage=Damage(0, 200, 0.5))
     x = readings(imu.Imu(rotor_vibration=v), TURNING)[:, 3]
     assert np.abs(x[:200]).max() == 0.0

@@ -36,7 +36,7 @@ def truth(position=ZERO, attitude=NO_ROTATION, velocity=ZERO, omega=ZERO, accele
 
 
 def read(module, p, *truths):
-    """The last of the readings of successive truths."""
+    """Return the last reading of successive true states."""
     s = module.initial(p, KEY, truths[0])
     for tick, now in enumerate(truths):
         s, reading = module.sample(p, s, KEY, tick, now)
@@ -84,7 +84,7 @@ def test_imu_scale_and_misalignment_have_stated_size():
 
 
 def test_imu_warms_up():
-    """The bias of the cold start fades with the time constant of the warm-up."""
+    """The bias at the start decays with the time constant of the warm-up."""
     p = imu.Imu(imu.Gyro(temperature_dps_per_k=1.0), warm_up_rise=10.0, warm_up_time=1.0, rate=100.0)
     first = np.array(read(imu, p, truth()).omega_body)
     later = np.array(read(imu, p, *[truth()] * 101).omega_body)
@@ -144,7 +144,7 @@ SONAR = sonar.Sonar(range_min=0.2, range_max=7.65, resolution=0.01, half_beam_de
         (2.0, 0.0, 2.0),
         (2.0, 9.0, 2.0),  # the nearest ground is still within the beam
         (2.0, 20.0, round(2.0 / math.cos(math.radians(10.0)), 2)),
-        (2.0, 26.0, math.inf),  # tilted too far: no echo
+        (2.0, 26.0, math.inf),  # beyond the maximum tilt: no echo
         (0.199, 0.0, 0.2),
         (0.19, 0.0, -math.inf),  # REP 117: detected, but too near
         (7.65, 0.0, 7.65),
@@ -161,7 +161,7 @@ def test_sonar_range(height, tilt_deg, expected):
 @pytest.mark.long
 @pytest.mark.parametrize(("slope_deg", "tilt_deg"), [(20.0, 0.0), (20.0, 20.0), (20.0, -4.0), (8.0, 0.0), (20.0, -6.0)])
 def test_sonar_over_slope(slope_deg, tilt_deg):
-    """The nearest ground within the beam: across the slope 2 m cos(slope), seen at slope - tilt off the beam's axis."""
+    """The nearest ground within the beam: across the slope 2 m cos(slope), at slope - tilt from the beam's axis."""
     slope, tilt = math.radians(slope_deg), math.radians(tilt_deg)
     ground = relief(slope=(0.0, math.tan(slope)))
     p = SONAR._replace(resolution=0.0)
@@ -185,8 +185,8 @@ def test_sonar_sees_box_and_next_tread_of_stair():
 
 
 @pytest.mark.long
-def test_accelerometers_off_centre_feel_turning():
-    """On a wheel of 0.3 m that turns at 2 rad/s and speeds up by 5 rad/s^2: inwards w^2 r, ahead a r."""
+def test_accelerometers_off_centre_measure_rotation():
+    """On a wheel of 0.3 m radius with 2 rad/s and 5 rad/s^2: w^2 r inwards, a r tangentially."""
     p = imu.Imu(position=(0.3, 0.0, 0.0))
     spinning = truth(omega=(0.0, 0.0, 2.0))._replace(angular_acceleration_body=(0.0, 0.0, 5.0))
     np.testing.assert_allclose(read(imu, p, spinning).specific_force_body, (-1.2, 1.5, G), atol=1e-12)
@@ -195,7 +195,7 @@ def test_accelerometers_off_centre_feel_turning():
 
 @pytest.mark.long
 def test_gps_measures_at_antenna():
-    """0.4 m ahead on a vehicle that heads north and turns left at 1 rad/s: 0.4 m north, going west at 0.4 m/s."""
+    """0.4 m ahead on a vehicle with heading north and 1 rad/s to the left: 0.4 m north, 0.4 m/s to the west."""
     p = gps.Gps(antenna=(0.4, 0.0, 0.1))
     north = truth((1.0, 2.0, 3.0), from_roll_pitch_yaw(0.0, 0.0, math.pi / 2), (5.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     reading = read(gps, p, north)
@@ -233,7 +233,7 @@ SIDES = {  # velocity through the air, body: published share of the dynamic pres
 
 @pytest.mark.parametrize("air", SIDES)
 def test_barometer_static_pressure_error_by_direction(air):
-    """Published coefficients of a quadrotor (PX4 pull request 19507); 60 Pa at 10 m/s, whatever the heading."""
+    """Published coefficients of a quadrotor (PX4 pull request 19507); 60 Pa at 10 m/s for any heading."""
     p = parameters("barometer", {"preset": "ideal", "static_pressure_error": {}}, 0.004)
     for attitude in (NO_ROTATION, from_roll_pitch_yaw(0.2, -0.3, 2.0)):
         flying = truth(attitude=attitude)._replace(air_density=1.2, air_velocity_world=rotate(attitude, air))
@@ -255,8 +255,8 @@ def test_pressure_error_set_for_one_direction_keeps_defaults_of_others():
     assert parameters("barometer", {}, 0.004).static_pressure_error is None
 
 
-def test_airspeed_feels_air_along_body_alone():
-    """10 m/s ahead at 1.2 kg/m^3 are 60 Pa; as much suction backwards; across nothing."""
+def test_airspeed_measures_only_flow_along_body_x():
+    """10 m/s forwards at 1.2 kg/m^3 cause 60 Pa; backwards -60 Pa; sideways 0."""
     north = truth(attitude=from_roll_pitch_yaw(0.0, 0.0, math.pi / 2))._replace(air_density=1.2)
     for air, expected in (((0.0, 10.0, 0.0), 60.0), ((0.0, -10.0, 0.0), -60.0), ((10.0, 0.0, 3.0), 0.0)):
         reading = read(airspeed, airspeed.Airspeed(), north._replace(air_velocity_world=air))
@@ -293,7 +293,7 @@ def test_rangefinder_in_any_direction_over_level_ground(azimuth, elevation, expe
 
 @pytest.mark.long
 def test_rangefinder_ahead_sees_wall_and_its_limits():
-    """A box whose face is 4 m ahead, seen level; turned away, nothing; beyond its range +inf, too near -inf."""
+    """A box 4 m ahead of a level ray; +inf for other directions and beyond the range, -inf below the minimum."""
     wall = relief(boxes=[(6.0, 0.0, 4.0, 4.0, 0.0, 5.0)])
     p = rangefinder.Rangefinder(elevation_deg=0.0)
     assert read(rangefinder, p, truth((0.0, 0.0, 2.0), terrain=wall)).range == pytest.approx(4.0, abs=1e-6)
@@ -315,15 +315,15 @@ def test_rangefinder_noise():
     assert np.std(result) == pytest.approx(0.01 * 5.0, rel=0.05)
 
 
-def test_optical_flow_of_turning_alone_is_turning():
+def test_optical_flow_of_rotation_is_body_rate():
     p, turning = optical_flow.OpticalFlow(), truth((0.0, 0.0, 3.0), omega=(0.3, -0.2, 0.5))
     reading = read(optical_flow, p, turning)
     assert reading.flow == reading.rate == (0.3, -0.2)
 
 
 @pytest.mark.long
-def test_optical_flow_over_ground_that_passes():
-    """By the geometry of the point that the axis meets: the body's turning that would move its image as fast."""
+def test_optical_flow_over_moving_ground():
+    """By geometry: the body rate that moves the image of the point on the axis at the same speed."""
     attitude, velocity = from_roll_pitch_yaw(0.2, -0.1, 1.3), np.array([2.0, -1.0, 0.5])
     ground = relief(slope=(0.1, -0.2))
     for terrain, tolerance in ((LEVEL, 1e-12), (ground, 1e-6)):
@@ -356,7 +356,7 @@ def test_optical_flow_without_texture_and_its_noise():
 
 
 def coning(k, rate):
-    """Attitude and rate of a body whose z axis goes round a cone of 5 degrees at 40 Hz, at sample k."""
+    """Return attitude and rate at sample k of a body whose z axis moves on a cone of 5 degrees at 40 Hz."""
     tilt, turn = math.radians(5.0), 2.0 * math.pi * 40.0
     t = k / rate
     half = math.sin(tilt / 2)
@@ -367,7 +367,7 @@ def coning(k, rate):
     )
 
 
-def test_integrated_readings_bring_coning_body_home():
+def test_delta_angles_of_coning_restore_attitude():
     """Composed delta angles equal the attitude; instantaneous rates drift away from it."""
     rate, ends = 250.0, {}
     for delta_output in (True, False):
@@ -385,7 +385,7 @@ def test_integrated_readings_bring_coning_body_home():
 
 @pytest.mark.long
 def test_integrated_readings_restore_velocity_at_imu():
-    """Turning and speeding up: the sum of R_before f / rate - g t is the change of v + R (omega x r)."""
+    """With rotation and acceleration: the sum of R_before f / rate - g t is the change of v + R (omega x r)."""
     rate, place = 100.0, (0.2, -0.1, 0.05)
     p, gained, before, path = imu.Imu(rate=rate, delta_output=True, position=place), np.zeros(3), None, []
     for k in range(60):
@@ -405,7 +405,7 @@ def test_integrated_readings_restore_velocity_at_imu():
 
 @pytest.mark.long
 def test_rotor_vibration_is_aliased_and_integration_attenuates():
-    """251 Hz sampled at 250 Hz looks like 1 Hz; of its mean over a sample is left sin(x)/x, x = pi 251/250."""
+    """251 Hz sampled at 250 Hz appears as 1 Hz; the mean over a sample attenuates it by sin(x)/x, x = pi 251/250."""
     speed = 2.0 * math.pi * 251.0
     shaking = imu.Vibration((100.0, 100.0, 50.0), 0.5 * speed)
     now, result = truth()._replace(rotor_speed=speed), {}
@@ -416,10 +416,10 @@ def test_rotor_vibration_is_aliased_and_integration_attenuates():
             s, reading = imu.sample(p, s, KEY, tick, now)
             forces.append(reading.specific_force_body)
         result[delta_output] = np.array(forces) - (0.0, 0.0, G)
-    seen = np.abs(np.fft.rfft(result[False], axis=0)) / 500.0
-    assert np.argmax(seen[:, 0]) == 4  # cycles in 4 s
+    spectrum = np.abs(np.fft.rfft(result[False], axis=0)) / 500.0
+    assert np.argmax(spectrum[:, 0]) == 4  # cycles in 4 s
     amplitude = 4.0 * 0.1 * 9.80665  # with the square of the speed
-    np.testing.assert_allclose(seen[4], (amplitude, amplitude, 0.5 * amplitude), rtol=1e-6)
+    np.testing.assert_allclose(spectrum[4], (amplitude, amplitude, 0.5 * amplitude), rtol=1e-6)
     left = np.abs(np.fft.rfft(result[True], axis=0))[4, 0] / 500.0
     x = math.pi * 251.0 / 250.0
     assert left == pytest.approx(amplitude * abs(math.sin(x) / x), rel=1e-6)
@@ -447,7 +447,7 @@ STREET = tuple(gps.Satellite(a, e) for a, e in ((10.0, 60.0), (170.0, 50.0), (20
 
 @pytest.mark.long
 def test_gps_errors_have_covariance_of_satellites_in_view():
-    """Against the rows (east, north, up, 1) of least squares, over 1500 receivers; the reading says it."""
+    """Against least squares with rows (east, north, up, 1) over 1500 receivers, and against the published variance."""
     p = gps.Gps(sky=STREET, range_correlated_error=2.0, range_noise_m_per_sqrt_hz=0.5)
     rows = [
         (math.cos(e) * math.sin(a), math.cos(e) * math.cos(a), math.sin(e), 1.0)

@@ -1,4 +1,4 @@
-"""Presets of real parts: spectrum of the readings, and the figures of the data sheets."""
+"""Presets of real sensors: spectrum of the readings, and values of the data sheets."""
 
 import math
 import subprocess
@@ -18,7 +18,7 @@ from lapwing.services.sensors.sonar import PRESETS as SONARS
 
 DPS, MG, PSI = math.radians(1.0), 1e-3 * 9.80665, 6894.757
 UP = REST._replace(position_world=(0.0, 0.0, 2.0))
-DENSITIES = {  # one-sided densities of the channels, and what to replace for readings without rounding
+DENSITIES = {  # one-sided densities of the channels, and replacements for readings without rounding
     "barometer": lambda p: ([p.noise_pa_per_sqrt_hz], {"resolution_pa": 0.0}),
     "sonar": lambda p: ([p.noise_m_per_sqrt_hz], {"resolution": 0.0}),
     "rangefinder": lambda p: ([p.noise_m_per_sqrt_hz], {"resolution": 0.0}),
@@ -48,7 +48,7 @@ def test_each_sensor_has_two_real_parts():
 
 @pytest.mark.parametrize(("name", "part"), PARTS)
 def test_spectrum_above_wander_is_stated_density(name, part):
-    """The one-sided power spectral density from a quarter of the Nyquist frequency on, to 4 %."""
+    """One-sided power spectral density above a quarter of the Nyquist frequency, within 4 %."""
     p = registry.sensors()[name].PRESETS[part]
     densities, fine = DENSITIES[name](p)
     f, power = welch(record(name, p._replace(**fine), 60_000, truth=UP), p.rate, nperseg=512, axis=0)
@@ -93,7 +93,7 @@ def test_flow_camera_of_data_sheet():
 
 
 @pytest.mark.long
-def test_command_flies_with_second_parts(tmp_path):
+def test_run_command_flies_with_second_presets(tmp_path):
     parts = {
         "barometer": "dps422", "sonar": "hc_sr04", "rangefinder": "tfmini", "airspeed": "ms4525do",
         "optical_flow": "paw3902", "gps": "standard", "magnetometer": "hmc5883l", "imu": "bmi088",

@@ -1,4 +1,4 @@
-"""Sensors are found, their presets hold together, and bad tables are refused in one line."""
+"""Registry of sensors: discovery, valid presets, and one-line errors for invalid tables."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.sensors import registry
 
 
-def test_sensors_of_folder_are_found():
+def test_sensors_of_folder_are_discovered():
     assert set(registry.sensors()) == {
         "airspeed",
         "barometer",
@@ -56,7 +56,7 @@ def test_invalid_table_error_is_one_line(table, words):
 
 
 @pytest.mark.parametrize(
-    ("sensor", "table", "said"),
+    ("sensor", "table", "message"),
     [
         ("imu", {"gyro": {"noise_dps_per_sqrt_hz": float("inf")}}, "imu.gyro.noise_dps_per_sqrt_hz: expected a finite"),
         ("airspeed", {"scale_error": float("nan")}, "airspeed.scale_error: expected a number at least 0 and below 1"),
@@ -65,8 +65,8 @@ def test_invalid_table_error_is_one_line(table, words):
         ("optical_flow", {"range_min": 31.0}, "optical_flow.range_min: expected less than range_max = 30 m, got 31"),
     ],
 )
-def test_numbers_that_would_spoil_every_reading_are_refused(sensor, table, text):
-    with pytest.raises(ConfigError, match=text):
+def test_invalid_limit_is_rejected(sensor, table, message):
+    with pytest.raises(ConfigError, match=message):
         registry.parameters(sensor, table, 0.004)
 
 
@@ -79,7 +79,7 @@ def test_unknown_sensor_lists_choices():
         registry.parameters("radar", {}, 0.004)
 
 
-def test_satellites_that_give_no_position_are_refused():
+def test_satellites_without_position_are_rejected():
     few = [{"azimuth_deg": a, "elevation_deg": 45.0} for a in (0.0, 120.0, 240.0)]
     with pytest.raises(ValueError, match=r"gps.sky: expected 4 or more, .* got 3 satellites"):
         registry.parameters("gps", {"sky": few}, 0.004)

@@ -80,7 +80,7 @@ def test_directions_are_those_of_rotated_orbits(time):
 
 
 def test_constellation_repeats_after_stated_17_revolutions_in_10_days():
-    """Galileo's ground track repeats after 17 revolutions in 10 sidereal days, to the drift of its real orbits."""
+    """Galileo's ground track repeats after 17 revolutions in 10 sidereal days, within the drift of its real orbits."""
     day = 2.0 * math.pi / satellites.EARTH_RATE
     first = np.array([satellites.direction(GALILEO, HOME, k, 0.0) for k in range(24)])
     again = np.array([satellites.direction(GALILEO, HOME, k, 10.0 * day) for k in range(24)])
@@ -98,10 +98,10 @@ def test_dilution_over_a_day_is_that_of_full_constellation():
     assert len(np.unique(np.round(pdop, 3))) > 100  # varies
     directions = [look_angles(GALILEO, 600.0 * k) for k in (0, 50, 100)]
     for k, d in zip((0, 50, 100), directions, strict=True):
-        seen = d[d[:, 2] > math.sin(math.radians(5.0))]
-        rows = np.column_stack([seen, np.ones(len(seen))])
+        visible = d[d[:, 2] > math.sin(math.radians(5.0))]
+        rows = np.column_stack([visible, np.ones(len(visible))])
         expected = np.diag(np.linalg.inv(rows.T @ rows))
-        assert result[k].used == result[k].visible == len(seen)
+        assert result[k].used == result[k].visible == len(visible)
         assert result[k].hdop == pytest.approx(math.sqrt(expected[0] + expected[1]), rel=1e-6)
         assert result[k].vdop == pytest.approx(math.sqrt(expected[2]), rel=1e-6)
 
@@ -121,7 +121,7 @@ def test_errors_are_least_squares_of_range_errors():
 
 @pytest.mark.parametrize("preset", ["rtk", "standard"])
 def test_preset_has_its_horizontal_error_by_satellites_too(preset):
-    """Root mean square over a day, to 10 %."""
+    """Root mean square over a day, within 10 %."""
     p = gps.PRESETS[preset]
     result = readings(p._replace(constellation=GALILEO, latency_samples=0, rate=1.0 / 600.0), 144)
     variance = np.mean([r.hdop**2 for r in result]) * np.square((p.range_correlated_error, p.range_noise_m_per_sqrt_hz))
@@ -130,7 +130,7 @@ def test_preset_has_its_horizontal_error_by_satellites_too(preset):
 
 
 def test_position_jumps_when_a_satellite_leaves():
-    """The jump is the difference of the two least-squares solutions; in between the errors only wander."""
+    """The jump is the difference of the two least-squares solutions; between jumps the errors change continuously."""
     p = gps.Gps(constellation=GALILEO, range_correlated_error=3.0, correlation_time=1e9, rate=0.1)
     result = readings(p, 1000)
     steps = np.linalg.norm(np.diff(places(result), axis=0), axis=1)
@@ -142,7 +142,7 @@ def test_position_jumps_when_a_satellite_leaves():
 
 @pytest.mark.long
 def test_building_hides_satellites_behind_it():
-    """North of a wide, high box only satellites above its edge or in the northern half are left."""
+    """North of a wide, high box only satellites above its edge or in the northern half are visible."""
     block = relief(boxes=[(0.0, -60.0, 400.0, 100.0, 0.0, 60.0)])
     at = (0.0, 0.0, 1.0)
     p = gps.Gps(constellation=GALILEO)
@@ -156,17 +156,17 @@ def test_building_hides_satellites_behind_it():
 
 
 def test_detour_is_path_of_image_antenna():
-    """Box wall at x = 10: the antenna's image is at x = 20 - x; the way is longer by (image - antenna) . u."""
+    """Box wall at x = 10: the antenna's image is at x = 20 - x; the path is longer by (image - antenna) . u."""
     wall = np.array([15.0, 0.0, 1.0, 0.0, 5.0, 30.0, 40.0])
     antenna, towards = np.array([4.0, 3.0, 1.5]), np.array([-0.6, 0.2, math.sqrt(1 - 0.4)])
     image = antenna * [-1, 1, 1] + [20.0, 0.0, 0.0]
     expected = (antenna - image) @ towards
     assert multipath.detour(wall, tuple(antenna), tuple(towards), False) == pytest.approx(expected)
     assert multipath.detour(wall, tuple(antenna), (0.6, 0.2, towards[2]), False) == 0.0  # from behind the wall
-    turned = np.array([0.0, 15.0, 0.0, 1.0, 5.0, 30.0, 40.0])  # the same wall across y
+    rotated_box = np.array([0.0, 15.0, 0.0, 1.0, 5.0, 30.0, 40.0])  # the same wall across y
     a, u = (-3.0, 4.0, 1.5), (-0.2, -0.6, towards[2])
-    assert multipath.detour(turned, a, u, False) == pytest.approx(expected)
-    low = np.array([*wall[:6], 8.0])  # reflected over its top
+    assert multipath.detour(rotated_box, a, u, False) == pytest.approx(expected)
+    low = np.array([*wall[:6], 8.0])  # above its top
     assert multipath.detour(low, tuple(antenna), tuple(towards), False) == 0.0
 
 
@@ -199,11 +199,11 @@ def test_long_range_of_satellite_overhead_lowers_fix():
     for k in (int(np.argmax(d[:, 2])), int(np.argmin(np.where(d[:, 2] > 0.1, d[:, 2], 9.0)))):
         errors = np.zeros((8, 3))
         errors[k // 3, k % 3] = 1.0
-        drawn = tuple((float(x), float(y), float(z)) for x, y, z in errors)
-        fix = satellites.solution(c, HOME, LEVEL, ZERO, 0.0, drawn, 1.0, 0.0, False, KEY, 0)
-        seen = d[d[:, 2] > math.sin(math.radians(5.0))]
-        rows = np.column_stack([-seen, np.ones(len(seen))])
-        expected = np.linalg.lstsq(rows, (seen == d[k]).all(axis=1).astype(float), rcond=None)[0][:3]
+        range_errors = tuple((float(x), float(y), float(z)) for x, y, z in errors)
+        fix = satellites.solution(c, HOME, LEVEL, ZERO, 0.0, range_errors, 1.0, 0.0, False, KEY, 0)
+        visible = d[d[:, 2] > math.sin(math.radians(5.0))]
+        rows = np.column_stack([-visible, np.ones(len(visible))])
+        expected = np.linalg.lstsq(rows, (visible == d[k]).all(axis=1).astype(float), rcond=None)[0][:3]
         np.testing.assert_allclose(fix.error, expected, atol=1e-9)
         assert np.dot(fix.error, d[k]) < 0.0
 
@@ -282,7 +282,7 @@ def test_wrong_options_are_rejected(table, message):
 
 def test_constellation_excludes_sky():
     sky = [{"azimuth_deg": a, "elevation_deg": e} for a, e in ((0.0, 45.0), (120.0, 45.0), (240.0, 45.0), (60.0, 90.0))]
-    with pytest.raises(ConfigError, match=r"gps.constellation: is given with sky; expected one of them"):
+    with pytest.raises(ConfigError, match=r"gps.constellation: cannot be combined with sky; expected one of them"):
         registry.parameters("gps", {"sky": sky, "constellation": {}}, 0.004)
 
 

@@ -22,7 +22,7 @@ BUMPS = relief(bump_height=0.5, bump_length=8.0, boxes=[(6.0, 1.0, 2.0, 3.0, 0.7
 
 @pytest.mark.parametrize("terrain", [OBSTACLES, BUMPS], ids=["obstacles", "bumps"])
 def test_cast_equals_ray_march(terrain):
-    """The march steps over what is narrower than 2 cm: a few grazing rays may differ."""
+    """The march misses parts narrower than 2 cm: a few grazing rays may differ."""
     random = np.random.default_rng(1)
     differences = []
     for _ in range(400):
@@ -56,7 +56,7 @@ def test_rays_cover_circle_once():
 
 
 def test_depth_of_level_ground_is_height():
-    """A camera that looks straight down sees the same depth in all pixels."""
+    """A camera that points straight down has the same depth in all pixels."""
     p = depth_camera.DepthCamera(width=8, height=6, pitch_deg=90.0)
     directions, cosines = depth_camera.pixels(p)
     out = np.empty(len(directions))

@@ -58,11 +58,11 @@ def path(tmp_path, vehicle="wing", *overrides):
     ].parameters.core  # fmt: skip
 
 
-def at(core, tick):
+def follower_setpoint(core, tick):
     return step(core, 0.0, tick, ())[1][0]
 
 
-def leading(core, tick):
+def leader_setpoint(core, tick):
     from lapwing.services.trajectory import block as own
 
     return own.step(core.leader, 0.0, tick, ())[1][0]
@@ -70,21 +70,21 @@ def leading(core, tick):
 
 def test_follower_keeps_its_place_relative_to_leader(tmp_path):
     core = path(tmp_path)
-    start, end = at(core, 0), at(core, 2500)
+    start, end = follower_setpoint(core, 0), follower_setpoint(core, 2500)
     assert start.position_world[:2] == pytest.approx((-2.0, 1.5))
     x, y = -3.0 + 1.0, 1.0
-    turned = (math.cos(1.5) * x - math.sin(1.5) * y, math.sin(1.5) * x + math.cos(1.5) * y)
-    assert end.position_world[:2] == pytest.approx((6.0 + turned[0], 0.5 + turned[1]))
-    assert end.position_world[2] == pytest.approx(start.position_world[2])  # it stands on its own feet
+    rotated = (math.cos(1.5) * x - math.sin(1.5) * y, math.sin(1.5) * x + math.cos(1.5) * y)
+    assert end.position_world[:2] == pytest.approx((6.0 + rotated[0], 0.5 + rotated[1]))
+    assert end.position_world[2] == pytest.approx(start.position_world[2])  # on its own resting height
     assert end.yaw == pytest.approx(1.8)
-    assert (at(core, 1400).final, at(core, 1600).final) == (False, True)
-    assert [at(core, tick).phase for tick in (0, 800)] == [0, 1]
+    assert (follower_setpoint(core, 1400).final, follower_setpoint(core, 1600).final) == (False, True)
+    assert [follower_setpoint(core, tick).phase for tick in (0, 800)] == [0, 1]
 
 
 def test_world_frame_displacement_does_not_rotate(tmp_path):
     core = path(tmp_path, "wing", "vehicle.1.trajectory.frame=world")
     for tick in (0, 900, 1300, 2500):
-        apart = np.subtract(at(core, tick).position_world, leading(core, tick).position_world)
+        apart = np.subtract(follower_setpoint(core, tick).position_world, leader_setpoint(core, tick).position_world)
         assert apart[1] == pytest.approx(1.0)
     assert apart[0] == pytest.approx(-2.0)
 
@@ -92,7 +92,7 @@ def test_world_frame_displacement_does_not_rotate(tmp_path):
 @pytest.mark.parametrize("tick", [700, 900, 1100, 1300])
 def test_follower_derivatives_match_finite_differences(tmp_path, tick):
     core, h = path(tmp_path), 0.004
-    before, now, after = (at(core, tick + k) for k in (-1, 0, 1))
+    before, now, after = (follower_setpoint(core, tick + k) for k in (-1, 0, 1))
     for value, slope in (("position_world", "velocity_world"), ("velocity_world", "acceleration_world")):
         result = np.subtract(getattr(after, value), getattr(before, value)) / (2.0 * h)
         assert getattr(now, slope) == pytest.approx(result, abs=2e-4)
@@ -103,7 +103,7 @@ def test_follower_setpoint_follows_leader(tmp_path):
     scene = parse(tmp_path / "two.toml", SCENE)
     flight = fly(resolve(scene))
     reported, core = flight.view("wing/setpoint"), path(tmp_path)
-    assert reported.position[400] == pytest.approx(at(core, 400).position_world)
+    assert reported.position[400] == pytest.approx(follower_setpoint(core, 400).position_world)
     assert flight.messages("wing/setpoint")[400].phase == "beside"
     assert flight.view("wing/ground_truth").position[-1] == pytest.approx(reported.position[-1], abs=0.15)
 
@@ -131,7 +131,7 @@ def test_phases_equal_to_leaders_are_rejected(tmp_path):
 
 
 @pytest.mark.parametrize(("duration", "cut_short"), [(2.0, True), (7.5, True), (9.0, False)])
-def test_short_run_is_no_failure_of_follower(tmp_path, duration, cut_short):
+def test_short_run_of_follower_completes(tmp_path, duration, cut_short):
     """The leader ends its trajectory at 8 s, the follower its displacement at 5 s."""
     setup = resolve(parse(tmp_path / "two.toml", SCENE, [f"run.duration={duration}"]))
     for name in ("leader", "wing"):

@@ -29,7 +29,7 @@ TURN = math.pi / 2 / 0.3
 
 
 def compile(tables: dict, *origin) -> CompiledTrajectory:
-    """Compile the trajectory of scene tables."""
+    """Return the compiled trajectory of scene tables."""
     return trajectory_compiler.compile(Phases.model_validate(tables), *origin)
 
 
@@ -62,7 +62,7 @@ def test_phase_lasts_as_long_as_its_longest_channel():
     assert evaluate(parameters, 12.0, 0).velocity_world == (0.0, 0.0, 0.0)
 
 
-def test_step_jumps_in_no_time():
+def test_step_is_instantaneous():
     parameters, _, duration, _ = compile(
         {"phase": [{"name": "a", "duration": 1.0}, {"name": "b", "x": {"kind": "step", "to": 2.0}}]}
     )

@@ -38,7 +38,7 @@ def scene(folder, module=MODULE, name="line", **keys):
     return load(path, {"trajectory.phase": phases, "run.duration": 1.0})
 
 
-def test_user_segment_flies_like_shipped_one_without_its_file(tmp_path):
+def test_user_segment_equals_shipped_kind_without_file(tmp_path):
     shipped, own = scene(tmp_path, name=""), scene(tmp_path)
     (tmp_path / "line.py").unlink()
     again = from_resolved(own.resolved, "hover")

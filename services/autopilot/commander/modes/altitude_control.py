@@ -18,7 +18,7 @@ class Mode(FlightMode):
         self._flight = AltitudeFlight(guidance) if guidance.flying else None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Follow the sticks; change mode without recent sticks."""
+        """Follow the sticks; change to hold or descend without recent sticks."""
         forward, left, up, yaw = (guidance.stick(k) for k in range(4))
         if up > 0.0:
             guidance.lift_off(constants, view)

@@ -12,7 +12,7 @@ RECOVERY_TIME = 1.0  # [s] of known position before the descent ends
 
 
 class Mode(FlightMode):
-    """Descend to the ground; if the position is known again, hold for the operator, or land."""
+    """Descend to the ground; once the position is known again, hold with an operator, land without."""
 
     needs_flight, needs_position = True, False
 

@@ -18,9 +18,9 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._target = fill_in(guidance.smoothing.position, vector(values, 0))
         if not all(map(math.isfinite, self._target)) or self._target[2] <= constants.resting_height:
-            raise ValueError("go to: expected a place above the ground")
+            raise ValueError("go to: expected a position above the ground")
         if not guidance.allows(constants, self._target):
-            raise ValueError("go to: the place is outside of the fence")
+            raise ValueError("go to: the position is outside of the fence")
         self._leg = Leg(guidance.smoothing.position, self._target)
         self._yaw, speed = value(values, 3), value(values, 4)
         if speed > 0.0:

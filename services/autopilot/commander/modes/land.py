@@ -24,7 +24,7 @@ class Mode(FlightMode):
     needs_flight = True
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        self._place: tuple[float, float] | None = None
+        self._position: tuple[float, float] | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Stop horizontally and descend."""
@@ -33,12 +33,12 @@ class Mode(FlightMode):
         smoothing, limits = guidance.smoothing, guidance.limits
         x, y, z = smoothing.position
         speed = descent_speed(constants, guidance, z)
-        slowed = limits._replace(down=speed)
-        if self._place is None:
+        descent_limits = limits._replace(down=speed)
+        if self._position is None:
             vx, vy, _ = ZERO
             if abs(smoothing.velocity[0]) + abs(smoothing.velocity[1]) < STOPPED:
-                self._place = (x, y)
+                self._position = (x, y)
         else:
-            vx, vy, _ = smoothing.velocity_to((*self._place, z), slowed)
-        smoothing.move_at((vx, vy, -speed), slowed, view.dt)
+            vx, vy, _ = smoothing.velocity_to((*self._position, z), descent_limits)
+        smoothing.move_at((vx, vy, -speed), descent_limits, view.dt)
         smoothing.turn_at(0.0, limits, view.dt)

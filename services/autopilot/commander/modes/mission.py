@@ -8,7 +8,7 @@ from lapwing.dynamics.vector import ZERO, Vec3, norm, subtract
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.commander.leg import Leg, Place, passing_speed
+from lapwing.services.autopilot.commander.leg import Leg, Waypoint, passing_speed
 from lapwing.services.autopilot.commander.modes import land, return_, takeoff
 from lapwing.services.autopilot.commander.route import GRAB, INSTANT, TO_PLACES
 from lapwing.services.autopilot.commander.smoothing import wrap_angle
@@ -18,7 +18,7 @@ ARRIVED = 0.05  # [m]
 EXACT_RADIUS = 0.2  # [m] maximum acceptance radius for waiting or landing
 LANDED_TIME = 1.0  # [s] on the ground before the next item
 FORESIGHT = 32  # items searched for the next positions
-_NOT_GIVEN = (math.nan, math.nan, math.nan)
+_NO_POSITION = (math.nan, math.nan, math.nan)
 
 
 class Mode(FlightMode):
@@ -27,7 +27,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         route = guidance.route
         if not route.items:
-            raise ValueError("mission: there is none; upload one first")
+            raise ValueError("mission: no mission is uploaded; upload one first")
         first = value(values, 0)
         if math.isfinite(first) and first >= 0.0:
             route.select(int(first))
@@ -111,7 +111,7 @@ class Mode(FlightMode):
             and norm(subtract(self._last_waypoint, here)) < 2.0 * guidance.parameters["NAV_ACC_RAD"]
         ):
             start = self._last_waypoint
-        ahead: list[Place] = [(target, _radius(guidance, item))]
+        ahead: list[Waypoint] = [(target, _radius(guidance, item))]
         before = item
         for after in islice(guidance.route.following(), FORESIGHT):
             if _instant(after):
@@ -179,7 +179,7 @@ def _instant(item: Any) -> bool:
 
 def _place(item: Any, here: Vec3) -> Vec3:
     """Return the position of an item [m]; missing coordinates are those of `here`."""
-    requested = tuple(item.position) if item.action in (*TO_PLACES, "land") else _NOT_GIVEN
+    requested = tuple(item.position) if item.action in (*TO_PLACES, "land") else _NO_POSITION
     x, y, z = fill_in(here, requested)
     return x, y, here[2] if item.action in ("land", "loiter_to_alt") else z  # horizontally first
 

@@ -18,12 +18,12 @@ SINKING = 1.0  # [m/s] minimum descent setpoint with motors off, which enables l
 
 
 class Mode(FlightMode):
-    """Follows the newest setpoint; a failsafe handles their loss."""
+    """Follows the newest setpoint; a failsafe handles the loss of setpoints."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         if not guidance.offboard_available:
-            refused = guidance.inputs.offboard_refused
-            raise ValueError(f"offboard: no setpoints received{refused and f'; the last was rejected: {refused}'}")
+            rejection = guidance.inputs.offboard_rejection
+            raise ValueError(f"offboard: no setpoints received{rejection and f'; the last was rejected: {rejection}'}")
         self._attitude: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
@@ -84,10 +84,10 @@ class Mode(FlightMode):
         if math.isnan(q.w):
             flight.turn(rates, guidance, view.dt)
         elif math.isnan(value(values, 6)):
-            flight.take(q, guidance)
+            flight.set_attitude(q, guidance)
         else:
             roll, pitch, _ = to_roll_pitch_yaw(q)
-            flight.take(from_roll_pitch_yaw(roll, pitch, flight.yaw + rates[2] * view.dt), guidance)
+            flight.set_attitude(from_roll_pitch_yaw(roll, pitch, flight.yaw + rates[2] * view.dt), guidance)
         return flight.setpoint(
             constants, view, guidance, rates[2], thrust, 0.0 if math.isnan(climb_rate) else climb_rate
         )
@@ -99,12 +99,12 @@ def _follow_position(
     """Move the setpoint by position [m], velocity [m/s] and acceleration [m/s^2]; NaN means missing."""
     smoothing, limits = guidance.smoothing, guidance.limits
     approach = smoothing.velocity_to(fill_in(smoothing.position, position), limits)
-    gained = scale(ACCELERATION_TIME, clamp_norm(_or_zero(acceleration), limits.acceleration))
+    velocity_change = scale(ACCELERATION_TIME, clamp_norm(_or_zero(acceleration), limits.acceleration))
     x, y, z = (
         v if math.isnan(p) and math.isnan(requested) and not math.isnan(a) else 0.0
         for v, p, requested, a in zip(smoothing.velocity, position, velocity, acceleration, strict=True)
     )  # an acceleration alone adds to the present velocity
-    smoothing.move_at(add(add(approach, _or_zero(velocity)), add(gained, (x, y, z))), limits, view.dt)
+    smoothing.move_at(add(add(approach, _or_zero(velocity)), add(velocity_change, (x, y, z))), limits, view.dt)
 
 
 def _or_zero(v: Vec3) -> Vec3:

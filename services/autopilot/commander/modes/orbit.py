@@ -11,7 +11,7 @@ NAME = "orbit"
 TO_CENTRE, INITIAL, FREE, TANGENT, STICKS, UNCHANGED = range(6)  # ORBIT_YAW_BEHAVIOUR
 RADIUS, LEAST_RADIUS, MOST_RADIUS = 10.0, 1.0, 1000.0  # [m]
 SPEED, MOST_ACCELERATION = 1.0, 2.0  # [m/s], [m/s^2] towards the centre
-GAIN = 1.0  # [1/s] speed towards the circle over the distance from it
+GAIN = 1.0  # [1/s] speed towards the circle over distance
 
 
 class Mode(FlightMode):
@@ -26,7 +26,7 @@ class Mode(FlightMode):
         if not LEAST_RADIUS <= self._radius <= MOST_RADIUS:
             raise ValueError(f"orbit: expected a radius from {LEAST_RADIUS:g} to {MOST_RADIUS:g} m")
         if not all(map(math.isfinite, self._centre)) or self._centre[2] <= constants.resting_height:
-            raise ValueError("orbit: expected a place above the ground")
+            raise ValueError("orbit: expected a position above the ground")
         limit = min(math.sqrt(MOST_ACCELERATION * self._radius), guidance.limits.horizontal)
         self._speed = max(-limit, min(limit, -SPEED if math.isnan(speed) else speed))
         self._behaviour = TO_CENTRE if math.isnan(behaviour) or behaviour == UNCHANGED else int(behaviour)

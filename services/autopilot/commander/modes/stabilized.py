@@ -21,7 +21,7 @@ class Mode(FlightMode):
         self._flight: AttitudeFlight | None = None
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> Setpoint | None:
-        """Follow the sticks; change mode without recent sticks."""
+        """Follow the sticks; change to hold or descend without recent sticks."""
         forward, left, up, turn = (guidance.stick(k) for k in range(4))
         thrust = stick_thrust(constants, up)
         if not guidance.flying:
@@ -40,5 +40,5 @@ class Mode(FlightMode):
     ) -> float:
         """Rotate the attitude for a tick. Return its yaw rate [rad/s]."""
         tilt, rate = guidance.manual_tilt, turn * math.radians(guidance.parameters["MPC_MAN_Y_MAX"])
-        flight.take(from_roll_pitch_yaw(-tilt * left, tilt * forward, flight.yaw + rate * view.dt), guidance)
+        flight.set_attitude(from_roll_pitch_yaw(-tilt * left, tilt * forward, flight.yaw + rate * view.dt), guidance)
         return rate

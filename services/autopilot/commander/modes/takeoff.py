@@ -18,9 +18,10 @@ class Mode(FlightMode):
         requested, ground = value(values, 0), constants.resting_height
         self._height = guidance.above_home(constants, "MIS_TAKEOFF_ALT") if math.isnan(requested) else requested
         if not ground < self._height <= MAXIMUM_TAKEOFF_HEIGHT:
-            raise ValueError(f"take-off: expected a height from {ground:g} to 1000 m, got {self._height:g} m")
+            limits = f"{ground:g} to {MAXIMUM_TAKEOFF_HEIGHT:g} m"
+            raise ValueError(f"take-off: expected a height from {limits}, got {self._height:g} m")
         if guidance.flying and guidance.smoothing.position[2] > self._height:
-            raise ValueError(f"take-off: is higher than {self._height:g} m already")
+            raise ValueError(f"take-off: the vehicle is already above {self._height:g} m")
         self._yaw = value(values, 1)
 
     @property

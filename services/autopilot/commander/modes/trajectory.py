@@ -8,7 +8,7 @@ NAME = "trajectory"
 
 
 class Mode(FlightMode):
-    """Trajectory mode; it cannot be entered again after it was left."""
+    """Trajectory mode, which cannot be entered again."""
 
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
-        raise ValueError("trajectory: the trajectory of the scene has been left")
+        raise ValueError("trajectory: the trajectory of the scene cannot be resumed")

@@ -61,6 +61,6 @@ def step(
 ) -> tuple[NavigationState, tuple[()], int]:
     """Correct the filter by the reading of the tick."""
     x = s.filter
-    if s.begun:
+    if s.started:
         x = update(p.filter, x, inputs[0].value)
-    return NavigationState(s.begun, x), (), CONTINUE
+    return NavigationState(s.started, x), (), CONTINUE

@@ -13,7 +13,7 @@ from lapwing.services.common.ports import EstimateCovariance
 class CovarianceOutput(NamedTuple):
     """Parameters of the block."""
 
-    like: EstimateCovariance  # any sample
+    like: EstimateCovariance  # prototype of the sample
 
 
 @kernel

@@ -25,6 +25,6 @@ def step(
 ) -> tuple[NavigationState, tuple[StateEstimate], int]:
     """Output the estimate at `tick`."""
     battery, flight = inputs
-    e = estimator.estimate(p.filter, s.filter) if s.begun else p.before
+    e = estimator.estimate(p.filter, s.filter) if s.started else p.before
     due = wakeup_due(p.wakeup, tick, e.health, battery, flight)
     return s, (e,), WAKE_PYTHON if due else CONTINUE

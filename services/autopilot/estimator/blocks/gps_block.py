@@ -14,7 +14,7 @@ class GpsFusion(NamedTuple):
 
     filter: Estimator
     age: int  # delay of a reading, in IMU readings
-    height_variance: float  # [m^2] added to its height; 0 if it is the height reference
+    height_variance: float  # [m^2] added to the height's variance; 0 for the height reference
 
 
 @always_inline
@@ -23,10 +23,12 @@ def step(
 ) -> tuple[NavigationState, tuple[()], int]:
     """Correct the filter by the reading of the tick."""
     r, x = inputs[0].value, s.filter
-    if s.begun:
+    if s.started:
         east, north, up = r.position_variance
-        doubted = (east, north, up + p.height_variance)
-        x = estimator.update_gps(p.filter, x, r.latitude_deg, r.longitude_deg, r.height, doubted, p.age, r.valid)
+        position_variance = (east, north, up + p.height_variance)
+        x = estimator.update_gps(
+            p.filter, x, r.latitude_deg, r.longitude_deg, r.height, position_variance, p.age, r.valid
+        )
         variance = r.velocity_variance if r.valid else -1.0
         x = estimator.update_gps_velocity(p.filter, x, r.velocity_world, variance, p.age, variance >= 0.0)
-    return NavigationState(s.begun, x), (), CONTINUE
+    return NavigationState(s.started, x), (), CONTINUE

@@ -1,4 +1,4 @@
-"""Reset of the inertial biases when another inertial measurement unit is used: its biases are its own."""
+"""Reset of the inertial biases at a switch to another inertial measurement unit."""
 
 from typing import NamedTuple
 
@@ -21,6 +21,6 @@ def step(
 ) -> tuple[NavigationState, tuple[()], int]:
     """Reset the biases at the tick of a switch."""
     x = s.filter
-    if s.begun and inputs[0].value.switched:
-        x = estimator.forget_imu(p.filter, x)
-    return NavigationState(s.begun, x), (), CONTINUE
+    if s.started and inputs[0].value.switched:
+        x = estimator.reset_imu_biases(p.filter, x)
+    return NavigationState(s.started, x), (), CONTINUE

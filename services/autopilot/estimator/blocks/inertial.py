@@ -29,7 +29,7 @@ def step(
 ) -> tuple[NavigationState, tuple[()], int]:
     """Start once the vehicle is at rest with a magnetometer reading; then predict to `tick`."""
     imu, magnetometer, flight = inputs
-    r, started, x = imu.value, s.begun, s.filter
+    r, started, x = imu.value, s.started, s.filter
     if not started:
         still = abs(norm(r.specific_force_body) - p.filter.gravity) < STANDSTILL_RATIO * p.filter.gravity
         if magnetometer.due and still:

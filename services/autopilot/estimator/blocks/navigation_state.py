@@ -8,9 +8,9 @@ from lapwing.services.autopilot.estimator.filter_state import Inertial, Nominal,
 
 
 class NavigationState(NamedTuple):
-    """The filter and a flag for its start."""
+    """State of the filter, and whether it has started."""
 
-    begun: bool
+    started: bool
     filter: State  # undefined before the start
 
 

@@ -1,4 +1,4 @@
-"""Fusion of the sonar as height reference, which makes the height one above ground."""
+"""Fusion of the sonar as height reference: the estimated height is above the ground."""
 
 import math
 from typing import NamedTuple
@@ -22,8 +22,8 @@ def step(
 ) -> tuple[NavigationState, tuple[()], int]:
     """Correct the filter by the reading of the tick."""
     r, x = inputs[0].value, s.filter
-    if s.begun:
+    if s.started:
         if r.valid and not math.isinf(r.range):
             estimator.follow_ground(p.filter, x)
         x = estimator.update_sonar(p.filter, x, r.range, r.variance, r.valid)
-    return NavigationState(s.begun, x), (), CONTINUE
+    return NavigationState(s.started, x), (), CONTINUE

@@ -1,4 +1,4 @@
-"""From tick to tick, without a controller: what is asked for, and that the state is all that is remembered."""
+"""Commander without a controller: outputs by tick, and completeness of its state."""
 
 import copy
 import pickle
@@ -17,7 +17,7 @@ GPS_LOST = 1 << 1
 
 
 def in_the_air(*commands):
-    """A session that has taken off to 3 m and then got these commands."""
+    """Return a session after take-off to 3 m and these commands."""
     session = Session(WAITING)
     session.step(estimate=GROUND, commands=(command("arm"), command("takeoff", 3.0)))
     session.run(6.0)
@@ -30,7 +30,7 @@ def route():
 
 
 @pytest.mark.parametrize(
-    "given",
+    "mode_command",
     [
         command("goto", 9.0, 0.0, 3.0),
         command("land"),
@@ -41,8 +41,8 @@ def route():
     ],
     ids=lambda c: c.kind,
 )
-def test_copied_and_pickled_state_behave_alike(inputs):
-    session = in_the_air(inputs, command("manual", 0.3, 0.2, 0.1, 0.4))
+def test_copied_and_pickled_state_behave_alike(mode_command):
+    session = in_the_air(mode_command, command("manual", 0.3, 0.2, 0.1, 0.4))
     session.run(0.5)
     copied, pickled = copy.deepcopy(session.commander.state), pickle.loads(pickle.dumps(session.commander.state))
     others = [Commander(WAITING, copied), Commander(WAITING, pickled)]
@@ -131,7 +131,7 @@ def test_unreachable_takeoff_item_is_skipped():
     session.run(8.0)
     items = [item("takeoff"), item("waypoint", 9.0, 2.0, 4.0)]
     session.step(commands=(command("mission_upload", items=items), command("mission")))
-    assert session.run(0.1).status.mission_current == 1  # higher than the item asks for already
+    assert session.run(0.1).status.mission_current == 1  # already above the item's altitude
     session.step(commands=(command("mission_upload", items=[item("takeoff", z=2000.0)]),))
     assert session.acknowledgements[-1].result == CommandAck.DENIED
     assert session.texts[-1] == "item 0: expected a take-off to at most 1000 m"

@@ -1,4 +1,4 @@
-"""Missions from start to end, by a vehicle that is where it is asked to be."""
+"""Complete missions of a vehicle that follows its setpoint exactly."""
 
 import math
 from itertools import groupby
@@ -17,7 +17,7 @@ def mission(*items, **more):
     return Flight(command("mission_upload", items=items), *START, **more)
 
 
-def reached(flight):
+def reached_items(flight):
     return [number for number, _ in groupby(s.mission_reached for _, s in flight.track) if number != 65535]
 
 
@@ -31,19 +31,19 @@ def test_landed_mission_completes_disarms_and_repeats(last):
         assert (flight.status.mission_current, flight.status.mission_reached) == (2, 2)
         assert flight.status.mode == "hold"
         assert max(s.mission_current for _, s in flight.track) == 2
-        flight.told(*START)
+        flight.send(*START)
         assert (flight.status.mission_state, flight.status.mission_current) == (3, 0)
-    assert reached(flight) == [0, 1, 2] * 2
+    assert reached_items(flight) == [0, 1, 2] * 2
 
 
 def test_mission_is_started_and_armed_by_one_command():
     items = item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0), item("land")
-    flight = Flight(command("mission_upload", items=items)).told(command("mission_start", 1.0))
+    flight = Flight(command("mission_upload", items=items)).send(command("mission_start", 1.0))
     assert (flight.status.mode, flight.status.armed, flight.status.mission_current) == ("mission", True, 1)
     assert flight.until(lambda s: s.mission_state == 5)
     other = Flight(command("mission_start"))
     assert not other.status.armed
-    assert other.texts == ["mission: there is none; upload one first"]
+    assert other.texts == ["mission: no mission is uploaded; upload one first"]
 
 
 def test_mission_continues_after_landing_without_disarming():
@@ -53,7 +53,7 @@ def test_mission_continues_after_landing_without_disarming():
     )  # fmt: skip
     assert flight.until(lambda s: s.mission_state == 5)
     assert all(s.armed for _, s in flight.track)
-    assert reached(flight) == [0, 1, 2, 3, 4]
+    assert reached_items(flight) == [0, 1, 2, 3, 4]
     assert flight.setpoint.position_world == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
 
 
@@ -75,7 +75,7 @@ def test_line_has_no_braking_and_corner_keeps_radius():
     assert flight.setpoint.position_world == pytest.approx((60.0, 40.0, 3.0), abs=0.1)
 
 
-def test_item_that_waits_is_stopped_at():
+def test_vehicle_stops_at_item_with_hold_time():
     flight = mission(
         item("takeoff", z=3.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0), item("waypoint", 40.0, 0.0, 3.0)
     )
@@ -95,7 +95,7 @@ def test_heading_follows_yaw_mode_parameter(mode, yaw):
     assert math.cos(flight.setpoint.yaw - yaw) > math.cos(0.5)
 
 
-def test_items_own_yaw_goes_before_and_must_be_reached():
+def test_item_yaw_overrides_heading_and_must_be_reached():
     flight = mission(item("takeoff", z=3.0), item("waypoint", 6.0, 0.0, 3.0, yaw=2.0), item("waypoint", 9.0, 0.0, 3.0))
     assert flight.until(lambda s: s.mission_current == 2)
     assert flight.setpoint.yaw == pytest.approx(2.0, abs=math.radians(12.0))
@@ -105,15 +105,15 @@ def test_mission_speed_ends_with_mission():
     flight = mission(item("takeoff", z=3.0), item("speed", values=(2.0,)), item("waypoint", 20.0, 0.0, 3.0))
     assert flight.until(lambda s: s.mission_state == 5)
     assert max(flight.speeds((10.0, 0.0), 3.0)) == pytest.approx(2.0, abs=0.01)
-    flight.told(command("goto", 60.0, 0.0, 3.0)).on(20.0)
+    flight.send(command("goto", 60.0, 0.0, 3.0)).fly_for(20.0)
     assert max(flight.speeds((40.0, 0.0), 3.0)) == pytest.approx(5.0, abs=0.01)
 
 
 def test_heights_are_relative_to_home():
     flight = Flight(command("takeoff"), command("arm"))
     assert flight.until(lambda s: s.mode == "hold")
-    assert flight.on(2.0).setpoint.position_world[2] == pytest.approx(2.85, abs=0.05)
-    flight.told(command("goto", 30.0, 0.0, 3.0)).on(12.0).told(command("return")).on(10.0)
+    assert flight.fly_for(2.0).setpoint.position_world[2] == pytest.approx(2.85, abs=0.05)
+    flight.send(command("goto", 30.0, 0.0, 3.0)).fly_for(12.0).send(command("return")).fly_for(10.0)
     assert flight.setpoint.position_world[2] == pytest.approx(15.35, abs=0.05)
 
 
@@ -122,20 +122,20 @@ def test_item_without_effect_is_skipped():
     flight = mission(item("takeoff", z=3.0), *far)
     assert flight.until(lambda s: s.mission_state == 5)
     assert min(flight.speeds((15.0, 0.0), 1.0)) > 4.9
-    assert reached(flight)[-1] == 9
+    assert reached_items(flight)[-1] == 9
 
 
-def test_loiter_to_altitude_and_for_ever():
+def test_loiter_to_altitude_and_unlimited():
     flight = mission(item("takeoff", z=3.0), item("loiter_to_alt", 9.0, 0.0, 8.0), item("loiter", 9.0, 9.0, 8.0))
     assert flight.until(lambda s: s.mission_current == 2)
     over = [s.position_world for s, _ in flight.track if s.position_world[2] > 3.2]
-    assert all(math.dist(p[:2], (9.0, 0.0)) < 0.5 for p in over)  # first there, then up
-    flight.on(30.0)
+    assert all(math.dist(p[:2], (9.0, 0.0)) < 0.5 for p in over)  # horizontally first, then vertically
+    flight.fly_for(30.0)
     assert (flight.status.mission_current, flight.status.mission_state) == (2, 3)
     assert flight.setpoint.position_world == pytest.approx((9.0, 9.0, 8.0), abs=0.05)
 
 
-def test_nose_points_at_region_of_interest():
+def test_heading_follows_region_of_interest():
     flight = mission(
         item("takeoff", z=3.0), item("roi", 20.0, 20.0, 0.0), item("waypoint", 20.0, 0.0, 3.0, hold=1.0),
         item("roi"), item("waypoint", 40.0, 0.0, 3.0, hold=2.0),
@@ -144,11 +144,11 @@ def test_nose_points_at_region_of_interest():
     assert flight.setpoint.yaw == pytest.approx(0.5 * math.pi, abs=0.05)
     assert flight.until(lambda s: s.mission_state == 5)
     assert flight.setpoint.yaw == pytest.approx(0.0, abs=0.05)
-    flight.told(command("roi", 40.0, -30.0, 0.0)).on(6.0)
+    flight.send(command("roi", 40.0, -30.0, 0.0)).fly_for(6.0)
     assert flight.setpoint.yaw == pytest.approx(-0.5 * math.pi, abs=0.05)
 
 
-def test_conditions_are_waited_for_on_way():
+def test_conditions_delay_items_without_stop():
     for condition in (item("condition", radius=10.0), item("condition", hold=4.0)):
         flight = mission(
             item("takeoff", z=3.0), condition, item("speed", values=(2.0,)), item("waypoint", 40.0, 0.0, 3.0)
@@ -158,7 +158,7 @@ def test_conditions_are_waited_for_on_way():
         assert max(flight.speeds((36.0, 0.0), 1.0)) == pytest.approx(2.0, abs=0.2)
 
 
-def test_relative_turn_and_another_home():
+def test_mission_turns_relatively_and_sets_home():
     flight = mission(
         item("takeoff", z=3.0), item("waypoint", 0.0, 9.0, 3.0, hold=3.0), item("yaw", yaw=-1.0, values=(1.0,)),
         item("set_home"), item("waypoint", 9.0, 9.0, 3.0), item("return"), parameters={"MPC_YAW_MODE": 5},
@@ -172,14 +172,14 @@ def test_relative_turn_and_another_home():
 def test_orbit_faces_its_centre():
     flight = Flight(command("takeoff", 5.0), command("arm"))
     assert flight.until(lambda s: s.mode == "hold")
-    flight.told(command("orbit", 20.0, 0.0, 8.0, 8.0, 2.0)).on(25.0)
+    flight.send(command("orbit", 20.0, 0.0, 8.0, 8.0, 2.0)).fly_for(25.0)
     flight.track.clear()
-    flight.on(25.0)
+    flight.fly_for(25.0)
     places = [s.position_world for s, _ in flight.track]
     assert all(math.dist(p[:2], (20.0, 0.0)) == pytest.approx(8.0, abs=0.2) for p in places)
     assert all(p[2] == pytest.approx(8.0, abs=0.1) for p in places)
-    turned = [math.atan2(p[1], p[0] - 20.0) for p in places]
-    assert math.remainder(turned[250] - turned[0], 2.0 * math.pi) == pytest.approx(0.25, abs=0.03)  # to the left
-    facing = flight.setpoint.yaw - turned[-1] - math.pi
+    bearings = [math.atan2(p[1], p[0] - 20.0) for p in places]
+    assert math.remainder(bearings[250] - bearings[0], 2.0 * math.pi) == pytest.approx(0.25, abs=0.03)  # to the left
+    facing = flight.setpoint.yaw - bearings[-1] - math.pi
     assert math.cos(facing) > 0.9
     assert flight.status.mode == "orbit"

@@ -7,8 +7,8 @@ from lapwing.services.autopilot.estimator import SOURCES
 from lapwing.services.autopilot.initial_estimate import EXACT, NOT_STARTED
 
 
-def shown(bits, seconds, constants=CONSTANTS):
-    """The reasons after these bits of health for so long."""
+def blockers_after(bits, seconds, constants=CONSTANTS):
+    """Return the arming blockers after a time with these health bits."""
     session = Session(constants._replace(has_trajectory=False))
     session.step(estimate=EXACT, estimate_interval=0.02)
     for _ in range(round(seconds / 0.02)):
@@ -18,17 +18,17 @@ def shown(bits, seconds, constants=CONSTANTS):
 
 def test_only_absent_source_blocks_arming():
     for bit, name in enumerate(SOURCES):
-        assert shown(1 << bit, 0.1)[0] == []
-        assert shown(1 << bit, 1.0)[0] == [f"no good readings of the {name}"]
+        assert blockers_after(1 << bit, 0.1)[0] == []
+        assert blockers_after(1 << bit, 1.0)[0] == [f"no good readings of the {name}"]
 
 
-def test_uncertain_estimate_is_reason_at_once():
-    assert shown(64, 0.02)[0] == ["the position is uncertain"]
-    assert shown(128, 0.02)[0] == ["the attitude is uncertain"]
-    assert shown(NOT_STARTED, 0.02)[0] == ["the estimator has not started"]
+def test_uncertain_estimate_blocks_arming_immediately():
+    assert blockers_after(64, 0.02)[0] == ["the position is uncertain"]
+    assert blockers_after(128, 0.02)[0] == ["the attitude is uncertain"]
+    assert blockers_after(NOT_STARTED, 0.02)[0] == ["the estimator has not started"]
 
 
-def test_time_counts_at_new_estimates_alone():
+def test_outage_time_counts_only_new_estimates():
     session = Session(CONSTANTS._replace(has_trajectory=False))
     lost = EXACT._replace(health=1)
     for tick in range(1000):
@@ -36,7 +36,7 @@ def test_time_counts_at_new_estimates_alone():
     assert session.commander.state.source_outage[0] == pytest.approx(200 * 0.02)
 
 
-def test_without_operator_no_arming_or_timeouts():
-    blockers, outage = shown(1, 1.0, CONSTANTS._replace(has_operator=False))
+def test_commander_without_operator_has_no_arming_checks():
+    blockers, outage = blockers_after(1, 1.0, CONSTANTS._replace(has_operator=False))
     assert blockers == []
     assert outage == [0.0] * len(SOURCES)

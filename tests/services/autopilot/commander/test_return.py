@@ -1,4 +1,4 @@
-"""Returns: where to, how high, and round what."""
+"""Returns: goal, altitude, and path around the fence."""
 
 import itertools
 import math
@@ -25,7 +25,7 @@ def lengths(fence, start, goal):
     return sum(math.dist(a, b) for a, b in itertools.pairwise(way))
 
 
-def test_way_round_is_short_and_keeps_to_fence():
+def test_route_around_fence_is_short_and_inside():
     out = Fence(polygon("fence_exclusion", BOX))
     assert 38.0 < lengths(out, (30.0, 0.0), (0.0, 0.0)) < 42.0
     assert lengths(out, (30.0, 20.0), (0.0, 20.0)) == 30.0
@@ -37,17 +37,17 @@ def test_way_round_is_short_and_keeps_to_fence():
     assert lengths(bay, (35.0, 30.0), (0.0, 30.0)) > 70.0
 
 
-def away(*commands, **parameters):
+def session_away(*commands, **parameters):
     flight = Flight(command("takeoff", 5.0), command("arm"), parameters={"RTL_RETURN_ALT": 5.0} | parameters)
     assert flight.until(lambda s: s.mode == "hold")
-    return flight.told(*commands, command("goto", 30.0, 0.0, 5.0)).on(15.0)
+    return flight.send(*commands, command("goto", 30.0, 0.0, 5.0)).fly_for(15.0)
 
 
-def test_return_goes_round_fence():
+def test_return_flies_around_fence():
     fence = Fence(polygon("fence_exclusion", BOX))
-    flight = away()
+    flight = session_away()
     flight.track.clear()
-    flight.told(command("fence_upload", items=polygon("fence_exclusion", BOX)), command("return"))
+    flight.send(command("fence_upload", items=polygon("fence_exclusion", BOX)), command("return"))
     assert flight.until(lambda s: not s.armed)
     assert all(fence.allows(*s.position_world[:2]) for s, _ in flight.track)
     assert flight.setpoint.position_world[:2] == pytest.approx((0.0, 0.0), abs=0.3)
@@ -64,22 +64,22 @@ def test_return_goes_round_fence():
         (3, (80.0, 0.0), (0.0, 0.0)),
     ],
 )
-def test_return_obeys_its_type(kind, rally, end):
+def test_return_goal_follows_rtl_type(kind, rally, end):
     items = [item("takeoff", z=5.0), item("waypoint", 30.0, 20.0, 5.0), item("land", 30.0, 30.0, 0.0)]
-    flight = away(
+    flight = session_away(
         command("mission_upload", items=items),
         command("rally_upload", items=[item("rally", *rally, 5.0)]),
         RTL_TYPE=kind,
     )
-    flight.told(command("return"))
+    flight.send(command("return"))
     assert flight.until(lambda s: not s.armed)
     assert flight.setpoint.position_world[:2] == pytest.approx(end, abs=0.3)
     assert (min(flight.speeds((30.0, 20.0), 3.0), default=None) is None) == (kind not in (1, 2))
 
 
 def test_return_waits_at_configured_height():
-    flight = away(RTL_LAND_DELAY=5.0, RTL_DESCEND_ALT=3.0)
-    flight.told(command("return"))
+    flight = session_away(RTL_LAND_DELAY=5.0, RTL_DESCEND_ALT=3.0)
+    flight.send(command("return"))
     assert flight.until(lambda s: s.phase == "wait")
     assert flight.setpoint.position_world == pytest.approx((0.0, 0.0, 3.35), abs=0.35)
     start = flight.time

@@ -1,4 +1,4 @@
-"""The smoothed setpoint arrives, stops, and never breaks a limit on the way."""
+"""Position smoothing: the setpoint arrives, stops, and respects its limits."""
 
 import math
 
@@ -11,8 +11,8 @@ LIMITS = Limits(horizontal=5.0, up=3.0, down=1.5, acceleration=2.0, jerk=8.0, ya
 DT = 0.004
 
 
-def led(target, seconds, limits=LIMITS, start=(0.0, 0.0, 10.0), velocity=(0.0, 0.0, 0.0)):
-    """Positions, velocities, accelerations, each (n, 3)."""
+def moved_setpoint(target, seconds, limits=LIMITS, start=(0.0, 0.0, 10.0), velocity=(0.0, 0.0, 0.0)):
+    """Return positions, velocities and accelerations, each (n, 3)."""
     smoothing = PositionSmoothing(start, 0.0, velocity)
     rows = []
     for _ in range(round(seconds / DT)):
@@ -23,7 +23,7 @@ def led(target, seconds, limits=LIMITS, start=(0.0, 0.0, 10.0), velocity=(0.0, 0
 
 @pytest.mark.parametrize("target", [(30.0, 0.0, 10.0), (3.0, -4.0, 2.0), (0.2, 0.1, 10.3), (0.0, 0.0, 40.0)])
 def test_smoothing_has_no_overshoot_and_keeps_limits(target):
-    p, v, a = led(target, 40.0)
+    p, v, a = moved_setpoint(target, 40.0)
     assert p[-1] == pytest.approx(target, abs=1e-3)
     assert np.linalg.norm(v[-1]) < 1e-3
     assert np.hypot(v[:, 0], v[:, 1]).max() <= 5.0 * 1.01
@@ -36,18 +36,18 @@ def test_smoothing_has_no_overshoot_and_keeps_limits(target):
 
 
 def test_velocity_and_acceleration_are_derivatives():
-    p, v, a = led((10.0, 5.0, 12.0), 8.0)
+    p, v, a = moved_setpoint((10.0, 5.0, 12.0), 8.0)
     assert np.diff(p, axis=0) / DT == pytest.approx((v[1:] + v[:-1]) / 2.0, abs=1e-3)
     assert np.diff(v, axis=0) / DT == pytest.approx((a[1:] + a[:-1]) / 2.0, abs=1e-9)
 
 
 def test_smoothing_stops_from_full_speed():
-    p, _, _ = led((0.0, 0.0, 10.0), 20.0, velocity=(5.0, 0.0, 0.0))
+    p, _, _ = moved_setpoint((0.0, 0.0, 10.0), 20.0, velocity=(5.0, 0.0, 0.0))
     assert p[-1] == pytest.approx((0.0, 0.0, 10.0), abs=1e-3)
     assert p[:, 0].max() < 25.0 / 2.0 / 2.0 + 5.0
 
 
-def test_yaw_takes_shorter_way():
+def test_yaw_setpoint_turns_by_shortest_angle():
     smoothing = PositionSmoothing((0.0, 0.0, 1.0), 3.0)
     for _ in range(2000):
         smoothing.turn_to(-3.0, LIMITS, DT)

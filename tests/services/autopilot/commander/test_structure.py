@@ -1,4 +1,4 @@
-"""The parts of the commander import one way, and a mode is a module that the table names."""
+"""Structure of the commander: acyclic imports, and one module per mode of the table."""
 
 import ast
 from graphlib import TopologicalSorter
@@ -12,13 +12,13 @@ FOLDER, PACKAGE = Path(commander.__file__).parent, commander.__name__
 
 
 def modules():
-    """File by module name."""
+    """Return the files by module name."""
     names = {path: [PACKAGE, *path.relative_to(FOLDER).with_suffix("").parts] for path in FOLDER.rglob("*.py")}
     return {".".join(parts).removesuffix(".__init__"): path for path, parts in names.items()}
 
 
-def imported(path, known):
-    """Modules of the package that a file imports, wherever in it."""
+def imported_modules(path, known):
+    """Return the modules of the package that a file imports."""
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
             yield from {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)} & known
@@ -28,8 +28,8 @@ def imported(path, known):
 
 def test_imports_are_acyclic_and_below_commander():
     result = modules()
-    graph = {name: set(imported(path, set(result))) - {name} for name, path in result.items()}
-    order = list(TopologicalSorter(graph).static_order())  # CycleError names a cycle
+    graph = {name: set(imported_modules(path, set(result))) - {name} for name, path in result.items()}
+    order = list(TopologicalSorter(graph).static_order())  # raises CycleError, with the cycle
     assert len(order) == len(result) > 20
     assert [name for name in graph if f"{PACKAGE}.commander" in graph[name]] == []
     for name in graph:

@@ -1,4 +1,4 @@
-"""A commander that is called only where it has a say asks for the same, to the bit, as one called at every tick."""
+"""A commander called only at wake-ups has bit-for-bit the outputs of one called at every tick."""
 
 import math
 
@@ -25,7 +25,7 @@ GPS_LOST, ATTITUDE_UNSURE = 1 << 1, 128
 NAMES = ("FS_ESTIMATE_ACT", "FS_MOTOR_ACT", "FS_BAT_EMER_ACT", "FS_BAT_CRIT_ACT", "FS_BAT_LOW_ACT")
 
 SOUND = {"health": 0, "charge": 0.5, "motor": 0, "thrust": 1.0, "cut": False}
-"""A flight in which nothing is wrong."""
+"""A flight without failures."""
 deviations = st.sampled_from(
     [
         *({"health": bits} for bits in (1, GPS_LOST, GPS_LOST, 64, ATTITUDE_UNSURE, 255)),
@@ -35,7 +35,7 @@ deviations = st.sampled_from(
     ]
 )
 spells = st.tuples(st.integers(1, 40), st.one_of(st.just({}), deviations, st.tuples(deviations, deviations)))
-"""A number of ticks, and what is different from a sound flight."""
+"""A number of ticks, and differences to a flight without failures."""
 
 NEAR = [item("fence_circle_in", 0.0, 0.0, radius=20.0)]
 PLACES = [item("takeoff", z=3.0), item("waypoint", 4.0, 0.0, 3.0)]
@@ -63,7 +63,7 @@ COMMANDS = (
     command("offboard"),
 )
 orders = st.dictionaries(st.integers(0, 150), st.lists(st.sampled_from(COMMANDS), min_size=1, max_size=2), max_size=12)
-"""Commands by the tick at which they come."""
+"""Return the commands by tick."""
 
 
 def constants(actions, delay, operator=False):
@@ -74,7 +74,7 @@ def constants(actions, delay, operator=False):
 
 
 def plain(value):
-    """Any state as nested lists and tuples, to be compared."""
+    """Return a state as nested lists and tuples, for comparisons."""
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
     if isinstance(value, dict):
@@ -83,8 +83,8 @@ def plain(value):
 
 
 def views(flight, orders=()):
-    """(view, whether the estimate is due) of each tick; the estimate is that of the last look. Send each request."""
-    tick, shown, every_tick = 0, EXACT, False
+    """Yield (view, estimate is due) of each tick, with the estimate of the last wake-up. Send each output."""
+    tick, last_estimate, every_tick = 0, EXACT, False
     for ticks, different in flight:
         now = dict(SOUND)
         for each in different if isinstance(different, tuple) else (different,):
@@ -92,12 +92,12 @@ def views(flight, orders=()):
         for _ in range(ticks):
             due = tick % LOOK == 0 or every_tick
             if due:
-                shown = EXACT._replace(
+                last_estimate = EXACT._replace(
                     position_world=(float(tick), 0.1 * tick, 5.0 + 0.01 * tick), health=now["health"]
                 )
             view = VIEW._replace(
                 dt=DT,
-                estimate=shown,
+                estimate=last_estimate,
                 estimate_interval=(1 if every_tick else LOOK) * DT if due else 0.0,
                 battery_charge=now["charge"],
                 failed_motor=now["motor"],
@@ -112,41 +112,43 @@ def views(flight, orders=()):
 
 
 def skip(commander, missed):
-    """Let a commander take in views that it was not shown."""
+    """Advance a commander over views without a call."""
     flies = [view.thrust > 0.0 and not view.motors_cut for view in missed]
     flew = [view.setpoint for view, flying in zip(missed, flies, strict=True) if flying]
     commander.skip(len(missed), DT, flies[-1], flew[-1] if flew else None)
 
 
-UNSAID = {"acknowledgements": (), "texts": (), "parameters": None, "faults": None}
-"""Outputs sent once."""
+NO_MESSAGES = {"acknowledgements": (), "texts": (), "parameters": None, "faults": None}
+"""Return the outputs that are sent once."""
 
 
-def check_same(known, flight, orders=()):
-    """Fly with a commander that is called at every tick, and one that is called as seldom as it allows."""
-    always, seldom = Commander(known), Commander(known)
+def check_same(vehicle, flight, orders=()):
+    """Fly with a commander that is called at every tick, and one that is called only at wake-ups."""
+    dense, sparse = Commander(vehicle), Commander(vehicle)
     reported = views(flight, orders)
     view, due = next(reported)
     last, until, missed = None, 0.0, []
     while True:
-        expected = always.step(view)
-        thresholds = battery_thresholds(seldom.state.guidance.parameters)
+        expected = dense.step(view)
+        thresholds = battery_thresholds(sparse.state.guidance.parameters)
         conditions = view.estimate.health, view.battery_charge, view.failed_motor, due
-        operated = known.has_operator and (due or view.commands)
+        operated = vehicle.has_operator and (due or view.commands)
         if len(missed) + 1 >= until or operated or needs_wakeup(thresholds, *conditions):
-            if known.has_operator and missed:
-                skip(seldom, missed)
-            last = seldom.step(view)
+            if vehicle.has_operator and missed:
+                skip(sparse, missed)
+            last = sparse.step(view)
             missed, until = [], last.valid_for / DT if last.valid_for < math.inf else math.inf
             assert last.valid_for == 0.0 or last.setpoint is None
         else:
             missed.append(view)
             assert expected.acknowledgements == expected.texts == ()
-        assert repr(last._replace(valid_for=0.0, **UNSAID)) == repr(expected._replace(valid_for=0.0, **UNSAID))
+        assert repr(last._replace(valid_for=0.0, **NO_MESSAGES)) == repr(
+            expected._replace(valid_for=0.0, **NO_MESSAGES)
+        )
         if not missed:
             assert (last.acknowledgements, last.texts) == (expected.acknowledgements, expected.texts)
-            if known.has_operator or expected.status.mode != "mission":
-                assert plain(seldom.state) == plain(always.state)
+            if vehicle.has_operator or expected.status.mode != "mission":
+                assert plain(sparse.state) == plain(dense.state)
         try:
             view, due = reported.send(expected)
         except StopIteration:
@@ -180,7 +182,7 @@ SHORT_LINK = {3: [COMMANDS[0]], 5: [COMMANDS[3], COMMANDS[5]]}
 @example([(60, {})], (4,) * 5, 0.1, {17: [command("goto", 4.0, 1.0, 5.0)]})
 @example([(60, {"thrust": 0.0, "health": 1})], (4,) * 5, 0.1, {27: [command("arm", math.nan, 1.0)]})
 @example([(60, {})], (4,) * 5, 0.1, {17: [command("parameter", 0.6, text="BAT_LOW_THR")]})
-def test_nor_where_operator_is_listened_to(flight, actions, delay, orders):
+def test_extra_calls_with_operator_do_not_change_output(flight, actions, delay, orders):
     check_same(constants(actions, delay, operator=True), flight, orders)
 
 
@@ -201,15 +203,15 @@ def test_delay_of_failsafe_limits_validity():
     assert commander.step(VIEW).valid_for
     requests = [commander.step(lost) for _ in range(round(1.1 / VIEW.dt))]
     assert [r.status.mode for r in requests].index("hold") in (249, 250)
-    assert not commander.step(VIEW).valid_for  # the trajectory has been left
+    assert not commander.step(VIEW).valid_for  # no longer on the trajectory
 
 
 def test_next_wakeup_is_link_or_setpoint_timeout():
-    known = constants((1,) * 5, 1.0, operator=True)
-    timeout = {name: known.parameters[name].default for name in ("COM_DL_LOSS_T", "COM_OF_LOSS_T")}
-    linked = Commander(known).step(VIEW._replace(commands=(command("link"),)))
+    vehicle = constants((1,) * 5, 1.0, operator=True)
+    timeout = {name: vehicle.parameters[name].default for name in ("COM_DL_LOSS_T", "COM_OF_LOSS_T")}
+    linked = Commander(vehicle).step(VIEW._replace(commands=(command("link"),)))
     assert linked.valid_for == timeout["COM_DL_LOSS_T"] - VIEW.dt
-    offboard = Commander(known).step(VIEW._replace(commands=(command("offboard_position", 1.0, 2.0, 3.0),)))
+    offboard = Commander(vehicle).step(VIEW._replace(commands=(command("offboard_position", 1.0, 2.0, 3.0),)))
     assert offboard.valid_for == timeout["COM_OF_LOSS_T"] - VIEW.dt
 
 
@@ -231,4 +233,4 @@ def test_wakeup_conditions_compile_into_loop():
     assert first(thresholds, 0, 10.0) == -1
     assert first(BatteryThresholds(0.0, 0.0, 0.5), 0, 0.505) == 1
     assert first(thresholds, GPS_LOST, math.nan) == 0
-    assert first(thresholds, 1, math.nan) == -1  # the IMU refused once: not the position
+    assert first(thresholds, 1, math.nan) == -1  # one rejected IMU reading; the position is not lost

@@ -1,4 +1,4 @@
-"""Controllers of the user's own: in Python and compiled, and every way to get one wrong."""
+"""User-defined controllers: in Python and compiled, and their error messages."""
 
 import re
 from pathlib import Path
@@ -74,15 +74,15 @@ class Full:
 
 @pytest.fixture
 def scene(tmp_path):
-    """Loads the hover scene with a controller whose module lies beside it."""
+    """Return a function that loads the hover scene with a controller module in the same folder."""
 
-    def made(module, text, name, *overrides):
+    def make(module, text, name, *overrides):
         (tmp_path / f"{module}.py").write_text(text)
         path = tmp_path / "hover.toml"
         path.write_text(HOVER.read_text())
         return load(path, [f'autopilot.controller="{module}:{name}"', *overrides])
 
-    return made
+    return make
 
 
 def test_python_controller_flies_and_holds_its_command(scene):
@@ -114,7 +114,7 @@ def test_voltages_are_clipped_to_range(scene):
     assert volts.max(axis=0) == pytest.approx([44.4, 44.4, 44.4, 0.0])
 
 
-def test_set_up_carries_text_and_needs_no_file(scene, tmp_path):
+def test_configuration_has_controller_text(scene, tmp_path):
     own = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5")
     before = fly(own).digest
     (tmp_path / "own_python.py").unlink()
@@ -170,7 +170,7 @@ def test_non_finite_command_is_rejected(scene):
 
 
 @pytest.mark.parametrize(
-    ("module", "text", "name", "overrides", "said"),
+    ("module", "text", "name", "overrides", "message"),
     [
         ("own", IN_PYTHON, "Altitud", (), "unknown name in own 'Altitud'; did you mean Altitude?"),
         ("own", IN_PYTHON.replace("125.0", "100.0"), "Altitude", (), "expected a rate that divides communication.rate"),
@@ -189,12 +189,12 @@ def test_non_finite_command_is_rejected(scene):
         ),
     ],
 )  # fmt: skip
-def test_error_is_one_line_with_key(scene, module, text, name, overrides, printed):
+def test_error_is_one_line_with_key(scene, module, text, name, overrides, message):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
     assert line.startswith("--set autopilot.controller")
-    assert printed in line
+    assert message in line
     assert "\n" not in line
 
 

@@ -1,4 +1,4 @@
-"""An estimator of the user's own."""
+"""User-defined estimators."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.simulate import fly
 
-# Integrates the IMU from rest: good for seconds, with ideal sensors.
+# Integrates the IMU from rest: accurate for some seconds with ideal sensors.
 DEAD_RECKONING = """
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -37,7 +37,7 @@ class DeadReckoning:
 
 @pytest.fixture
 def scene(tmp_path):
-    def made(text, name, *overrides):
+    def make(text, name, *overrides):
         (tmp_path / "own_estimator.py").write_text(text)
         path = tmp_path / "hover.toml"
         path.write_text(
@@ -45,7 +45,7 @@ def scene(tmp_path):
         )
         return load(path, [f"autopilot.estimator=own_estimator:{name}", *overrides])
 
-    return made
+    return make
 
 
 def test_custom_estimate_is_used_and_logged(scene):
@@ -57,7 +57,7 @@ def test_custom_estimate_is_used_and_logged(scene):
     assert np.ptp(estimate) == pytest.approx(1.0, abs=0.1)
 
 
-def test_reading_is_shown_once_and_estimate_holds_between_steps(scene):
+def test_reading_is_passed_once_and_estimate_is_latched(scene):
     text = DEAD_RECKONING.replace("rate = 250.0", "rate = 125.0").replace(
         'if "imu" in readings:', 'self.p = self.p + [float("gps" in readings), 0.0, 0.0]\n        if False:'
     )

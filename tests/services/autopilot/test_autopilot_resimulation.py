@@ -1,4 +1,4 @@
-"""A recorded run is flown again from its log bit for bit, with the commands at their ticks."""
+"""Resimulation of a recorded run, bit-for-bit, with the commands at their ticks."""
 
 import shutil
 from pathlib import Path
@@ -15,39 +15,39 @@ SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 
 
 def fly(log, setup, operator=None, sources=None):
-    """Fly into a log; its digest."""
+    """Record a flight in a log. Return its digest."""
     fly_single(setup, log, sources, operator=operator)
     with LogReader(log) as read:
         return read.digest()
 
 
-def test_commands_come_again_at_their_ticks(tmp_path):
+def test_resimulated_commands_keep_their_ticks(tmp_path):
     log = tmp_path / "flight.mcap"
     script = UP | {4: [command("goto", 2.0, 1.0, 3.0)]}
-    flown = fly(log, resolve(load("hover", [*OPERATED, "run.duration=6"])), scripted(script))
-    assert resimulate(log) == (flown, flown)
+    digest = fly(log, resolve(load("hover", [*OPERATED, "run.duration=6"])), scripted(script))
+    assert resimulate(log) == (digest, digest)
 
 
-def test_commands_of_plan_come_once(tmp_path):
+def test_commands_of_plan_are_executed_once(tmp_path):
     log = tmp_path / "plan.mcap"
     setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), {"drone1": tuple(UP[0.04])})
-    flown = fly(log, setup)
-    assert resimulate(log) == (flown, flown)
+    digest = fly(log, setup)
+    assert resimulate(log) == (digest, digest)
 
 
 def test_run_without_operator_is_resimulated(tmp_path):
     log = tmp_path / "hover.mcap"
-    flown = fly(log, resolve(load("hover", ["run.duration=2"])))
-    assert resimulate(log) == (flown, flown)
+    digest = fly(log, resolve(load("hover", ["run.duration=2"])))
+    assert resimulate(log) == (digest, digest)
 
 
-def test_log_alone_is_enough(tmp_path):
+def test_log_resimulates_without_scene_files(tmp_path):
     copy = shutil.copytree(SCENES, tmp_path / "scenes")
     scene = load(copy / "hover.toml", ["run.duration=2", "airframe.mass.total=9.5", "gains.tilt_limit=0.5"])
     shutil.rmtree(copy)
     log, setup = tmp_path / "hover.mcap", resolve(scene)
-    flown = fly(log, setup, sources={name: content.decode() for name, content in scene.sources.items()})
-    assert resimulate(log) == (flown, flown)
+    digest = fly(log, setup, sources={name: content.decode() for name, content in scene.sources.items()})
+    assert resimulate(log) == (digest, digest)
     with LogReader(log) as read:
         assert first_difference(recorded_setup(read), setup) is None
         assert read.attachments["airframe.toml"] == (SCENES / "vehicles" / "delivery_drone.toml").read_bytes()

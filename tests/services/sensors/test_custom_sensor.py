@@ -1,4 +1,4 @@
-"""A sensor of the user's own: a module beside the scene."""
+"""Custom sensors: a module in the scene's folder."""
 
 from pathlib import Path
 
@@ -61,7 +61,7 @@ class Echo:
 
 @pytest.fixture
 def scene(tmp_path):
-    def made(*overrides, text=ANEMOMETER):
+    def make(*overrides, text=ANEMOMETER):
         (tmp_path / "own_anemometer.py").write_text(text)
         (tmp_path / "own_echo.py").write_text(ESTIMATOR)
         path = tmp_path / "hover.toml"
@@ -70,7 +70,7 @@ def scene(tmp_path):
         )
         return load(path, ["run.duration=3.0", *overrides])
 
-    return made
+    return make
 
 
 def test_custom_sensor_is_logged_and_reaches_estimator(scene):
@@ -84,7 +84,7 @@ def test_custom_sensor_is_logged_and_reaches_estimator(scene):
 
 
 @pytest.mark.long
-def test_several_are_logged_each_on_its_topic(scene, tmp_path):
+def test_custom_sensors_have_separate_topics(scene, tmp_path):
     (tmp_path / "own_height.py").write_text(
         ANEMOMETER.replace("AnemometerReading", "HeightReading").replace(
             "norm(truth.velocity_world)", "truth.position_world[2]"
@@ -113,27 +113,27 @@ def test_preset_and_its_noise(scene):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "text", "said"),
+    ("overrides", "text", "message"),
     [
         (("sensors.anemometer.deviatoin=1.0",), ANEMOMETER, "sensors.anemometer.deviatoin: unknown key"),
         (("sensors.anemometer.rate=60.0",), ANEMOMETER, "sensors.anemometer.rate: expected a rate that divides"),
         (
             ("sensors.anemometer.faults=[{kind='bias'}]",),
             ANEMOMETER,
-            "sensors.anemometer.faults: anemometer knows none",
+            "sensors.anemometer.faults: anemometer has no fault model",
         ),
         ((), ANEMOMETER.replace("READING =", "READ ="), "sensors.anemometer.module: own_anemometer has no READING"),
         ((), ANEMOMETER.replace("(speed, True)", "(speed, 1.0)"), "sample's reading is of another type"),
-        (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a name that a topic can have"),
+        (('sensors.a-b.module="own_anemometer"',), ANEMOMETER, "sensors.a-b: expected a valid topic name"),
     ],
 )
-def test_custom_sensor_errors_are_one_line(scene, overrides, text, output):
+def test_custom_sensor_errors_are_one_line(scene, overrides, text, message):
     with pytest.raises(ConfigError) as caught:
         resolve(scene(*overrides, text=text))
-    assert output in str(caught.value)
+    assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_sensor_that_ships_keeps_its_name():
-    with pytest.raises(ConfigError, match=r"gps.module: gps is the name of a sensor that ships; expected another name"):
+def test_name_of_built_in_sensor_is_reserved():
+    with pytest.raises(ConfigError, match=r"gps.module: gps is the name of a built-in sensor; expected another name"):
         module_of("gps", {"module": "own_anemometer"})

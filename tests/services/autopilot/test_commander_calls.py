@@ -1,4 +1,4 @@
-"""A commander that is asked only where something may change flies as one that is asked at every tick: to the bit."""
+"""Flights with a commander called only at wake-ups are bit-for-bit those with one called at every tick."""
 
 import pytest
 from flights import ENABLED, NAN, RATE, SCENE, command, inject, item
@@ -64,11 +64,11 @@ CASES = {
     "no trajectory": (GROUND, 6.0, {0.04: [command("takeoff", 2.0), command("arm", NAN, 10.0)]}, []),
 }  # fmt: skip
 ROUNDS = {"nobody says anything": 4.0 * RATE / 5 + 1}
-"""Number of commander steps in these flights."""
+"""Count the commander steps in these flights."""
 
 
 def operator_of(script, answers_every):
-    """The commands of a script at the first tick at which they can be taken."""
+    """Return the commands of a script at the first tick at which they are accepted."""
 
     def operator(tick):
         result = []
@@ -81,8 +81,8 @@ def operator_of(script, answers_every):
     return operator
 
 
-def flown(name, monkeypatch, always):
-    """(the flight, how often the commander was asked)"""
+def fly_counted(name, monkeypatch, always):
+    """Return the flight and the number of commander steps."""
     scene, seconds, script, overrides = CASES[name]
     setup = resolve(load(scene, [*overrides, f"run.duration={seconds}"]))
     requested = []
@@ -100,8 +100,8 @@ def flown(name, monkeypatch, always):
 
 @pytest.mark.parametrize("name", CASES)
 def test_sparse_commander_equals_commander_every_tick(name, monkeypatch):
-    always, most = flown(name, monkeypatch, always=True)
-    seldom, requested = flown(name, monkeypatch, always=False)
+    always, most = fly_counted(name, monkeypatch, always=True)
+    seldom, requested = fly_counted(name, monkeypatch, always=False)
     assert requested < most or name == "no trajectory"
     assert requested == ROUNDS.get(name, requested)
     assert seldom.topics.keys() == always.topics.keys()

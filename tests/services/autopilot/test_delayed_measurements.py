@@ -1,4 +1,4 @@
-"""Measurements of the past: what came in since they were taken has no part in them."""
+"""Delayed measurements: independent of disturbances after the measurement."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from lapwing.services.autopilot.estimator import delayed_measurements, filter_st
 from lapwing.services.autopilot.estimator.delayed_measurements import Noise
 
 P = estimator.PRESETS["rtk"]
-AGE = 25  # ticks by which a fix is late: 0.1 s
+AGE = 25  # [ticks] delay of a fix: 0.1 s
 REST = (0.0, 0.0, P.gravity)
 
 
@@ -19,11 +19,11 @@ def at_rest():
     return estimator.initial(P, estimator.new_memory(), ZERO, REST, STANDARD.magnetic_field_world)
 
 
-def predicted(s, ticks, force=REST):
+def predict_ticks(s, ticks, force=REST):
     for _ in range(ticks):
         s = estimator.predict(
             P, s, ZERO, force, 0.0, 1e-4, True
-        )  # no noise in the rates: equal readings are not frozen
+        )  # no noise in the rates: equal readings do not count as stuck
     return s
 
 
@@ -32,22 +32,22 @@ def velocity_std(s):
 
 
 def velocity_fix(s, velocity, tick):
-    noise = 1e-6 * (tick % 7)  # no two fixes alike: those would count as frozen
+    noise = 1e-6 * (tick % 7)  # no equal fixes, which would count as stuck
     return estimator.update_gps_velocity(P, s, (noise, noise, velocity + noise), 0.02**2, AGE, True)
 
 
 @pytest.mark.long
 def test_fix_before_impact_does_not_correct_impact():
-    """The vehicle comes down at 1 m/s and stops; of that the accelerometer sees one reading."""
-    s = velocity_fix(predicted(at_rest(), 100), 0.0, 0)
+    """The vehicle sinks at 1 m/s and stops; only one accelerometer reading shows it."""
+    s = velocity_fix(predict_ticks(at_rest(), 100), 0.0, 0)
     assert np.all(velocity_std(s) < 0.05)
-    s = predicted(predicted(predicted(s, 10), 1, force=(0.0, 0.0, 78.0)), 4)  # clipped at 8 g
+    s = predict_ticks(predict_ticks(predict_ticks(s, 10), 1, force=(0.0, 0.0, 78.0)), 4)  # clipped at 8 g
     before = velocity_std(s)
     assert np.all(before > 0.4)
     hit = velocity_fix(s, 0.0, 1)  # measured 0.1 s ago, 0.08 s before the impact
     assert np.all(velocity_std(hit) > 0.99 * before)
-    after = velocity_fix(predicted(hit, 25), 1.0, 2)  # the first that was measured after it
-    assert after.memory.refused[filter_state.GPS_VELOCITY] == 0
+    after = velocity_fix(predict_ticks(hit, 25), 1.0, 2)  # the first fix measured after it
+    assert after.memory.rejected[filter_state.GPS_VELOCITY] == 0
     assert np.all(velocity_std(after) < 0.05)
     assert after.nominal.velocity_world[2] == pytest.approx(1.0, abs=0.01)
 
@@ -61,7 +61,7 @@ def random_memory(rng):
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0, 10.0])
 def test_covariance_against_dense_matrices(share):
-    """The row sees the error now less what came in since, which has its part of the covariance with the row."""
+    """The row applies to the present error less the noise since the measurement, which is correlated with it."""
     rng = np.random.default_rng(round(share * 10))
     m = random_memory(rng)
     m.row[:] = rng.normal(size=filter_state.SIZE)
@@ -69,9 +69,10 @@ def test_covariance_against_dense_matrices(share):
     since, force = Noise(0.8 * share, 0.3 * share, 0.2 * share, 0.05 * share, 0.02 * share), (7.0, 1.0, -2.0)
     block = h[[filter_state.VELOCITY, filter_state.POSITION]]
     now, noise = h @ before @ h, block @ np.array([[0.8, 0.3], [0.3, 0.2]]) @ block * share
-    noise += (0.02 if block[1] > 0.0 else 0.05) * share * 5.0  # 1^2 + 2^2: what the attitude turns onto the axis
+    # 1^2 + 2^2: force components that an attitude error rotates onto the axis
+    noise += (0.02 if block[1] > 0.0 else 0.05) * share * 5.0
     part = min(noise / now, 1.0)
-    s, largest = delayed_measurements.late_innovation_variances(m, 0, since, variance, force)
+    s, largest = delayed_measurements.delayed_innovation_variances(m, 0, since, variance, force)
     assert s == pytest.approx(now * (1.0 - part) + variance)
     assert largest == pytest.approx(now + noise + variance)
     fuse.apply_update(m, 0.7, s)
@@ -85,7 +86,7 @@ def test_covariance_against_dense_matrices(share):
 
 
 def turning(s):
-    """So many ticks as a fix is late, in which the force goes from one side to the other, and to its half."""
+    """The ticks of a delay, in which the force changes sides and decreases to its half."""
     for k in range(AGE):
         a = 3.0 * k / AGE
         force = (4.0 * np.cos(a), 4.0 * np.sin(a), 10.0 - 0.2 * k)
@@ -94,11 +95,11 @@ def turning(s):
 
 
 def test_delayed_rows_are_invariant_to_constant_attitude_error():
-    """Two filters at the same place then, one turned by a little: what both say of then is the same."""
+    """Two filters at the same past position, one rotated by a small angle, predict the same delayed measurement."""
     theta = 1e-5 * np.array([1.0, -2.0, 0.5])
-    one, other = predicted(at_rest(), 100), predicted(at_rest(), 100)
-    turned = multiply(exp(tuple(theta)), other.nominal.attitude)
-    one, other = turning(one), turning(other._replace(nominal=other.nominal._replace(attitude=turned)))
+    one, other = predict_ticks(at_rest(), 100), predict_ticks(at_rest(), 100)
+    rotated = multiply(exp(tuple(theta)), other.nominal.attitude)
+    one, other = turning(one), turning(other._replace(nominal=other.nominal._replace(attitude=rotated)))
     off = np.zeros(filter_state.SIZE)
     off[filter_state.THETA : filter_state.THETA + 3] = theta
     for at, name in ((filter_state.VELOCITY, "velocity_world"), (filter_state.POSITION, "position_world")):
@@ -106,8 +107,8 @@ def test_delayed_rows_are_invariant_to_constant_attitude_error():
     _, _, delay, weighted, mean = gps_fusion._past(P, one, AGE)
     matrix = rotation_matrix(one.nominal.attitude)
     for row, force, at in (
-        (delayed_measurements.late_velocity_row, mean, filter_state.VELOCITY),
-        (delayed_measurements.late_position_row, weighted, filter_state.POSITION),
+        (delayed_measurements.delayed_velocity_row, mean, filter_state.VELOCITY),
+        (delayed_measurements.delayed_position_row, weighted, filter_state.POSITION),
     ):
         for axis in range(3):
             row(one.memory, force, matrix, axis, delay)
@@ -115,13 +116,13 @@ def test_delayed_rows_are_invariant_to_constant_attitude_error():
 
 
 def test_attitude_noise_is_weighted_by_remaining_delay():
-    """A gyroscope's noise of the last ticks alone says little of a late fix, that of the first all."""
+    """Gyroscope noise of the last ticks hardly affects a delayed fix; that of the first ticks does."""
     s = at_rest()
     for k in range(AGE):
-        rate = (0.0, 0.0, 1e-9 * k)  # no two readings alike
+        rate = (0.0, 0.0, 1e-9 * k)  # no equal readings
         s = estimator.predict(P, s, rate, REST, 1e-2 if k == 4 else 0.0, 1e-12, True)
     since, noise = gps_fusion._noise_since(P, s, AGE), (P.interval * 0.1) ** 2
-    left = (AGE - (AGE - 1 - 4)) * P.interval  # of the delay, before the fifth tick
+    left = (AGE - (AGE - 1 - 4)) * P.interval  # part of the delay before the fifth tick
     assert since.attitude_velocity == pytest.approx(noise * left**2, rel=1e-3)
     assert since.attitude_position == pytest.approx(noise * left**4 / 4.0, rel=1e-3)
 
@@ -131,6 +132,6 @@ def test_exact_past_measurement_leaves_noise_since():
     m.covariance[:] = np.eye(filter_state.SIZE)
     m.row[:] = 0.0
     m.row[filter_state.VELOCITY + 1] = 1.0
-    s, _ = delayed_measurements.late_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
+    s, _ = delayed_measurements.delayed_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
     fuse.apply_update(m, 0.3, s)
     assert m.covariance[filter_state.VELOCITY + 1, filter_state.VELOCITY + 1] == pytest.approx(0.25)

@@ -1,4 +1,4 @@
-"""Failures of the sensors that look outside: distance by a rangefinder, optical flow, airspeed."""
+"""Injected failures of rangefinder, optical flow and airspeed sensor."""
 
 import math
 
@@ -18,7 +18,7 @@ from flights import (
     mode,
     place,
     results,
-    said,
+    sent_texts,
 )
 
 from lapwing.services.autopilot.failure_injection.failure_state import SLOWED
@@ -34,13 +34,13 @@ ALL = [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT]
 
 
 def rejected(flight, start, source):
-    """Share of the estimates from a time on in which a source was refused or missing."""
+    """Return the share of estimates from a time on with a rejected or missing source."""
     result = flight.column("estimate", lambda m: source in m.rejected_sources)[flight.times("estimate") >= start]
     return float(np.mean(result))
 
 
 def by_flow(kind):
-    """A flight whose receiver falls silent, and whose optical flow, which stands in for it, fails then."""
+    """Return a flight that loses its receiver, and then the optical flow that replaces it."""
     script = {9: [inject("gps", OFF)], 13: [inject("optical_flow", kind, id=8)]}
     flight = fly_by_sensors(26, script, ENABLED, FLOW)
     assert results(flight)[8] == ACCEPTED
@@ -51,7 +51,7 @@ def by_flow(kind):
 def test_failed_flow_without_gps_causes_descent(kind):
     flight = by_flow(kind)
     assert rejected(flight, 14.0, "optical_flow") > 0.9
-    reported = said(flight)
+    reported = sent_texts(flight)
     assert reported.index(f"injected: optical_flow {KINDS[kind]}") < reported.index(
         "the position is lost: descend in 9 s"
     )
@@ -93,7 +93,7 @@ def test_wrong_distance_is_followed_as_height_reference():
     assert height(flight, 13.0) == pytest.approx(height(flight, 8.0) - EXCESS_RANGE, abs=0.1)
 
 
-def test_stuck_distance_does_not_keep_vehicle_down():
+def test_stuck_distance_does_not_prevent_climb():
     script = {8: [inject("distance_sensor", STUCK)], 9: [command("goto", 0.0, 0.0, 6.0, 0.0, 2.0)]}
     flight = fly_by_sensors(14, script, ENABLED)
     assert height(flight, 14.0) == pytest.approx(6.0, abs=0.1)
@@ -106,7 +106,7 @@ def test_rangefinder_that_autopilot_does_not_read_cannot_fail():
     script = {0.1: [inject("distance_sensor", OFF)]}
     flight = fly(0.3, script, ENABLED, "autopilot.estimator=kalman", *sensors, *ahead)
     assert results(flight)[7] == DENIED
-    assert "inject failure: there is no distance_sensor" in said(flight)
+    assert "inject failure: the vehicle has no distance_sensor" in sent_texts(flight)
 
 
 @pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])

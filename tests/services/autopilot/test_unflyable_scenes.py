@@ -1,4 +1,4 @@
-"""Scenes that the autopilot cannot fly are rejected before the flight."""
+"""Scenes that the autopilot cannot fly are rejected at resolution."""
 
 import pytest
 
@@ -28,8 +28,8 @@ def test_vehicle_that_cannot_hover(overrides, message):
         load("hover", overrides)
 
 
-def test_limit_is_that_of_performance_card():
-    """Just below its maximum thrust the vehicle is taken, just above it is not."""
+def test_hover_limit_equals_performance_card():
+    """A weight just below the maximum thrust is accepted, one just above it is rejected."""
     heaviest = performance.maximum_thrust(DRONE, 1.225) / performance.GRAVITY
     scene = {**ELECTRIC, "environment.home.height": 0.0}
     load("hover", {**scene, "vehicle.mass": 0.999 * heaviest})
@@ -47,4 +47,4 @@ def test_field_without_heading():
         SceneError, match=r"environment.magnetic_field: expected at least 1e-06 T, got 0 T horizontally"
     ):
         load("hover", {**SENSORS, "environment.magnetic_field": [0.0, 0.0, -4e-5]})
-    load("hover", {"environment.magnetic_field": [0.0, 0.0, -4e-5]})  # flown by the truth
+    load("hover", {"environment.magnetic_field": [0.0, 0.0, -4e-5]})  # on the ground truth
