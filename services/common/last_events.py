@@ -14,8 +14,8 @@ class LastEvents:
         self._open = set(keys)
         self._deadline: float | None = None
 
-    def take(self, key: str) -> None:
-        """Take an empty message, the end of a key."""
+    def end(self, key: str) -> None:
+        """Process an empty message, which ends a key."""
         self._open.discard(key)
 
     def await_more(self, flying: bool) -> bool:

@@ -176,7 +176,7 @@ class Adapter:
             self.commands.acknowledge(acknowledgements.acks)
             self.missions.observe((), acknowledgements.acks)
             for text in acknowledgements.text:
-                self._announcements.say(text)
+                self._announcements.send_text(text)
         elif topic is STATUS:
             self._announcements.step()
 

@@ -26,7 +26,7 @@ from lapwing.services.mavlink.signing import TIME_STAMPS, read_key, state_folder
 from lapwing.services.mavlink.socket_watch import SocketWatch
 
 WAIT = 0.05  # [s] longest wait
-ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics whose messages are all handled
+ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics of which all messages are handled
 
 
 def run(process: Participant, spec: Any) -> None:
@@ -75,13 +75,13 @@ def run(process: Participant, spec: Any) -> None:
         sockets = stack.enter_context(SocketWatch(first_server.selector, first_source.wake))
         unfinished = set(setup.services)  # services whose last log packet has not arrived
         while unfinished and not process.stopping:
-            news = first_source.get_with_key(0.0 if sockets.ready else WAIT)
-            if news is None or sockets.ready:
+            message = first_source.get_with_key(0.0 if sockets.ready else WAIT)
+            if message is None or sockets.ready:
                 serve()
-                sockets.served()
-            while (news := news or log_packets.get_with_key(0.0)) is not None:
-                name, time_ns, payload = news
-                news = None
+                sockets.resume()
+            while (message := message or log_packets.get_with_key(0.0)) is not None:
+                name, time_ns, payload = message
+                message = None
                 if name in by_estimate_key:
                     if payload:
                         by_estimate_key[name].take(ESTIMATE, time_ns, payload)
@@ -104,9 +104,9 @@ def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immedi
             continue
         if page.payloads.shape[1] <= EMPTY_SIZES.get(topic, 0):
             continue
-        handled = topic in ALL
+        all_messages = topic in ALL
         for server in [servers[page.topic.vehicle]] if page.topic.vehicle else servers.values():
-            if not handled:
+            if not all_messages:
                 server.adapter.vehicle.put(topic, page.payloads[-1].tobytes())
                 continue
             for i in range(len(page.ticks)):

@@ -59,7 +59,7 @@ def run(process: Participant, spec: Any) -> None:
                 node.put(topics[key].key(setup.vehicle), time_ns, payload)
             else:
                 unfinished.discard(key)
-                ends.take(key)
+                ends.end(key)
         process.confirm()
     for commands in dict.fromkeys(commands_by_topic.values()):
         if report := commands.report():

@@ -1,4 +1,4 @@
-"""The seam of foreign firmwares: motor order, volts, time-outs, playback of the recorded commands."""
+"""Common parts of firmware adapters: motor order, volts, time-outs, playback of recorded commands."""
 
 import re
 import subprocess
@@ -41,7 +41,7 @@ def test_each_rotor_gets_output_of_its_quarter():
         assert rotors.spin_direction[k] == LAYOUT[i].spin
 
 
-def test_wrong_spin_direction_names_rotor():
+def test_wrong_spin_direction_is_rejected():
     wrong = tuple(Output(o.forward, o.left, "cw" if o.spin == "ccw" else "ccw") for o in LAYOUT)
     with pytest.raises(ConfigError, match=r"rotor 1 turns cw, output 3 of betaflight expects ccw"):
         motor_order(frame(), wrong, "betaflight")
@@ -77,8 +77,8 @@ def test_timeout_counts_from_restart():
     assert patience.over
 
 
-class Thrower:
-    """A link whose firmware lifts off at 0.2 s: rotors in the firmware's order get 0.6."""
+class TakeoffLink:
+    """Link whose firmware takes off at 0.2 s: rotors in the firmware's order get 0.6."""
 
     opened = closed = 0
 
@@ -101,7 +101,7 @@ class Thrower:
         type(self).closed += 1
 
 
-class Broken(Thrower):
+class NonFiniteLink(TakeoffLink):
     def step(self, tick, read, waits):
         return FirmwareOutput((float("nan"),) * 4, True)
 
@@ -112,23 +112,23 @@ def with_link(monkeypatch, link):
     )
 
 
-def test_recorded_commands_fly_again_to_recorded_digest(tmp_path, monkeypatch):
-    with_link(monkeypatch, Thrower)
+def test_resimulated_commands_have_recorded_digest(tmp_path, monkeypatch):
+    with_link(monkeypatch, TakeoffLink)
     log = tmp_path / "flight.mcap"
     fly_single(resolve(load("betaflight_quad", QUAD)), log)
-    assert (Thrower.opened, Thrower.closed) == (1, 1)
+    assert (TakeoffLink.opened, TakeoffLink.closed) == (1, 1)
     with LogReader(log) as read:
         assert read.metadata["firmware"].startswith("betaflight scripted: 501 steps, skew 0 ms")
         assert re.search(r"CPU [\d.]+ s of Lapwing and 250 s of the firmware", read.metadata["firmware"])
         flights = read.digest()
     assert resimulate(log) == (flights, flights)
-    assert Thrower.opened == 1
+    assert TakeoffLink.opened == 1
 
 
 def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):
     from lapwing.flight import Flight
 
-    with_link(monkeypatch, Thrower)
+    with_link(monkeypatch, TakeoffLink)
     log = tmp_path / "flight.mcap"
     fly_single(resolve(load("betaflight_quad", QUAD)), log)
     flight = Flight.read(log)
@@ -136,8 +136,8 @@ def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):
     assert flight.status.mode[-1] == "test"
 
 
-def test_non_finite_outputs_end_run_and_name_time(monkeypatch, tmp_path):
-    with_link(monkeypatch, Broken)
+def test_non_finite_outputs_end_run(monkeypatch, tmp_path):
+    with_link(monkeypatch, NonFiniteLink)
     with pytest.raises(FirmwareError, match=r"betaflight: invalid motor outputs .* at t = 0.000 s"):
         fly_single(resolve(load("betaflight_quad", QUAD)), tmp_path / "flight.mcap")
 
@@ -171,11 +171,11 @@ def test_program_and_its_children_end():
     assert not program.running
     state = Path(f"/proc/{child}/stat")
     patience = Patience(60.0)
-    while state.exists() and ") Z " not in state.read_text():  # a zombie has ended
+    while state.exists() and ") Z " not in state.read_text():  # a zombie has ended too
         assert not patience.over
 
 
-def test_missing_program_is_named():
+def test_missing_program_is_reported():
     with pytest.raises(FirmwareError, match=r"cannot start no-such-program .*check autopilot.command"):
         Program(setup_of(["no-such-program"]))
 
