@@ -65,7 +65,7 @@ class Station:
         self.got, self.sent = [], []
         self.endpoint = bench.adapter.connect(local, True, self._receive)
         if heartbeat:  # required before commands
-            self.endpoint.last_receivetbeat = bench.adapter.clock.now
+            self.endpoint.last_heartbeat = bench.adapter.clock.now
         self.on_message = lambda message: None  # called with each message
 
     def _times(self):
