@@ -151,7 +151,7 @@ def quaternion_columns(wxyz: Any) -> np.ndarray:
     return result.T
 
 
-def unknown_field(name: str, known: tuple[str, ...]) -> str:
+def unknown_field(name: str, names: tuple[str, ...]) -> str:
     """Return the error text for an unknown field, with the nearest names."""
-    near = get_close_matches(name, known, n=4, cutoff=0.4) or sorted(known)[:8]
+    near = get_close_matches(name, names, n=4, cutoff=0.4) or sorted(names)[:8]
     return f"no field {name}; near it: {', '.join(near)}"

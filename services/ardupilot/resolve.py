@@ -38,7 +38,7 @@ class ArduPilotSetup(NamedTuple):
     imu: bool  # rates and specific force of the IMU, otherwise ground truth
     range_port: str  # port of the distance sensor; "": none
     airspeed: bool
-    gps: bool  # the scene has a receiver, whose outages ArduPilot gets
+    gps: bool  # the scene has a receiver, whose outages are sent to ArduPilot
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:

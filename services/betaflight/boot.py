@@ -102,7 +102,7 @@ def settle(
         waits("Betaflight's calibration")
         if program:
             program.check(" at its start")
-        feed(status is not None)  # a firmware that gets RC channels before it has started ignores them
+        feed(status is not None)  # RC channels before the start of the firmware would disable them
         for command, payload in link.poll():
             if command == msp.STATUS:
                 status = msp.parse_status(payload)

@@ -23,7 +23,7 @@ ACCURACY = 0.03  # relative, of the measured rate
 RESOLUTION = 0.001  # [s] of the firmware's time
 LONGEST = 30.0  # [s] wall time of a measurement
 FEED_EVERY = 0.02  # [s] between two state packets
-START = 1_000_000_000  # [s] date that the firmware gets: 2001-09-09 01:46:40
+START = 1_000_000_000  # [s] date sent to the firmware: 2001-09-09 01:46:40
 
 
 def slow_down(

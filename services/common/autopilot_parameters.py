@@ -1,8 +1,8 @@
 """Autopilot parameters that can be changed in flight: meaning, default and bounds.
 
 Names and units are PX4's where the meaning is the same; MAVLink allows 16 characters. Only gains of the cascaded PID
-(PID_...) and failsafe actions (FS_...) have own names. Defaults of PID_... come from the scene's gain set; a scene
-with PX4's cascade has PX4's gains instead. `[autopilot.parameters]` sets other values, or `autopilot.parameters`
+(PID_...) and failsafe actions (FS_...) have Lapwing's own names. Defaults of PID_... come from the scene's gain set; a
+scene with PX4's cascade has PX4's gains instead. `[autopilot.parameters]` sets other values, or `autopilot.parameters`
 names a file of them (parameter_file.py).
 """
 

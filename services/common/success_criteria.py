@@ -48,11 +48,11 @@ class Success(SceneTable):
                 expected = 'a condition such as "rmse.x < 0.1"'
                 raise ConfigError(f"success.require.{i}", str(error), expected) from None
 
-    def check_names(self, known: Mapping[str, Any]) -> None:
+    def check_names(self, metrics: Mapping[str, Any]) -> None:
         """Raise ConfigError if an expression uses an unknown metric."""
         for i, text in enumerate(self.require):
-            for name in sorted(_expression(text).names - set(known)):
-                raise ConfigError.unknown(f"success.require.{i}", "figure", name, known)
+            for name in sorted(_expression(text).names - set(metrics)):
+                raise ConfigError.unknown(f"success.require.{i}", "figure", name, metrics)
 
     def unmet(self, figures: Mapping[str, Any]) -> list[str]:
         """Return the expressions that do not hold for these metrics."""

@@ -149,8 +149,8 @@ class Adapter:
             endpoint.system, endpoint.component = source
             handler(self.sessions[endpoint], m)
 
-    def take(self, topic: Topic, time_ns: int, payload: bytes, wall: float) -> None:
-        """Store a message of the vehicle. An estimate advances the time and sends the messages that are due.
+    def handle(self, topic: Topic, time_ns: int, payload: bytes, wall: float) -> None:
+        """Handle a message of the vehicle. An estimate advances the time and sends the due messages.
 
         Args:
             topic: topic of the message.

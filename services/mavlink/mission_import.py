@@ -60,7 +60,7 @@ def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[A
 
     Args:
         items: messages in order.
-        home_first: the first item of a mission is home and is not flown to.
+        home_first: True if the first item of a mission is home and not a waypoint.
         datum: reference of coordinates.
 
     Raises:

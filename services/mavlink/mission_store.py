@@ -77,7 +77,7 @@ class MissionStore:
             upload = self._uploads[kind] = Upload(endpoint, kind, count, self._clock)
             self._continue(upload)
 
-    def take(self, endpoint: Endpoint, m: Any) -> None:
+    def add_item(self, endpoint: Endpoint, m: Any) -> None:
         """Handle an item of an upload: the next one, one out of order, or a repeated one."""
         upload = self._uploads.get(m.mission_type)
         if upload is None or upload.endpoint is not endpoint:
@@ -91,7 +91,7 @@ class MissionStore:
             self._counts["item out of order"] += 1
             self._request_next(upload)
         else:
-            upload.take(m)
+            upload.append(m)
             self._continue(upload)
 
     def forget(self, endpoint: Endpoint, kind: int | None = None) -> None:

@@ -79,7 +79,7 @@ class Session:
     def command(
         self, kind: str, values: Sequence[float] = (), on_acknowledgement: OnAcknowledgement | None = None
     ) -> None:
-        """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` gets every acknowledgement."""
+        """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` receives every acknowledgement."""
         self._commands.put(kind, self.endpoint.name, on_acknowledgement, values)
 
     def offboard(self, kind: str, values: Sequence[float]) -> None:

@@ -225,7 +225,7 @@ class Px4Link:
                 self._shared.outputs[:], self._armed[0] = motors, result.armed
             else:
                 self.report.missed += 1
-                self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are held")
+                self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are kept")
         return result
 
     def _patience(self, timeout: float) -> Patience:

@@ -89,7 +89,7 @@ def _entries(payload: bytes) -> dict[str, str]:
 
 
 class Pending:
-    """Received record batches, held until every service has published their ticks."""
+    """Buffer of record batches until every service has published their ticks."""
 
     def __init__(self, services: Any):
         """Create an empty buffer for these services."""

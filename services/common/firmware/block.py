@@ -47,7 +47,7 @@ class StatusTextTable:
 
 
 class FirmwareBlock:
-    """Steps a link every `period` ticks."""
+    """Python block that steps a link every `period` ticks."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Emulated autopilot firmware: one module each, found by name."""
+"""Emulated autopilot firmware: a module for each, selected by name."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol, cast

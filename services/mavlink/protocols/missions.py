@@ -25,7 +25,7 @@ def count(session: Session, m: Any) -> None:
 def item_int(session: Session, m: Any) -> None:
     """Handle an item of an upload or, from ArduPilot's ground stations, a position to fly to."""
     if m.current not in (GUIDED, GUIDED_ALTITUDE):
-        session.missions.take(session.endpoint, m)
+        session.missions.add_item(session.endpoint, m)
         return
     try:
         x, y, z = to_world(session.vehicle.datum, m.frame, degrees(m.x), degrees(m.y), m.z)

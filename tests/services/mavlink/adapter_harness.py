@@ -38,7 +38,7 @@ class Bench:
         """Run `count` steps of the telemetry; wall time equals simulation time."""
         for _ in range(count):
             for topic, message in self.vehicle.messages():
-                self.adapter.take(topic, self.vehicle.time_ns, message.encode(), self.vehicle.seconds)
+                self.adapter.handle(topic, self.vehicle.time_ns, message.encode(), self.vehicle.seconds)
             for station in self.stations:
                 station.step()
 

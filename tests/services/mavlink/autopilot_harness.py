@@ -47,6 +47,6 @@ class AutopilotBench(Bench):
             for page in sorted(pages, key=lambda page: page.topic is ESTIMATE):  # the estimate advances the time
                 newest = slice(None) if page.topic in (STATUS, COMMAND_ACKS) else slice(-1, None)
                 for tick, payload in zip(page.ticks[newest], page.payloads[newest], strict=True):
-                    self.adapter.take(page.topic, int(tick) * self._interval_ns, payload.tobytes(), self.seconds)
+                    self.adapter.handle(page.topic, int(tick) * self._interval_ns, payload.tobytes(), self.seconds)
             for station in self.stations:
                 station.step()

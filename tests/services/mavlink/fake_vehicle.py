@@ -268,7 +268,7 @@ class Running:
                 self.hub.wait(left)
             self.hub.wait(0.0)
             for topic, message in self.vehicle.messages():
-                self.hub.take(topic, self.vehicle.time_ns, message.encode())
+                self.hub.handle(topic, self.vehicle.time_ns, message.encode())
             due += PERIOD / self._speed
 
     def end(self):

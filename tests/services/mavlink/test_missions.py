@@ -75,13 +75,13 @@ def test_mission_upload_and_download_are_equal(items, kind):
 
 def external_command(bench, time_ns, command, result):
     """Send a command of another sender to the autopilot, with its acknowledgement."""
-    bench.adapter.take(
+    bench.adapter.handle(
         COMMAND_ACKS,
         time_ns,
         CommandAcks(header(time_ns, ""), (CommandAck(command.source, command.id, result),)).encode(),
         0.0,
     )
-    bench.adapter.take(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
+    bench.adapter.handle(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
 
 
 def test_accepted_plan_is_downloadable_and_rejected_is_not():

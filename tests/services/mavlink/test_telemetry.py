@@ -77,7 +77,7 @@ def test_odometry_in_free_fall_is_along_body_axes():
     truth = VehicleState(acceleration=Vector3(0.0, 9.80665, 0.0))
     q = truth.pose.orientation._replace(w=math.cos(half), z=math.sin(half))  # the nose points north
     truth = truth._replace(pose=truth.pose._replace(orientation=q))
-    bench.adapter.take(TRUTH, 0, truth.encode(), 0.0)
+    bench.adapter.handle(TRUTH, 0, truth.encode(), 0.0)
     m = shown(bench, "HIL_STATE_QUATERNION")
     assert (m.xacc, m.yacc, m.zacc) == (1000, 0, 0)
 
