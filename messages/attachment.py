@@ -1,7 +1,7 @@
-"""The attachment of every Zenoh put, laid out as the ROS 2 middleware rmw_zenoh lays it out.
+"""Attachment of every Zenoh put, in the layout of the ROS 2 middleware rmw_zenoh.
 
-33 bytes, little-endian: sequence number (int64), source time [ns] (int64), the length 16 of what follows (one byte),
-and the publisher's 16-byte global identifier. A ROS 2 node drops samples that come without it.
+33 bytes, little-endian: sequence number (int64), source time [ns] (int64), the length 16 of the identifier (one
+byte), and the publisher's 16-byte global identifier (GID). A ROS 2 node drops samples without an attachment.
 """
 
 import struct
@@ -10,7 +10,7 @@ from typing import NamedTuple
 _LAYOUT = struct.Struct("<qqB16s")
 SIZE = _LAYOUT.size
 _GID_SIZE = 16
-_GID_PLACE = SIZE - _GID_SIZE
+_GID_OFFSET = SIZE - _GID_SIZE
 
 
 class Attachment(NamedTuple):
@@ -33,7 +33,7 @@ def pack(sequence: int, time_ns: int, gid: bytes) -> bytes:
 
 
 def unpack(data: bytes) -> Attachment:
-    """Read an attachment.
+    """Return the contents of an attachment.
 
     Raises:
         ValueError: not 33 bytes, or the identifier's length is not 16.
@@ -53,8 +53,8 @@ def time_and_gid(data: bytes) -> tuple[int, bytes]:
     """Return source time [ns] and GID of an attachment, for the hot path.
 
     Raises:
-        ValueError: the bytes are no attachment.
+        ValueError: the bytes are not an attachment.
     """
-    if len(data) != SIZE or data[_GID_PLACE - 1] != _GID_SIZE:
-        raise ValueError(f"no attachment: {len(data)} bytes")
-    return _TIME.unpack_from(data, 8)[0], data[_GID_PLACE:]
+    if len(data) != SIZE or data[_GID_OFFSET - 1] != _GID_SIZE:
+        raise ValueError(f"not an attachment: {len(data)} bytes")
+    return _TIME.unpack_from(data, 8)[0], data[_GID_OFFSET:]

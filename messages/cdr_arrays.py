@@ -15,7 +15,7 @@ from lapwing.messages.cdr_layout import Layout
 from lapwing.messages.parse import PRIMITIVES
 
 WHOLE = "CDR"
-"""The field of a record that covers all its bytes: numpy copies fields, and strings and padding would be lost."""
+"""Field of a record that covers all its bytes; numpy copies only fields, so strings and padding would be lost."""
 
 _SECOND = 1_000_000_000
 
@@ -26,12 +26,12 @@ def record_dtype(layout: Layout) -> np.dtype:
 
     Arrays and sequences of numbers are subarrays. A nested message of float64 only is also one subarray
     ("pose.orientation" (4,) in the order of its fields: x, y, z, w), as is a sequence of k of them ("moment" (k, 3)
-    beside "moment.0" (3,) and "moment.0.x"). Strings and lengths have no field; the last field, `WHOLE`, is the
+    in addition to "moment.0" (3,) and "moment.0.x"). Strings and lengths have no field; the last field, `WHOLE`, is the
     payload.
     """
     fields: dict[str, tuple[Any, int]] = {}
     floats: dict[str, list[int]] = {}  # by name of a nested message or of a sequence of them: offsets of its values
-    mixed: set[str] = set()  # those that hold anything but single float64
+    mixed: set[str] = set()  # those that contain anything but single float64
     for entry in layout.entries:
         code = "<" + PRIMITIVES.get(entry.base, "")
         if entry.kind == "value":
@@ -70,23 +70,23 @@ def _parents(name: str) -> list[str]:
 
 
 class Record:
-    """A message class together with all strings and sequence lengths.
+    """Template of a message with fixed strings and sequence lengths.
 
     Attributes:
         message: the message class.
-        dtype: of one payload with its encapsulation header; see `record_dtype`.
-        template: the sample's payload.
+        dtype: dtype of one payload with its encapsulation header; see `record_dtype`.
+        template: payload of the sample.
     """
 
     def __init__(self, message: Any, sample: Any) -> None:
-        """Take the shape, and what columns leave out, from a sample of the message class."""
+        """Store the shape and the default values of a sample of the message class."""
         self.message = message
         self.template: bytes = sample.encode()
         self.dtype = record_dtype(message.layouts.measure(self.template))
 
     @classmethod
     def of(cls, sample: Any) -> Self:
-        """Return the record of a sample message; the dtype is made once for each shape."""
+        """Return the record of a sample message; the dtype is created once for each shape."""
         return cls(type(sample), sample)
 
     def encode(self, n: int, columns: Mapping[str, Any]) -> np.ndarray:
@@ -125,11 +125,11 @@ class Record:
             raise ValueError(f"{self.message.type_name}: column {name} holds {column.dtype}, expected numbers")
         if field.base.kind == "f" or column.dtype == field.base:
             return column
-        with np.errstate(invalid="ignore"):  # NaN is found below
-            fitted = column.astype(field.base)
-        if not np.array_equal(fitted, column):
+        with np.errstate(invalid="ignore"):  # NaN is detected below
+            converted = column.astype(field.base)
+        if not np.array_equal(converted, column):
             raise ValueError(f"{self.message.type_name}: column {name} holds values that {field.base} cannot")
-        return fitted
+        return converted
 
 
 def stamp_columns(times_ns: np.ndarray, field: str = "header.stamp") -> dict[str, Callable[[], np.ndarray]]:
@@ -151,7 +151,7 @@ def quaternion_columns(wxyz: Any) -> np.ndarray:
     return result.T
 
 
-def unknown_field(name: str, known: tuple[str, ...]) -> str:
+def unknown_field(name: str, names: tuple[str, ...]) -> str:
     """Return the error text for an unknown field, with the nearest names."""
-    near = get_close_matches(name, known, n=4, cutoff=0.4) or sorted(known)[:8]
+    near = get_close_matches(name, names, n=4, cutoff=0.4) or sorted(names)[:8]
     return f"no field {name}; near it: {', '.join(near)}"

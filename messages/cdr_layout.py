@@ -1,4 +1,4 @@
-"""CDR layouts: the byte positions of a message, once the lengths of its strings and sequences are known.
+"""CDR layouts: the byte positions of a message, which follow from the lengths of its strings and sequences.
 
 A message type together with these lengths (its *shape*) has a fixed layout, so it is packed and unpacked by a single
 precompiled `struct.Struct`. Messages of one topic rarely change shape: a layout is built once and then looked up.
@@ -17,7 +17,7 @@ from lapwing.messages.parse import PRIMITIVES, Definition
 
 ENCAPSULATION = 256  # the header's bytes 0, 1, 0, 0 read as little-endian uint32
 _HEADER = 4  # [bytes]
-_CAPACITY = 4096  # layouts kept per type before starting afresh: free text could otherwise fill the memory
+_CAPACITY = 4096  # cached layouts per type before the cache is cleared: free text could otherwise fill the memory
 _UINT32 = struct.Struct("<I")
 
 
@@ -32,31 +32,31 @@ class Entry(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Bytes that it takes."""
+        """Size [bytes]."""
         if self.kind == "length":
             return _UINT32.size
         return self.length if self.kind == "string" else self.length * struct.calcsize("<" + PRIMITIVES[self.base])
 
 
 class Layout:
-    """The layout of one shape: `codec` packs the flat values, the encapsulation header first."""
+    """Layout of one shape: `codec` packs the flat values, the encapsulation header first."""
 
     def __init__(self, entries: list[Entry]) -> None:
         self.entries = tuple(entries)
         self.shape = tuple(entry.length for entry in entries if entry.kind == "length")
-        parts, places = ["<I"], []
+        parts, indices = ["<I"], []
         end, values = _HEADER, 1  # bytes and flat values so far
         for entry in entries:
             if entry.kind == "array" and not entry.length:
                 continue
             parts.append(f"{entry.offset - end}x{_format(entry)}")
             if entry.kind == "length":
-                places.append(values)
+                indices.append(values)
             end = entry.offset + entry.size
             values += entry.length if entry.kind == "array" else 1
         self.codec = struct.Struct("".join(parts))
-        self._lengths = itemgetter(0, *places)  # header and every length among the flat values
-        self._expected = (ENCAPSULATION, *self.shape) if places else ENCAPSULATION
+        self._lengths = itemgetter(0, *indices)  # header and every length among the flat values
+        self._expected = (ENCAPSULATION, *self.shape) if indices else ENCAPSULATION
 
     def fits(self, values: tuple) -> bool:
         """Return True if values unpacked with this layout belong to it.
@@ -76,7 +76,7 @@ def _format(entry: Entry) -> str:
 
 
 class Layouts:
-    """All layouts of one message type met so far."""
+    """Cache of the layouts of one message type."""
 
     def __init__(self, definition: Definition, definitions: dict[str, Definition]) -> None:
         self._definition = definition
@@ -87,13 +87,13 @@ class Layouts:
     def build(self, shape: tuple[int, ...]) -> Layout:
         """Return the layout of a shape: the lengths in order of appearance, strings counted with their NUL."""
         lengths = iter(shape)
-        return self._keep(walk(self._definition, self._definitions, lambda offset: next(lengths)))
+        return self._cache(walk(self._definition, self._definitions, lambda offset: next(lengths)))
 
     def unpack(self, payload: bytes) -> tuple:
-        """Return flat values of a payload.
+        """Return the flat values of a payload.
 
         Raises:
-            ValueError: the payload is not little-endian CDR, or shorter or longer than its own lengths say.
+            ValueError: the payload is not little-endian CDR, or its size does not agree with the lengths in it.
         """
         size = len(payload)
         layout = self._by_size.get(size)
@@ -129,7 +129,7 @@ class Layouts:
                 )
             return length
 
-        layout = self._keep(walk(self._definition, self._definitions, length_at))
+        layout = self._cache(walk(self._definition, self._definitions, length_at))
         if layout.codec.size != size:
             raise ValueError(f"{name}: payload has {size} bytes, expected {layout.codec.size}")
         if len(self._by_size) >= _CAPACITY:
@@ -137,7 +137,7 @@ class Layouts:
         self._by_size[size] = layout
         return layout
 
-    def _keep(self, entries: list[Entry]) -> Layout:
+    def _cache(self, entries: list[Entry]) -> Layout:
         shape = tuple(entry.length for entry in entries if entry.kind == "length")
         layout = self.by_shape.get(shape)
         if layout is None:

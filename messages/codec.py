@@ -57,7 +57,7 @@ def make_class(definition: Definition, definitions: dict[str, Definition], class
     cls = type(name, (fields,), members)
 
     layouts = Layouts(definition, definitions)
-    scope: dict[str, Any] = {_identifier(base): known for base, known in classes.items()} | {
+    scope: dict[str, Any] = {_identifier(base): contained for base, contained in classes.items()} | {
         _identifier(definition.type_name): cls,
         "by_shape": layouts.by_shape.get,
         "build": layouts.build,

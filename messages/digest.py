@@ -1,4 +1,4 @@
-"""One number for everything deterministic that a run published: equal digests mean equal bits."""
+"""Digest of all deterministic messages of a run: equal digests mean bit-for-bit equal messages."""
 
 import hashlib
 import struct
@@ -6,13 +6,13 @@ import struct
 import numpy as np
 
 _ENTRY = struct.Struct("<qQ")  # time [ns], payload length
-_FOLD = 4096  # parts kept per topic before they are hashed: one long update is cheaper than many short ones
+_FOLD = 4096  # parts collected per topic before hashing: one long update is faster than many short ones
 
 
 class Digest:
     """Running BLAKE2b hash per topic over (time, length, payload), joined over the topics in order of their names.
 
-    The order of messages within a topic counts; how topics interleave does not, since it differs between processes.
+    The order of messages within a topic counts; that of different topics does not, since it differs between processes.
     """
 
     def __init__(self) -> None:
@@ -32,12 +32,12 @@ class Digest:
         """Add n messages of a topic that have the same size, as n calls of `update` do.
 
         Args:
-            topic: its name.
-            times_ns: int64, shape (n,).
+            topic: name of the topic.
+            times_ns: times [ns], int64, shape (n,).
             payloads: uint8, shape (n, size).
 
         Raises:
-            ValueError: as many times as payloads are needed.
+            ValueError: the numbers of times and payloads differ.
         """
         n, size = payloads.shape
         if len(times_ns) != n:

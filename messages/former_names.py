@@ -5,7 +5,7 @@ A renamed topic, type or field is entered here; its layout must not have changed
 
 from lapwing.messages.parse import Definition
 
-_TOPICS = {  # by former name below the vehicle's and current type: the former name's replacement
+_TOPICS = {  # current name by former name, without the vehicle's, and current type
     ("truth", "lapwing_msgs/msg/VehicleState"): "ground_truth",
     ("bodies", "lapwing_msgs/msg/BodyStates"): "body_states",
     ("contact", "lapwing_msgs/msg/ContactForces"): "contact_forces",
@@ -49,8 +49,8 @@ def current_fields(class_path: str, members: dict) -> dict:
     """Return the members of a serialised message with the current names of its fields.
 
     Args:
-        class_path: "lapwing.messages.types:MissionItem".
-        members: by recorded name.
+        class_path: path of the class, "lapwing.messages.types:MissionItem".
+        members: values by recorded name.
     """
     module, _, name = class_path.partition(":")
     names = _FIELDS.get(f"lapwing_msgs/msg/{name}", {}) if module == "lapwing.messages.types" else {}

@@ -22,7 +22,7 @@ def first_difference(message: Any, one: bytes, other: bytes) -> FieldDifference 
     """Return the first different field of two encoded messages of a class. Return None if the bytes are equal.
 
     Raises:
-        ValueError: one of them is not a message of the class.
+        ValueError: one payload is not a message of the class.
     """
     if one == other:
         return None

@@ -55,7 +55,7 @@ def parse(type_name: str, text: str) -> Definition:
     Bounded strings and sequences, wide strings, and arrays of anything but primitives are not supported.
 
     Raises:
-        ValueError: a line is no field and no constant, or uses an unsupported construct; names type and line.
+        ValueError: a line is neither a field nor a constant, or uses an unsupported construct.
     """
     package = type_name.split("/")[0]
     fields: list[Field] = []
@@ -83,7 +83,7 @@ def read_folder(folder: Path) -> dict[str, Definition]:
     """Read every `<package>/<Name>.msg` under a folder, by full type name, each after the types that it contains.
 
     Raises:
-        ValueError: a definition is faulty, or contains a type that has no file.
+        ValueError: a definition is invalid, or contains a type without a file.
     """
     result = {}
     for path in sorted(folder.glob("*/*.msg")):

@@ -148,10 +148,10 @@ def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]
         pages: indices of the messages among all, shape (m,); their payloads, records or uint8 of shape (m, size).
     """
     groups = []
-    for places, payloads in pages:
+    for indices, payloads in pages:
         rows = payloads if payloads.dtype == np.uint8 else _bytes(payloads)
         layout = message.layouts.measure(rows[0].tobytes())
-        groups.append(_Group(places, layout, rows.view(record_dtype(layout)).reshape(len(rows))))
+        groups.append(_Group(indices, layout, rows.view(record_dtype(layout)).reshape(len(rows))))
     return TopicColumns(message, groups or list(_groups(message, ())))
 
 
@@ -167,15 +167,15 @@ def _groups(message: Any, payloads: Sequence[bytes]) -> Iterator[_Group]:
         yield _Group(np.empty(0, np.int64), layout, np.empty(0, record_dtype(layout)))
     sizes = np.fromiter(map(len, payloads), np.int64, len(payloads))
     for size in dict.fromkeys(sizes.tolist()):
-        places = np.flatnonzero(sizes == size)
-        joined = b"".join(payloads if len(places) == len(payloads) else [payloads[k] for k in places.tolist()])
-        rows = np.frombuffer(joined, np.uint8).reshape(len(places), size)
-        while len(places):
+        indices = np.flatnonzero(sizes == size)
+        joined = b"".join(payloads if len(indices) == len(payloads) else [payloads[k] for k in indices.tolist()])
+        rows = np.frombuffer(joined, np.uint8).reshape(len(indices), size)
+        while len(indices):
             layout = message.layouts.measure(rows[0].tobytes())
-            same = _fits(layout, rows)
-            fitting = rows if same.all() else rows[same]
-            yield _Group(places[same], layout, fitting.view(record_dtype(layout)).reshape(len(fitting)))
-            places, rows = places[~same], rows[~same]
+            fits = _fits(layout, rows)
+            fitting = rows if fits.all() else rows[fits]
+            yield _Group(indices[fits], layout, fitting.view(record_dtype(layout)).reshape(len(fitting)))
+            indices, rows = indices[~fits], rows[~fits]
 
 
 def _fits(layout: Layout, rows: np.ndarray) -> np.ndarray:
@@ -196,7 +196,7 @@ def _columns(group: _Group) -> dict[str, None]:
 def _texts(group: _Group, name: str) -> list[Any]:
     """Return a field's strings, or tuples of strings, of each message of a group."""
     result = {entry.name: entry for entry in group.layout.entries if entry.name == name}
-    entry = result[name]  # the last of its name: a string follows its length
+    entry = result[name]  # the last entry of the name: a string follows its length
     if entry.kind == "length":
         elements = [_texts(group, f"{name}.{k}") for k in range(entry.length)]
         return list(zip(*elements, strict=True)) if elements else [()] * len(group.records)

@@ -40,14 +40,14 @@ from lapwing.messages.types import (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Topic:
-    """Topic; of all vehicles if its name contains `{vehicle}`."""
+    """Topic; template for all vehicles if its name contains `{vehicle}`."""
 
     name: str  # "{vehicle}/imu" or "clock", without a leading slash
     message: Any  # message class
     rate: str | None = None  # scene key of its rate; None: every exchange tick
     recorded: bool = True
     deterministic: bool = True  # equal bytes for equal scene and seed; only these topics enter the digest
-    vehicle: str = ""  # vehicle of a fleet that it belongs to; its name then contains no `{vehicle}`
+    vehicle: str = ""  # vehicle of a fleet, whose name then replaces `{vehicle}`
 
     def key(self, vehicle: str = "") -> str:
         """Return ROS name and name in the log: "/drone1/imu"."""
@@ -82,7 +82,7 @@ LASER_SCAN = Topic("{vehicle}/scan", LaserScan, rate="sensors.lidar.rate")
 POINT_CLOUD = Topic("{vehicle}/points", PointCloud2, rate="sensors.lidar.rate")
 DEPTH_IMAGE = Topic("{vehicle}/depth/image_rect", Image, rate="sensors.depth_camera.rate")
 BATTERY = Topic("{vehicle}/battery", BatteryState, rate="rates.battery")
-TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # SETPOINT has the setpoints that are flown
+TRAJECTORY = Topic("{vehicle}/trajectory", Setpoint, recorded=False)  # SETPOINT has those that the autopilot follows
 SETPOINT = Topic("{vehicle}/setpoint", Setpoint)
 ESTIMATE = Topic("{vehicle}/estimate", Estimate, rate="rates.estimate")
 ESTIMATE_COVARIANCE = Topic("{vehicle}/estimate/covariance", EstimateCovariance, rate="rates.covariance")
@@ -138,5 +138,5 @@ def topic_named(name: str) -> Topic:
 
 
 def topic_rank(topic: Topic) -> int:
-    """Return the rank among the messages of a tick: the order of the table, then custom sensors."""
+    """Return the rank among the messages of a tick: that in the table; custom sensors come last."""
     return _RANKS.get(topic, len(TOPICS))

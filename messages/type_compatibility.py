@@ -4,12 +4,12 @@ from lapwing.messages.former_names import with_current_fields
 from lapwing.messages.parse import PRIMITIVES, Definition, parse
 from lapwing.messages.types import DEFINITIONS, TYPES
 
-_BAR = "=" * 80  # between the types of a schema, as ROS 2 writes it
+_BAR = "=" * 80  # between the types of a schema, as in ROS 2
 _HEAD = "MSG: "
 
 
 def first_type_difference(type_name: str, text: str) -> str:
-    """Return the first difference between a recorded and the current definition as text; "" if both decode alike.
+    """Return the first difference between a recorded and the current definition as text; "" if both are compatible.
 
     Comments, constants and defaults are not part of a message. An unknown type has no difference.
 
@@ -37,22 +37,22 @@ def _definitions(type_name: str, text: str) -> dict[str, Definition]:
     """Return the types of a schema by full name."""
     result = {}
     for k, part in enumerate(text.replace("\r", "").split(f"{_BAR}\n")):
-        name, own = type_name, part
+        name, content = type_name, part
         if k:
-            head, _, own = part.partition("\n")
+            head, _, content = part.partition("\n")
             package, _, short = head.removeprefix(_HEAD).strip().partition("/")
             name = f"{package}/msg/{short.removeprefix('msg/')}"
-        result[name] = with_current_fields(parse(name, own))
+        result[name] = with_current_fields(parse(name, content))
     return result
 
 
-def _fields(type_name: str, known: dict[str, Definition], prefix: str = "") -> list[tuple[str, str]]:
+def _fields(type_name: str, definitions: dict[str, Definition], prefix: str = "") -> list[tuple[str, str]]:
     """Return type and dotted name of all leaf fields of a type; types with equal layouts count as one."""
     result = []
-    for field in known[type_name].fields:
+    for field in definitions[type_name].fields:
         array = "" if field.length is None else f"[{field.length or ''}]"
         if field.nested:
-            result += _fields(field.base, known, f"{prefix}{field.name}{array}.")
+            result += _fields(field.base, definitions, f"{prefix}{field.name}{array}.")
         else:
             result.append((_NAMES.get(PRIMITIVES.get(field.base, ""), field.base) + array, f"{prefix}{field.name}"))
     return result

@@ -1,6 +1,6 @@
-"""Type hashes of ROS 2 (REP 2011, version RIHS01): SHA-256 of a type's fields and of those of all types within it.
+"""Type hashes of ROS 2 (REP 2011, version RIHS01): SHA-256 of a type's fields and of those of all types in it.
 
-Two nodes exchange messages only where their hashes agree; rmw_zenoh has the hash in the key of a topic.
+Two nodes exchange messages only if their hashes agree; rmw_zenoh has the hash in the key of a topic.
 """
 
 import hashlib
@@ -30,15 +30,15 @@ _TYPE_IDS = {
     "byte": 16,
     "string": 17,
 }
-_ARRAY, _SEQUENCE = 48, 144  # what is added for `T[n]` and `T[]`
+_ARRAY, _SEQUENCE = 48, 144  # added to the type id for `T[n]` and `T[]`
 
 
 def type_hash(type_name: str, definitions: Mapping[str, Definition]) -> str:
     """Return the hash of a type, "RIHS01_" and 64 hexadecimal digits; `definitions` has all types by full name."""
-    within = sorted(set(dependencies(type_name, dict(definitions))))
+    contained = sorted(set(dependencies(type_name, dict(definitions))))
     description = {
         "type_description": _describe(definitions[type_name]),
-        "referenced_type_descriptions": [_describe(definitions[name]) for name in within],
+        "referenced_type_descriptions": [_describe(definitions[name]) for name in contained],
     }
     return "RIHS01_" + hashlib.sha256(json.dumps(description).encode()).hexdigest()
 
@@ -54,9 +54,9 @@ def _describe(definition: Definition) -> dict[str, Any]:
 
 
 def _field(field: Field) -> dict[str, Any]:
-    more = 0 if field.length is None else _ARRAY if field.length else _SEQUENCE
+    array_id = 0 if field.length is None else _ARRAY if field.length else _SEQUENCE
     kind = {
-        "type_id": more + (_NESTED if field.nested else _TYPE_IDS[field.base]),
+        "type_id": array_id + (_NESTED if field.nested else _TYPE_IDS[field.base]),
         "capacity": field.length or 0,
         "string_capacity": 0,  # no bounded strings
         "nested_type_name": field.base if field.nested else "",

@@ -1,4 +1,4 @@
-"""Every message class, found from the `.msg` files beside this module: `lapwing.messages.types.Imu` and so on."""
+"""Message classes, generated from the `.msg` files next to this module: `lapwing.messages.types.Imu` and so on."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ def message_class(type_name: str) -> Any:
     """Return the class of a full type name.
 
     Raises:
-        ValueError: there is no such type; names the choices.
+        ValueError: the type is unknown; the message lists the choices.
     """
     if type_name not in TYPES:
         raise ValueError(f"unknown message type {type_name}; known: {', '.join(sorted(TYPES))}")

@@ -10,7 +10,7 @@ _ZERO, _MINUS, _POINT = b"0-."
 
 @always_inline
 def write_text(out: Any, at: int, text: Any) -> int:
-    """Write bytes into `out` from `at` on. Return the place after them."""
+    """Write bytes into `out` at index `at`. Return the index after them."""
     for k in range(len(text)):
         out[at + k] = text[k]
     return at + len(text)
@@ -21,27 +21,27 @@ def write_number(out: Any, at: int, value: float, decimals: int, scale: int) -> 
     """Write a number, rounded to `decimals` decimals, without zeros at its end; its absolute value is below LIMIT.
 
     Args:
-        out: bytes.
-        at: first place.
-        value: the number.
+        out: buffer of bytes.
+        at: index of the first byte.
+        value: number to write.
         decimals: at most 10.
         scale: 10^decimals.
 
     Returns:
-        The place after the number.
+        The index after the number.
     """
     n = int(math.fabs(value) * scale + 0.5)
     if value < 0.0 and n > 0:
         out[at] = _MINUS
         at += 1
     whole, rest = n // scale, n % scale
-    size, above = 1, 10
-    while whole >= above:
-        size, above = size + 1, above * 10
-    for k in range(size):
-        out[at + size - 1 - k] = _ZERO + whole % 10
+    digits, power = 1, 10
+    while whole >= power:
+        digits, power = digits + 1, power * 10
+    for k in range(digits):
+        out[at + digits - 1 - k] = _ZERO + whole % 10
         whole //= 10
-    at += size
+    at += digits
     if rest == 0:
         return at
     out[at] = _POINT

@@ -38,7 +38,7 @@ class ArduPilotExchange(NamedTuple):
 
 @always_inline
 def _is_expected(p: ArduPilotExchange, size: int) -> bool:
-    """Return True if the datagram is the next servo packet, which Python does not need to look at."""
+    """Return True if the datagram is the next servo packet and valid, so that Python need not check it."""
     data, magic = p.datagrams.received, unsigned16(p.datagrams.received, 0)
     if not ((size == 40 and magic == MAGIC_16) or (size == 72 and magic == MAGIC_32)) or not is_from_peer(p.datagrams):
         return False
@@ -53,7 +53,7 @@ def _is_expected(p: ArduPilotExchange, size: int) -> bool:
 
 @always_inline
 def step(p: ArduPilotExchange, s: int, tick: int, inputs: tuple) -> tuple[int, tuple, int]:
-    """Answer the last servo packet with the state at `tick`, and take in the next packet."""
+    """Answer the last servo packet with the state at `tick`, and receive the next packet."""
     e, d = p.shared, p.datagrams
     if tick % e.period != 0:
         return s, (), CONTINUE

@@ -1,14 +1,14 @@
 """Frame count of ArduPilot's servo packets: new, resent and skipped frames, and restarts.
 
-ArduPilot sends a frame again, with the same count, if its answer does not come within about a second. Such a frame is
-answered but does not step the plant. A lower count means that the program has started again.
+ArduPilot sends a frame again, with the same count, if its answer does not arrive within about a second. Such a frame is
+answered but does not step the plant. A lower count means that the program has restarted.
 """
 
 from enum import Enum, auto
 
 import numpy as np
 
-ANY = -1  # no frame has come, or the program has started again
+ANY = -1  # no frame has arrived since the program started
 
 
 class Frame(Enum):
@@ -16,18 +16,18 @@ class Frame(Enum):
 
     NEW = auto()  # answer with the state after a step
     RESENT = auto()  # answer with the last state again
-    RESTARTED = auto()  # the program has started again; answer as to a new frame
+    RESTARTED = auto()  # the program has restarted; answer as for a new frame
 
 
 class FrameSequence:
-    """Classifies frame counts.
+    """Classifier of frame counts.
 
     Attributes:
-        next: (1,) count of the next frame, ANY before the first; compiled code, which takes in the frames that come in
-            order, increases it.
-        resent: frames that came again.
-        skipped: frames that never came.
-        restarts: starts of the program after the first.
+        next: (1,) count of the next frame, ANY before the first; compiled code increments it for each
+            frame in order.
+        resent: frames received again.
+        skipped: frames never received.
+        restarts: restarts of the program.
     """
 
     def __init__(self) -> None:

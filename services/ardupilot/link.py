@@ -1,8 +1,7 @@
 """Link to ArduPilot SITL: lock step over UDP, and MAVLink over TCP for the mission.
 
-ArduPilot sends a servo packet and waits for the state after that step, so that every exchange is an answer to the last
-packet followed by the wait for the next one. Compiled code makes it (`exchange`) as long as the packets come in order
-and within 0.2 s.
+ArduPilot sends a servo packet and waits for the state after that step, so each exchange answers the last packet and
+waits for the next one. Compiled code does this (`exchange`) as long as the packets arrive in order and within 0.2 s.
 """
 
 import math
@@ -20,7 +19,7 @@ from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttl
 from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.datagrams import DatagramSocket
-from lapwing.services.common.firmware.exchange import INVALID, LAST, POLL, SEND, Shared, empty_ring
+from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL, SEND, Shared, empty_ring
 from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
@@ -33,7 +32,7 @@ from lapwing.services.common.ports import AirspeedReading, DistanceReading, ImuR
 
 PORT, MAVLINK_PORT, STRIDE = 9002, 5760, 10
 INSTANCES = 100
-FORGOTTEN = 2.0  # [s] without an answer after which packets from another address are a restarted firmware
+PEER_TIMEOUT = 2.0  # [s] without an answer; after it, another sender is a restarted firmware
 PARAMETERS_FILE = "lapwing.parm"
 PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
 
@@ -53,13 +52,13 @@ class ArduPilotLink:
         self._client: MissionClient | None = None
         self._status: FlightStatus | None = None
         self._simulated: SimulatedSensors | None = None
-        self._time = 0.0  # [s] of the simulation
+        self._time = 0.0  # [s] simulation time
         self._packet: ServoPacket | None = None
-        self._again = False  # a frame has come again since the last answer
+        self._was_resent = False  # a frame was resent since the last answer
 
     @property
     def address(self) -> tuple[str, int]:
-        """Address of the lock step, of this link's socket."""
+        """Host and port of this link's lock-step socket."""
         return self._setup.host, self._setup.port_at(PORT, STRIDE)
 
     def exchange(self, shared: Shared, ring: Callable[[str], InputRing]) -> ArduPilotExchange:
@@ -79,7 +78,7 @@ class ArduPilotLink:
         return ArduPilotExchange(shared, samples, self._socket.memory, self._sequence.next)
 
     def open(self, waits: Waits) -> None:
-        """Start or await ArduPilot, and receive its first servo packet."""
+        """Start ArduPilot or wait for it, and receive its first servo packet."""
         self._setup, bound = first_free(self._setup, INSTANCES, _claim)
         self._socket.attach(bound)
         setup = self._setup
@@ -100,25 +99,25 @@ class ArduPilotLink:
         while self._packet is None:
             waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
             self._client.read()  # ArduPilot waits for a connection before it starts
-            self._take(self._socket.receive())
+            self._process(self._socket.receive())
             self._check(patience, "no servo packet", "start arducopter with --model JSON:127.0.0.1")
 
     def _arguments(self) -> list[str]:
-        """Return the arguments of the program that the scene does not have."""
+        """Return the arguments of the program that the scene does not set."""
         home, instance = self._own.datum.home, self._setup.instance
-        place = f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.height:.3f},0"
-        known = {
+        position = f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.height:.3f},0"
+        defaults = {
             "--model": f"JSON:{self._setup.host}",
-            "--home": place,
+            "--home": position,
             "--instance": str(instance),
             "--sim-port-out": str(self.address[1]) if self._setup.port else "",
             "--defaults": PARAMETERS_FILE,
         }
         arguments = set(self._setup.command)
-        return [text for name, value in known.items() if value and name not in arguments for text in (name, value)]
+        return [text for name, value in defaults.items() if value and name not in arguments for text in (name, value)]
 
-    def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
-        """Do what compiled code leaves to Python; see `ExchangeLink`."""
+    def handle_call(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
+        """Handle a call from the compiled exchange; see `ExchangeLink`."""
         self._time = tick * self._setup.interval
         if reason == INVALID:
             raise ValueError("the state of the vehicle is not finite")
@@ -142,34 +141,33 @@ class ArduPilotLink:
         return self._status.output((), running=False)
 
     def _await(self, size: int, waits: Waits) -> None:
-        """Wait for the next servo packet, after the receipt of `size` bytes that are not simply this packet.
+        """Wait for the next servo packet, after compiled code received `size` bytes that were not this packet.
 
-        A frame that comes again is answered again only if no other packet follows it. It may have been on its way
-        before the answer, and ArduPilot would take a second answer as that to its next frame: all later outputs would
-        be a step late.
+        A resent frame is answered again only if no other packet follows it: ArduPilot may have sent it before the
+        answer arrived, and would use a second answer for its next frame. All later outputs would then be a step late.
         """
-        self._packet, self._again = None, False
-        self._take(size)
+        self._packet, self._was_resent = None, False
+        self._process(size)
         patience: Patience | None = None
         while self._packet is None:
             patience = patience or self._patience()
             waits("ardupilot")
             self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
             size = self._socket.receive()
-            self._take(size)
-            if size < 0 and self._again:
-                self._again = False
+            self._process(size)
+            if size < 0 and self._was_resent:
+                self._was_resent = False
                 self._send()
             elif size < 0 and self._client:
                 self._client.read()  # ArduPilot waits for a connection before it starts again
         self._shared.outputs[:] = [throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS]]
 
     def cpu(self) -> float:
-        """Return the CPU time [s] of the program, 0 if somebody else has started it."""
+        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
         return self._program.cpu() if self._program else 0.0
 
     def close(self) -> None:
-        """End the connections, and the program."""
+        """Close the connections and end the program."""
         if self._client:
             self._client.close()
         self._socket.close()
@@ -180,33 +178,33 @@ class ArduPilotLink:
     def _patience(self) -> Patience:
         return Patience(self._setup.step_timeout, self._program.pid if self._program else None)
 
-    def _check(self, patience: Patience, what: str, advice: str) -> None:
-        """Raise FirmwareError if the program has ended or the patience is over."""
+    def _check(self, patience: Patience, problem: str, advice: str) -> None:
+        """Raise FirmwareError if the program has ended or the time-out has passed."""
         at = f" at t = {self._time:.3f} s"
         if self._program:
             self._program.check(at)
         if patience.over:
             answered = self._socket.memory.sent_size[0] > 0
             timeout = self._setup.step_timeout if answered else self._setup.start_timeout
-            raise FirmwareError(f"ardupilot: {what} for {timeout:g} s{at}; {advice}")
+            raise FirmwareError(f"ardupilot: {problem} for {timeout:g} s{at}; {advice}")
 
     def _send(self) -> None:
         """Send the last answer."""
         if reason := self._socket.send():
             self.report.note(f"cannot send to ArduPilot ({reason})")
 
-    def _take(self, size: int) -> None:
-        """Take in a datagram of `size` bytes; negative: none has come."""
+    def _process(self, size: int) -> None:
+        """Process a datagram of `size` bytes; negative if none has arrived."""
         link = self._socket
-        if size < 0:  # none, or the port of a firmware that has ended
+        if size < 0:  # none, or the firmware's port is closed
             return
         try:
             packet = decode(link.datagram(size))
         except ValueError as error:
-            self._reject(f"packet from {link.sender} is no servo packet: {error}")
+            self._reject(f"packet from {link.sender} is not a servo packet: {error}")
             return
         if link.has_peer and not link.knows_sender:
-            if time.monotonic() < self._shared.seconds[LAST] + FORGOTTEN:
+            if time.monotonic() < self._shared.seconds[LAST_START] + PEER_TIMEOUT:
                 self._reject(f"another ArduPilot sends from {link.sender}")
                 return
             self._sequence.restart()
@@ -218,7 +216,7 @@ class ArduPilotLink:
             self._simulated = SimulatedSensors(self._own, self._client)
         self.report.reconnected = self._sequence.restarts
         if meaning is Frame.RESENT:
-            self._again = True
+            self._was_resent = True
             return
         if packet.frame_rate <= LOOP_RATE:  # a rate that ArduPilot cannot keep
             self.report.note(f"SIM_RATE_HZ is {packet.frame_rate}; set it above the loop rate of {LOOP_RATE} Hz")
@@ -233,7 +231,7 @@ def _claim(setup: FirmwareSetup) -> socket.socket:
     """Open the port of an instance.
 
     Raises:
-        FirmwareError: it is in use.
+        FirmwareError: the port is in use.
     """
     address = setup.host, setup.port_at(PORT, STRIDE)
     result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

@@ -32,13 +32,13 @@ LAYOUT = (  # outputs 1 to 4 of FRAME_CLASS 1, FRAME_TYPE 1 (quadrotor in X)
 class ArduPilotSetup(NamedTuple):
     """Resolved values of the adapter."""
 
-    datum: Datum  # of the mission
+    datum: Datum  # origin of the mission
     gravity_world: Vec3  # [m/s^2]
     rate: float  # [Hz] of the exchange
     imu: bool  # rates and specific force of the IMU, otherwise ground truth
     range_port: str  # port of the distance sensor; "": none
     airspeed: bool
-    gps: bool  # outages of the scene's receiver
+    gps: bool  # the scene has a receiver, whose outages are sent to ArduPilot
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -53,11 +53,11 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if exchange.rate <= LOOP_RATE:
         message = f"got {exchange.rate:g} Hz, ArduPilot's loop runs at {LOOP_RATE} Hz"
         raise ConfigError("communication.rate", message, f"more than {LOOP_RATE} Hz")
-    carried = set(scene.tables("sensors"))
+    sensors = set(scene.tables("sensors"))
     imu = scene.has(ArduPilot) and scene[ArduPilot].inertial == "sensors"
-    if imu and ports.IMU not in carried:
+    if imu and ports.IMU not in sensors:
         raise ConfigError("ardupilot.inertial", '"sensors" needs an IMU', "[sensors.imu] too")
-    distance = next((name for name in (ports.RANGEFINDER, ports.SONAR) if name in carried), "")
+    distance = next((name for name in (ports.RANGEFINDER, ports.SONAR) if name in sensors), "")
     home = environment(scene).home
     own = ArduPilotSetup(
         Datum(home, start_height(scene), start_height(scene)),
@@ -65,8 +65,8 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         exchange.rate,
         imu,
         distance,
-        ports.AIRSPEED in carried,
-        ports.GPS in carried,
+        ports.AIRSPEED in sensors,
+        ports.GPS in sensors,
     )
     inputs = [ports.TRUTH, *([ports.IMU] if imu else []), *([distance] if distance else [])]
     inputs += [ports.AIRSPEED] if own.airspeed else []

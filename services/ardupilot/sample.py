@@ -14,7 +14,7 @@ SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] of indicated airspeed
 
 
 class Samples(NamedTuple):
-    """Ports of the vehicle, and which of them it has."""
+    """Rings of the vehicle's ports, and flags of its optional sensors."""
 
     gravity_world: Vec3  # [m/s^2]
     truth: InputRing

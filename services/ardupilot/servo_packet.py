@@ -27,7 +27,7 @@ def decode(data: bytes) -> ServoPacket:
     """Return the packet in a datagram.
 
     Raises:
-        ValueError: (one line) the datagram is no servo packet; the text says why.
+        ValueError: (one line) the datagram is not a servo packet; the text states the reason.
     """
     if len(data) < _HEAD.size:
         raise ValueError(f"{len(data)} bytes, a servo packet has 40 or 72")

@@ -42,7 +42,7 @@ class VehicleState(NamedTuple):
 
 
 class Extras(NamedTuple):
-    """Optional fields; those that are not finite are left out."""
+    """Optional fields; those that are not finite are omitted."""
 
     ranges: tuple[float, ...] = (math.nan,)  # [m] of the rangefinders, at most 6
     airspeed: float = math.nan  # [m/s]
@@ -54,15 +54,16 @@ NO_EXTRAS = Extras()
 
 
 @always_inline
-def _is_written(values: Any) -> bool:
-    fits = True
+def _fits(values: Any) -> bool:
+    """Return True if all absolute values are below LIMIT."""
+    result = True
     for value in values:
-        fits = fits and math.fabs(value) < LIMIT
-    return fits
+        result = result and math.fabs(value) < LIMIT
+    return result
 
 
 @always_inline
-def _numbers(out: Any, at: int, values: Any) -> int:
+def _write_numbers(out: Any, at: int, values: Any) -> int:
     """Write numbers with nine decimals, separated by commas."""
     first = True
     for value in values:
@@ -86,24 +87,24 @@ def write_state(out: Any, time: float, state: VehicleState, extras: Extras) -> i
         extras: optional fields.
 
     Returns:
-        Its length [bytes]; INVALID if a number of the state is not finite, or is 9e8 or more.
+        Length [bytes]; INVALID if a number of the state is not finite, or is 9e8 or more.
     """
     position, velocity = _swap_world(state.position_world), _swap_world(state.velocity_world)
     gyro, force = _swap_body(state.omega_body), _swap_body(state.specific_force_body)
     quaternion = _swap_attitude(state.attitude)
-    if not _is_written((time, *gyro, *force, *position, *quaternion, *velocity)):
+    if not _fits((time, *gyro, *force, *position, *quaternion, *velocity)):
         return INVALID
     at = write_number(out, write_text(out, 0, _TIME), time, 10, _TENTH_NANO)
-    at = _numbers(out, write_text(out, at, _GYRO), gyro)
-    at = _numbers(out, write_text(out, at, _FORCE), force)
-    at = _numbers(out, write_text(out, at, _POSITION), position)
-    at = _numbers(out, write_text(out, at, _QUATERNION), quaternion)
-    at = write_text(out, _numbers(out, write_text(out, at, _VELOCITY), velocity), _CLOSE)
-    return write_text(out, _optional(out, at, extras), _END)
+    at = _write_numbers(out, write_text(out, at, _GYRO), gyro)
+    at = _write_numbers(out, write_text(out, at, _FORCE), force)
+    at = _write_numbers(out, write_text(out, at, _POSITION), position)
+    at = _write_numbers(out, write_text(out, at, _QUATERNION), quaternion)
+    at = write_text(out, _write_numbers(out, write_text(out, at, _VELOCITY), velocity), _CLOSE)
+    return write_text(out, _write_optional(out, at, extras), _END)
 
 
 @always_inline
-def _optional(out: Any, at: int, extras: Extras) -> int:
+def _write_optional(out: Any, at: int, extras: Extras) -> int:
     """Write the optional fields, each after a comma."""
     for k in range(len(extras.ranges)):
         if math.fabs(extras.ranges[k]) < LIMIT:

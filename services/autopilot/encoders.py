@@ -13,7 +13,7 @@ from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.autopilot.estimator import NAMES
 from lapwing.services.common import ports
-from lapwing.services.common.command_encoder import actuators_wire, status_wire
+from lapwing.services.common.command_encoder import actuators_encoder, status_encoder
 from lapwing.services.common.ports import StateEstimate
 from lapwing.services.common.setpoint_encoder import setpoint_encoder
 
@@ -31,12 +31,12 @@ def wires(
         status_texts: status texts of the commander by index; may grow.
     """
     return [
-        actuators_wire(setup.port(ports.ACTUATORS)),
+        actuators_encoder(setup.port(ports.ACTUATORS)),
         TopicEncoder(
             topic.ESTIMATE, ports.ESTIMATE, estimate_every, _estimate, _estimate_sample, lambda x: [x.rejected]
         ),
         setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases),
-        status_wire(status_every, phases, status_texts),
+        status_encoder(status_every, phases, status_texts),
         *([_covariance_wire(setup.port(name))] if (name := ports.ESTIMATE_COVARIANCE) in setup.ports else []),
     ]
 

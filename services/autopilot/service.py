@@ -33,7 +33,7 @@ from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.px4.block import Px4Controller
 from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
-from lapwing.services.common.airspeed_encoder import encoder_of_airspeed
+from lapwing.services.common.airspeed_encoder import airspeed_encoder
 from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGHT
 from lapwing.services.common.failure_types import SOUND, Faults, with_satellites
 from lapwing.services.common.ports import EstimateCovariance
@@ -86,7 +86,7 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     service.wires = wires(setup, config.estimate_every, config.status_every, phases, status_texts)
     if ports.AIRSPEED in sensor_ports:
         airspeed_port = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
-        service.wires.append(encoder_of_airspeed(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
+        service.wires.append(airspeed_encoder(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
     if config.imus > 1:
         service.wires.append(imu_selection_wire(setup.vehicle, config.imu_every))
     service.python_topics = (topic.OPERATOR, topic.COMMAND_ACKS) if config.operator else ()

@@ -1,4 +1,4 @@
-"""Start of Betaflight SITL: configuration by its command line, restart, and calibration at rest."""
+"""Start of Betaflight SITL: configuration through its command line, restart, and calibration at rest."""
 
 import socket
 import time
@@ -16,23 +16,23 @@ from lapwing.services.common.firmware.setup import FirmwareSetup
 MODES = ("aux 0 0 0 1700 2100 0 0", "aux 1 1 1 1700 2100 0 0")  # ARM on channel 5, ANGLE on channel 6
 FEED_EVERY = 0.004  # [s] between two packets at rest
 POLL_EVERY = 0.2  # [s]
-IGNORED = ("arm switch", "not disarmed")  # reasons that are none once the arm switch opens
-PROMPT = "# "  # of the command line
-DEAF = ("starting",)  # reasons of a firmware that got RC channels before it was ready: it ignores them for good
-DEAF_TIMEOUT = 15.0  # [s]; it is ready after 5 s
-REPEAT = 2.0  # [s] without an answer after which the command line is asked for again
+IGNORED = ("arm switch", "not disarmed")  # reasons that disappear when the arm switch opens
+PROMPT = "# "  # end of the command line's output
+NOT_READY = ("starting",)  # reasons of a firmware that got RC channels too early, and ignores them from then on
+RC_TIMEOUT = 15.0  # [s] from the start; the firmware is ready after 5 s
+REPEAT = 2.0  # [s] without an answer after which the command line is requested again
 SAVE_TIMEOUT = 30.0  # [s] from `save` to the exit of the program
 
 
-class Deaf(FirmwareError):
-    """The firmware has started, but not all of it: another start helps."""
+class IncompleteStart(FirmwareError):
+    """Part of the firmware has not started; a restart resolves this."""
 
 
 def start(setup: FirmwareSetup, waits: Waits) -> Program | None:
-    """Start and configure the program; None if it is started elsewhere.
+    """Start and configure the program. Return None if it is started elsewhere.
 
     Raises:
-        FirmwareError: it cannot be started, another one runs, or it rejects a line of the configuration.
+        FirmwareError: the program cannot be started, another one runs, or it rejects a line of the configuration.
     """
     if not setup.command:
         return None
@@ -63,13 +63,14 @@ def connect(setup: FirmwareSetup, program: Program | None, waits: Waits) -> Msp:
         if program:
             program.check(" at its start")
             if f"bind port {port} for UART1 failed" in program.text():
-                raise Deaf(f"betaflight: cannot open TCP port {port}")
+                raise IncompleteStart(f"betaflight: cannot open TCP port {port}")
         try:
             return Msp(setup.host, port)
         except OSError:
             time.sleep(0.05)
-    how = "check autopilot.command" if program else f"start betaflight_SITL.elf {setup.host}, or set autopilot.command"
-    raise FirmwareError(f"betaflight: nothing listens at {setup.host}:{port} after {setup.start_timeout:g} s; {how}")
+    start_it = f"start betaflight_SITL.elf {setup.host}, or set autopilot.command"
+    advice = "check autopilot.command" if program else start_it
+    raise FirmwareError(f"betaflight: nothing listens at {setup.host}:{port} after {setup.start_timeout:g} s; {advice}")
 
 
 def settle(
@@ -78,43 +79,44 @@ def settle(
     program: Program | None,
     feed: Callable[[bool], None],
     waits: Waits,
-    again: bool = False,
+    can_restart: bool = False,
 ) -> FirmwareStatus:
-    """Feed the firmware with a vehicle at rest until it can be armed.
+    """Send the state of a vehicle at rest to the firmware until it can be armed.
 
     Args:
-        setup: time-out.
+        setup: configuration with the time-out.
         link: connection for the status.
         program: the program, if Lapwing runs it.
         feed: sends the state, and RC channels if its argument is True.
         waits: see `FirmwareLink`.
-        again: the program can be started again.
+        can_restart: the program can be started again.
 
     Raises:
-        Deaf: it does not receive RC channels, and `again` is True.
+        IncompleteStart: it does not receive RC channels, and `can_restart` is True.
         FirmwareError: it cannot be armed within `start_timeout`; the text has its reasons.
     """
     patience = Patience(setup.start_timeout, program.pid if program else None)
-    deaf = Patience(DEAF_TIMEOUT, program.pid if program else None)
+    rc_patience = Patience(RC_TIMEOUT, program.pid if program else None)
     status, next_poll = None, 0.0
     while not patience.over:
         waits("Betaflight's calibration")
         if program:
             program.check(" at its start")
-        feed(status is not None)  # RC before the firmware has started makes it deaf to RC
+        feed(status is not None)  # RC channels before the start of the firmware would disable them
         for command, payload in link.poll():
             if command == msp.STATUS:
                 status = msp.parse_status(payload)
         if status and not set(status.blockers).difference(IGNORED):
             return status
-        if again and deaf.over and (status is None or status.blockers == DEAF):
-            raise Deaf(f"betaflight: does not {'hear RC channels' if status else 'answer by MSP'}")
+        if can_restart and rc_patience.over and (status is None or status.blockers == NOT_READY):
+            raise IncompleteStart(f"betaflight: does not {'receive RC channels' if status else 'answer by MSP'}")
         if (now := time.monotonic()) >= next_poll:
             next_poll = now + POLL_EVERY
             link.send(msp.request(msp.STATUS))
         time.sleep(FEED_EVERY)
-    why = ", ".join(status.blockers) if status else "no answer by MSP"
-    raise FirmwareError(f"betaflight: cannot be armed after {setup.start_timeout:g} s ({why}); check its configuration")
+    reasons = ", ".join(status.blockers) if status else "no answer by MSP"
+    message = f"betaflight: cannot be armed after {setup.start_timeout:g} s ({reasons})"
+    raise FirmwareError(f"{message}; check its configuration")
 
 
 def _listens(host: str, port: int) -> bool:
@@ -126,11 +128,11 @@ def _listens(host: str, port: int) -> bool:
 
 
 def _configure(setup: FirmwareSetup, program: Program, waits: Waits) -> None:
-    """Write the configuration by the command line; `save` ends the program."""
+    """Write the configuration through the command line; `save` ends the program."""
     link = connect(setup, program, waits)
     try:
         _command(link, "#", program, waits)  # alone: a further byte would cancel it
-        _command(link, "version\n", program, waits)  # takes a second "#" with it, which begins a comment
+        _command(link, "version\n", program, waits)  # completes the line of a second "#", a comment
         for line in lines(setup):
             answer = _command(link, f"{line}\n", program, waits)
             if "###ERROR" in answer or "Invalid" in answer:
@@ -166,10 +168,10 @@ def _command(link: Msp, line: str, program: Program, waits: Waits) -> str:
 
 
 def lines(setup: FirmwareSetup) -> list[str]:
-    """Return the lines for the firmware's command line; those of the scene come last, so that they win."""
+    """Return the lines for the firmware's command line; those of the scene come last and take precedence."""
     pilot: PilotSetup = setup.own
     rate = round(pilot.yaw_rate_limit_deg / 10.0)
-    needed = [
+    required = [
         "map AETR1234",
         *MODES,
         "set acc_calibration = 0,0,0,1",  # a virtual sensor has no offset
@@ -186,4 +188,4 @@ def lines(setup: FirmwareSetup) -> list[str]:
         *(f"set {axis}_expo = 0" for axis in ("roll", "pitch", "yaw")),
     ]
     own = [line for line in setup.parameter_text.splitlines() if line.strip() and not line.startswith("#")]
-    return needed + own + [f"set {name} = {value:g}" for name, value in setup.parameters.items()]
+    return required + own + [f"set {name} = {value:g}" for name, value in setup.parameters.items()]

@@ -1,9 +1,9 @@
 """Link to Betaflight SITL: real time, UDP for state, RC and motors, MSP for status.
 
 The firmware would set the rate of its clock by the wall time between two packets of increasing time, which on a busy
-machine jumps by a factor of 100. All packets therefore carry the same time, and its clock keeps to the wall's, or to
-`betaflight.clock_rate` of it, which is set and measured before the first tick. A late packet shifts all later ones: a
-simulation that catches up would be faster than the firmware.
+machine varies by a factor of 100. All packets therefore carry the same time, so that its clock runs at wall time, or at
+`betaflight.clock_rate` times wall time, which is set and measured before the first tick. A late packet shifts all later
+ones: a simulation that catches up would be faster than the firmware.
 """
 
 import math
@@ -28,9 +28,9 @@ TIME = 1.0  # [s] in all packets, unless the clock is slowed down
 RC_EVERY = 0.01  # [s]
 STARTS = 3  # starts of the program while it does not receive RC channels
 STATUS_EVERY = 0.2  # [s]
-RUNNING = 0.02  # motor output of an armed vehicle, at least
-REPLY = 0.05  # [s] that the firmware has for its motor outputs; the simulation waits for them
-FORGOTTEN = 1.0  # [s] of silence after which another firmware may take over
+RUNNING = 0.02  # motor output above which the vehicle is armed
+REPLY = 0.05  # [s] longest wait for motor outputs before the state is sent again
+PEER_TIMEOUT = 1.0  # [s] of silence after which another firmware may take over
 
 
 class BetaflightLink:
@@ -49,18 +49,18 @@ class BetaflightLink:
         self._outputs: tuple[float, ...] = (0.0,) * 4
         self._sender: tuple[str, int] | None = None  # of the motor outputs
         self._armed = False
-        self._heard = 0.0  # [s] of the wall clock
+        self._output_at = 0.0  # [s] wall time of the last motor outputs
         self._pace = Pace(self.report)
         self._clock_rate = pilot.clock_rate
         self._stamp = TIME  # [s] in all packets
         self._rate = 1.0  # of the firmware's clock
-        self._rc_at = self._asked_at = -math.inf  # [s] simulation time
+        self._rc_at = self._status_at = -math.inf  # [s] simulation time
         self._sticks = OFF
 
     def open(self, waits: Waits) -> None:
-        """Start or await the firmware, and calibrate it."""
+        """Start the firmware or wait for it, and calibrate it."""
         setup = self._setup
-        self._socket = _bound(setup.host, self._ports.motors)
+        self._socket = _open_socket(setup.host, self._ports.motors)
         self._program = boot.start(setup, waits)
         self._calibrate(waits)
         if self._clock_rate < 1.0:
@@ -80,7 +80,7 @@ class BetaflightLink:
         assert self._socket is not None
         self._socket.settimeout(0.0)
         with suppress(OSError):
-            while self._socket.recv(2048):  # of the program before its restart
+            while self._socket.recv(2048):  # sent by the program before its restart
                 pass
 
         def feed(with_rc: bool) -> None:
@@ -92,7 +92,7 @@ class BetaflightLink:
                 self._msp = boot.connect(setup, self._program, waits)
                 self._status = boot.settle(setup, self._msp, self._program, feed, waits, left > 0)
                 return
-            except boot.Deaf as error:
+            except boot.IncompleteStart as error:
                 if not left:
                     raise
                 assert self._program is not None
@@ -110,26 +110,26 @@ class BetaflightLink:
         motion = self._source.update(t, read)
         self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), motion)
         self._pace.wait(interval / self._rate, self._rate)
-        self._drain(0.0)  # what has come since the last reply is older than this tick
+        self._drain(0.0)  # outputs since the last reply are older than this tick
         if t >= self._rc_at + RC_EVERY:
             self._rc_at = t
             self._send(self._sticks)
         else:
             self._send(None)
-        has_started = time.monotonic()
+        start = time.monotonic()
         if not self._drain(REPLY):
             self.report.missed += 1
             self._repeat(t, waits)
-        self.report.waiting += time.monotonic() - has_started
+        self.report.waiting += time.monotonic() - start
         self._poll_status(t)
         return self._output()
 
     def cpu(self) -> float:
-        """Return the CPU time [s] of the program, 0 if somebody else has started it."""
+        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
         return self._program.cpu() if self._program else 0.0
 
     def close(self) -> None:
-        """End the connections, and the program."""
+        """Close the connections and end the program."""
         if self._msp:
             self._msp.close()
         if self._socket:
@@ -140,13 +140,13 @@ class BetaflightLink:
 
     def _send(self, sticks: Sticks | None) -> None:
         assert self._socket is not None
-        with suppress(OSError):  # it is not there yet, or gone: silence shows that
+        with suppress(OSError):  # the firmware does not run; `step` detects its silence
             self._socket.sendto(state_packet(self._stamp, self._source.state), (self._setup.host, self._ports.state))
             if sticks:
                 self._socket.sendto(rc_packet(self._stamp, tuple(sticks)), (self._setup.host, self._ports.rc))
 
     def _drain(self, timeout: float) -> bool:
-        """Take in the motor outputs that have come, and wait for one at most `timeout` [s]; False if none came."""
+        """Receive all pending motor outputs; wait at most `timeout` [s] for the first. Return False if none arrived."""
         assert self._socket is not None
         deadline, result = time.monotonic() + timeout, False
         while True:
@@ -161,10 +161,10 @@ class BetaflightLink:
             result = self._accept(data, sender) or result
 
     def _accept(self, data: bytes, sender: tuple[str, int]) -> bool:
-        """Store motor outputs; count and ignore what is malformed or comes from a second firmware."""
+        """Store motor outputs; count and ignore malformed ones and those of a second firmware."""
         now = time.monotonic()
         if self._sender not in (None, sender):
-            if now - self._heard < FORGOTTEN:
+            if now - self._output_at < PEER_TIMEOUT:
                 self.report.rejected += 1
                 self.report.note(f"a second Betaflight ({sender[0]}:{sender[1]}) sent motor outputs, which are ignored")
                 return False
@@ -175,11 +175,11 @@ class BetaflightLink:
             self.report.rejected += 1
             self.report.note(f"malformed motor outputs: {error}")
             return False
-        self._sender, self._heard = sender, now
+        self._sender, self._output_at = sender, now
         return True
 
     def _repeat(self, t: float, waits: Waits) -> None:
-        """Send the state again until motor outputs come: the simulation pauses while the firmware gets no CPU.
+        """Send the state again until motor outputs arrive: the simulation pauses while the firmware gets no CPU.
 
         Raises:
             FirmwareError: the firmware has been silent for too long, or has ended.
@@ -199,9 +199,9 @@ class BetaflightLink:
 
     def _poll_status(self, t: float) -> None:
         assert self._msp is not None
-        if t < self._asked_at + STATUS_EVERY:
+        if t < self._status_at + STATUS_EVERY:
             return
-        self._asked_at = t
+        self._status_at = t
         for command, payload in self._msp.poll():
             if command == msp.STATUS:
                 with suppress(ValueError):
@@ -222,8 +222,8 @@ class BetaflightLink:
         )
 
 
-def _bound(host: str, port: int) -> socket.socket:
-    """Return the socket of the motor outputs.
+def _open_socket(host: str, port: int) -> socket.socket:
+    """Open the socket of the motor outputs.
 
     Raises:
         FirmwareError: the port is in use.

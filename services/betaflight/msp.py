@@ -1,4 +1,4 @@
-"""MSP version 1 over TCP: status of the firmware; and its command line, by which it is configured."""
+"""MSP version 1 over TCP: status and command line of the firmware."""
 
 import contextlib
 import functools
@@ -24,7 +24,7 @@ class FirmwareStatus(NamedTuple):
 
     armed: bool
     blockers: tuple[str, ...]  # reasons why it cannot be armed
-    load: float  # fraction of the CPU time of its scheduler
+    load: float  # fraction of its scheduler's CPU time
 
 
 def request(command: int, payload: bytes = b"") -> bytes:
@@ -54,8 +54,8 @@ def parse_status(payload: bytes) -> FirmwareStatus:
     """
     try:
         flags, _, load = struct.unpack_from("<IBH", payload, 6)
-        more = payload[15] & 0xF
-        bits: int = struct.unpack_from("<I", payload, 17 + more)[0]
+        extra = payload[15] & 0xF
+        bits: int = struct.unpack_from("<I", payload, 17 + extra)[0]
     except (struct.error, IndexError):
         raise ValueError(f"MSP status of {len(payload)} bytes is too short") from None
     blockers = tuple(name for i, name in enumerate(BLOCKERS) if bits >> i & 1)
@@ -63,16 +63,16 @@ def parse_status(payload: bytes) -> FirmwareStatus:
 
 
 class Msp:
-    """Non-blocking connection; replies are polled."""
+    """Non-blocking connection, whose replies are polled."""
 
     def __init__(self, host: str, port: int):
-        """Connect; OSError if nothing listens."""
+        """Connect. Raise OSError if nothing listens."""
         self._socket = socket.create_connection((host, port), timeout=0.2)
         self._socket.setblocking(False)
         self._data = b""
 
     def send(self, data: bytes) -> None:
-        """Send, and ignore a connection that is gone (`poll` shows it by silence)."""
+        """Send data, or discard it if the connection is lost: `poll` then returns nothing."""
         with contextlib.suppress(OSError):
             self._socket.sendall(data)
 

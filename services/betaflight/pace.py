@@ -10,10 +10,10 @@ FASTEST = 0.8  # shortest fraction of an interval between two packets
 
 
 class Pace:
-    """Waits for the time of each packet, and reports how well it is kept."""
+    """Pacing of packets in wall time, with statistics of its accuracy."""
 
     def __init__(self, report: LinkReport) -> None:
-        """Create it before the first packet."""
+        """Store the report."""
         self._report = report
         self._next = self._sent = 0.0  # [s] of the wall clock
         self._count = self._sum = self._squares = 0.0  # of the times [s] between packets
@@ -35,7 +35,7 @@ class Pace:
         self._next = max(self._next + interval, now + FASTEST * interval)
 
     def _add(self, gap: float) -> None:
-        """Take in a time [s] between two packets."""
+        """Add a time [s] between two packets to the statistics."""
         self._count, self._sum, self._squares = self._count + 1, self._sum + gap, self._squares + gap * gap
         mean = self._sum / self._count
         self._report.jitter = math.sqrt(max(0.0, self._squares / self._count - mean * mean))

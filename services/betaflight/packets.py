@@ -22,7 +22,7 @@ class Ports(NamedTuple):
 
     @classmethod
     def of(cls, setup: FirmwareSetup) -> "Ports":
-        """Return the ports of a configuration: the firmware's own, or four from `autopilot.port` on."""
+        """Return the ports of a configuration: the firmware's defaults, or four that start at `autopilot.port`."""
         first = setup.port
         return cls(first, first + 1, first + 2, first + 3) if first else cls()
 
@@ -32,7 +32,7 @@ class State(NamedTuple):
 
     omega_body: Vec3  # [rad/s] of the gyroscope
     specific_force_body: Vec3  # [m/s^2] of the accelerometer
-    attitude: Quaternion  # body to world; the firmware's build takes it as its own estimate
+    attitude: Quaternion  # body to world; the firmware uses it as its estimate
     velocity_world: Vec3  # [m/s] of the receiver
     latitude_deg: float
     longitude_deg: float
@@ -47,12 +47,12 @@ def state_packet(time: float, s: State) -> bytes:
     (w, x, -y, -z).
     """
     (p, q, r), (fx, fy, fz), (w, x, y, z) = s.omega_body, s.specific_force_body, s.attitude
-    place = (s.longitude_deg, s.latitude_deg, s.height)
-    return STATE.pack(time, p, -q, -r, fx, -fy, -fz, w, x, -y, -z, *s.velocity_world, *place, s.pressure)
+    position = (s.longitude_deg, s.latitude_deg, s.height)
+    return STATE.pack(time, p, -q, -r, fx, -fy, -fz, w, x, -y, -z, *s.velocity_world, *position, s.pressure)
 
 
 def rc_packet(time: float, channels: tuple[int, ...]) -> bytes:
-    """Return the packet for port 9004: up to 16 channels [us]; those that are left out are at 1000."""
+    """Return the packet for port 9004: up to 16 channels [us]; the others are at 1000."""
     return RC.pack(time, *channels, *(RC_LOW,) * (16 - len(channels)))
 
 

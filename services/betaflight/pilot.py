@@ -1,4 +1,4 @@
-"""Pilot of Betaflight: flies a trajectory by the sticks, in ANGLE mode, as a companion computer with GPS would."""
+"""Pilot of Betaflight: follows a trajectory with the sticks in ANGLE mode, like a companion computer with GPS."""
 
 import math
 from typing import NamedTuple
@@ -9,15 +9,15 @@ from lapwing.services.betaflight.resolve import PilotSetup
 from lapwing.services.common.ports import Setpoint
 
 ARM_AT = 0.5  # [s] at which the arm switch is closed, with the throttle low
-LIFTED = 0.02  # [m] of the reference above the start, from which the pilot flies
-LOW = 0.5  # [m] above the start, below which the landing begins
+TAKEOFF_HEIGHT = 0.02  # [m] of the reference above the start, from which the pilot flies
+LANDING_HEIGHT = 0.5  # [m] above the start, below which the landing begins
 DESCENT = 0.4  # [m/s] below the end of the trajectory, until the vehicle rests
-RESTED = 0.6  # [s] without vertical motion, after which it has landed
-NEAR = 0.1  # [m] above the start
-TOUCHED = 0.3  # [s] near the ground, after which a vehicle that bounces has landed
-STILL = 0.12  # [m/s]
-DISARMED = 0.5  # [s] of low throttle before the run ends
-REACH = 2.0  # [m] of position error that the pilot corrects at once
+REST_TIME = 0.6  # [s] without vertical motion, after which the vehicle has landed
+CONTACT_HEIGHT = 0.1  # [m] above the start
+CONTACT_TIME = 0.3  # [s] below CONTACT_HEIGHT, after which a vehicle that bounces has landed
+REST_SPEED = 0.12  # [m/s]
+DISARM_TIME = 0.5  # [s] of low throttle before the run ends
+ERROR_LIMIT = 2.0  # [m] of the position error on each axis
 CLIMB_LIMIT = 6.0  # [m/s^2]
 IDLE = 0.055  # output of an armed motor at low throttle
 LOWEST = 1050  # [us] throttle channel from which on the output rises (min_check)
@@ -66,38 +66,38 @@ class Pilot:
     def step(self, time: float, interval: float, setpoint: Setpoint, motion: Motion) -> Sticks:
         """Return the sticks at `time` [s], `interval` [s] after the last step."""
         if self.stage == "waiting":
-            if time > ARM_AT and setpoint.position_world[2] > self._start[2] + LIFTED:
+            if time > ARM_AT and setpoint.position_world[2] > self._start[2] + TAKEOFF_HEIGHT:
                 self.stage = "flying"
             return OFF._replace(arm=RC_HIGH if time > ARM_AT else RC_LOW)
-        low = motion.position_world[2] < self._start[2] + LOW
+        low = motion.position_world[2] < self._start[2] + LANDING_HEIGHT
         if self.stage == "flying" and setpoint.final and low and self._ends(setpoint):
             self.stage = "landing"
         if self.stage == "landing":
             self._descent += DESCENT * interval
             velocity = motion.velocity_world[2]
-            self._still = self._still + interval if self._descent > 0.2 and abs(velocity) < STILL else 0.0
-            if motion.position_world[2] < self._start[2] + NEAR:
+            self._still = self._still + interval if self._descent > 0.2 and abs(velocity) < REST_SPEED else 0.0
+            if motion.position_world[2] < self._start[2] + CONTACT_HEIGHT:
                 self._near += interval
-            if self._still > RESTED or self._near > TOUCHED:
+            if self._still > REST_TIME or self._near > CONTACT_TIME:
                 self.stage = "landed"
         if self.stage == "landed":
             self._landed += interval
-            self.finished = self._landed > DISARMED
-            return OFF._replace(arm=RC_HIGH if self._landed < 0.5 * DISARMED else RC_LOW)
+            self.finished = self._landed > DISARM_TIME
+            return OFF._replace(arm=RC_HIGH if self._landed < 0.5 * DISARM_TIME else RC_LOW)
         return self._fly(interval, setpoint, motion)
 
     def _ends(self, setpoint: Setpoint) -> bool:
-        """Return True if the reference has come to the ground and rests there."""
-        return setpoint.position_world[2] < self._start[2] + LIFTED and abs(setpoint.velocity_world[2]) < 0.05
+        """Return True if the reference is at rest on the ground."""
+        return setpoint.position_world[2] < self._start[2] + TAKEOFF_HEIGHT and abs(setpoint.velocity_world[2]) < 0.05
 
     def _fly(self, interval: float, setpoint: Setpoint, motion: Motion) -> Sticks:
         s = self._setup
-        down = (0.0, 0.0, min(self._descent, REACH))
-        target = tuple(w - d for w, d in zip(setpoint.position_world, down, strict=True))
-        error = [max(-REACH, min(REACH, a - b)) for a, b in zip(target, motion.position_world, strict=True)]
-        slower = [a - b for a, b in zip(setpoint.velocity_world, motion.velocity_world, strict=True)]
+        offset = (0.0, 0.0, min(self._descent, ERROR_LIMIT))
+        target = tuple(w - d for w, d in zip(setpoint.position_world, offset, strict=True))
+        error = [max(-ERROR_LIMIT, min(ERROR_LIMIT, a - b)) for a, b in zip(target, motion.position_world, strict=True)]
+        velocity_error = [a - b for a, b in zip(setpoint.velocity_world, motion.velocity_world, strict=True)]
         if self.stage == "landing":
-            slower[2] -= DESCENT
+            velocity_error[2] -= DESCENT
         else:
             self._integral = tuple(  # type: ignore[assignment]
                 max(-3.0, min(3.0, i + s.integral_gain * e * interval))
@@ -105,7 +105,7 @@ class Pilot:
             )
         ax, ay, az = (
             feed + s.position_gain * e + s.velocity_gain * v + i
-            for feed, e, v, i in zip(setpoint.acceleration_world, error, slower, self._integral, strict=True)
+            for feed, e, v, i in zip(setpoint.acceleration_world, error, velocity_error, self._integral, strict=True)
         )
         az = max(-0.6 * s.gravity, min(CLIMB_LIMIT, az)) + s.gravity
         c, sine = math.cos(motion.yaw), math.sin(motion.yaw)
@@ -115,8 +115,8 @@ class Pilot:
         self.attitude_reference = (max(-limit, min(limit, roll)), max(-limit, min(limit, pitch)), setpoint.yaw)
         thrust = math.sqrt(forward * forward + left * left + az * az) / s.gravity
         output = min(s.hover_output * math.sqrt(thrust), 1.0)
-        turn = (setpoint.yaw - motion.yaw + math.pi) % (2.0 * math.pi) - math.pi
-        rate = setpoint.yaw_rate + s.yaw_gain * turn
+        yaw_error = (setpoint.yaw - motion.yaw + math.pi) % (2.0 * math.pi) - math.pi
+        rate = setpoint.yaw_rate + s.yaw_gain * yaw_error
         return Sticks(
             _stick(roll / limit),
             _stick(pitch / limit),

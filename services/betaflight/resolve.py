@@ -18,7 +18,7 @@ from lapwing.services.common.firmware.setup import firmware_config
 from lapwing.services.common.vehicle_schema import airframe, gravity, thrust_coefficient
 
 NAME = "betaflight"
-SLOWEST = 50  # [Hz] of its clock's measurement
+SLOWEST = 50  # [Hz] at which the firmware does not measure its clock's rate
 LAYOUT = (  # of port 9002, which differs from the firmware's numbering of motors; propellers turn inwards
     Output(1.0, -1.0, "ccw"),
     Output(-1.0, 1.0, "ccw"),
@@ -57,18 +57,18 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         raise ConfigError("trajectory", "missing", "[[trajectory.phase]], which Betaflight's pilot flies")
     if (rate := scene[Communication].rate) <= SLOWEST:
         raise ConfigError("communication.rate", f"got {rate} Hz", f"more than {SLOWEST} Hz with Betaflight")
-    carried = set(scene.tables("sensors"))
+    sensor_names = set(scene.tables("sensors"))
     table = scene[Betaflight] if scene.has(Betaflight) else Betaflight()
     pilot = PilotSetup(
         **table.model_dump(),
         hover_output=_hover_output(scene),
         gravity=gravity(scene),
-        gps=ports.GPS in carried,
-        imu=ports.IMU in carried,
-        barometer=ports.BAROMETER in carried,
+        gps=ports.GPS in sensor_names,
+        imu=ports.IMU in sensor_names,
+        barometer=ports.BAROMETER in sensor_names,
         home=environment(scene).home,
     )
-    sensors = [name for name in (ports.IMU, ports.GPS, ports.BAROMETER) if name in carried]
+    sensors = [name for name in (ports.IMU, ports.GPS, ports.BAROMETER) if name in sensor_names]
     return firmware_config(scene, (ports.TRUTH, *sensors), 1, LAYOUT, pilot)
 
 
@@ -76,7 +76,7 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
     """Return the configurations by vehicle name.
 
     Raises:
-        ConfigError: two vehicles have the same ports, which the firmware does not let one choose.
+        ConfigError: two vehicles have the same ports, which the firmware does not make configurable.
     """
     used: dict[tuple[str, int], str] = {}
     for name, share in shares.items():

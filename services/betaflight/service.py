@@ -10,5 +10,5 @@ NAME = "betaflight"
 
 
 def create(setup: RunConfig, recorded: Recorded | None = None) -> Service:
-    """Return the adapter of a run; `recorded`: messages of a log to fly again."""
+    """Return the adapter of a run; `recorded` replaces the firmware by the commands of a log."""
     return firmware_service(setup, NAME, BetaflightLink, recorded)

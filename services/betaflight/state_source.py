@@ -1,4 +1,4 @@
-"""Samples of Lapwing's ports as Betaflight's state packet, and as the motion that the pilot sees."""
+"""Conversion of Lapwing's samples to Betaflight's state packet and to the pilot's measured motion."""
 
 import math
 
@@ -18,10 +18,10 @@ _rotate, _conjugate = python_function(rotate), python_function(conjugate)
 
 
 class StateSource:
-    """Newest samples; a sensor without a reading leaves its last one."""
+    """Newest samples; a sensor without a new reading keeps its last one."""
 
     def __init__(self, setup: PilotSetup, start_world: Vec3):
-        """Begin with the vehicle at rest at `start_world`, level and heading east."""
+        """Start with the vehicle at rest at `start_world`, level and heading east."""
         self._setup = setup
         latitude, longitude, height = _to_geodetic(setup.home, start_world)
         force = (0.0, 0.0, setup.gravity)
@@ -29,7 +29,7 @@ class StateSource:
         self._position, self._velocity, self._fixed_at = start_world, (0.0, 0.0, 0.0), 0.0
 
     def update(self, time: float, read: Read) -> Motion:
-        """Take the samples at `time` [s]."""
+        """Update the state with the samples at `time` [s]. Return the motion."""
         s, truth = self._setup, read(ports.TRUTH)
         state = self.state._replace(attitude=truth.attitude)
         if not s.imu:

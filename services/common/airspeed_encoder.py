@@ -12,7 +12,7 @@ from lapwing.messages.topics import Topic
 from lapwing.services.common.ports import AirspeedReading
 
 
-def encoder_of_airspeed(topic: Topic, frame: str, port: Port) -> TopicEncoder:
+def airspeed_encoder(topic: Topic, frame: str, port: Port) -> TopicEncoder:
     """Return the encoder of the readings on `port`; `frame` is the vehicle's name."""
     return TopicEncoder(topic, port.name, port.period, _fields, lambda: FluidPressure(header(0, frame)))
 

@@ -1,8 +1,8 @@
 """Autopilot parameters that can be changed in flight: meaning, default and bounds.
 
 Names and units are PX4's where the meaning is the same; MAVLink allows 16 characters. Only gains of the cascaded PID
-(PID_...) and failsafe actions (FS_...) have own names. Defaults of PID_... come from the scene's gain set; a scene
-with PX4's cascade has PX4's gains instead. `[autopilot.parameters]` sets other values, or `autopilot.parameters`
+(PID_...) and failsafe actions (FS_...) have Lapwing's own names. Defaults of PID_... come from the scene's gain set; a
+scene with PX4's cascade has PX4's gains instead. `[autopilot.parameters]` sets other values, or `autopilot.parameters`
 names a file of them (parameter_file.py).
 """
 
@@ -135,17 +135,17 @@ _MANY = 1000.0  # bound of gains that PX4 does not bound
 
 
 def _px4_axis(axis: str, stem: str, p: tuple[float, ...], d_most: float) -> list[Parameter]:
-    """Return the rate and angle gains of an axis; `p` has defaults and bounds of P, default of I and D, least K."""
-    name, what = f"MC_{axis}RATE", axis.lower()
+    """Return the rate gains of an axis; `p`: default, minimum, maximum of P, defaults of I and D, minimum of K."""
+    name, label = f"MC_{axis}RATE", axis.lower()
     default, least, most, i, d, k_least = p
     return [
-        Parameter(f"{name}_K", "", 1.0, k_least, 5.0, f"scale of P, I and D of the {what} rate"),
-        Parameter(f"{name}_P", "s", default, least, most, f"normalised torque over the error of the {what} rate"),
-        Parameter(f"{name}_I", "", i, 0.0, _MANY, f"normalised torque over the integral of the {what} rate's error"),
-        Parameter(f"{name}_D", "s^2", d, 0.0, d_most, f"normalised torque over the {what} acceleration"),
-        Parameter(f"{name}_FF", "s", 0.0, 0.0, _MANY, f"normalised torque over the {what} rate setpoint"),
+        Parameter(f"{name}_K", "", 1.0, k_least, 5.0, f"scale of P, I and D of the {label} rate"),
+        Parameter(f"{name}_P", "s", default, least, most, f"normalised torque over the error of the {label} rate"),
+        Parameter(f"{name}_I", "", i, 0.0, _MANY, f"normalised torque over the integral of the {label} rate's error"),
+        Parameter(f"{name}_D", "s^2", d, 0.0, d_most, f"normalised torque over the {label} acceleration"),
+        Parameter(f"{name}_FF", "s", 0.0, 0.0, _MANY, f"normalised torque over the {label} rate setpoint"),
         Parameter(
-            f"MC_{stem}R_INT_LIM", "", 0.3, 0.0, _MANY, f"limit of the {what} rate's integral, normalised torque"
+            f"MC_{stem}R_INT_LIM", "", 0.3, 0.0, _MANY, f"limit of the {label} rate's integral, normalised torque"
         ),
     ]
 
@@ -194,30 +194,30 @@ def table(scene: "Scene") -> dict[str, Parameter]:
 
 def _table(scene: "Scene") -> dict[str, Parameter]:
     px4 = scene.lookup("autopilot.controller") == PX4_CASCADE
-    gains = _PX4_GAINS if px4 else of_gains(scene.section("gains"))
-    known = {p.name: p for p in (*gains, *_FLIGHT, *_FAILSAFES)}
+    gains = _PX4_GAINS if px4 else gain_parameters(scene.section("gains"))
+    parameters = {p.name: p for p in (*gains, *_FLIGHT, *_FAILSAFES)}
     for name, value in scene.lookup("autopilot.parameters").items():
-        if name not in known:
-            raise ConfigError.unknown(f"autopilot.parameters.{name}", "parameter", name, known)
+        if name not in parameters:
+            raise ConfigError.unknown(f"autopilot.parameters.{name}", "parameter", name, parameters)
         try:
-            known[name].check(value)
+            parameters[name].check(value)
         except ConfigError as error:
             raise error.with_prefix("autopilot.parameters") from None
-        known[name] = known[name]._replace(default=float(value))
-    return known
+        parameters[name] = parameters[name]._replace(default=float(value))
+    return parameters
 
 
 def apply_commands(table: dict[str, Parameter], commands: Iterable[Any]) -> dict[str, float]:
     """Return the values after the accepted parameter commands among `commands`."""
     values = {p.name: p.default for p in table.values()}
     for command in commands:
-        known = table.get(command.text) if command.kind == "parameter" else None
-        if known and command.values and known.allows(command.values[0]):
-            values[known.name] = command.values[0]
+        parameter = table.get(command.text) if command.kind == "parameter" else None
+        if parameter and command.values and parameter.allows(command.values[0]):
+            values[parameter.name] = command.values[0]
     return values
 
 
-def of_gains(gains: Any) -> list[Parameter]:
+def gain_parameters(gains: Any) -> list[Parameter]:
     """Return the gain parameters, with the numbers of a gain set as defaults."""
     limit = math.degrees(gains.tilt_limit)
     tilt = Parameter("MPC_TILTMAX_AIR", "deg", limit, min(limit, 5.0), 89.0, "maximum tilt about either axis")

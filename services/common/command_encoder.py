@@ -14,13 +14,13 @@ from lapwing.services.common import ports
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand
 
 
-def actuators_wire(port: Port) -> TopicEncoder:
+def actuators_encoder(port: Port) -> TopicEncoder:
     """Return the encoder of the motor commands."""
     command = Actuators(header(0, "body"), port.like.motor_voltage, False, port.like.thrust)
     return TopicEncoder(topic.ACTUATORS, ports.ACTUATORS, 1, _actuators, lambda: command)
 
 
-def status_wire(every: int, texts: Sequence[str], words: Sequence[Any]) -> TopicEncoder:
+def status_encoder(every: int, texts: Sequence[str], words: Sequence[Any]) -> TopicEncoder:
     """Return the encoder of the status.
 
     Args:

@@ -54,7 +54,7 @@ class Rates(SceneTable):
     contact_forces: int | None = Field(default=None, gt=0)  # [Hz] forces on each foot; unset: not published
 
     def check(self, scene: Scene) -> None:
-        """Raise ConfigError unless every rate divides the exchange rate."""
+        """Raise ConfigError unless every rate divides communication.rate."""
         for key in type(self).model_fields:
             if (rate := getattr(self, key)) is not None:
                 ticks(scene, min(rate, scene[Communication].rate), f"rates.{key}")
@@ -64,7 +64,7 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
     """Return the ticks between messages at `rate` [Hz].
 
     Raises:
-        ConfigError: the rate of `key` does not divide the exchange rate.
+        ConfigError: the rate of `key` does not divide communication.rate.
     """
     exchange = scene[Communication].rate
     if rate <= 0 or exchange % rate:

@@ -37,29 +37,29 @@ def check(scene: Scene, key: str, column: str) -> None:
     """Raise ConfigError unless the scene has the effect of a column, and it has named inputs.
 
     Args:
-        scene: with its tables.
-        key: of the scene, for the error.
+        scene: scene with its tables.
+        key: scene key, for the message.
         column: "effect.battery.voltage".
     """
     name = column.split(".")[1]
-    known = with_inputs(scene)
-    if name in known:
+    names = with_inputs(scene)
+    if name in names:
         return
     if name in scene.tables(EFFECTS):
-        listed = ", ".join(known) or "none in this scene"
+        listed = ", ".join(names) or "none in this scene"
         raise ConfigError(key, f"the effect {name} has no named inputs", f"an effect that has them: {listed}")
     possible = [each for each in effects.names() if hasattr(effects.parameter_class(each), "with_inputs")]
     if name in possible:
         raise ConfigError(key, f"the scene has no effect {name}", f"a table [effects.{name}]")
-    raise ConfigError.unknown(key, "effect", name, {*possible, *known})
+    raise ConfigError.unknown(key, "effect", name, {*possible, *names})
 
 
 def ports_of(scene: Scene, active: tuple) -> dict[str, Port]:
     """Return the ports of the named inputs that FMUs compute.
 
     Args:
-        scene: with its tables.
-        active: its effects, in the order of evaluation.
+        scene: scene with its tables.
+        active: effects of the scene, in the order of evaluation.
     """
     names = [EFFECT + name for name in external(scene)]
     return {name: Port(name, like) for name, like in zip(names, inputs_of(active), strict=True)}

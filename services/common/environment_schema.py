@@ -43,9 +43,7 @@ class Steps(Table):
     def pairs(self) -> list[tuple[float, float]]:
         """Return (distance, rise) of each step. Raise ConfigError if the keys differ in length."""
         if len(self.distance) != len(self.rise):
-            raise ConfigError(
-                "steps.rise", f"got {len(self.rise)} of them", f"one for each of the {len(self.distance)}"
-            )
+            raise ConfigError("steps.rise", f"got {len(self.rise)}", f"one for each distance ({len(self.distance)})")
         return list(zip(self.distance, self.rise, strict=True))
 
 

@@ -38,7 +38,7 @@ def validate_estimate(result: Any) -> StateEstimate:
     """Return the estimate that a step returned, with tuples for arrays and lists.
 
     Raises:
-        TypeError: the result is no `StateEstimate` or has the wrong shape.
+        TypeError: the result is not a `StateEstimate` or has the wrong shape.
         ValueError: a number is not finite.
     """
     if not isinstance(result, StateEstimate):

@@ -7,7 +7,7 @@ class Kind(NamedTuple):
     """Properties of an event kind."""
 
     serious: bool = False  # viewers show it as a warning
-    afterwards: bool = False  # its text is known only when it is over
+    afterwards: bool = False  # its text is complete only at its end
 
 
 KINDS = {

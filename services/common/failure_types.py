@@ -12,7 +12,7 @@ UNITS = (
 )  # fmt: skip
 """Units, in the order of the operator command's numbering."""
 OF_SYSTEMS = {"battery": (SOUND, OFF, STUCK, WRONG), "motor": (SOUND, OFF, STUCK, WRONG, SLOW)}
-"""Failure types of units that are no sensors; sensors support all."""
+"""Failure types of units other than sensors; sensors support all."""
 
 
 class Faults(NamedTuple):
@@ -31,7 +31,7 @@ class Faults(NamedTuple):
     motors: tuple[int, ...] = ()  # of each motor
 
 
-SATELLITES, FIX_SATELLITES = "SIM_GPS_USED", 4  # parameter, and its least value with a fix, as in PX4
+SATELLITES, FIX_SATELLITES = "SIM_GPS_USED", 4  # parameter, and its minimum with a fix, as in PX4
 
 
 def with_satellites(faults: Faults, values: Mapping[str, float]) -> Faults:
@@ -40,11 +40,11 @@ def with_satellites(faults: Faults, values: Mapping[str, float]) -> Faults:
     return faults if enough else faults._replace(gps=OFF)
 
 
-def possible(unit: str) -> tuple[int, ...]:
+def supported_types(unit: str) -> tuple[int, ...]:
     """Return the failure types that a unit supports."""
     return OF_SYSTEMS.get(unit, tuple(range(len(KINDS))))
 
 
-def refusal(unit: str) -> str:
+def rejection_text(unit: str) -> str:
     """Return the message for a failure type that a unit does not support."""
-    return f"{unit} can be {', '.join(KINDS[kind] for kind in possible(unit))}"
+    return f"{unit} can be {', '.join(KINDS[kind] for kind in supported_types(unit))}"

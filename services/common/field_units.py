@@ -49,7 +49,7 @@ class Unit(NamedTuple):
 
 
 @cache
-def _of_class(cls: type) -> dict[str, str]:
+def _units_of_class(cls: type) -> dict[str, str]:
     try:
         lines = inspect.getsource(cls).splitlines()
     except (OSError, TypeError):
@@ -58,14 +58,14 @@ def _of_class(cls: type) -> dict[str, str]:
 
 
 def field_unit(owner: type | None, field: str) -> str:
-    """Return the unit that the source of a NamedTuple names for a field, "" if it names none that is known."""
-    name = _of_class(owner).get(field, "") if owner else ""
+    """Return the unit in the source comment of a NamedTuple's field, "" without a comment or for an unknown unit."""
+    name = _units_of_class(owner).get(field, "") if owner else ""
     return name if name and parse_unit(name) is not None else ""
 
 
 @cache
 def parse_unit(name: str) -> Unit | None:
-    """Return a unit from a text such as "(m/s)^2", "N m" or "kg m^2/s"; None for other texts.
+    """Return a unit from a text such as "(m/s)^2", "N m" or "kg m^2/s"; return None for other texts.
 
     A blank or a dot multiplies. Everything after a slash up to the next blank divides.
     """
@@ -90,7 +90,7 @@ def _evaluate(node: ast.expr) -> tuple[float, dict[str, int]]:
         if isinstance(node.op, ast.Pow):
             exponent = ast.literal_eval(node.right)
             if not isinstance(exponent, int):
-                raise ValueError("the exponent is no whole number")
+                raise ValueError("the exponent is not an integer")
             product = 1.0
             for _ in range(abs(exponent)):
                 product *= factor
@@ -102,4 +102,4 @@ def _evaluate(node: ast.expr) -> tuple[float, dict[str, int]]:
             for base, n in others.items():
                 powers[base] = powers.get(base, 0) + sign * n
             return (factor * other if sign > 0 else factor / other), powers
-    raise ValueError("no unit")
+    raise ValueError("not a unit")

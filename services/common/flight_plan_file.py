@@ -117,9 +117,9 @@ def _waypoints(text: str, datum: _Datum) -> tuple[list[Any], list[Any], list[Any
     return [_jump_back(item, len(rows) - len(items)) for item in items], [], []
 
 
-def _jump_back(item: Any, left_out: int) -> Any:
+def _jump_back(item: Any, skipped: int) -> Any:
     """Renumber a jump, whose target counts the home row."""
-    return item._replace(values=(item.values[0] - left_out, item.values[1])) if item.action == "jump" else item
+    return item._replace(values=(item.values[0] - skipped, item.values[1])) if item.action == "jump" else item
 
 
 def _plan(data: dict, datum: _Datum) -> tuple[list[Any], list[Any], list[Any]]:
@@ -149,7 +149,7 @@ def _plan(data: dict, datum: _Datum) -> tuple[list[Any], list[Any], list[Any]]:
 
 @contextmanager
 def _entry(where: str) -> Iterator[None]:
-    """Name the entry of a plan in the ValueError about its content."""
+    """Prefix the ValueError about an entry's content with its name."""
     try:
         yield
     except KeyError as error:
@@ -189,17 +189,17 @@ def _item(command: int, frame: int, params: list[float], place: list[float], dat
     return _mission_item(action, (math.nan,) * 3, **fields(params))
 
 
-def _item_of(datum: _Datum, action: str, latitude: float, longitude: float, height: float = 0.0, **more: Any) -> Any:
+def _item_of(datum: _Datum, action: str, latitude: float, longitude: float, height: float = 0.0, **fields: Any) -> Any:
     """Return an item at a geodetic position and a world z of `height` [m]; NaN without a position."""
     if math.isnan(latitude) or (latitude, longitude) == (0.0, 0.0):
-        return _mission_item(action, (math.nan, math.nan, height), **more)
+        return _mission_item(action, (math.nan, math.nan, height), **fields)
     x, y, _ = geodetic_to_enu(datum.home, float(latitude), float(longitude), datum.home.height + height)
-    return _mission_item(action, (x, y, height), **more)
+    return _mission_item(action, (x, y, height), **fields)
 
 
-def _mission_item(action: str, place: tuple[float, float, float], **more: Any) -> Any:
+def _mission_item(action: str, place: tuple[float, float, float], **fields: Any) -> Any:
     item = MissionItem(action, Vector3(*place), math.nan, math.nan, 0.0, ())
-    return item._replace(**more)
+    return item._replace(**fields)
 
 
 def _zero(value: float) -> float:

@@ -1,6 +1,6 @@
 """Permission to run machine code that is not Lapwing's own, such as that of FMUs.
 
-Python programs have it. The command line withdraws it, and grants it for `--allow-code`.
+It is granted in Python programs. The command line withdraws it unless `--allow-code` is set.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
 
-FMU_SUFFIX = "_fmu"  # of the service of an FMU
+FMU_SUFFIX = "_fmu"  # suffix of the names of FMU services
 _allowed = [True]
 
 

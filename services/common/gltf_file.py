@@ -1,4 +1,4 @@
-"""Reader of triangle meshes in glTF 2.0 files (.glb, and .gltf with its buffers inside); colours are not used."""
+"""Reader of triangle meshes in glTF 2.0 files (.glb, and .gltf with embedded buffers); colours are not used."""
 
 import base64
 import binascii
@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 
 SUFFIXES = (".glb", ".gltf")
-DEEPEST = 32  # levels of nodes
-MOST_NODES = 10_000  # parts of a scene, each as often as it is placed
-MOST_TRIANGLES = 200_000  # that are counted
+DEEPEST = 32  # nested levels of nodes
+MOST_NODES = 10_000  # instances of nodes in a scene
+MOST_TRIANGLES = 200_000  # in a file
 _MAGIC, _JSON, _BINARY = b"glTF", 0x4E4F534A, 0x004E4942
 _TYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # of components
 _TRIANGLES = 4  # mode of a primitive
 _EMBEDDED = "base64,"
-_FAULTS = (  # of a file that is no glTF
+_FAULTS = (  # raised for a file that is not glTF
     *(KeyError, IndexError, TypeError, AttributeError, RecursionError),
     *(struct.error, json.JSONDecodeError, UnicodeDecodeError, binascii.Error),
 )
-# glTF has y up and z ahead; a body has x ahead, y left, z up.
+# Axes of glTF: y up, z forward; of a body: x forward, y left, z up.
 _TO_BODY = np.array([(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
 
 
@@ -28,7 +28,7 @@ def corners_of(data: bytes) -> np.ndarray:
     """Return the corners of all triangles of the default scene, shape (m, 3, 3) [m], in the axes of a body.
 
     Raises:
-        ValueError: the file is invalid or uses an extension; the message does not name it.
+        ValueError: the file is invalid or uses an extension; the message does not contain its name.
     """
     try:
         tree, binary = _parts(data)
@@ -44,11 +44,11 @@ def corners_of(data: bytes) -> np.ndarray:
             if level > DEEPEST or count > MOST_NODES:
                 raise ValueError(f"more than {DEEPEST} levels or {MOST_NODES} parts; join the parts")
             node = tree["nodes"][number]
-            place = parent @ _transform(node)
-            stack += [(child, place, level + 1) for child in node.get("children", [])]
+            pose = parent @ _transform(node)
+            stack += [(child, pose, level + 1) for child in node.get("children", [])]
             if "mesh" in node:
                 for primitive in tree["meshes"][node["mesh"]]["primitives"]:
-                    parts.append(_triangles(tree, buffers, primitive) @ place[:3, :3].T + place[:3, 3])
+                    parts.append(_triangles(tree, buffers, primitive) @ pose[:3, :3].T + pose[:3, 3])
                     triangles += len(parts[-1])
                     if triangles > MOST_TRIANGLES:
                         raise ValueError(f"more than {MOST_TRIANGLES} triangles; decimate it in Blender or MeshLab")
@@ -60,7 +60,7 @@ def corners_of(data: bytes) -> np.ndarray:
 
 
 def _parts(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the description and the binary part, which may be empty."""
+    """Return the JSON tree and the binary chunk, which may be empty."""
     if data[:4] != _MAGIC:
         return json.loads(data), b""
     at = 12

@@ -10,7 +10,7 @@ from lapwing.dynamics.input_file import read_bytes
 from lapwing.services.common import gltf_file
 
 SUFFIXES = (".stl", ".obj", *gltf_file.SUFFIXES)
-LARGEST = 20_000_000  # [byte] of a file
+LARGEST = 20_000_000  # [byte] largest file
 MOST = 20_000  # triangles: 0.3 MB in the run configuration, and smooth in a browser
 _HEAD = 84  # [byte] header of a binary STL file; its last four bytes are the number of triangles
 _TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -27,7 +27,7 @@ def read(path: Path) -> Mesh:
     """Return the triangles of a file; equal corners become one vertex.
 
     Raises:
-        ValueError: the file is invalid; the message does not name it.
+        ValueError: the file is invalid; the message does not contain its name.
         OSError: the file cannot be read.
     """
     if path.stat().st_size > LARGEST:

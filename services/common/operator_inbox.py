@@ -22,19 +22,19 @@ def no_operator(_: int) -> Iterable[OperatorCommand]:
 
 
 class OperatorInbox:
-    """Queues of received commands by vehicle; with several vehicles, the header's `frame_id` names one."""
+    """Queues of received commands by vehicle; with several vehicles, the header's `frame_id` selects one."""
 
-    def __init__(self, vehicles: Sequence[str], arrived: Callable[[], tuple[int, bytes] | None]):
-        """Create the queues; `arrived` returns the next time and encoded OperatorInput, or None."""
-        self._arrived, self._first = arrived, vehicles[0]
-        self._waiting: dict[str, list[Any]] = {vehicle: [] for vehicle in vehicles}
+    def __init__(self, vehicles: Sequence[str], receive: Callable[[], tuple[int, bytes] | None]):
+        """Create the queues; `receive` returns the next time [ns] and encoded OperatorInput, or None."""
+        self._receive, self._first = receive, vehicles[0]
+        self._queues: dict[str, list[Any]] = {vehicle: [] for vehicle in vehicles}
 
     def take(self, vehicle: str, _: int) -> list[Any]:
         """Remove and return the queued commands of a vehicle."""
-        while arrived := self._arrived():
-            name, commands = decode_input(arrived[1])
-            self._waiting.get(name, self._waiting[self._first]).extend(commands)
-        queue, self._waiting[vehicle] = self._waiting[vehicle], []
+        while received := self._receive():
+            name, commands = decode_input(received[1])
+            self._queues.get(name, self._queues[self._first]).extend(commands)
+        queue, self._queues[vehicle] = self._queues[vehicle], []
         return queue
 
 

@@ -16,7 +16,7 @@ FAILSAFES = (
 """Failsafe reasons; the index is the reason's event number."""
 
 NOT_STARTED = "the estimator has not started"
-NO_READINGS = "no good readings of the {}"  # name of the source
+NO_READINGS = "no good readings of the {}"  # sensor
 POSITION_UNCERTAIN = "the position is uncertain"
 ATTITUDE_UNCERTAIN = "the attitude is uncertain"
 NOT_LEVEL = "the vehicle does not stand level"

@@ -18,7 +18,7 @@ FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
 LONGEST = 500  # characters of an expression
 MOST_NODES = 200  # of its syntax tree
 
-_MAY_HAVE = (
+_ALLOWED_NODES = (
     ast.Expression, ast.Constant, ast.Name, ast.Attribute, ast.Load, ast.Tuple, ast.List, ast.Call,
     ast.BoolOp, ast.boolop, ast.Compare, ast.cmpop, ast.UnaryOp, ast.USub, ast.Not,
     ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div,
@@ -39,8 +39,8 @@ class Success(SceneTable):
             try:
                 _expression(text)
             except ValueError:
-                shown = text if len(text) <= 80 else f"{text[:77]}..."
-                raise ConfigError(f"success.require.{i}", f"got {shown!r}", EXPECTED) from None
+                excerpt = text if len(text) <= 80 else f"{text[:77]}..."
+                raise ConfigError(f"success.require.{i}", f"got {excerpt!r}", EXPECTED) from None
             try:
                 check_types(ast.parse(text.strip(), mode="eval").body)
                 _check_constants(text)
@@ -48,11 +48,11 @@ class Success(SceneTable):
                 expected = 'a condition such as "rmse.x < 0.1"'
                 raise ConfigError(f"success.require.{i}", str(error), expected) from None
 
-    def check_names(self, known: Mapping[str, Any]) -> None:
+    def check_names(self, metrics: Mapping[str, Any]) -> None:
         """Raise ConfigError if an expression uses an unknown metric."""
         for i, text in enumerate(self.require):
-            for name in sorted(_expression(text).names - set(known)):
-                raise ConfigError.unknown(f"success.require.{i}", "figure", name, known)
+            for name in sorted(_expression(text).names - set(metrics)):
+                raise ConfigError.unknown(f"success.require.{i}", "figure", name, metrics)
 
     def unmet(self, figures: Mapping[str, Any]) -> list[str]:
         """Return the expressions that do not hold for these metrics."""
@@ -61,7 +61,7 @@ class Success(SceneTable):
 
 class _Expression(NamedTuple):
     code: CodeType
-    names: frozenset[str]  # of figures
+    names: frozenset[str]  # of its metrics
 
 
 def holds(text: str, figures: Mapping[str, Any]) -> bool:
@@ -73,7 +73,7 @@ def holds(text: str, figures: Mapping[str, Any]) -> bool:
 
 
 def _number(value: Any) -> float:
-    """Return an operand of arithmetic. Raise TypeError for texts and sequences, whose products exhaust the memory."""
+    """Return an operand of arithmetic. Raise TypeError for texts and sequences: products exhaust the memory."""
     if not isinstance(value, int | float):
         raise TypeError(f"{type(value).__name__} in arithmetic")
     return value
@@ -92,7 +92,7 @@ def _expression(text: str) -> _Expression:
     except (SyntaxError, RecursionError, MemoryError):
         raise ValueError(text) from None
     nodes = list(ast.walk(tree))
-    if len(nodes) > MOST_NODES or not all(isinstance(node, _MAY_HAVE) for node in nodes):
+    if len(nodes) > MOST_NODES or not all(isinstance(node, _ALLOWED_NODES) for node in nodes):
         raise ValueError(text)
     lookup = _Lookup()
     return _Expression(
@@ -119,7 +119,7 @@ def _values(node: ast.expr) -> list[ast.AST]:
 
 
 class _Lookup(ast.NodeTransformer):
-    """Replace every dotted name, such as `rmse.x`, by a lookup in the metrics."""
+    """Transformer that replaces every dotted name, such as `rmse.x`, by a lookup in the metrics."""
 
     def __init__(self) -> None:
         self.names: set[str] = set()

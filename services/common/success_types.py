@@ -1,4 +1,4 @@
-"""Types of success criteria: an expression compares like with like, and is true or false."""
+"""Types of success criteria: an expression compares values of the same type, and is true or false."""
 
 import ast
 
@@ -7,7 +7,7 @@ NUMBER, TEXT, TRUTH, LIST = "a number", "a text", "true or false", "a list"
 
 
 def check_types(tree: ast.expr) -> None:
-    """Raise ValueError with one line for a result that is not true or false, or a comparison of unlike types."""
+    """Raise ValueError with one line for a result that is not true or false, or a comparison of different types."""
     if (kind := _kind(tree)) != TRUTH:
         raise ValueError(f"{ast.unparse(tree)!r} is {kind}, not true or false")
 
@@ -35,11 +35,11 @@ def _check_parts(node: ast.expr) -> None:
         case ast.UnaryOp(operand=operand):
             check_types(operand)
         case ast.Compare(left=left, ops=ops, comparators=others):
-            for one, op, other in zip((left, *others), ops, others, strict=False):
-                _check_comparison(one, op, other)
+            for left_side, op, other in zip((left, *others), ops, others, strict=False):
+                _check_comparison(left_side, op, other)
 
 
-def _check_comparison(one: ast.expr, op: ast.cmpop, other: ast.expr) -> None:
+def _check_comparison(left: ast.expr, op: ast.cmpop, other: ast.expr) -> None:
     members = [other]
     if isinstance(op, ast.In | ast.NotIn):
         if isinstance(other, ast.Tuple | ast.List):
@@ -47,6 +47,6 @@ def _check_comparison(one: ast.expr, op: ast.cmpop, other: ast.expr) -> None:
         elif _kind(other) != TEXT:
             raise ValueError(f"{ast.unparse(other)!r} is {_kind(other)}, not a list")
     for member in members:
-        kinds = _kind(one), _kind(member)
+        kinds = _kind(left), _kind(member)
         if kinds[0] != kinds[1]:
-            raise ValueError(f"{ast.unparse(one)!r} is {kinds[0]}, {ast.unparse(member)!r} is {kinds[1]}")
+            raise ValueError(f"{ast.unparse(left)!r} is {kinds[0]}, {ast.unparse(member)!r} is {kinds[1]}")

@@ -13,7 +13,7 @@ from lapwing.cosim.config import user_module
 from lapwing.dynamics.config_error import ConfigError
 
 MEMORY = "memory"  # module name of objects in this process only: "memory:MyController"
-_lent: dict[str, Any] = {}  # registered objects by name
+_registered: dict[str, Any] = {}  # registered objects by name
 
 
 @contextmanager
@@ -24,7 +24,7 @@ def register(thing: Any, folder: Path) -> Iterator[str]:
     "memory:Name" and exists in this process only.
 
     Args:
-        thing: object to name; a text is a name already.
+        thing: object to name; a text is already a name.
         folder: folder of the scene.
     """
     if name := thing if isinstance(thing, str) else _module_of_log(thing, folder):
@@ -32,14 +32,14 @@ def register(thing: Any, folder: Path) -> Iterator[str]:
         return
     base = re.sub(r"\W", "", getattr(thing, "__name__", type(thing).__name__)) or "object"
     name, number = base, 1
-    while name in _lent:
+    while name in _registered:
         number += 1
         name = f"{base}_{number}"
-    _lent[name] = thing
+    _registered[name] = thing
     try:
         yield f"{MEMORY}:{name}"
     finally:
-        del _lent[name]
+        del _registered[name]
 
 
 def _module_of_log(thing: Any, folder: Path) -> str:
@@ -53,8 +53,8 @@ def _module_of_log(thing: Any, folder: Path) -> str:
         file = user_module.find("", module.__name__, folder)[module.__name__]
     except ConfigError:
         return ""
-    same = user_module.source(module) in (None, file.read_text(encoding="utf-8"))
-    return f"{module.__name__}:{name}" if same else ""
+    is_unchanged = user_module.source(module) in (None, file.read_text(encoding="utf-8"))
+    return f"{module.__name__}:{name}" if is_unchanged else ""
 
 
 def split_reference(key: str, text: str) -> tuple[str, str]:
@@ -83,13 +83,13 @@ def load_object(key: str, text: str, texts: Mapping[str, str]) -> tuple[ModuleTy
     """
     module, name = split_reference(key, text)
     if module == MEMORY:
-        if name not in _lent:
+        if name not in _registered:
             message = f"{name} was an object in the memory of the Python session that ran it"
             raise ConfigError(key, message, "a class in a module, which the log stores")
-        thing = _lent[name]
+        thing = _registered[name]
         return sys.modules[getattr(thing, "__module__", type(thing).__module__)], thing
     code = load_module(key, module, texts)
     if not hasattr(code, name):
-        own = [n for n, value in vars(code).items() if callable(value) and value.__module__ == code.__name__]
-        raise ConfigError.unknown(key, f"name in {module}", name, own)
+        candidates = [n for n, value in vars(code).items() if callable(value) and value.__module__ == code.__name__]
+        raise ConfigError.unknown(key, f"name in {module}", name, candidates)
     return code, getattr(code, name)

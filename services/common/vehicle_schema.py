@@ -26,7 +26,7 @@ from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.named_tables import NamedTables
 from lapwing.services.common.run_schema import SHIPPED, Pair
 
-BURIED = 1e-6  # [m]
+MAX_PENETRATION = 1e-6  # [m] of a part of the resting vehicle into the ground
 STEEPEST_START = 46.0  # [deg] initial tilt; terrain is at most 45 degrees steep
 
 
@@ -165,12 +165,12 @@ def rotor_constants(scene: Scene) -> RotorConstants:
 
 def thrust_coefficient(scene: Scene) -> float:
     """Return the thrust of a rotor over the square of its speed [N s^2/rad^2] in the air at home."""
-    rotor, around = rotor_constants(scene), environment(scene)
+    rotor, here = rotor_constants(scene), environment(scene)
     if not rotor.with_density:
         return rotor.thrust
     if "air_density" not in scene[Effects].tables:
         return STANDARD_DENSITY * rotor.thrust
-    return float(python_function(density)(around.atmosphere, around.home.height)) * rotor.thrust
+    return float(python_function(density)(here.atmosphere, here.home.height)) * rotor.thrust
 
 
 def wake_slopes(scene: Scene) -> WakeSlopes:
@@ -192,30 +192,30 @@ def _start_pose(scene: Scene) -> tuple[Vec3, Quaternion]:
     contact, terrain = airframe(scene).contact, environment(scene).terrain
     pose = resting_pose(contact.feet if contact else (), terrain, scene[Vehicle].initial_position or (0.0, 0.0))
     if not isinstance(terrain, Level):
-        _upright(pose)
-        _above_ground(airframe(scene), terrain, pose)
+        _check_upright(pose)
+        _check_above_ground(airframe(scene), terrain, pose)
     return pose
 
 
-def _upright(pose: Pose) -> None:
-    """Raise ConfigError if the feet find no common ground, for example next to a wall."""
+def _check_upright(pose: Pose) -> None:
+    """Raise ConfigError if the vehicle cannot stand upright, for example next to a wall."""
     upward = rotate(pose[1], (0.0, 0.0, 1.0))[2]
-    lean = math.degrees(math.acos(min(upward, 1.0)))
-    if lean > STEEPEST_START:
-        message = f"no room for the vehicle at its start: on its feet it would lean by {lean:.0f} degrees"
+    tilt = math.degrees(math.acos(min(upward, 1.0)))
+    if tilt > STEEPEST_START:
+        message = f"no room for the vehicle at its start: on its feet it would tilt by {tilt:.0f} degrees"
         raise ConfigError("environment.terrain", message, "flatter ground at the start")
 
 
-def _above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
+def _check_above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
     """Raise ConfigError if a part of the resting vehicle is below the ground."""
     (x, y, z), attitude = pose
     hull = frame.contact.hull if frame.contact else ()
     for part in ((0.0, 0.0, 0.0), *frame.rotors.position, *hull):
         dx, dy, dz = rotate(attitude, part)
-        under = surface(terrain, x + dx, y + dy)[0] - (z + dz)
-        if under > BURIED:
-            place = ", ".join(f"{p:g}" for p in part)
-            message = f"buries the start: the vehicle's ({place}) m would be {under:.2f} m below the ground"
+        depth = surface(terrain, x + dx, y + dy)[0] - (z + dz)
+        if depth > MAX_PENETRATION:
+            point = ", ".join(f"{p:g}" for p in part)
+            message = f"buries the start: the vehicle's point ({point}) m would be {depth:.2f} m below the ground"
             raise ConfigError("environment.terrain", message, "free ground at the start")
 
 

@@ -1,8 +1,8 @@
 """Gate before the WebSocket server, which rejects connections of foreign web pages.
 
-A browser lets any page open a WebSocket to this machine, and names the page in Origin. A page whose name was rebound
-to a local address (DNS rebinding) is named in Host. foxglove-sdk checks neither. The SDK's server therefore listens at
-a random address of 127.0.0.0/8, which a page cannot find, and this gate at the public one.
+A browser lets any page open a WebSocket to this machine; the header Origin has the page's name. If this name was
+rebound to a local address (DNS rebinding), it is in Host. foxglove-sdk checks neither. The SDK's server therefore
+listens at a random address of 127.0.0.0/8, which a page cannot find, and this gate at the public address.
 """
 
 import asyncio
@@ -31,7 +31,7 @@ def hidden_address() -> str:
 
 
 def rejection_reason(head: bytes, host: str) -> str | None:
-    """Return the reason to reject a request, None to accept it.
+    """Return the reason to reject a request; None: accept it.
 
     Args:
         head: request line and headers.
@@ -55,7 +55,7 @@ def _is_viewer(origin: str, host: str) -> bool:
 
 
 def _is_own(name: str, host: str) -> bool:
-    """Return True for an address and for the names that the user has chosen; a foreign page has a name."""
+    """Return True for an IP address, localhost and the listening host; a foreign page has another name."""
     with suppress(ValueError):
         return bool(ipaddress.ip_address(name))
     return name in ("localhost", host) and bool(name)
@@ -98,14 +98,14 @@ class OriginGate:
         self._listening.wait()
 
     async def _serve(self) -> None:
-        self._ended = asyncio.Event()
+        self._stop = asyncio.Event()
         server = await asyncio.start_server(self._accept, sock=self._socket, limit=LONGEST_HEAD)
         self._listening.set()
-        await self._ended.wait()
+        await self._stop.wait()
         server.close()
         if self._open:
-            _, late = await asyncio.wait(self._open, timeout=END_TIMEOUT)
-            await _cancelled(late)
+            _, unfinished = await asyncio.wait(self._open, timeout=END_TIMEOUT)
+            await _cancel(unfinished)
 
     async def _accept(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
@@ -133,12 +133,12 @@ class OriginGate:
         try:
             await _pump(server_reader, writer)
         finally:
-            await _cancelled([to_server])
+            await _cancel([to_server])
             server_writer.close()
 
     def close(self) -> None:
         """Let clients read the remaining data, and stop. Stop the server first."""
-        self._loop.call_soon_threadsafe(self._ended.set)
+        self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join()
         self._loop.close()
 
@@ -153,7 +153,7 @@ async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> N
             writer.write_eof()
 
 
-async def _cancelled(tasks: Iterable["asyncio.Task[None]"]) -> None:
+async def _cancel(tasks: Iterable["asyncio.Task[None]"]) -> None:
     for task in tasks:
         task.cancel()
         with suppress(asyncio.CancelledError):

@@ -40,10 +40,10 @@ class Server:
 
         Args:
             address: HOST:PORT.
-            insecure: other machines may reach it.
+            insecure: True if other machines may reach it.
 
         Raises:
-            ValueError: no address, one that other machines reach without `insecure`, it cannot be listened on, or
+            ValueError: the address is invalid, in use, or reachable from other machines without `insecure`, or
                 foxglove-sdk is not installed.
         """
         check_address(address, insecure)
@@ -53,7 +53,7 @@ class Server:
             from foxglove.websocket import Capability
         except ImportError:
             raise ValueError("--foxglove: foxglove-sdk is not installed; pip install lapwing[foxglove]") from None
-        foxglove.set_log_level("CRITICAL")  # a line for each thing that a client does wrong would have no end
+        foxglove.set_log_level("CRITICAL")  # faulty clients could flood the output with warnings
         self._foxglove: Any = foxglove
         self._context = foxglove.Context()
         self._channels: dict[str, Any] = {}
@@ -67,7 +67,7 @@ class Server:
                 context=self._context,
                 message_backlog_size=BACKLOG,
             )
-        except Exception as fault:  # the library's own, of whatever class
+        except Exception as fault:  # the library raises various classes
             raise ValueError(f"--foxglove {address}: cannot be listened on: {fault}") from None
         try:
             self._gate = OriginGate(host, port, (hidden, self._server.port))

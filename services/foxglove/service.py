@@ -1,4 +1,4 @@
-"""Live display of a run: it reads the services' log packets, which slows no service."""
+"""Live display of a run: it reads the services' log packets, which does not slow the services."""
 
 from typing import Any
 
@@ -20,7 +20,7 @@ def run(process: Participant, spec: Any) -> None:
     with Server(spec.foxglove, spec.insecure) as server:
         events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
         watcher = dict.fromkeys(events, process.participants.gid(MONITOR))
-        arrived = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
+        subscription = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
         for topic in events.values():
             server.declare(topic, EVENTS.message.type_name)
         for name in setup.services:  # so that viewers subscribe before the flight begins
@@ -30,10 +30,10 @@ def run(process: Participant, spec: Any) -> None:
         unfinished = set(setup.services)  # services whose last log packet has not arrived
         open_events = set(events) if MONITOR in process.others else set()  # they end after the flight
         while (unfinished or open_events) and not process.stopping:
-            news = arrived.get_with_key(POLL)
-            if news is None:
+            message = subscription.get_with_key(POLL)
+            if message is None:
                 continue
-            key, time_ns, payload = news
+            key, time_ns, payload = message
             if not payload:
                 unfinished.discard(key.rpartition("/")[2])
                 open_events.discard(key)
@@ -47,6 +47,6 @@ def run(process: Participant, spec: Any) -> None:
                 server.declare(topic, page.topic.message.type_name)
                 times = page.ticks * setup.interval_ns
                 messages += [(int(t), topic, p.tobytes()) for t, p in zip(times, page.payloads, strict=True)]
-            for time_ns, topic, message in sorted(messages, key=lambda m: m[0]):
-                server.put(topic, time_ns, message)
+            for time_ns, topic, content in sorted(messages, key=lambda m: m[0]):
+                server.put(topic, time_ns, content)
         process.confirm()

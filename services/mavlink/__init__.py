@@ -1,4 +1,4 @@
-"""The link of a real autopilot: MAVLink 2 on one side, the run's topics on the other; no other service uses MAVLink.
+"""MAVLink 2 link between the run's topics and ground stations, as of a real autopilot.
 
-Foreign units and frames (NED, FRD, degrees, millimetres) end here.
+MAVLink's units and frames (NED, FRD, degrees, millimetres) are converted here from and to SI, ENU and FLU.
 """

@@ -1,7 +1,7 @@
 """Actuator metadata for ground stations: output, position and spin direction of each motor.
 
-The format is MAVLink's component_metadata/actuators.schema.json, filled in as by PX4: QGroundControl draws its actuator
-page from it. All entries are read-only, and motors cannot be run one by one.
+The format is MAVLink's component_metadata/actuators.schema.json, with the entries of PX4: QGroundControl builds its
+actuator page from it. All entries are read-only, and motors cannot be run one by one.
 """
 
 from collections.abc import Sequence
@@ -11,7 +11,7 @@ from lapwing.services.common.mavlink.frames import swap_body
 from lapwing.services.mavlink.px4_facts import FIRST_MOTOR, MULTIROTOR, output_function
 from lapwing.services.mavlink.vehicle_description import Rotor
 
-VERSION = 2  # of the format
+VERSION = 2  # version of the format
 _STOPPED, _FULL = 0.0, 1.0
 
 
@@ -47,12 +47,12 @@ def actuators(rotors: Sequence[Rotor]) -> dict[str, Any]:
 def _geometry(rotors: Sequence[Rotor]) -> dict[str, Any]:
     """Return the rotor geometry in FRD axes, as in PX4."""
     x, y, z = zip(*(swap_body(rotor.position_body) for rotor in rotors), strict=True)
-    turns = [float(rotor.counterclockwise) for rotor in rotors]
+    directions = [float(rotor.counterclockwise) for rotor in rotors]
     values = {
         "posx": ("Position X", x),
         "posy": ("Position Y", y),
         "posz": ("Position Z", z),
-        "spin-dir": ("Direction CCW", turns),
+        "spin-dir": ("Direction CCW", directions),
     }
     return {
         "option": f"CA_AIRFRAME=={MULTIROTOR}",

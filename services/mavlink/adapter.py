@@ -149,8 +149,8 @@ class Adapter:
             endpoint.system, endpoint.component = source
             handler(self.sessions[endpoint], m)
 
-    def take(self, topic: Topic, time_ns: int, payload: bytes, wall: float) -> None:
-        """Store a message of the vehicle. An estimate advances the time and sends the messages that are due.
+    def handle(self, topic: Topic, time_ns: int, payload: bytes, wall: float) -> None:
+        """Handle a message of the vehicle. An estimate advances the time and sends the due messages.
 
         Args:
             topic: topic of the message.
@@ -176,7 +176,7 @@ class Adapter:
             self.commands.acknowledge(acknowledgements.acks)
             self.missions.observe((), acknowledgements.acks)
             for text in acknowledgements.text:
-                self._announcements.say(text)
+                self._announcements.send_text(text)
         elif topic is STATUS:
             self._announcements.step()
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.services.common.mavlink.dialect import id_of, mavlink
 from lapwing.services.common.status_texts import ROUTINE, TAKEN_OVER
-from lapwing.services.mavlink.events import Definition, watches
+from lapwing.services.mavlink.events import Definition, new_detectors
 from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.telemetry import streams
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -17,7 +17,7 @@ class Announcements:
     """Detector of changes between two statuses of the autopilot."""
 
     def __init__(self, vehicle: VehicleCache, broadcast: Callable[[Any], None]):
-        """Create the comparison; `broadcast` sends a message to every endpoint."""
+        """Create the detector; `broadcast` sends a message to every endpoint."""
         self._vehicle, self._broadcast = vehicle, broadcast
         self._mode: tuple = ()
         self._home = vehicle.home_world
@@ -25,7 +25,7 @@ class Announcements:
         self._reached = NO_ITEM
         self._texts = 0
         self._event_text = ""  # text of a failsafe that an event has reported
-        self._watches = watches() if vehicle.firmware.EVENTS else []
+        self._detectors = new_detectors() if vehicle.firmware.EVENTS else []
 
     def step(self) -> None:
         """Send the changes since the last status."""
@@ -44,8 +44,8 @@ class Announcements:
         if (item := (s.mission_current, s.mission_state)) != self._item:
             self._item = item
             self._send("MISSION_CURRENT")
-        for watch in self._watches:
-            for definition, values in watch.step(self._vehicle):
+        for detector in self._detectors:
+            for definition, values in detector.step(self._vehicle):
                 self._announce_event(definition, values)
 
     def _announce_event(self, definition: Definition, values: Sequence[int]) -> None:
@@ -61,7 +61,7 @@ class Announcements:
             for number in range(min(first, reached), reached + 1):
                 self._broadcast(mavlink.MAVLink_mission_item_reached_message(number))
 
-    def say(self, text: str) -> None:
+    def send_text(self, text: str) -> None:
         """Send a text to all endpoints, in pieces if it is long.
 
         A text that an event also reports ends with a tab, as in PX4: ground stations that read events do not show it.
@@ -70,7 +70,7 @@ class Announcements:
         severity = mavlink.MAV_SEVERITY_CRITICAL if failsafe else mavlink.MAV_SEVERITY_WARNING
         if text in ROUTINE:
             severity = mavlink.MAV_SEVERITY_INFO
-        if self._watches and (text in ROUTINE or text == self._event_text):
+        if self._detectors and (text in ROUTINE or text == self._event_text):
             text, self._event_text = f"{text}\t", ""
         self._texts = self._texts % 0xFFFF + 1
         for message in statustext(severity, text, self._texts):

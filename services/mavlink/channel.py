@@ -15,7 +15,7 @@ class _Codec(mavlink.MAVLink):
     signature: Signature | None = None
 
     def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:
-        """Check as the library does, but keep the time stamp of a stream when a forged frame bears a later one."""
+        """Check as the library does, but keep the time stamp of a stream if a forged frame has a later one."""
         assert self.signature
         self.signature.advance()
         times = self.signing.stream_timestamps

@@ -53,7 +53,7 @@ def _parameter(p: Parameter) -> dict[str, Any]:
 
 
 def _fact(fact: Fact, value: float) -> dict[str, Any]:
-    text = "A fact of the vehicle; cannot be changed"
+    text = "Property of the vehicle (read-only)"
     return _entry(fact.name, fact.whole, fact.unit, text, value) | {"readOnly": True}
 
 

@@ -1,7 +1,7 @@
 """Latitude, longitude and angles for telemetry, with the C library's functions.
 
-They are rounded as on this machine, which is enough for messages that are no part of a run. In Python they take a tenth
-of the time of `lapwing.kernels.math`, which took half of the adapter's processor time.
+Their rounding depends on the machine, which is acceptable for messages outside of the run's digest. In Python they take
+a tenth of the time of `lapwing.kernels.math`, which used half of the adapter's processor time.
 """
 
 import math

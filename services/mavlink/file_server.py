@@ -1,4 +1,4 @@
-"""MAVLink FTP for files that can only be read (MAVLink guide, "File Transfer Protocol"): payloads in, payloads out."""
+"""MAVLink FTP server of read-only files (MAVLink guide, "File Transfer Protocol"), from payload to payloads."""
 
 import struct
 import zlib
@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 _HEADER = struct.Struct("<HBBBBBxI")  # sequence, session, opcode, size, request's opcode, burst complete, offset
 PAYLOAD = 251  # [bytes] of a message
 DATA = PAYLOAD - _HEADER.size  # [bytes] of data in it
-BURST = 32  # messages at most in reply to one request
+BURST = 32  # most messages in reply to one request
 SESSIONS = 4  # files that one endpoint may have open
 
 TERMINATE, RESET, LIST, OPEN, READ, CRC32, BURST_READ = 1, 2, 3, 4, 5, 14, 15
@@ -16,7 +16,7 @@ ACK, NAK = 128, 129
 INVALID_SIZE, INVALID_SESSION, NO_SESSION, END_OF_FILE, UNKNOWN_COMMAND, PROTECTED, NOT_FOUND = 3, 4, 5, 6, 7, 9, 10
 
 
-class _RefusedError(Exception):
+class _RejectedError(Exception):
     """Error for a rejected request; its argument is the error code."""
 
 
@@ -26,7 +26,7 @@ def crc32(data: bytes) -> int:
 
 
 class FileServer:
-    """The files as one endpoint sees them, and those that it has open."""
+    """Server of the files for one endpoint, with its open files."""
 
     def __init__(self, files: Mapping[str, bytes]):
         """Create a server of `files`: contents by path, without a leading slash."""
@@ -50,7 +50,7 @@ class FileServer:
 
         try:
             if opcode == OPEN:
-                session = self._begin(self._file(data))
+                session = self._open_session(self._file(data))
                 yield reply(ACK, struct.pack("<I", len(self._open[session])))
             elif opcode in (READ, BURST_READ):
                 count = BURST if opcode == BURST_READ else 1
@@ -59,8 +59,8 @@ class FileServer:
                     yield reply(ACK, piece, number, at, number == len(pieces) and opcode == BURST_READ)
             else:
                 yield reply(ACK, self._other(opcode, session, data, offset))
-        except _RefusedError as refused:
-            yield reply(NAK, bytes([refused.args[0]]))
+        except _RejectedError as error:
+            yield reply(NAK, bytes([error.args[0]]))
 
     def _other(self, opcode: int, session: int, data: bytes, offset: int) -> bytes:
         """Return the data of the acknowledgement of a request with a single reply."""
@@ -73,33 +73,33 @@ class FileServer:
         elif opcode == RESET:
             self._open.clear()
         elif opcode in WRITING:
-            raise _RefusedError(PROTECTED)
-        elif opcode:  # 0 asks for nothing
-            raise _RefusedError(UNKNOWN_COMMAND)
+            raise _RejectedError(PROTECTED)
+        elif opcode:  # 0: no operation
+            raise _RejectedError(UNKNOWN_COMMAND)
         return b""
 
     def _file(self, data: bytes) -> bytes:
         path = _path(data)
         if path not in self._files:
-            raise _RefusedError(NOT_FOUND)
+            raise _RejectedError(NOT_FOUND)
         return self._files[path]
 
-    def _begin(self, content: bytes) -> int:
+    def _open_session(self, content: bytes) -> int:
         free = next((number for number in range(SESSIONS) if number not in self._open), None)
         if free is None:
-            raise _RefusedError(NO_SESSION)
+            raise _RejectedError(NO_SESSION)
         self._open[free] = content
         return free
 
     def _pieces(self, session: int, offset: int, size: int, count: int) -> list[tuple[int, bytes]]:
         """Return up to `count` pieces of an open file from an offset, as (offset, bytes)."""
         if session not in self._open:
-            raise _RefusedError(INVALID_SESSION)
+            raise _RejectedError(INVALID_SESSION)
         if not 0 < size <= DATA:
-            raise _RefusedError(INVALID_SIZE)
+            raise _RejectedError(INVALID_SIZE)
         content = self._open[session]
         if offset >= len(content):
-            raise _RefusedError(END_OF_FILE)
+            raise _RejectedError(END_OF_FILE)
         starts = range(offset, min(len(content), offset + count * size), size)
         return [(start, content[start : start + size]) for start in starts]
 
@@ -108,18 +108,18 @@ class FileServer:
         prefix = f"{folder}/" if folder else ""
         inside = [(path.removeprefix(prefix), data) for path, data in self._files.items() if path.startswith(prefix)]
         if not inside:
-            raise _RefusedError(NOT_FOUND)
+            raise _RejectedError(NOT_FOUND)
         folders = sorted({name.partition("/")[0] for name, _ in inside if "/" in name})
         entries = [f"D{name}\0" for name in folders]
         entries += [f"F{name}\t{len(data)}\0" for name, data in sorted(inside) if "/" not in name]
         if offset >= len(entries):
-            raise _RefusedError(END_OF_FILE)
-        listed = b""
+            raise _RejectedError(END_OF_FILE)
+        listing = b""
         for entry in entries[offset:]:
-            if len(listed) + len(entry) > DATA:
+            if len(listing) + len(entry) > DATA:
                 break
-            listed += entry.encode()
-        return listed
+            listing += entry.encode()
+        return listing
 
 
 def _path(data: bytes) -> str:

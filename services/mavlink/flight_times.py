@@ -8,11 +8,11 @@ class FlightTimes:
 
     def __init__(self) -> None:
         self.armed_ns = self.takeoff_ns = self.landing_ns = 0
-        self.number = 0  # of flights so far, the present one included
+        self.number = 0  # number of flights, including the current one
         self._before = Status(landed=True)
 
     def update(self, status: Status, time_ns: int) -> None:
-        """Take in a newer status of the autopilot and its simulation time [ns]."""
+        """Update with a newer status of the autopilot and its simulation time [ns]."""
         before, self._before = self._before, status
         if status.armed and not before.armed:
             self.armed_ns, self.takeoff_ns, self.landing_ns = time_ns, 0, 0

@@ -1,4 +1,4 @@
-"""Frames of messages of numbers, as nearly all of the telemetry: pymavlink's bytes in less than half of its time.
+"""Frames of messages that contain only numbers, as most telemetry does, in less than half of pymavlink's time.
 
 The most frequent messages are pairs of class and values (`Numbers`), which saves the message object.
 """
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from lapwing.services.common.mavlink.dialect import mavlink
 
 Numbers = tuple[Any, tuple]
-"""Message class of pymavlink, and its values in the order of the class's arguments. None of them is a text."""
+"""Message class of pymavlink, and its values in the order of the class's arguments. None of them is a string."""
 
 _HEADER = "<BBBBBBBHB"  # MAVLink guide, "Packet Serialization": magic to message id (24 bits)
 _HEADER_SIZE = struct.calcsize(_HEADER)
@@ -22,9 +22,9 @@ _CHECKSUM = struct.Struct("<H")
 class _Kind(NamedTuple):
     """Constants of a message class."""
 
-    attributes: Callable[[Any], tuple]  # of a message object, in the order of the wire
-    reorder: Callable[[tuple], tuple]  # from the order of the arguments to that of the wire
-    arrays: tuple[int, ...]  # places of those that are arrays, the last first
+    attributes: Callable[[Any], tuple]  # of a message object, in wire order
+    reorder: Callable[[tuple], tuple]  # from the order of the arguments to wire order
+    arrays: tuple[int, ...]  # indices of the arrays, in descending order
     layout: struct.Struct  # header, payload, CRC_EXTRA
     size: int  # [bytes] payload
     low: int  # 16 bits of the message id; a message's own `id` may be one of its fields
@@ -40,12 +40,12 @@ def _kind(message_type: Any) -> _Kind | None:
     if len(names) < 2 or {"c", "s"} & set(letters):
         return None
     arrays = tuple(k for k, length in reversed(list(enumerate(message_type.array_lengths))) if length)
-    places = itemgetter(*[message_type.orders.index(i) for i in range(len(names))])
+    order = itemgetter(*[message_type.orders.index(i) for i in range(len(names))])
     fields = message_type.unpacker.format.removeprefix("<")
     layout, number = struct.Struct(f"{_HEADER}{fields}B"), message_type.id
     size = message_type.unpacker.size
     low, high = number & 0xFFFF, number >> 16
-    return _Kind(attrgetter(*names), places, arrays, layout, size, low, high, message_type.crc_extra)
+    return _Kind(attrgetter(*names), order, arrays, layout, size, low, high, message_type.crc_extra)
 
 
 def frame(message: Any, sequence: int, system: int, component: int) -> bytes | None:

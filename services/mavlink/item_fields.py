@@ -12,7 +12,7 @@ from lapwing.services.common.mavlink.geo_coordinates import ABOVE_HOME, ABOVE_SE
 _ON_GLOBE = ABOVE_SEA | ABOVE_HOME
 
 
-class RefusedItemError(ValueError):
+class RejectedItemError(ValueError):
     """Item that cannot be flown; `result` is the MAV_MISSION_RESULT."""
 
     def __init__(self, result: int, item: int = 0):
@@ -20,17 +20,17 @@ class RefusedItemError(ValueError):
         self.result = result
 
 
-Maker = Callable[[Any, Datum], Any]
+Converter = Callable[[Any, Datum], Any]
 
-MAKERS: dict[int, Maker] = {}
+CONVERTERS: dict[int, Converter] = {}
 """Conversion function by MAV_CMD."""
 
 
-def makes(*commands: int) -> Callable[[Maker], Maker]:
+def converts(*commands: int) -> Callable[[Converter], Converter]:
     """Declare the function that converts items with these commands."""
 
-    def declare(function: Maker) -> Maker:
-        MAKERS.update(dict.fromkeys(commands, function))
+    def declare(function: Converter) -> Converter:
+        CONVERTERS.update(dict.fromkeys(commands, function))
         return function
 
     return declare
@@ -41,27 +41,27 @@ def idle() -> Any:
     return MissionItem("delay", Vector3(), math.nan, math.nan, 0.0, ())
 
 
-def place(m: Any, datum: Datum, needed: bool = True) -> Any:
+def position(m: Any, datum: Datum, required: bool = True) -> Any:
     """Return the position of an item; NaN if it is optional and not specified."""
     if m.frame not in _ON_GLOBE:
-        raise RefusedItemError(mavlink.MAV_MISSION_UNSUPPORTED_FRAME, m.seq)
+        raise RejectedItemError(mavlink.MAV_MISSION_UNSUPPORTED_FRAME, m.seq)
     latitude, longitude = degrees(m.x), degrees(m.y)
-    if not needed and (m.x, m.y) == (0, 0):
+    if not required and (m.x, m.y) == (0, 0):
         latitude = longitude = math.nan
     for value, limit, result in (
         (latitude, 90.0, mavlink.MAV_MISSION_INVALID_PARAM5_X),
         (longitude, 180.0, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
         (m.z, 1e5, mavlink.MAV_MISSION_INVALID_PARAM7),
     ):
-        if abs(value) > limit or (needed and math.isnan(value)):
-            raise RefusedItemError(result, m.seq)
+        if abs(value) > limit or (required and math.isnan(value)):
+            raise RejectedItemError(result, m.seq)
     return Vector3(*to_world(datum, m.frame, latitude, longitude, m.z))
 
 
-def length(value: float, result: int, m: Any) -> float:
+def non_negative(value: float, result: int, m: Any) -> float:
     """Return a time or number that must not be negative; 0 if it is not specified."""
     if value < 0.0:
-        raise RefusedItemError(result, m.seq)
+        raise RejectedItemError(result, m.seq)
     return 0.0 if math.isnan(value) else value
 
 

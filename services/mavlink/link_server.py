@@ -69,14 +69,14 @@ class LinkServer:
         """Handle a recorded message, with its topic name in the log; serve the endpoints at each estimate."""
         topic = self._topics.get(key)
         if topic:
-            self.take(topic, time_ns, payload)
+            self.handle(topic, time_ns, payload)
         if topic is ESTIMATE:
             self.wait(0.0)
 
-    def take(self, topic: Topic, time_ns: int, payload: bytes) -> None:
+    def handle(self, topic: Topic, time_ns: int, payload: bytes) -> None:
         """Handle a published message of the vehicle."""
         wall = time.monotonic()
-        self.adapter.take(topic, time_ns, payload, wall)
+        self.adapter.handle(topic, time_ns, payload, wall)
         if topic is ESTIMATE:
             self._pacing.note(time_ns * 1e-9, wall)
 

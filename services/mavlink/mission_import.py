@@ -1,7 +1,7 @@
-"""Items of missions, fences and rally points from MAVLink messages to the autopilot's.
+"""Conversion of mission, fence and rally items from MAVLink messages to the autopilot's.
 
-An item that this vehicle has nothing to do for (cameras, gimbals, servos) becomes a delay of no length, so that the
-numbers of the items stay; `texts_of_skipped_items` names them.
+An item without effect on this vehicle (cameras, gimbals, servos) becomes a delay of zero length, so that item numbers
+are unchanged; `texts_of_skipped_items` lists them.
 """
 
 import math
@@ -11,12 +11,12 @@ from typing import Any
 from lapwing.messages import MissionItem
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.geo_coordinates import Datum
-from lapwing.services.mavlink.item_fields import MAKERS, RefusedItemError, idle
-from lapwing.services.mavlink.item_makers import MAX_ITEMS
+from lapwing.services.mavlink.item_converters import MAX_ITEMS
+from lapwing.services.mavlink.item_fields import CONVERTERS, RejectedItemError, idle
 
-__all__ = ["MAX_ITEMS", "RefusedItemError", "from_mavlink", "texts_of_skipped_items"]
+__all__ = ["MAX_ITEMS", "RejectedItemError", "from_mavlink", "texts_of_skipped_items"]
 
-_IDLE = {  # commands of a mission for parts that this vehicle does not have
+_IDLE = {  # commands for parts that this vehicle does not have
     mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
     mavlink.MAV_CMD_DO_VTOL_TRANSITION,
     mavlink.MAV_CMD_DO_WINCH,
@@ -60,17 +60,17 @@ def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[A
 
     Args:
         items: messages in order.
-        home_first: the first item of a mission is home and is not flown to.
+        home_first: True if the first item of a mission is home and not a waypoint.
         datum: reference of coordinates.
 
     Raises:
-        RefusedItemError: an item cannot be flown.
+        RejectedItemError: an item cannot be flown.
     """
     result = [
         idle() if home_first and number == 0 and m.mission_type == mavlink.MAV_MISSION_TYPE_MISSION else _item(m, datum)
         for number, m in enumerate(items)
     ]
-    # ArduPilot's ground stations write 0 where they mean no heading: its copter turns by CONDITION_YAW alone.
+    # ArduPilot's ground stations send 0 for an unspecified heading: its copters turn only by CONDITION_YAW.
     return [_without_heading(i) if home_first and i.action != "yaw" else i for i in result]
 
 
@@ -81,9 +81,9 @@ def _without_heading(i: Any) -> Any:
 def _item(m: Any, datum: Datum) -> Any:
     if m.command in _IDLE:
         return idle()
-    action = MAKERS.get(m.command)
+    action = CONVERTERS.get(m.command)
     if action is None:
-        raise RefusedItemError(mavlink.MAV_MISSION_UNSUPPORTED, m.seq)
+        raise RejectedItemError(mavlink.MAV_MISSION_UNSUPPORTED, m.seq)
     if any(map(math.isinf, (m.param1, m.param2, m.param3, m.param4, m.z))):
-        raise RefusedItemError(mavlink.MAV_MISSION_INVALID, m.seq)
+        raise RejectedItemError(mavlink.MAV_MISSION_INVALID, m.seq)
     return action(m, datum)

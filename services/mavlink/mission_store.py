@@ -10,7 +10,7 @@ from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.mavlink.clock import Clock
 from lapwing.services.mavlink.command_queue import CommandQueue
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.mission_import import MAX_ITEMS, RefusedItemError, from_mavlink, texts_of_skipped_items
+from lapwing.services.mavlink.mission_import import MAX_ITEMS, RejectedItemError, from_mavlink, texts_of_skipped_items
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
 from lapwing.services.mavlink.statustext import statustext
 
@@ -52,7 +52,7 @@ class MissionStore:
         """
         self._clock, self._commands, self._datum = clock, commands, datum
         self._home_first, self._counts = home_first, counts
-        self.items: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as the endpoint sent them
+        self.items: dict[int, list[Any]] = {kind: [] for kind in KINDS}  # as sent by the endpoint
         self._uploads: dict[int, Upload] = {}
         self._finished: dict[int, tuple[Endpoint, int]] = {}  # endpoint and result of the last upload
         self._repeats: dict[int, Repeat] = {}  # repetitions of last acknowledgements, which may be lost
@@ -77,7 +77,7 @@ class MissionStore:
             upload = self._uploads[kind] = Upload(endpoint, kind, count, self._clock)
             self._continue(upload)
 
-    def take(self, endpoint: Endpoint, m: Any) -> None:
+    def add_item(self, endpoint: Endpoint, m: Any) -> None:
         """Handle an item of an upload: the next one, one out of order, or a repeated one."""
         upload = self._uploads.get(m.mission_type)
         if upload is None or upload.endpoint is not endpoint:
@@ -91,11 +91,11 @@ class MissionStore:
             self._counts["item out of order"] += 1
             self._request_next(upload)
         else:
-            upload.take(m)
+            upload.append(m)
             self._continue(upload)
 
     def forget(self, endpoint: Endpoint, kind: int | None = None) -> None:
-        """Stop repeating the last acknowledgement to an endpoint that has left or continues with something else."""
+        """Stop repeating the last acknowledgement to an endpoint that has disconnected or starts another transfer."""
         for other, repeat in list(self._repeats.items()):
             if repeat.endpoint is endpoint and kind in (None, other):
                 del self._repeats[other]
@@ -111,7 +111,7 @@ class MissionStore:
         if kind == mavlink.MAV_MISSION_TYPE_ALL:
             for other in KINDS:
                 if other not in self._uploads:
-                    self._hand_over(Upload(endpoint, other, 0, self._clock), acknowledged_kind=kind)
+                    self._submit(Upload(endpoint, other, 0, self._clock), acknowledged_kind=kind)
         else:
             self.begin(endpoint, kind, 0)
 
@@ -150,17 +150,17 @@ class MissionStore:
         if len(upload.items) < upload.count:
             self._request_next(upload)
             return
-        self._hand_over(upload)
+        self._submit(upload)
 
     def _request_next(self, upload: Upload) -> None:
-        to = upload.endpoint.system, upload.endpoint.component
-        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*to, upload.next_request(), upload.kind))
+        target = upload.endpoint.system, upload.endpoint.component
+        upload.endpoint.send(mavlink.MAVLink_mission_request_int_message(*target, upload.next_request(), upload.kind))
 
-    def _hand_over(self, upload: Upload, acknowledged_kind: int | None = None) -> None:
+    def _submit(self, upload: Upload, acknowledged_kind: int | None = None) -> None:
         """Send the complete items to the autopilot, or reject them."""
         try:
             items = from_mavlink(upload.items, self._home_first, self._datum())
-        except RefusedItemError as error:
+        except RejectedItemError as error:
             self._counts["invalid item"] += 1
             self._end(upload, error.result)
             return

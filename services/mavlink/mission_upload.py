@@ -42,7 +42,7 @@ class Upload:
         """Record that the requested item was lost."""
         self._repeated = self.lossy = True
 
-    def take(self, item: Any) -> None:
+    def append(self, item: Any) -> None:
         """Append the next item."""
         if not self._repeated:  # otherwise the round trip is unknown
             round_trip = self._clock.since(self._requested)

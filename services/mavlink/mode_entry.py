@@ -8,8 +8,8 @@ from lapwing.services.common.mavlink.dialect import mavlink
 class FlightMode(NamedTuple):
     """A mode that an operator may choose."""
 
-    kind: str  # of the command that enters it, and the mode's name in Status
-    name: str  # for people
+    kind: str  # of the command that enters it; also the mode's name in Status
+    name: str  # displayed
     number: int  # the custom mode
     standard: int = mavlink.MAV_STANDARD_MODE_NON_STANDARD
     advanced: bool = True  # ground stations may hide it from beginners

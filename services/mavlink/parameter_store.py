@@ -97,13 +97,13 @@ class ParameterStore:
         if name in self._number:
             self._send(endpoint, name)
         else:
-            self._refuse(endpoint, name, index, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._reject(endpoint, name, index, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def set(self, endpoint: Endpoint, name: str, value: float, kind: int, trusted: bool) -> None:
         """Request a new value of a MAV_PARAM_TYPE from the autopilot, then send the result to every endpoint."""
         bytewise = self._firmware.PARAMETER_ENCODING == mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
         if name in self._number and bytewise and kind != self._kind(name):
-            self._refuse(endpoint, name, BY_NAME, TYPE_MISMATCH)
+            self._reject(endpoint, name, BY_NAME, TYPE_MISMATCH)
             self._send(endpoint, name)
             return
         if name in self._facts:
@@ -111,7 +111,7 @@ class ParameterStore:
             return
         parameter = self._table.get(name)
         if parameter is None:
-            self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
         requested = _restore_bound(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
 
@@ -119,14 +119,14 @@ class ParameterStore:
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self._change(name, acknowledgement.value)
             else:
-                self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+                self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
                 self._send(endpoint, name)
 
         if not trusted:
-            self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED)
+            self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED)
             self._send(endpoint, name)
         elif not math.isfinite(requested):
-            self._refuse(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             self._send(endpoint, name)
         else:
             self._commands.put("parameter", endpoint.name, on_acknowledgement, (requested,), name)
@@ -145,24 +145,24 @@ class ParameterStore:
         ):
             error = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
         if error is not None or counterparts is None:
-            self._refuse(endpoint, fact.name, BY_NAME, error or mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+            self._reject(endpoint, fact.name, BY_NAME, error or mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             self._send(endpoint, fact.name)
             return
         before = self.value(fact.name)
         self._set_facts[fact.name] = set_value
-        waiting = {name: v for name, v in counterparts.items() if self._values[name] != v}
-        if not waiting:
+        pending = {name: v for name, v in counterparts.items() if self._values[name] != v}
+        if not pending:
             self._announce(fact.name)
             return
 
         def on_acknowledgement(name: str, acknowledgement: Any) -> None:
-            del waiting[name]
+            del pending[name]
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self._change(name, acknowledgement.value)
-            if not waiting and self.value(fact.name) == before:  # otherwise `_change` has sent it
+            if not pending and self.value(fact.name) == before:  # otherwise `_change` has sent it
                 self._announce(fact.name)
 
-        for name, v in list(waiting.items()):
+        for name, v in list(pending.items()):
             self._commands.put("parameter", endpoint.name, partial(on_acknowledgement, name), (v,), name)
 
     def _announce(self, name: str) -> None:
@@ -191,7 +191,7 @@ class ParameterStore:
         kind: int = mavlink.MAV_PARAM_TYPE_INT32 if integer else mavlink.MAV_PARAM_TYPE_REAL32
         return kind
 
-    def _refuse(self, endpoint: Endpoint, name: str, index: int, error: int) -> None:
+    def _reject(self, endpoint: Endpoint, name: str, index: int, error: int) -> None:
         self._counts["parameter rejected"] += 1
         endpoint.send(
             mavlink.MAVLink_param_error_message(endpoint.system, endpoint.component, name.encode(), index, error)
@@ -199,5 +199,5 @@ class ParameterStore:
 
 
 def _restore_bound(value: float, *bounds: float) -> float:
-    """Return the bound that the field of 32 bits holds as `value`; else the value."""
+    """Return the bound whose 32-bit float equals `value`, otherwise the value."""
     return next((bound for bound in bounds if struct.unpack("<f", struct.pack("<f", bound))[0] == value), value)

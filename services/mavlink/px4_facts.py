@@ -18,7 +18,7 @@ class Fact(NamedTuple):
     """Parameter that is computed from the vehicle or from the autopilot's parameters."""
 
     name: str
-    value: Callable[[Values], float]  # of the autopilot's parameters
+    value: Callable[[Values], float]  # function of the autopilot's parameters
     whole: bool = True
     unit: str = ""
     # returns the autopilot's parameters for a value, or None for an unsupported value; None: read-only
@@ -26,7 +26,7 @@ class Fact(NamedTuple):
 
 
 def _translate_action(name: str, counterpart: str, actions: dict[int, int], default: int = 0) -> Fact:
-    """Return a failsafe action of PX4 that is one of the autopilot's; `actions` has the latter by the former."""
+    """Return a failsafe action of PX4; `actions`: action of the autopilot by action of PX4."""
     px4_actions = {own: px4 for px4, own in reversed(actions.items())}
 
     def assign(value: float) -> Values | None:
@@ -55,7 +55,7 @@ _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency ch
 }
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
 MULTIROTOR = 0  # CA_AIRFRAME
-SATELLITES = 16  # of a fix, as telemetry has them
+SATELLITES = 16  # of a fix, as in telemetry
 FIRST_MOTOR = 101  # function of an output that drives motor 1
 
 
@@ -122,7 +122,7 @@ def _battery(b: Battery) -> Sequence[Fact]:
         Fact("BAT1_V_CHARGED", lambda _: b.charged_voltage, False, "V"),
         Fact("BAT1_V_EMPTY", lambda _: b.empty_voltage, False, "V"),
         Fact("BAT1_CAPACITY", lambda _: b.capacity / 3.6, False, "mAh"),
-        Fact("BAT1_V_LOAD_DROP", lambda _: 0.0, False, "V"),  # PX4 leaves it aside where it knows the resistance
+        Fact("BAT1_V_LOAD_DROP", lambda _: 0.0, False, "V"),  # unused by PX4 if the resistance is set
         Fact("BAT1_R_INTERNAL", lambda _: b.resistance, False, "Ohm"),
     ]
 

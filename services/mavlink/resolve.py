@@ -23,17 +23,17 @@ def resolve(scene: Scene) -> VehicleDescription | None:
 def describe(scene: Scene) -> VehicleDescription:
     """Return the description of the vehicle of a scene with an autopilot."""
     frame, identity, sensors = airframe(scene), scene[Mavlink], tuple(sorted(scene.tables("sensors")))
-    around = environment(scene)
+    here = environment(scene)
     return VehicleDescription(
         name=scene[Vehicle].name,
         system_id=identity.system_id,
         firmware=identity.firmware,
-        home=around.home,
-        air_temperature=python_function(temperature)(around.atmosphere, around.home.height) - FREEZING,
+        home=here.home,
+        air_temperature=python_function(temperature)(here.atmosphere, here.home.height) - FREEZING,
         standing_height=start_height(scene),
         rotors=tuple(
-            Rotor(place, turn == "ccw")
-            for place, turn in zip(frame.rotors.position, frame.rotors.spin_direction, strict=True)
+            Rotor(position, spin == "ccw")
+            for position, spin in zip(frame.rotors.position, frame.rotors.spin_direction, strict=True)
         ),
         max_voltage=frame.motor.max_voltage if frame.motor else None,
         battery=_battery(scene),

@@ -26,7 +26,7 @@ from lapwing.services.mavlink.signing import TIME_STAMPS, read_key, state_folder
 from lapwing.services.mavlink.socket_watch import SocketWatch
 
 WAIT = 0.05  # [s] longest wait
-ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics whose messages are all handled
+ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics of which all messages are handled
 
 
 def run(process: Participant, spec: Any) -> None:
@@ -36,27 +36,10 @@ def run(process: Participant, spec: Any) -> None:
         ValueError: a link cannot be opened.
     """
     setup = process.setup
-    linked_members = [member for member in members(setup) if "mavlink" in member.auxiliary]
-    if not linked_members:
-        raise ValueError("--mavlink: the scene has no autopilot; use a scene with [autopilot]")
-    for module in {member.resolved["mavlink"].get("module") for member in linked_members} - {None}:
-        user_module.load(module, setup.modules)  # declares its messages
-    key = read_key(Path(spec.mavlink_key)) if spec.mavlink_key else None
-    time_stamps = state_folder() / TIME_STAMPS
-    log = Path(spec.log) if spec.log else None
     # Every message that wakes a process slows a run without real-time factor; log packets arrive often enough.
     immediate = process.speed is not None
-    publish = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with ExitStack() as stack:
-        servers: dict[str, LinkServer] = {}
-        for i, member in enumerate(linked_members):
-            urls = tuple(for_vehicle_index(url, i) for url in spec.mavlink)
-            options = Options(urls, key, spec.insecure, log, time_stamps, process.speed)
-            first = next(iter(servers.values()), None)
-            server = LinkServer(member.auxiliary["mavlink"], options, lambda payload: publish(payload, 0), first)
-            servers[member.vehicle] = stack.enter_context(server)
-            for command in member.services["autopilot"].parameters.plan:  # the autopilot starts with it
-                server.adapter.missions.store(command)
+        servers = _open_servers(process, spec, stack)
         by_estimate_key = {
             ESTIMATE.zenoh_key(name, process.key_prefix): server for name, server in servers.items() if immediate
         }
@@ -75,16 +58,16 @@ def run(process: Participant, spec: Any) -> None:
         sockets = stack.enter_context(SocketWatch(first_server.selector, first_source.wake))
         unfinished = set(setup.services)  # services whose last log packet has not arrived
         while unfinished and not process.stopping:
-            news = first_source.get_with_key(0.0 if sockets.ready else WAIT)
-            if news is None or sockets.ready:
+            message = first_source.get_with_key(0.0 if sockets.ready else WAIT)
+            if message is None or sockets.ready:
                 serve()
-                sockets.served()
-            while (news := news or log_packets.get_with_key(0.0)) is not None:
-                name, time_ns, payload = news
-                news = None
+                sockets.resume()
+            while (message := message or log_packets.get_with_key(0.0)) is not None:
+                name, time_ns, payload = message
+                message = None
                 if name in by_estimate_key:
                     if payload:
-                        by_estimate_key[name].take(ESTIMATE, time_ns, payload)
+                        by_estimate_key[name].handle(ESTIMATE, time_ns, payload)
                 elif payload:
                     _handle_log_packet(servers, payload, immediate, setup.interval_ns)
                 else:
@@ -93,6 +76,33 @@ def run(process: Participant, spec: Any) -> None:
         for name, server in servers.items():
             for line in server.report():
                 print(f"{name}: {line}" if others else line, flush=True)
+
+
+def _open_servers(process: Participant, spec: Any, stack: ExitStack) -> dict[str, LinkServer]:
+    """Open the links of all vehicles with an autopilot. Return the servers by vehicle name.
+
+    Raises:
+        ValueError: no vehicle has an autopilot, or a link cannot be opened.
+    """
+    setup = process.setup
+    linked_members = [member for member in members(setup) if "mavlink" in member.auxiliary]
+    if not linked_members:
+        raise ValueError("--mavlink: the scene has no autopilot; use a scene with [autopilot]")
+    for module in {member.resolved["mavlink"].get("module") for member in linked_members} - {None}:
+        user_module.load(module, setup.modules)  # declares its messages
+    key = read_key(Path(spec.mavlink_key)) if spec.mavlink_key else None
+    log = Path(spec.log) if spec.log else None
+    publish = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
+    servers: dict[str, LinkServer] = {}
+    for i, member in enumerate(linked_members):
+        urls = tuple(for_vehicle_index(url, i) for url in spec.mavlink)
+        options = Options(urls, key, spec.insecure, log, state_folder() / TIME_STAMPS, process.speed)
+        first = next(iter(servers.values()), None)
+        server = LinkServer(member.auxiliary["mavlink"], options, lambda payload: publish(payload, 0), first)
+        servers[member.vehicle] = stack.enter_context(server)
+        for command in member.services["autopilot"].parameters.plan:  # the autopilot starts with it
+            server.adapter.missions.store(command)
+    return servers
 
 
 def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immediate: bool, interval_ns: int) -> None:
@@ -104,10 +114,10 @@ def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immedi
             continue
         if page.payloads.shape[1] <= EMPTY_SIZES.get(topic, 0):
             continue
-        handled = topic in ALL
+        all_messages = topic in ALL
         for server in [servers[page.topic.vehicle]] if page.topic.vehicle else servers.values():
-            if not handled:
+            if not all_messages:
                 server.adapter.vehicle.put(topic, page.payloads[-1].tobytes())
                 continue
             for i in range(len(page.ticks)):
-                server.take(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())
+                server.handle(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())

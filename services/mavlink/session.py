@@ -64,7 +64,7 @@ class Session:
 
     @property
     def address(self) -> tuple[int, int]:
-        """System and component id of the endpoint, which messages to it name as their target."""
+        """System and component id of the endpoint, the target of messages to it."""
         return self.endpoint.system, self.endpoint.component
 
     @property
@@ -79,7 +79,7 @@ class Session:
     def command(
         self, kind: str, values: Sequence[float] = (), on_acknowledgement: OnAcknowledgement | None = None
     ) -> None:
-        """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` gets every acknowledgement."""
+        """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` receives every acknowledgement."""
         self._commands.put(kind, self.endpoint.name, on_acknowledgement, values)
 
     def offboard(self, kind: str, values: Sequence[float]) -> None:
@@ -92,8 +92,8 @@ class Session:
         self.command("manual", values)
         self._sticks.hold("manual", self.endpoint.name, values)
 
-    def say(self, text: str) -> None:
-        """Send the reason of a rejection to this endpoint only, equal texts at most every few seconds."""
+    def send_text(self, text: str) -> None:
+        """Send the reason of a rejection to this endpoint only, the same text at most every `TEXT_PERIOD` seconds."""
         last_sent = self._sent_texts.get(text)
         if last_sent is None or self.clock.since(last_sent) > TEXT_PERIOD:
             if len(self._sent_texts) >= MAX_TEXTS:

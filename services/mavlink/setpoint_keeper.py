@@ -1,7 +1,7 @@
-"""Repetition of offboard setpoints and stick positions in fast runs, until their sender is late by wall time too.
+"""Repetition of offboard setpoints and stick positions in fast runs, until their sender is also late in wall time.
 
-The autopilot counts COM_OF_LOSS_T and COM_RC_LOSS_T in simulation time. In a run faster than real time a sender would
-be lost after a fraction of it in wall time: at five times real time a pause of 0.2 s loses 1 s.
+The autopilot counts COM_OF_LOSS_T and COM_RC_LOSS_T in simulation time. In a run faster than real time, they would
+pass in a fraction of it in wall time: at five times real time a pause of 0.2 s loses 1 s.
 """
 
 from collections.abc import Callable, Sequence

@@ -101,7 +101,7 @@ class Signature:
     """Key of a vehicle and the time stamps of its streams, shared by all its channels."""
 
     def __init__(self, key: bytes, store: TimeStampStore | None = None):
-        """Begin with the stored time stamps, or with none."""
+        """Start with the stored time stamps, or without any."""
         self.state = mavlink.MAVLinkSigning()
         self.state.secret_key = key
         self.state.sign_outgoing = True
@@ -111,7 +111,7 @@ class Signature:
         self.state.timestamp = max([_now(), *self.state.stream_timestamps.values()])
 
     def advance(self) -> None:
-        """Let the vehicle's own time stamp follow the clock: new streams at most one minute older are accepted."""
+        """Advance the vehicle's time stamp to the clock; new streams at most one minute older are accepted."""
         self.state.timestamp = max(self.state.timestamp, _now())
 
     def accept(self, stream: Stream) -> None:

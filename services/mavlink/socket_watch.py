@@ -9,11 +9,11 @@ from collections.abc import Callable
 class SocketWatch:
     """Thread that waits for data of endpoints; a context manager.
 
-    Most wake-ups of a link are by messages of the run. With this thread the main thread waits for those only, which
+    Messages of the run cause most wake-ups of a link. With this thread the main thread waits for those only, which
     takes fewer system calls than a wait for both.
 
     Attributes:
-        ready: True if a socket is ready, until `served`.
+        ready: True if a socket is ready, until `resume`.
     """
 
     def __init__(self, selector: selectors.BaseSelector, wake: Callable[[], None]):
@@ -21,11 +21,11 @@ class SocketWatch:
 
         Args:
             selector: selector of the sockets, which another thread reads.
-            wake: called in this thread when a socket is ready, and not again before `served`.
+            wake: called in this thread when a socket is ready, and not again before `resume`.
         """
         self._selector, self._wake = selector, wake
         self.ready = self._closed = False
-        self._served = threading.Event()
+        self._resume = threading.Event()
         self._end = os.eventfd(0, os.EFD_NONBLOCK)
         selector.register(self._end, selectors.EVENT_READ, lambda: None)
         self._thread = threading.Thread(target=self._run, name="sockets", daemon=True)
@@ -38,13 +38,13 @@ class SocketWatch:
                 return
             self.ready = True
             self._wake()
-            self._served.wait()
-            self._served.clear()
+            self._resume.wait()
+            self._resume.clear()
 
-    def served(self) -> None:
-        """Watch again; called after all sockets that were ready have been served."""
+    def resume(self) -> None:
+        """Resume the wait; called after all ready sockets have been served."""
         self.ready = False
-        self._served.set()
+        self._resume.set()
 
     def __enter__(self) -> "SocketWatch":
         return self
@@ -52,7 +52,7 @@ class SocketWatch:
     def __exit__(self, *_: object) -> None:
         self._closed = True
         os.eventfd_write(self._end, 1)
-        self._served.set()
+        self._resume.set()
         self._thread.join()
         self._selector.unregister(self._end)
         os.close(self._end)

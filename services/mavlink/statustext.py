@@ -1,4 +1,4 @@
-"""Texts for operators as STATUSTEXT messages: in pieces, where they are long."""
+"""STATUSTEXT messages of texts for operators, in several pieces if they are long."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +11,6 @@ TEXT_LENGTH = 50  # [bytes] of one STATUSTEXT
 def statustext(severity: int, text: str, number: int = 1) -> Iterator[Any]:
     """Yield the messages of a text; `number` (not 0) identifies the pieces of a long one."""
     data = text.encode()
-    joined = number if len(data) > TEXT_LENGTH else 0
+    text_id = number if len(data) > TEXT_LENGTH else 0
     for piece, start in enumerate(range(0, len(data), TEXT_LENGTH)):
-        yield mavlink.MAVLink_statustext_message(severity, data[start : start + TEXT_LENGTH], joined, piece)
+        yield mavlink.MAVLink_statustext_message(severity, data[start : start + TEXT_LENGTH], text_id, piece)

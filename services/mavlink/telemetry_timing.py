@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-MAX_STEPS = 200_000  # that are remembered
+MAX_STEPS = 200_000  # recorded steps
 
 
 class Pacing:
@@ -34,7 +34,7 @@ class Pacing:
         """Return the line of the final report."""
         jitter = self.jitter()
         if self._speed is None or not jitter:
-            return "telemetry: no pace to be kept"
+            return "telemetry: no real-time factor"
         median, p99 = (1e3 * jitter[int(share * (len(jitter) - 1))] for share in (0.5, 0.99))
         return (
             f"telemetry: jitter median {median:.1f} ms, p99 {p99:.1f} ms, worst {1e3 * jitter[-1]:.1f} ms; "

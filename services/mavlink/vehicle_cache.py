@@ -41,8 +41,8 @@ class NedMotion:
     def __init__(self, message: Any, payload: bytes, home: Home, standing_height: float):
         """Convert an encoded message with header, pose, velocity and angular velocity: the estimate or the truth.
 
-        The values are read without the message: a link converts an estimate every 20 ms, each time from memory that
-        other processes have displaced from the caches, where each function and object that is used counts.
+        The values are read without decoding the message: a link converts an estimate every 20 ms, each time with cold
+        caches, so that every function call and object adds time.
         """
         values = message.layouts.unpack(payload)
         _, seconds, nanoseconds, _, _, x, y, z, q_x, q_y, q_z, q_w, u, v, w, p, q, r = values[:_MOTION_END]
@@ -71,7 +71,7 @@ class VehicleCache:
         # GPS_GLOBAL_ORIGIN for ground stations: [1e-7 deg], [1e-7 deg], [mm]
         altitude = height + description.standing_height
         self.origin = saturate(latitude * 1e7, 32), saturate(longitude * 1e7, 32), saturate(altitude * 1e3, 32)
-        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # its mission items, as endpoints wrote them
+        self.mission: Callable[[], Sequence[Any]] = lambda: ()  # mission items as uploaded by endpoints
         self.parameter: Callable[[str], float] = lambda name: math.nan  # value of a parameter; NaN if there is none
         self._home_heading, self._armed = 0.0, False
         self._payloads: dict[Topic, bytes] = {}
@@ -124,7 +124,7 @@ class VehicleCache:
 
     @property
     def home_world(self) -> Vec3:
-        """Home in the world frame [m]: the body frame's origin where the vehicle stood when it was armed."""
+        """Home in the world frame [m]: the body frame's origin at the time of arming."""
         x, y, ground = self.status.home
         return x, y, ground + self.description.standing_height
 
@@ -140,7 +140,7 @@ class VehicleCache:
 
     @property
     def boot_ms(self) -> int:
-        """Time since the start [ms], as fields of 32 bits hold it."""
+        """Time since the start [ms], modulo 2^32."""
         return self.time_ns // 1_000_000 & 0xFFFFFFFF
 
     @property

@@ -1,4 +1,4 @@
-"""All that the MAVLink link knows of a vehicle before it flies: one frozen value, made from a scene or from a log."""
+"""Description of a vehicle for the MAVLink link, created before the flight from a scene or a log."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from lapwing.services.common.autopilot_parameters import Parameter
 
 
 class Battery(NamedTuple):
-    """A battery that is modelled."""
+    """Battery of the scene's battery effect."""
 
     cells: int  # in series
     capacity: float  # [A s]

@@ -1,4 +1,4 @@
-"""MAV_TYPE of a vehicle by its rotors, by which ground stations name and draw it."""
+"""MAV_TYPE of a vehicle by its number of rotors, for the display of ground stations."""
 
 from lapwing.services.common.mavlink.dialect import mavlink
 

@@ -1,4 +1,4 @@
-"""TCP server of PX4's simulator interface: one firmware at a time, which may come back."""
+"""TCP server of PX4's simulator interface: one firmware at a time, which may reconnect."""
 
 import select
 import socket
@@ -18,13 +18,13 @@ class Connection:
     """Server and its connection.
 
     Attributes:
-        memory: of the connection, shared with compiled code.
-        connected: False before a firmware has connected, and after it has gone.
-        refused: further firmwares that have tried to connect.
+        memory: memory of the connection, shared with compiled code.
+        connected: True while a firmware is connected.
+        extra_connections: connections of further firmwares, which were closed.
     """
 
     def __init__(self, host: str, port: int, memory: Stream):
-        """Listen.
+        """Listen on the port.
 
         Raises:
             FirmwareError: the port is in use.
@@ -41,16 +41,16 @@ class Connection:
             raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
         self._peer: socket.socket | None = None
         self._parser, self.memory = FrameParser(RECEIVED), memory
-        self.refused = self._rejected = 0
+        self.extra_connections = self._rejected = 0
 
     @property
     def connected(self) -> bool:
-        """Return True while a firmware is connected."""
+        """True while a firmware is connected."""
         return self._peer is not None
 
     @property
     def rejected(self) -> int:
-        """Count of malformed pieces of the streams."""
+        """Number of malformed parts of the streams."""
         return self._rejected + self._parser.rejected
 
     def accept(self, wait: float = WAIT) -> bool:
@@ -67,25 +67,25 @@ class Connection:
         self._poll.register(self._peer, select.POLLIN)
         return True
 
-    def refuse_others(self) -> bool:
-        """Close the connection of a second firmware, unless the first one has gone. Return True if one came."""
-        if self._peer is None or self._gone(self._peer):
+    def reject_others(self) -> bool:
+        """Close a connection of a second firmware while the first is connected. Return True if there was one."""
+        if self._peer is None or self._is_closed(self._peer):
             return False
         self._server.settimeout(0.0)
         try:
             self._server.accept()[0].close()
         except OSError:
             return False
-        self.refused += 1
+        self.extra_connections += 1
         return True
 
     def send_sensors(self, time_us: int, sensors: Sensors) -> None:
-        """Send HIL_SENSOR; it is lost if the firmware has gone."""
+        """Send HIL_SENSOR; it is lost if the firmware has disconnected."""
         if self._peer is None:
             return
         try:
             self._peer.sendall(sensor_frame(self._next_sequence(), time_us, sensors))
-        except OSError:  # also a full buffer: a firmware that has not read for a long time
+        except OSError:  # also if the buffer is full, since the firmware does not read
             self.lose()
 
     def append(self, messages: list[tuple[Layout, tuple]]) -> None:
@@ -97,7 +97,7 @@ class Connection:
             self.memory.sent_size[0] = begin + len(data)
 
     def receive(self, wait: bool = True) -> list[tuple[int, tuple]]:
-        """Return the messages that have come; wait for some at most 0.2 s if `wait`."""
+        """Return the received messages; if `wait`, wait for them at most 0.2 s."""
         if self._peer is None:
             return []
         if wait and not self._poll.poll(1000.0 * WAIT):
@@ -108,15 +108,15 @@ class Connection:
             return []
         except OSError:
             data = b""
-        return self._take(data)
+        return self._parse(data)
 
-    def received(self, size: int) -> list[tuple[int, tuple]]:
+    def parse_received(self, size: int) -> list[tuple[int, tuple]]:
         """Return the messages in the `size` bytes that compiled code has received; see `stream.receive`."""
         if size < CLOSED or self._peer is None:
             return []
-        return self._take(self.memory.received[:size].tobytes())
+        return self._parse(self.memory.received[:size].tobytes())
 
-    def _take(self, data: bytes) -> list[tuple[int, tuple]]:
+    def _parse(self, data: bytes) -> list[tuple[int, tuple]]:
         if not data:
             self.lose()
             return []
@@ -130,7 +130,7 @@ class Connection:
         return sequence
 
     @staticmethod
-    def _gone(peer: socket.socket) -> bool:
+    def _is_closed(peer: socket.socket) -> bool:
         """Return True if the other end has closed the connection."""
         try:
             return not peer.recv(1, socket.MSG_PEEK)
@@ -158,7 +158,7 @@ def claim(setup: FirmwareSetup, memory: Stream) -> tuple[Connection, UdpTranspor
     """Open the ports of an instance.
 
     Raises:
-        FirmwareError: one is in use.
+        FirmwareError: a port is in use.
     """
     connection, port = Connection(setup.host, setup.port_at(PORT), memory), MAVLINK_PORT + setup.instance
     try:

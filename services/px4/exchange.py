@@ -32,13 +32,13 @@ class Px4Exchange(NamedTuple):
     controls: Payload
     epoch: Any  # (1,) int64 [us] of PX4's clock at tick 0
     interval_ns: int
-    armed: Any  # (1,) int64: 1 if the last outputs say so
+    armed: Any  # (1,) int64: 1 if the motors are armed in the last outputs
     silent: Any  # (1,) int64: consecutive steps without an answer
 
 
 @always_inline
 def _is_answer(p: Px4Exchange, size: int, time_us: int) -> bool:
-    """Return True if the bytes are the answer to `time_us`, which Python does not need to look at; take it in."""
+    """Return True if the bytes are the complete and valid answer to `time_us`; store its outputs."""
     m = p.controls
     if p.stream.rest[0] != 0 or not read_controls(p.stream.received, size, m):
         return False
@@ -55,7 +55,7 @@ def _is_answer(p: Px4Exchange, size: int, time_us: int) -> bool:
 
 @always_inline
 def step(p: Px4Exchange, s: int, tick: int, inputs: tuple) -> tuple[int, tuple, int]:
-    """Send the readings at `tick`, and take in the outputs of the same time."""
+    """Send the readings at `tick`, and receive the outputs of the same time."""
     e, stream = p.shared, p.stream
     if tick % e.period != 0:
         return s, (), CONTINUE

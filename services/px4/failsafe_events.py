@@ -1,4 +1,4 @@
-"""Texts of PX4's failsafe events: PX4 names cause and action of a failsafe in MAVLink EVENT, not in its status texts.
+"""Texts of PX4's failsafe events: MAVLink EVENT has their cause and action, status texts do not.
 
 Sources: PX4, src/modules/commander/failsafe/framework.cpp and src/lib/events/enums.json; MAVLink guide, "Events
 Interface".
@@ -35,7 +35,7 @@ _LAYOUTS = {  # mode, action, delay [s], cause
 
 
 def failsafe_text(number: int, arguments: bytes) -> str:
-    """Return cause, if it is known, and action of the failsafe that an event reports, "" if it reports none."""
+    """Return cause (if known) and action of the failsafe in an event, "" for other events."""
     if number not in _LAYOUTS:
         return ""
     layout, names = _LAYOUTS[number]

@@ -1,7 +1,7 @@
 """MAVLink frames of the simulator link.
 
-Every step of the lock step costs one frame in each direction, so that the few messages of this link are packed here
-instead of by pymavlink, which takes ten times as long. Source: MAVLink guide, "Packet Serialization".
+Every step of the lock step costs one frame in each direction, so the few messages of this link are packed here:
+pymavlink takes ten times as long. Source: MAVLink guide, "Packet Serialization".
 """
 
 import struct
@@ -32,7 +32,7 @@ class Layout(NamedTuple):
 
     number: int  # message id
     extra: int  # CRC_EXTRA
-    fields: struct.Struct  # in the order of the wire, with extensions
+    fields: struct.Struct  # in wire order, with extensions
 
 
 def frame(layout: Layout, sequence: int, values: tuple, system: int, component: int) -> bytes:
@@ -44,10 +44,10 @@ def frame(layout: Layout, sequence: int, values: tuple, system: int, component: 
 
 
 class FrameParser:
-    """Splits a stream of bytes into the messages of known layouts.
+    """Parser of a byte stream into messages of known layouts.
 
     Attributes:
-        rejected: frames with a wrong checksum, and runs of bytes that are no frame.
+        rejected: frames with a wrong checksum, and runs of bytes outside of frames.
     """
 
     def __init__(self, layouts: tuple[Layout, ...]):
@@ -59,11 +59,11 @@ class FrameParser:
 
     @property
     def rest(self) -> int:
-        """Return the number of bytes of an incomplete frame."""
+        """Number of bytes of an incomplete frame."""
         return len(self._data)
 
     def parse(self, data: bytes) -> list[tuple[int, tuple]]:
-        """Return (message id, values in the order of the wire) of the frames that `data` completes."""
+        """Return (message id, values in wire order) of the frames that `data` completes."""
         data, result = self._data + data, []
         at = 0
         while at < len(data):

@@ -2,7 +2,7 @@
 
 PX4's clock is the time of the last HIL_SENSOR. While PX4 starts, messages of a vehicle at rest are sent without waiting
 ("free-wheel"), until its first HIL_ACTUATOR_CONTROLS; from then on every HIL_SENSOR is answered by one with its time.
-Compiled code makes this exchange (`exchange`) as long as nothing else comes.
+Compiled code makes this exchange (`exchange`) as long as only expected answers arrive.
 """
 
 import math
@@ -28,10 +28,10 @@ from lapwing.services.px4.sensor_frame import payload
 from lapwing.services.px4.stream import stream
 from lapwing.services.px4.vehicle_link import VehicleLink
 
-INSTANCES = 10  # with a MAVLink port of their own
+INSTANCES = 10  # number of instances with separate MAVLink ports
 SECOND = 1_000_000  # [us]
-MISSED = 1.0  # [s] after which a step goes on without the answer of PX4
-OTHERS_EVERY = 1.0  # [s] between two looks for a second firmware
+ANSWER_TIMEOUT = 1.0  # [s] after which a step continues without the answer of PX4
+OTHERS_EVERY = 1.0  # [s] between two checks for a second firmware
 
 
 class Px4Link:
@@ -50,23 +50,23 @@ class Px4Link:
         self._vehicle: VehicleLink | None = None
         self._epoch = np.zeros(1, np.int64)  # [us] of PX4's clock at tick 0
         self._last_us = 0  # [us] of the last message
-        self._time = 0.0  # [s] of the simulation
+        self._time = 0.0  # [s] simulation time
         self._step_us = setup.period * setup.interval_ns // 1000
-        self._others_at = 0.0  # [s] of the next look for a second firmware
+        self._others_at = 0.0  # [s] of the next check for a second firmware
         self._silent = np.zeros(1, np.int64)  # consecutive steps without an answer
         self._armed = np.zeros(1, np.int64)
 
     def exchange(self, shared: Shared, ring: Callable[[str], InputRing]) -> Px4Exchange:
         """Return the parameters of the compiled exchange."""
         self._shared, periods = shared, self._own.periods
-        named = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *RARE)
+        port_names = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *RARE)
         airspeed = ring(ports.AIRSPEED) if ports.AIRSPEED in periods else empty_ring(AirspeedReading())
         readings = Readings(
             ring(ports.IMU),
             ring(ports.MAGNETOMETER),
             ring(ports.BAROMETER),
             airspeed,
-            np.array([periods.get(port, 0) for port in named]),
+            np.array([periods.get(port, 0) for port in port_names]),
             self._setup.period,
         )
         return Px4Exchange(
@@ -75,7 +75,7 @@ class Px4Link:
         )  # fmt: skip
 
     def open(self, waits: Waits) -> None:
-        """Start or await PX4, and run it up to a full second of its clock."""
+        """Start PX4 or wait for it, and run it up to a full second of its clock."""
         self._setup, (self._connection, transport) = first_free(
             self._setup, INSTANCES, lambda candidate: claim(candidate, self._stream)
         )
@@ -86,7 +86,7 @@ class Px4Link:
         self._connect(waits, self._patience(setup.start_timeout))
         self._epoch[0] = -(-self._last_us // SECOND) * SECOND
         while self._last_us + self._step_us < self._epoch[0]:
-            self._rest(self._last_us // self._step_us)
+            self._send_rest(self._last_us // self._step_us)
             self._await(self._connection.receive(), self._last_us, waits)
         self.report.late = 0  # answers to messages that were sent without waiting
 
@@ -95,72 +95,72 @@ class Px4Link:
         setup = self._setup
         arguments = () if "-i" in setup.command else ("-i", str(instance))
         own = {"SIM_BAT_ENABLE": 0.0} if self._own.battery else {}
-        named = {f"PX4_PARAM_{name}": f"{value:.9g}" for name, value in {**own, **setup.parameters}.items()}
-        return Program(setup._replace(environment={**named, **setup.environment}), arguments)
+        variables = {f"PX4_PARAM_{name}": f"{value:.9g}" for name, value in {**own, **setup.parameters}.items()}
+        return Program(setup._replace(environment={**variables, **setup.environment}), arguments)
 
     def _connect(self, waits: Waits, patience: Patience) -> None:
-        """Await a connection, and send messages of rest until the first answer."""
+        """Wait for a connection, and send the readings at rest until the first answer."""
         link = self._connection
         assert link is not None
         while not link.accept():
             waits(f"px4 on {link.where}")
             self._check(patience, "no connection", "start px4 with PX4_SIM_MODEL=none_iris")
         count = 0
-        while not self._answers(link.receive(wait=False)):
+        while not self._store_outputs(link.receive(wait=False)):
             if not link.connected:
                 raise FirmwareError("px4: closed its connection while it started; see its output")
-            self._rest(count)
+            self._send_rest(count)
             count += 1
             if count % 50 == 0:
                 waits("px4 to send its first outputs")
                 self._check(patience, "no HIL_ACTUATOR_CONTROLS", "check that pwm_out_sim runs")
             time.sleep(1e-6 * self._step_us)
 
-    def _rest(self, count: int) -> None:
-        """Send the next message of a vehicle at rest."""
+    def _send_rest(self, count: int) -> None:
+        """Send the next readings of a vehicle at rest."""
         assert self._connection is not None
         self._last_us += self._step_us
         self._connection.send_sensors(self._last_us, at_rest(self._own, count))
 
-    def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
-        """Do what compiled code leaves to Python; see `ExchangeLink`."""
+    def handle_call(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
+        """Handle a call from the compiled exchange; see `ExchangeLink`."""
         link, setup = self._connection, self._setup
         assert link is not None
         self._time = tick * setup.interval
         self._last_us = int(self._epoch[0]) + tick * setup.interval_ns // 1000
         if reason == MESSAGES:
             link.append(rare_messages(self._own, setup.period, tick, self._last_us, read))
-        elif reason == SEND:  # also a full buffer: a firmware that has not read for a long time
+        elif reason == SEND:  # also if the buffer is full, since the firmware does not read
             link.lose()
             self._check_program()
         elif reason == POLL:
             return self._poll(tick, read)
         else:
-            self._await(link.received(number), self._last_us, waits)
-            self.report.rejected = link.rejected + link.refused
+            self._await(link.parse_received(number), self._last_us, waits)
+            self.report.rejected = link.rejected + link.extra_connections
         return None
 
     def _poll(self, tick: int, read: Read) -> FirmwareOutput:
-        """Poll the MAVLink link, and look for other firmwares. Return the state of the flight."""
+        """Poll the MAVLink link, and reject other firmwares. Return the state of the flight."""
         link = self._connection
         assert link is not None
         assert self._vehicle is not None
         if self._time >= self._others_at:
             self._others_at = self._time + OTHERS_EVERY
-            if link.refuse_others():
+            if link.reject_others():
                 self.report.note(f"a second PX4 tried to connect at t = {self._time:.3f} s")
-        self.report.rejected = link.rejected + link.refused
+        self.report.rejected = link.rejected + link.extra_connections
         result = self._vehicle.poll(self._time, read)
         self.report.version = self._vehicle.version
         self._shared.next_poll[0] = max(tick + 1, math.floor(self._vehicle.next_poll / self._setup.interval))
         return result
 
     def cpu(self) -> float:
-        """Return the CPU time [s] of the program, 0 if somebody else has started it."""
+        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
         return self._program.cpu() if self._program else 0.0
 
     def close(self) -> None:
-        """End the connections, and the program."""
+        """Close the connections and end the program."""
         if self._vehicle:
             self._vehicle.close()
         if self._connection:
@@ -170,12 +170,12 @@ class Px4Link:
         self._program = self._connection = self._vehicle = None
 
     def _await(self, messages: list[tuple[int, tuple]], time_us: int, waits: Waits) -> None:
-        """Wait for the outputs of a time, which may be among `messages`; go on without them after a second."""
+        """Wait for the outputs of a time, which may be among `messages`; continue without them after a second."""
         link, report = self._connection, self.report
         assert link is not None
         patience: Patience | None = None
         while True:
-            result = self._answers(messages)
+            result = self._store_outputs(messages)
             if result and result.time_us >= time_us:
                 report.skew_max = max(report.skew_max, 1e-6 * (result.time_us - time_us))
                 self._silent[0] = 0
@@ -185,7 +185,7 @@ class Px4Link:
                 messages = link.receive()
                 continue
             waits("px4")
-            patience = patience or self._patience(MISSED)
+            patience = patience or self._patience(ANSWER_TIMEOUT)
             if not link.connected:
                 self._reconnect(waits)
                 break
@@ -193,13 +193,13 @@ class Px4Link:
             if patience.over:
                 report.missed += 1
                 self._silent[0] += 1
-                if self._silent[0] * MISSED >= self._setup.step_timeout:
+                if self._silent[0] * ANSWER_TIMEOUT >= self._setup.step_timeout:
                     self._fail(f"no HIL_ACTUATOR_CONTROLS for {self._setup.step_timeout:g} s", "check that it runs")
                 break
             messages = link.receive()
 
     def _reconnect(self, waits: Waits) -> None:
-        """Await a firmware that is started again; the vehicle keeps its state, with its motors off."""
+        """Wait for the restarted firmware; the vehicle keeps its state, with its motors off."""
         if self._program:
             self._check_program()
             self._fail("it closed its connection", "see its output")
@@ -211,8 +211,8 @@ class Px4Link:
         self.report.reconnected += 1
         self._epoch[0] = self._last_us - round(self._time * 1e6)
 
-    def _answers(self, messages: list[tuple[int, tuple]]) -> ActuatorControls | None:
-        """Take in the outputs among messages. Return the newest."""
+    def _store_outputs(self, messages: list[tuple[int, tuple]]) -> ActuatorControls | None:
+        """Store the outputs among messages. Return the newest, None if there are none."""
         result = None
         for number, values in messages:
             if number != HIL_ACTUATOR_CONTROLS.number:
@@ -225,7 +225,7 @@ class Px4Link:
                 self._shared.outputs[:], self._armed[0] = motors, result.armed
             else:
                 self.report.missed += 1
-                self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are held")
+                self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are kept")
         return result
 
     def _patience(self, timeout: float) -> Patience:
@@ -235,11 +235,11 @@ class Px4Link:
         if self._program:
             self._program.check(f" at t = {self._time:.3f} s")
 
-    def _check(self, patience: Patience, what: str, advice: str) -> None:
-        """Raise FirmwareError if the program has ended or the patience is over."""
+    def _check(self, patience: Patience, problem: str, advice: str) -> None:
+        """Raise FirmwareError if the program has ended or the time-out has passed."""
         self._check_program()
         if patience.over:
-            self._fail(f"{what} for {self._setup.start_timeout:g} s", advice)
+            self._fail(f"{problem} for {self._setup.start_timeout:g} s", advice)
 
-    def _fail(self, what: str, advice: str) -> None:
-        raise FirmwareError(f"px4: {what} at t = {self._time:.3f} s; {advice}")
+    def _fail(self, problem: str, advice: str) -> None:
+        raise FirmwareError(f"px4: {problem} at t = {self._time:.3f} s; {advice}")

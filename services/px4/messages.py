@@ -31,7 +31,7 @@ DOWN = 25  # MAV_SENSOR_ROTATION_PITCH_270
 
 
 def gps_values(time_us: int, r: GpsReading) -> tuple:
-    """Return the values of HIL_GPS; altitude is taken as above sea level. Without a fix only the time is set."""
+    """Return the values of HIL_GPS; the height is sent as above sea level. Without a fix only the time is set."""
     if not r.valid:
         return (time_us, 0, 0, 0, UNKNOWN, UNKNOWN, UNKNOWN, 0, 0, 0, UNKNOWN, NO_FIX, 0, 0, 0)
     east, north, up = r.position_variance
@@ -58,7 +58,7 @@ def gps_values(time_us: int, r: GpsReading) -> tuple:
 
 
 def distance_values(time_us: int, r: DistanceReading) -> tuple:
-    """Return the values of DISTANCE_SENSOR for a sensor that looks down."""
+    """Return the values of DISTANCE_SENSOR of a downward-facing sensor."""
     distance = saturate(100.0 * r.range, 16, True)
     return (time_us // 1000, 0, UNKNOWN, distance, 0, 0, DOWN, 0, *(0.0,) * 6, 0)
 

@@ -38,7 +38,7 @@ _pressure = python_function(atmosphere.pressure)
 class Px4Setup(NamedTuple):
     """Resolved values of the adapter."""
 
-    datum: Datum  # of the mission
+    datum: Datum  # origin of the mission
     periods: dict[str, int]  # [ticks] between two readings, by port
     force_body: Vec3  # [m/s^2] specific force at rest at the start
     field_body: Vec3  # [T] magnetic field there
@@ -54,19 +54,19 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     """
     if firmware_of(scene) != NAME:
         return None
-    carried = scene.tables("sensors")
-    missing = ", ".join(f"[sensors.{name}]" for name in REQUIRED if name not in carried)
+    tables = scene.tables("sensors")
+    missing = ", ".join(f"[sensors.{name}]" for name in REQUIRED if name not in tables)
     if missing:
         raise ConfigError("autopilot.firmware", f'"px4" needs {missing}; add them or choose another firmware')
-    sensors = [*REQUIRED, *(name for name in OPTIONAL if name in carried)]
+    sensors = [*REQUIRED, *(name for name in OPTIONAL if name in tables)]
     periods = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
-    around, (place, attitude) = environment(scene), start_pose(scene)
+    here, (position, attitude) = environment(scene), start_pose(scene)
     own = Px4Setup(
-        Datum(around.home, start_height(scene), start_height(scene)),
+        Datum(here.home, start_height(scene), start_height(scene)),
         periods,
         _rotate_back(attitude, (0.0, 0.0, gravity(scene))),
-        _rotate_back(attitude, around.magnetic_field_world),
-        _pressure(around.atmosphere, around.home.height + place[2]),
+        _rotate_back(attitude, here.magnetic_field_world),
+        _pressure(here.atmosphere, here.home.height + position[2]),
         any(name in scene.tables("effects") for name in BATTERIES),
     )
     return with_mission(scene, Px4, firmware_config(scene, tuple(sensors), periods[ports.IMU], LAYOUT, own))

@@ -1,6 +1,6 @@
-"""Readings of the ports as messages of PX4's simulator interface, each once.
+"""Conversion of port readings to messages of PX4's simulator interface; each reading is sent once.
 
-HIL_SENSOR, of every step, is written by compiled code (`sensors`); the rarer messages by Python (`rare_messages`).
+Compiled code writes HIL_SENSOR at every step (`sensors`), Python the less frequent messages (`rare_messages`).
 """
 
 from typing import Any, NamedTuple
@@ -15,19 +15,19 @@ from lapwing.services.px4.messages import DISTANCE_SENSOR, HIL_GPS, distance_val
 from lapwing.services.px4.resolve import Px4Setup
 from lapwing.services.px4.sensor_frame import NONE, Sensors
 
-DITHER = 0.02  # [m/s^2] and 2e-3 rad/s of the readings at rest: PX4 rejects sensors that repeat their values
+DITHER = 0.02  # [m/s^2], and 2e-3 rad/s: variation of the readings at rest, since PX4 rejects constant ones
 RARE = (ports.GPS, ports.RANGEFINDER, ports.SONAR)  # ports whose messages Python writes
 _IMU, _MAGNETOMETER, _BAROMETER, _AIRSPEED = range(4)
 
 
 class Readings(NamedTuple):
-    """Ports of HIL_SENSOR, and when they have readings."""
+    """Rings and periods of the ports of HIL_SENSOR."""
 
     imu: InputRing
     magnetometer: InputRing
     barometer: InputRing
     airspeed: InputRing
-    periods: Any  # (n,) int64 [ticks] of these ports, then of those in RARE; 0: none
+    periods: Any  # (n,) int64 [ticks] period of these ports, then of those in RARE; 0: none
     step: int  # [ticks] between two exchanges
 
 
@@ -65,7 +65,7 @@ def sensors(p: Readings, tick: int) -> Sensors:
 
 
 def rare_messages(own: Px4Setup, step: int, tick: int, time_us: int, read: Read) -> list[tuple[Layout, tuple]]:
-    """Return the messages of the ports in RARE at a tick; `step` as in `Readings`."""
+    """Return the messages of the ports in RARE at a tick; `step`: see `Readings`."""
     result = []
     for port in RARE:
         if not python_function(is_new)(own.periods.get(port, 0), step, tick):

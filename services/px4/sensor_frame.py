@@ -1,6 +1,6 @@
-"""MAVLink frames of HIL_SENSOR and HIL_ACTUATOR_CONTROLS in compiled code: one of each is a step of the lock step.
+"""MAVLink frames of HIL_SENSOR and HIL_ACTUATOR_CONTROLS in compiled code: a step of the lock step is one of each.
 
-Numbers are written through views of the same memory, which begin at multiples of their size.
+Numbers are written through views of the same memory; their offsets are multiples of their size.
 Sources: MAVLink guide, "Packet Serialization"; MAVLink common message set.
 """
 
@@ -24,7 +24,7 @@ from lapwing.services.px4.messages import (
 
 SYSTEM, COMPONENT = 1, 51  # ids of the simulator; PX4 does not check them
 NONE = (math.nan, math.nan, math.nan)  # no new reading
-_HEAD, _MASK, _END = 10, 60, 65  # [bytes] of a header; place of fields_updated; length of HIL_SENSOR
+_HEAD, _MASK, _END = 10, 60, 65  # [bytes] size of a header; offset of fields_updated; length of HIL_SENSOR
 _CONTROLS_END = HIL_ACTUATOR_CONTROLS.fields.size
 _SENSOR, _SENSOR_EXTRA = HIL_SENSOR.number, HIL_SENSOR.extra
 _CONTROLS, _CONTROLS_EXTRA = HIL_ACTUATOR_CONTROLS.number, HIL_ACTUATOR_CONTROLS.extra
@@ -98,10 +98,10 @@ def write_sensors(out: Any, m: Payload, sequence: int, time_us: int, s: Sensors)
     """Write the frame of HIL_SENSOR: FRD, gauss and hPa; id 0, which sets PX4's clock. Return its length [bytes].
 
     Args:
-        out: bytes.
-        m: memory for its payload.
+        out: buffer of bytes.
+        m: memory for the payload.
         sequence: number of the frame, 0 to 255.
-        time_us: [us].
+        time_us: time [us].
         s: readings.
     """
     m.words[0] = time_us

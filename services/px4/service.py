@@ -10,5 +10,5 @@ NAME = "px4"
 
 
 def create(setup: RunConfig, recorded: Recorded | None = None) -> Service:
-    """Return the adapter of a run; `recorded` replaces the firmware by its recorded commands."""
+    """Return the adapter of a run; `recorded` replaces the firmware by the commands of a log."""
     return firmware_service(setup, NAME, Px4Link, recorded)

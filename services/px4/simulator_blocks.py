@@ -1,4 +1,4 @@
-"""Blocks that put a simulator in the place of plant and sensors: readings before the autopilot, controls after it."""
+"""Blocks that replace plant and sensors by an external simulator: readings before the autopilot, controls after it."""
 
 import time
 from typing import Any, NamedTuple
@@ -14,8 +14,8 @@ from lapwing.services.px4.simulator_client import SimulatorClient
 from lapwing.services.px4.simulator_readings import readings
 
 NAME = "simulator"
-TOLERANCE = 0.01  # relative difference of the simulator's step and the tick of the scene
-NEAR = 1000.0  # [m] from the scene's home to a fix, north or east
+TOLERANCE = 0.01  # relative difference between the simulator's step and that of the scene's IMU
+MAX_DISTANCE = 1000.0  # [m] from the scene's home to a fix, north or east
 _to_enu = python_function(geodetic_to_enu)
 
 
@@ -30,12 +30,12 @@ class SimulatorSetup(NamedTuple):
     home: Home
     interval_ns: int
     imu_every: int  # [ticks] between two HIL_SENSOR
-    start_timeout: float  # [s] until it listens
+    start_timeout: float  # [s] until the simulator listens
     step_timeout: float  # [s] of silence after which it has stalled
 
 
 class Receiver:
-    """Waits for the readings of a tick and writes them to the ports."""
+    """Block that waits for the readings of a tick and writes them to the ports."""
 
     def __init__(self, setup: SimulatorSetup, client: SimulatorClient, outputs: tuple[Port, ...]):
         """Create the block; `outputs` are the ports of the readings and of the battery."""
@@ -44,8 +44,8 @@ class Receiver:
         self._setup, self._client = setup, client
         self._waits: Waits = lambda text: None
         self._epoch = self._last = -1  # [us]
-        self._kept: dict[str, Any] = {}  # readings that are not yet due
-        self._begun = 0.0
+        self._pending: dict[str, Any] = {}  # readings that are not yet due
+        self._start = 0.0
 
     def bind(self, graph: BlockDiagram) -> None:
         """Store the diagram."""
@@ -57,7 +57,7 @@ class Receiver:
         self._client.open(waits, self._setup.start_timeout)
 
     def close(self) -> None:
-        """End the connection."""
+        """Close the connection."""
         self._client.close()
 
     @property
@@ -68,23 +68,23 @@ class Receiver:
         return {"firmware": str(report), "external": NAME, **notes}
 
     def on_tick(self, tick: int) -> int:
-        """Write the readings of `tick`, or end the run if the simulator has gone."""
+        """Write the readings of `tick`, or end the run if the simulator has disconnected."""
         setup, report = self._setup, self._client.report
-        self._begun = self._begun or time.perf_counter()
+        self._start = self._start or time.perf_counter()
         if tick % setup.imu_every == 0 and not self._step(tick):
             report.note(f"the simulator closed its connection at t = {1e-9 * tick * setup.interval_ns:.3f} s")
             self._graph.finish()
         for port in self.outputs:
             if port.name in setup.nominal and tick % port.period == 0:
-                reading = self._kept.pop(port.name, None)
+                reading = self._pending.pop(port.name, None)
                 self._graph.put(port.name, tick, reading or setup.nominal[port.name])
             elif port.name == ports.BATTERY:
                 self._graph.put(port.name, tick, ports.BatteryReading(float("nan"), setup.voltage_max))
-        report.wall = time.perf_counter() - self._begun
+        report.wall = time.perf_counter() - self._start
         return tick + 1
 
     def _step(self, tick: int) -> bool:
-        """Take in the messages up to the HIL_SENSOR of a new time. Return False if the simulator has gone."""
+        """Process the messages up to the HIL_SENSOR of a new time. Return False if the simulator has disconnected."""
         setup, report = self._setup, self._client.report
         at = f"at t = {1e-9 * tick * setup.interval_ns:.3f} s"
         while True:
@@ -92,15 +92,15 @@ class Receiver:
             if messages is None:
                 return False
             for number, values in messages:
-                self._kept |= readings(number, values, setup.nominal)
+                self._pending |= readings(number, values, setup.nominal)
             self.time_us = next(values[0] for number, values in reversed(messages) if number == HIL_SENSOR.number)
             if tick == 0 or self.time_us != self._last:
                 break
             report.resent += 1
             self._client.repeat()
         self._check_time(tick, at)
-        if fix := self._kept.get(ports.GPS):
-            self._check_place(fix)
+        if fix := self._pending.get(ports.GPS):
+            self._check_position(fix)
         report.steps += 1
         return True
 
@@ -116,7 +116,7 @@ class Receiver:
         expected = self._epoch + tick * setup.interval_ns // 1000
         if tick == 0 or self.time_us < before:
             if tick > 0:
-                report.note(f"the simulator's time ran backwards {at}: it has started again")
+                report.note(f"the simulator's time decreased {at}: it has restarted")
                 report.reconnected += 1
             self._epoch = self.time_us - tick * setup.interval_ns // 1000
             return
@@ -127,23 +127,23 @@ class Receiver:
             expected += lost * step
         report.skew_max = max(report.skew_max, 1e-6 * abs(self.time_us - expected))
 
-    def _check_place(self, fix: Any) -> None:
+    def _check_position(self, fix: Any) -> None:
         """Raise FirmwareError if a fix is far from the scene's home."""
         home = self._setup.home
         east, north, _ = _to_enu(home, fix.latitude_deg, fix.longitude_deg, fix.height)
-        if max(abs(east), abs(north)) > NEAR:
+        if max(abs(east), abs(north)) > MAX_DISTANCE:
             text = f"{fix.latitude_deg:.6f}, {fix.longitude_deg:.6f}, {fix.height:.1f}"
-            message = f"simulator: it is at {text} (degrees, metres), far from the scene's home"
+            message = f"simulator: it is at {text} (degrees, metres), over {MAX_DISTANCE:g} m from the scene's home"
             raise FirmwareError(f"{message}; set environment.home to the simulator's")
 
 
 class Sender:
-    """Answers the simulator with the motor commands of a tick."""
+    """Block that sends the motor commands of a tick to the simulator."""
 
     outputs = ()
 
     def __init__(self, setup: SimulatorSetup, client: SimulatorClient, receiver: Receiver):
-        """Create the block; `receiver` has the time to answer."""
+        """Create the block; `receiver` has the time of the answer."""
         self.name, self.inputs = f"{NAME}.send", (InputPort(ports.ACTUATORS),)
         self._setup, self._client, self._receiver = setup, client, receiver
 

@@ -1,4 +1,4 @@
-"""TCP client of a simulator that speaks PX4's simulator interface: PX4's side of the link."""
+"""TCP client for a simulator with PX4's simulator interface: PX4's side of the link."""
 
 import contextlib
 import select
@@ -20,7 +20,7 @@ HELLO = (0, 2, 12, 0, 4, 3)  # HEARTBEAT: quadrotor, PX4, active, MAVLink 2
 CUSTOM_MODE = 1
 CONTROLS = 16
 
-Message = tuple[int, tuple]  # id, values in the order of the wire
+Message = tuple[int, tuple]  # id, values in wire order
 
 
 class SimulatorClient:
@@ -32,15 +32,15 @@ class SimulatorClient:
         self.report = LinkReport("PX4 simulator")
         self._address = (host, port)
         self._socket: socket.socket | None = None
-        self._waiting: deque[Message] = deque()
+        self._messages: deque[Message] = deque()
         self._parser, self._sequence = FrameParser(RECEIVED), 0
-        self._answer: bytes = b""  # the last one, for a message that is sent again
+        self._answer: bytes = b""  # last answer, sent again on a repeated message
 
     def open(self, waits: Waits, timeout: float) -> None:
         """Connect within `timeout` [s].
 
         Raises:
-            FirmwareError: nobody listens.
+            FirmwareError: nothing listens.
         """
         patience = Patience(timeout)
         while self._socket is None:
@@ -59,25 +59,25 @@ class SimulatorClient:
         self._send(HEARTBEAT, HELLO)
 
     def receive(self, waits: Waits, timeout: float, at: str) -> list[Message] | None:
-        """Return the messages up to the next HIL_SENSOR of the first IMU; None once the simulator has gone.
+        """Return the messages up to the next HIL_SENSOR of the first IMU; None once the simulator has disconnected.
 
-        The split depends on the stream alone, not on the arrival of its pieces.
+        The split depends only on the content of the stream, not on the arrival of its pieces.
 
         Raises:
-            FirmwareError: none comes within `timeout` [s]; `at` is the time for the message.
+            FirmwareError: none arrives within `timeout` [s]; `at` is the time for the message.
         """
         result: list[Message] = []
-        started, patience = time.perf_counter(), None
+        start, patience = time.perf_counter(), None
         while True:
-            while self._waiting:
-                result.append(self._waiting.popleft())
+            while self._messages:
+                result.append(self._messages.popleft())
                 number, values = result[-1]
                 if number == HIL_SENSOR.number and values[15] == 0:
-                    self.report.waiting += time.perf_counter() - started
+                    self.report.waiting += time.perf_counter() - start
                     return result
             if not self._read():
                 return None
-            if not self._waiting:
+            if not self._messages:
                 waits("the simulator")
                 patience = patience or Patience(timeout)
                 if patience.over:
@@ -101,7 +101,7 @@ class SimulatorClient:
             self._socket = None
 
     def _read(self) -> bool:
-        """Read what has come, within 0.2 s. Return False once the simulator has closed the connection."""
+        """Read the available bytes, after at most 0.2 s. Return False once the simulator has closed the connection."""
         if self._socket is None:
             return False
         if not self._poll.poll(1000.0 * WAIT):
@@ -115,7 +115,7 @@ class SimulatorClient:
         if not data:
             self.close()
             return False
-        self._waiting.extend(self._parser.parse(data))
+        self._messages.extend(self._parser.parse(data))
         self.report.rejected = self._parser.rejected
         return True
 
@@ -126,5 +126,5 @@ class SimulatorClient:
 
     def _write(self, data: bytes) -> None:
         if self._socket is not None:
-            with contextlib.suppress(OSError):  # it has gone: `receive` finds that
+            with contextlib.suppress(OSError):  # `receive` detects a lost connection
                 self._socket.sendall(data)

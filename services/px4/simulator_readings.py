@@ -1,6 +1,6 @@
-"""Messages of a simulator that speaks PX4's interface, as readings of the ports: the inverse of `messages`.
+"""Conversion of messages of PX4's simulator interface to readings of the ports: the inverse of `messages`.
 
-The interface has no variances of the sensors but GPS accuracy, so that the scene's sensors give them.
+The interface has no variances except the GPS accuracy, so the scene's sensors define them.
 """
 
 from collections.abc import Mapping
@@ -31,8 +31,8 @@ def readings(number: int, values: tuple, nominal: Mapping[str, Any]) -> dict[str
 
     Args:
         number: message id.
-        values: of the message, in the order of the wire.
-        nominal: reading of each wanted port with the variances of its sensor.
+        values: values of the message, in wire order.
+        nominal: reading of each consumed port with the variances of its sensor.
     """
     result: dict[str, Any] = {}
     if number == HIL_SENSOR.number:
@@ -61,7 +61,7 @@ def _sensors(values: tuple) -> dict[str, dict[str, Any]]:
 
 
 def _gps(values: tuple, nominal: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a fix; the horizontal accuracy is shared by east and north."""
+    """Return the fields of a fix; the horizontal accuracy applies to east and north alike."""
     latitude, longitude, altitude, horizontal, vertical = values[1:6]
     default = nominal[ports.GPS].position_variance if ports.GPS in nominal else (0.0, 0.0, 0.0)
     east, _, up = default

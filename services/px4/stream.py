@@ -1,4 +1,4 @@
-"""TCP connection whose bytes compiled code and Python send and receive in the same memory."""
+"""TCP connection for compiled code and Python, which share the memory of its bytes."""
 
 import ctypes
 import socket
@@ -9,8 +9,8 @@ import numpy as np
 from lapwing.kernels import always_inline
 from lapwing.kernels.native_calls import address_of, call_int, call_long, poll_entry
 
-PIECE = 65536  # [bytes] received at once
-SENT = 2048  # [bytes] of the messages of a step, at most
+PIECE = 65536  # [bytes] most that one call receives
+SENT = 2048  # [bytes] most for the messages of a step
 WAIT = 0.2  # [s] of one wait
 CLOSED, NOTHING = 0, -1  # results of `receive`
 _NO_SIGNAL: int = getattr(socket, "MSG_NOSIGNAL", 0)  # Python ignores SIGPIPE anyway
@@ -25,7 +25,7 @@ class Stream(NamedTuple):
     sent_size: Any  # (1,)
     received: Any  # bytes
     sequence: Any  # (1,) int64 number of the next frame, 0 to 255
-    rest: Any  # (1,) bytes of an incomplete frame, which Python holds
+    rest: Any  # (1,) bytes of an incomplete frame, which Python stores
     addresses: tuple[int, int, int]  # of sent, received, entry
     send: int  # addresses of functions
     recv: int
@@ -33,12 +33,12 @@ class Stream(NamedTuple):
 
 
 def stream() -> Stream:
-    """Return the memory of a connection that is not open yet."""
+    """Return the memory of a closed connection."""
     libc = ctypes.CDLL(None)
     sent, received, entry = np.zeros(SENT, np.uint8), np.zeros(PIECE, np.uint8), np.zeros(1, np.int64)
-    one = [np.zeros(1, np.int64) for _ in range(3)]
+    scalars = [np.zeros(1, np.int64) for _ in range(3)]
     return Stream(
-        np.full(1, -1), entry, sent, one[0], received, one[1], one[2],
+        np.full(1, -1), entry, sent, scalars[0], received, scalars[1], scalars[2],
         (sent.ctypes.data, received.ctypes.data, entry.ctypes.data),
         address_of(libc.send), address_of(libc.recv), address_of(libc.poll),
     )  # fmt: skip

@@ -14,10 +14,10 @@ BATTERY_EVERY = 0.5  # [s]
 
 
 class VehicleLink:
-    """The link, polled from the lock step."""
+    """MAVLink connection to one PX4, polled from the lock step."""
 
     def __init__(self, setup: FirmwareSetup, transport: UdpTransport):
-        """Create it before PX4 has sent anything."""
+        """Create the client of a PX4 that has not sent anything yet."""
         items, parameters = mission_items(setup.plan), {} if setup.command else dict(setup.parameters)
         self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, setup.own.datum), parameters)
         self._status = FlightStatus("px4", self._client)
@@ -25,12 +25,12 @@ class VehicleLink:
 
     @property
     def next_poll(self) -> float:
-        """Return the simulation time [s] of the next poll."""
+        """Simulation time [s] of the next poll."""
         return self._client.next_poll
 
     @property
     def version(self) -> str:
-        """Return the version of the firmware, "" if it is not known."""
+        """Version of the firmware, "" if it is not known."""
         return self._status.version
 
     def poll(self, time: float, read: Read) -> FirmwareOutput:
@@ -44,7 +44,7 @@ class VehicleLink:
         return self._status.output((), running=False)
 
     def restart(self) -> None:
-        """Begin again with a PX4 that has started again: upload the mission, and arm."""
+        """Start over after a restart of PX4: upload the mission, and arm."""
         self._client.restart()
 
     def close(self) -> None:

@@ -62,7 +62,7 @@ def run(process: Participant, spec: Any) -> None:
                 if pages:
                     recording.write(pages, pending.written - 1)
                     process.report_rejected()
-                progress.recorded(pending.written)  # also if no tick was completed, as a sign of life
+                progress.recorded(pending.written)  # also if no tick was completed: shows that the recorder runs
             process.confirm()
         except Stopped:
             writer.metadata = failure("the run was ended") | writer.metadata
@@ -89,11 +89,11 @@ def _entries(payload: bytes) -> dict[str, str]:
 
 
 class Pending:
-    """Received record batches, held until every service has published their ticks."""
+    """Buffer of record batches until every service has published their ticks."""
 
     def __init__(self, services: Any):
-        """Wait for these services."""
-        self._stop = dict.fromkeys(services, 0)  # each has published all ticks before this one
+        """Create an empty buffer for these services."""
+        self._stop = dict.fromkeys(services, 0)  # first tick that each has not published
         self._unfinished = set(services)  # services that have not ended
         self._pages: list[RecordBatch] = []
         self.written = 0  # all ticks before this one are complete
@@ -129,15 +129,15 @@ class Pending:
         if stop <= self.written:
             return []
         self.written = stop
-        done, remaining = [], []
+        complete, remaining = [], []
         for page in self._pages:
             k = int(np.searchsorted(page.ticks, stop))
             if k > 0:
-                done.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
+                complete.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
             if k < len(page.ticks):
                 remaining.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
         self._pages = remaining
-        return done
+        return complete
 
     def waits_for(self) -> str:
         """Return a text that names the service that is furthest behind."""

@@ -1,1 +1,1 @@
-"""Publishes a log as the live run did."""
+"""Playback of a log on the bus, as in the live run."""

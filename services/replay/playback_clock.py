@@ -13,27 +13,27 @@ class Pace:
     def __init__(
         self,
         keys: Callable[[], str] = lambda: "",
-        say: Callable[[str], None] = lambda line: None,
+        show: Callable[[str], None] = lambda line: None,
         wait: Callable[[float], None] = time.sleep,
         clock: Callable[[], float] = time.perf_counter,
     ):
-        """Prepare a replay that begins with the first call of `wait`.
+        """Prepare a replay, which starts with the first call of `wait`.
 
         Args:
             keys: returns the keys that were typed since the last call.
-            say: shows a pause, a step and their end.
+            show: displays a pause, a step and their end.
             wait: waits at most a number of seconds.
             clock: returns the time [s].
         """
-        self._keys, self._say, self._wait, self._clock = keys, say, wait, clock
+        self._keys, self._show, self._wait, self._clock = keys, show, wait, clock
         self._paused = self._step = self.quit = False
-        self._stepped_ns = -1  # instant that is released during a pause
+        self._stepped_ns = -1  # [ns] instant that is released during a pause
         self._next_poll = clock()
         self.begin()
 
     def begin(self) -> None:
         """Restart at the beginning of the log."""
-        self._started = self._clock()
+        self._start = self._clock()
         self._stepped_ns = -1
 
     def wait(self, due: float, time_ns: int, stopping: Callable[[], bool]) -> None:
@@ -49,12 +49,12 @@ class Pace:
             if self._paused:
                 if self._step and time_ns != self._stepped_ns:
                     self._step, self._stepped_ns = False, time_ns
-                    self._say(f"t = {time_ns * 1e-9:.9g} s")
+                    self._show(f"t = {time_ns * 1e-9:.9g} s")
                 if time_ns == self._stepped_ns:
                     return
                 self._wait(POLL)
                 continue
-            remaining = self._started + due - self._clock()
+            remaining = self._start + due - self._clock()
             if remaining <= 0.0:
                 return
             self._wait(min(remaining, POLL))
@@ -67,8 +67,8 @@ class Pace:
         for key in self._keys():
             if key == PAUSE:
                 self._paused, self._step, self._stepped_ns = not self._paused, False, -1
-                self._started = self._clock() - due  # continues from here
-                self._say(f"{'paused before' if self._paused else 'resumed at'} t = {time_ns * 1e-9:.9g} s")
+                self._start = self._clock() - due  # continue from here
+                self._show(f"{'paused before' if self._paused else 'resumed at'} t = {time_ns * 1e-9:.9g} s")
             elif key == STEP:
                 self._step = self._paused
             elif key == QUIT:

@@ -10,7 +10,7 @@ class Cut(NamedTuple):
     """The part of a log that is replayed."""
 
     start_ns: int
-    end_ns: int | None  # the first instant left out; None: to the end
+    end_ns: int | None  # first instant after the part; None: to the end
 
     @classmethod
     def of(cls, start: float, end: float | None) -> "Cut":
@@ -27,16 +27,16 @@ class Cut(NamedTuple):
 
 
 class Due(NamedTuple):
-    """A message and when it is due."""
+    """A message and its due time."""
 
     wait: float  # [s] of wall time after the first message
     topic: str
-    time_ns: int  # simulation time that it is stamped with
+    time_ns: int  # its simulation time stamp
     payload: bytes
 
 
 def schedule(messages: Iterable[tuple[str, str, int, bytes]], speed: float | None) -> Iterator[Due]:
-    """Yield each message with its time; without `speed`, without waiting.
+    """Yield each message with its due time, 0 if `speed` is None.
 
     Args:
         messages: (topic, type name, time [ns], payload) in the order of the log.

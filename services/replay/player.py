@@ -13,7 +13,7 @@ from lapwing.services.replay.playback_schedule import Cut, schedule
 
 SUBSCRIBER_TIMEOUT = 1.0  # [s] for the first subscriber to appear
 CONFIRMATION_TIMEOUT = 60.0  # [s] for subscribers to confirm the end
-BRIEF = 0.02  # [s] between two checks
+CHECK_INTERVAL = 0.02  # [s] between two checks
 
 
 def play(
@@ -85,7 +85,7 @@ class Subscribers:
     """Programs that have declared their presence, and those that have confirmed the end of the playback."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str):
-        """Follow the tokens of a key prefix."""
+        """Watch the liveliness tokens of a key prefix."""
         self._alive: set[str] = set()
         self._confirmed: set[str] = set()
         bus.watch_liveliness(f"{key_prefix}/{ALIVE_KEY}/*", partial(self._change, self._alive))
@@ -105,7 +105,7 @@ class Subscribers:
         """Publish the end of each topic, and wait for confirmations, without which a closing session loses messages.
 
         Raises:
-            ValueError: names the programs that have not confirmed in time.
+            ValueError: a program has not confirmed in time.
         """
         for publish in publishers:
             publish(b"", 0)
@@ -115,7 +115,7 @@ class Subscribers:
                 raise ValueError(
                     f"{', '.join(sorted(unconfirmed))}: did not confirm the last message in {CONFIRMATION_TIMEOUT:g} s"
                 )
-            time.sleep(BRIEF)
+            time.sleep(CHECK_INTERVAL)
 
 
 def _copy_metadata(metadata: dict[str, str]) -> dict[str, str]:
@@ -126,4 +126,4 @@ def _copy_metadata(metadata: dict[str, str]) -> dict[str, str]:
 def _await_subscriber(bus: ZenohBus, keys: list[str], stopping: Callable[[], bool]) -> None:
     deadline = time.monotonic() + SUBSCRIBER_TIMEOUT
     while time.monotonic() < deadline and not stopping() and not bus.has_subscribers(keys):
-        time.sleep(BRIEF)
+        time.sleep(CHECK_INTERVAL)

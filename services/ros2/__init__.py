@@ -1,1 +1,1 @@
-"""ROS 2 without ROS: topics and commands as rmw_zenoh has them, so that its nodes see the simulator as a node."""
+"""ROS 2 node without a ROS installation: topics and commands with the keys and types of rmw_zenoh."""

@@ -26,7 +26,7 @@ _NONE = (math.nan,) * 3
 CommandValues = tuple[str, tuple[float, ...]]  # kind and values of an OperatorCommand
 
 
-class Accepted(NamedTuple):
+class CommandTopic(NamedTuple):
     """Topic on which commands are accepted."""
 
     name: str  # after the name of the vehicle
@@ -61,12 +61,12 @@ def _check_frame(m: Any) -> None:
 
 
 ACCEPTED = (
-    Accepted("command/arm", Bool, lambda m: ("arm" if m.data else "disarm", ())),
-    Accepted("command/mode", String, lambda m: (m.data, ())),
-    Accepted("command/pose", PoseStamped, _pose),
-    Accepted("command/velocity", TwistStamped, _velocity),
-    Accepted("command/setpoint", Setpoint, _setpoint),
-    Accepted("command/motors", Actuators, _motors),
+    CommandTopic("command/arm", Bool, lambda m: ("arm" if m.data else "disarm", ())),
+    CommandTopic("command/mode", String, lambda m: (m.data, ())),
+    CommandTopic("command/pose", PoseStamped, _pose),
+    CommandTopic("command/velocity", TwistStamped, _velocity),
+    CommandTopic("command/setpoint", Setpoint, _setpoint),
+    CommandTopic("command/motors", Actuators, _motors),
 )
 OPERATOR = "command/operator"  # accepts an OperatorInput, with any command
 
@@ -75,7 +75,7 @@ class Commands:
     """Converter of messages into commands of the autopilot, with counts."""
 
     def __init__(self, vehicle: str):
-        """Create the conversion for a vehicle name."""
+        """Create the converter of a vehicle's commands."""
         self.vehicle = vehicle
         self._accepted = {f"/{vehicle}/{a.name}": a for a in ACCEPTED}
         self._operator = f"/{vehicle}/{OPERATOR}"

@@ -10,7 +10,7 @@ from lapwing.messages import TYPES
 from lapwing.services.common.address import host_and_port, is_loopback
 from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
 
-ROUTER = "127.0.0.1:7447"  # where nodes of rmw_zenoh look for their router
+ROUTER = "127.0.0.1:7447"  # default router of rmw_zenoh
 # Nodes discover each other as with rmw_zenoh's own router, and then communicate directly.
 _SETTINGS = {"scouting/gossip/enabled": True, "transport/unicast/open_timeout": 3000}
 
@@ -30,36 +30,36 @@ def parse_router(text: str, insecure: bool) -> tuple[str, bool]:
         raise ValueError(
             f"--ros2-router {text}: programs of that host could send commands; use --insecure to allow them"
         )
-    written = f"[{host}]" if ":" in host else host
-    return f"tcp/{written}:{port}", local
+    url_host = f"[{host}]" if ":" in host else host
+    return f"tcp/{url_host}:{port}", local
 
 
 class CommandSubscription:
-    """Messages of other nodes that were not read yet."""
+    """Queue of messages from other nodes."""
 
-    def __init__(self, arrived: Subscription, topics: dict[str, str]):
+    def __init__(self, subscription: Subscription, topics: dict[str, str]):
         """Wrap a subscription with the topic of each key."""
-        self._arrived, self._topics = arrived, topics
+        self._subscription, self._topics = subscription, topics
 
     def get(self) -> tuple[str, bytes] | None:
         """Return topic and payload of the next message. Return None if there is none."""
-        result = self._arrived.get_with_key(timeout=0.0)
+        result = self._subscription.get_with_key(timeout=0.0)
         return result and (self._topics[result[0]], result[2])
 
 
 class Node:
-    """Publishes and subscribes in a graph; a context manager."""
+    """Node of a ROS 2 graph; a context manager."""
 
     def __init__(self, domain: int, router: str = ROUTER, insecure: bool = False):
-        """Join a graph by its router; where none is on this machine, be the router.
+        """Join a graph through its router; if this machine has none, run the router.
 
         Args:
             domain: ROS_DOMAIN_ID of the graph.
             router: HOST:PORT.
-            insecure: it may be on another machine.
+            insecure: True if the router may be on another machine.
 
         Raises:
-            ValueError: the router is no address, or cannot be reached.
+            ValueError: the router's address is invalid, or cannot be reached.
         """
         endpoint, local = parse_router(router, insecure)
         self._domain, self._entities = domain, 0
@@ -68,12 +68,12 @@ class Node:
         self._bus.declare_liveliness(node_token(domain, self._bus.session_id))
 
     def declare(self, topic: str, type_name: str) -> None:
-        """Publish a topic, "/drone1/imu"; types that are not ours are left out."""
+        """Declare a topic to publish, "/drone1/imu"; types without a message class are ignored."""
         if topic in self._puts or type_name not in TYPES:
             return
         endpoint = Endpoint(topic, type_name)
         token = self._token(endpoint, PUBLISHER)
-        # A node that is too slow misses messages, as with rmw_zenoh's own publishers; it does not hold up the run.
+        # A node that is too slow misses messages, as with rmw_zenoh's own publishers; it does not delay the run.
         self._puts[topic] = self._bus.publisher(endpoint.key(self._domain), identifier(token), drops=True)
         self._bus.declare_liveliness(token)
 
@@ -83,7 +83,7 @@ class Node:
             self._puts[topic](payload, time_ns)
 
     def subscribe(self, messages: dict[str, Any]) -> "CommandSubscription":
-        """Subscribe to topics of other nodes; `topics` has the message class by topic."""
+        """Subscribe to topics of other nodes; `messages` has the message class by topic."""
         endpoints = [Endpoint(topic, message.type_name) for topic, message in messages.items()]
         topics = {endpoint.key(self._domain): endpoint.topic for endpoint in endpoints}
         commands = CommandSubscription(self._bus.subscribe(*topics), topics)

@@ -1,7 +1,7 @@
 """Keys and liveliness tokens of rmw_zenoh (Jazzy and later; its docs/design.md).
 
 A topic's key is `<domain>/<topic>/<type>/<type hash>`. A node and each of its publishers and subscriptions declare a
-liveliness token, from which `ros2 node list` and `ros2 topic list` are made; in it, `%` replaces `/`.
+liveliness token, which `ros2 node list` and `ros2 topic list` show; in it, `%` replaces `/`.
 """
 
 import hashlib
@@ -10,8 +10,8 @@ from typing import NamedTuple
 from lapwing.messages.type_hash import known_type_hash
 
 NODE, PUBLISHER, SUBSCRIPTION = "NN", "MP", "MS"
-QOS = "::,10:,:,:,,"  # all as ROS 2's default: reliable, volatile, the last 10
-NAME = "lapwing"  # of the node
+QOS = "::,10:,:,:,,"  # ROS 2's defaults: reliable, volatile, the last 10
+NAME = "lapwing"  # name of the node
 _ROOT = "%"  # an empty enclave, and the namespace "/"
 
 

@@ -1,1 +1,1 @@
-"""The listen endpoint for programs outside a run."""
+"""Listening endpoint for programs outside of a run."""

@@ -12,7 +12,7 @@ from lapwing.cosim.executors.participant import POLL, Participant, Stopped
 def run(process: Participant, spec: Any) -> None:
     """Route until the recorder has the entire run or this process is requested to stop."""
     process.join()
-    process.confirm()  # it forwards messages, but does not read them
+    process.confirm()  # the router reads no messages
     process.stop_without("recorder")
     while not process.stopping:
         time.sleep(POLL)

@@ -11,7 +11,7 @@ from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.kernels import always_inline, kernel
 from lapwing.messages import topics as topic
-from lapwing.services.common.airspeed_encoder import encoder_of_airspeed
+from lapwing.services.common.airspeed_encoder import airspeed_encoder
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
@@ -79,7 +79,7 @@ def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> 
 
 def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
-    return [encoder_of_airspeed(topic.AIRSPEED, frame, port)]
+    return [airspeed_encoder(topic.AIRSPEED, frame, port)]
 
 
 # Sensirion, preliminary data sheet SDP33, version 0.1 (August 2017): 1500 Pa. Resolution: 20 counts a pascal, the scale

@@ -36,7 +36,7 @@ def _conversations() -> Callable[[bytes], None]:
             if now.endpoint:
                 adapter.disconnect(now.endpoint)
             time_ns = now.count // CONVERSATION * STEP
-            adapter.take(ESTIMATE, time_ns, Estimate(header(time_ns, "world")).encode(), time_ns * 1e-9)
+            adapter.handle(ESTIMATE, time_ns, Estimate(header(time_ns, "world")).encode(), time_ns * 1e-9)
             now.endpoint = adapter.connect(True, True, lambda sent: None)
         now.count += 1
         adapter.receive(now.endpoint, data)

@@ -143,7 +143,7 @@ def test_elements_that_fill_last_block_repeat_last_member():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "text"),
     [
         (lambda b: lapwing.BatchSimulator("hover", 0), "n: expected at least 1 member, got 0"),
         (

@@ -15,7 +15,7 @@ RANGES = {
 
 
 def sample(type_name: str, rng: random.Random) -> Any:
-    """A random message of a type."""
+    """Return a random message of a type."""
     return TYPES[type_name](*(_field(field, rng) for field in DEFINITIONS[type_name].fields))
 
 
@@ -40,7 +40,7 @@ def _element(base, rng):
 
 
 def varied(message: Any, rng: random.Random) -> Any:
-    """Return the message with other numbers; strings and lengths of sequences are kept."""
+    """Return the message with other numbers; strings and lengths of sequences are unchanged."""
     fields = DEFINITIONS[message.type_name].fields
     return type(message)(*(_varied(field.base, getattr(message, field.name), rng) for field in fields))
 
@@ -54,12 +54,12 @@ def _varied(base, value, rng):
 
 
 def value(message: Any, name: str) -> Any:
-    """A field by its dotted name."""
+    """Return a field by its dotted name."""
     for part in name.split("."):
         message = message[int(part)] if part.isdecimal() else getattr(message, part)
     return message
 
 
 def flat(item: Any) -> list[Any]:
-    """Numbers and strings of nested tuples, one after the other."""
+    """Return the numbers and strings of nested tuples as a list."""
     return [leaf for part in item for leaf in flat(part)] if isinstance(item, tuple) else [item]

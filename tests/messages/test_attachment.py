@@ -15,7 +15,7 @@ def test_round_trip():
     assert time_and_gid(pack(7, -5, GID)) == (-5, GID)
 
 
-def test_faults_are_named():
+def test_invalid_attachment_is_rejected():
     with pytest.raises(ValueError, match="15 bytes, expected 16"):
         pack(0, 0, GID[:15])
     with pytest.raises(ValueError, match="32 bytes, expected 33"):
@@ -23,5 +23,5 @@ def test_faults_are_named():
     with pytest.raises(ValueError, match="length 17, expected 16"):
         unpack(bytes(16) + b"\x11" + GID)
     for damaged in (b"", pack(0, 0, GID)[:-1], pack(0, 0, GID) + b"\0", bytes(16) + b"\x11" + GID):
-        with pytest.raises(ValueError, match="no attachment"):
+        with pytest.raises(ValueError, match="not an attachment"):
             time_and_gid(damaged)

@@ -81,7 +81,7 @@ def test_elements_of_sequences_have_their_number_in_name():
     assert record.dtype["velocity"].shape == (2, 3)
 
 
-def test_one_value_for_all_and_columns_of_width_one():
+def test_single_value_and_column_of_width_one_are_broadcast():
     lift = Record.of(RotorWrench(thrust=(0.0,), moment=(Vector3(),)))
     column = np.array([1.0, 2.0, 3.0])
     records = lift.encode(3, {"thrust": column, "moment.0": (4.0, 5.0, 6.0), "moment.0.z": 7})
@@ -98,7 +98,7 @@ def test_stamps():
     assert payloads(records) == [Clock(stamp(t)).encode() for t in times.tolist()]
 
 
-def test_columns_of_floats_fill_integers_that_can_hold_them():
+def test_whole_floats_fit_integer_fields():
     records = Record.of(TWO_ROTORS).encode(2, {"ground_contact": np.array([0.0, 1.0])})
     assert [VehicleState.decode(payload).ground_contact for payload in payloads(records)] == [False, True]
 
@@ -118,7 +118,7 @@ def test_columns_of_floats_fill_integers_that_can_hold_them():
         ({"header.stamp.sec": np.array([0.0, np.nan, 0.0])}, "sec holds values that int32 cannot"),
     ],
 )
-def test_columns_that_do_not_fit_are_named(columns, words):
+def test_invalid_columns_are_rejected(columns, words):
     with pytest.raises(ValueError, match=words) as caught:
         Record.of(TWO_ROTORS).encode(3, columns)
     assert "\n" not in str(caught.value)

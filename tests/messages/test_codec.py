@@ -15,7 +15,7 @@ FOLDER = Path(lapwing.messages.__file__).parent / "msg"
 
 
 def published_store():
-    """The standard types as the rosbags library ships them; only those that it does not have from our text."""
+    """Return the standard types of the rosbags library, and Lapwing's own types from their text."""
     store = get_typestore(Stores.LATEST)
     shipped = set(store.fielddefs)
     for name, cls in TYPES.items():
@@ -29,7 +29,7 @@ STORE = published_store()
 
 
 def foreign(value, store=STORE):
-    """One of our messages as the rosbags library's own object."""
+    """Return one of Lapwing's messages as an object of the rosbags library."""
     if hasattr(value, "type_name"):
         cls = store.types[value.type_name]
         desc = dict(store.fielddefs[value.type_name][1])
@@ -59,7 +59,7 @@ def test_bytes_equal_those_of_rosbags_library(name):
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_decode_undoes_encode(name):
+def test_decode_inverts_encode(name):
     for message in samples(name):
         decoded = TYPES[name].decode(message.encode())
         assert decoded == message
@@ -68,7 +68,7 @@ def test_decode_undoes_encode(name):
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_every_shorter_and_longer_payload_is_refused(name):
+def test_payload_of_wrong_length_is_rejected(name):
     for message in samples(name)[:6]:
         payload = message.encode()
         for size in range(len(payload)):
@@ -93,20 +93,20 @@ def test_damaged_bytes_give_message_or_value_error(name):
     assert not any("\n" in fault for fault in faults)
 
 
-def test_huge_length_is_refused_without_allocating():
+def test_huge_length_is_rejected_without_allocation():
     payload = bytearray(TFMessage().encode())
     payload[4:8] = b"\xff\xff\xff\xff"
     with pytest.raises(ValueError, match="runs past the end"):
         TFMessage.decode(bytes(payload))
 
 
-def test_big_endian_is_refused():
+def test_big_endian_payload_is_rejected():
     with pytest.raises(ValueError, match="expected CDR header"):
         Imu.decode(b"\0\0\0\0" + Imu().encode()[4:])
 
 
-def test_same_size_and_other_shape_is_not_mistaken():
-    """Two strings share the same bytes differently: the layout kept for this size must not be trusted."""
+def test_equal_size_with_other_shape_is_distinguished():
+    """Decode two strings that divide the same bytes differently; the layout cached for the size does not fit."""
     first, second = Status(mode="abcdefg", phase="hij"), Status(mode="abc", phase="defghij")
     assert len(first.encode()) == len(second.encode())
     for message in (first, second, first):
@@ -129,13 +129,13 @@ def test_string_of_length_zero_without_nul_is_empty_string():
         (NavSatFix()._replace(position_covariance_type=300), "sensor_msgs/msg/NavSatFix"),
     ],
 )
-def test_values_that_do_not_fit_are_named(message, words):
+def test_invalid_values_are_rejected(message, words):
     with pytest.raises(ValueError, match=words) as caught:
         message.encode()
     assert "\n" not in str(caught.value)
 
 
-def test_numpy_arrays_and_plain_tuples_encode_as_well():
+def test_numpy_arrays_and_tuples_are_encoded():
     state = VehicleState(velocity=Vector3(1.0, 2.0, 3.0), rotor_speed=(1.0, 2.0))
     other = VehicleState(velocity=(1.0, 2.0, 3.0), rotor_speed=np.array([1.0, 2.0]))
     assert state.encode() == other.encode()
@@ -151,20 +151,20 @@ def test_schema_text_defines_same_fields_as_published_type(name):
         assert sorted(store.fielddefs[name][0]) == sorted(reference[0])  # constants
 
 
-def test_types_are_files():
+def test_each_type_has_file():
     files = {f"{path.parent.name}/msg/{path.stem}" for path in FOLDER.glob("*/*.msg")}
     assert set(TYPES) == files
     assert all(getattr(lapwing.messages, cls.__name__) is cls for cls in TYPES.values())
 
 
-def test_defaults_are_zero_but_for_identity_quaternion():
+def test_defaults_are_zero_except_identity_quaternion():
     assert Quaternion() == (0.0, 0.0, 0.0, 1.0)
     assert Imu().header.frame_id == ""
     assert Imu().orientation_covariance == (0.0,) * 9
     assert VehicleState().rotor_speed == ()
 
 
-def test_unknown_names_are_errors():
+def test_unknown_names_are_rejected():
     with pytest.raises(ImportError):
         exec("from lapwing.messages import NoSuchMessage")
     with pytest.raises(ValueError, match="unknown message type a/msg/B; known: builtin_interfaces/msg/Time"):

@@ -22,7 +22,7 @@ def test_definition():
     assert digest(A) == hashlib.blake2b(b"\2\0\0\0/a" + parts.digest(), digest_size=16).hexdigest()
 
 
-def test_interleaving_of_topics_does_not_count():
+def test_digest_is_independent_of_topic_interleaving():
     mixed = [entry for pair in zip(A, B, strict=False) for entry in pair] + A[len(B) :]
     assert digest(A + B) == digest(B + A) == digest(mixed)
 
@@ -37,11 +37,11 @@ def test_interleaving_of_topics_does_not_count():
         [("/a", 0, b"\1"), *A[1:]],
     ],
 )
-def test_order_times_names_and_contents_count(other):
+def test_digest_depends_on_order_times_names_and_contents(other):
     assert digest(other) != digest(A)
 
 
-def test_reading_digest_does_not_change_it():
+def test_hexdigest_leaves_digest_unchanged():
     one, other = Digest(), Digest()
     for entry in A[:10]:
         one.update(*entry)

@@ -1,4 +1,4 @@
-"""The first difference of two messages, and the units of fields."""
+"""First difference of two messages, and units of fields."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from lapwing.messages.message_diff import first_difference
 from lapwing.messages.units import unit
 
 
-def test_first_field_that_differs_is_named_with_both_values():
+def test_first_different_field_has_both_values():
     one = Imu(header(5, "base"))
     other = one._replace(linear_acceleration=(0.0, 9.81, 1.0))
     result = first_difference(Imu, one.encode(), other.encode())
@@ -17,12 +17,12 @@ def test_first_field_that_differs_is_named_with_both_values():
     assert (text.field, text.delta) == ("mode", None)
 
 
-def test_negative_zero_is_not_zero():
+def test_negative_zero_differs_from_zero():
     one, other = (Imu(linear_acceleration=(x, 0.0, 0.0)).encode() for x in (0.0, -0.0))
     assert first_difference(Imu, one, other).field == "linear_acceleration.x"
 
 
-def test_sequences_of_other_lengths_differ():
+def test_sequences_of_different_lengths_differ():
     one, other = (VehicleState(rotor_speed=(1.0,) * n).encode() for n in (3, 4))
     assert first_difference(VehicleState, one, other) is not None
 
@@ -31,7 +31,7 @@ def test_sequences_of_other_lengths_differ():
     ("kind", "field", "expected"),
     [
         ("lapwing_msgs/msg/VehicleState", "rotor_speed.2", "rad/s"),
-        ("lapwing_msgs/msg/VehicleState", "velocity.x", "m/s"),  # stated where the vector is
+        ("lapwing_msgs/msg/VehicleState", "velocity.x", "m/s"),  # unit of the containing vector
         ("lapwing_msgs/msg/VehicleState", "pose.position.z", "m"),
         ("lapwing_msgs/msg/VehicleState", "pose.orientation.w", ""),
         ("lapwing_msgs/msg/BodyStates", "velocity.3.x", "m/s"),

@@ -30,7 +30,7 @@ def test_fields_constants_and_defaults():
 
 
 @pytest.mark.parametrize("line", ["float64", "float64[<=3] x", "string<=5 x", "string[3] x", "float64 2x", "!"])
-def test_faulty_lines_are_named(line):
+def test_invalid_line_is_rejected(line):
     with pytest.raises(ValueError, match="a/msg/B, line 2: ") as caught:
         parse("a/msg/B", "int8 a\n" + line)
     assert "\n" not in str(caught.value)
@@ -43,7 +43,7 @@ def write(folder, **texts):
     return read_folder(folder)
 
 
-def test_contained_types_come_first_and_outer_ones_lead_schema(tmp_path):
+def test_contained_types_precede_but_follow_in_schema(tmp_path):
     result = write(tmp_path, A="B b\nC c\n", B="C c\n", C="int8 x\n")
     assert list(result) == ["p/msg/C", "p/msg/B", "p/msg/A"]
     assert dependencies("p/msg/A", result) == ["p/msg/B", "p/msg/C"]
@@ -51,12 +51,12 @@ def test_contained_types_come_first_and_outer_ones_lead_schema(tmp_path):
     assert schema_text("p/msg/A", result) == f"B b\nC c\n{bar}\nMSG: p/B\nC c\n{bar}\nMSG: p/C\nint8 x\n"
 
 
-def test_missing_type_is_named(tmp_path):
+def test_missing_type_is_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"p/msg/A: field b has type p/msg/B, which has no \.msg file"):
         write(tmp_path, A="B b\n")
 
 
-def test_class_made_from_new_text_works(tmp_path):
+def test_class_of_new_definition_round_trips(tmp_path):
     result = write(tmp_path, A="int8 x\nint64 big\nB[] many\nuint16[] words\nint8 last\n", B="string s\nfloat64[] v\n")
     classes: dict = {}
     for name, definition in result.items():

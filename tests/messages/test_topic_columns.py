@@ -57,7 +57,7 @@ def test_sequences_of_varying_length():
     assert [cell.tolist() for cell in cells] == [[], [1.5], [2.5, 3.5], [4.5]]
 
 
-def test_field_missing_in_message_is_no_column():
+def test_field_missing_in_message_has_no_column():
     messages = [RotorWrench(moment=(Vector3(),) * count) for count in (1, 2)]
     columns = history(RotorWrench, [message.encode() for message in messages])
     assert "moment.0" in columns
@@ -74,7 +74,7 @@ def test_no_messages_have_empty_columns():
     assert columns["mode"] == []
 
 
-def test_damaged_messages_are_refused():
+def test_damaged_messages_are_rejected():
     good = Status(mode="auto").encode()
     with pytest.raises(ValueError, match="lapwing_msgs/msg/Status"):
         history(Status, [good, good[:-3]])
@@ -84,15 +84,15 @@ def test_damaged_messages_are_refused():
         columns["mode"]
 
 
-def test_pages_are_same_as_payloads():
+def test_pages_equal_payloads():
     messages = [
         Status(mode=mode, arming_blockers=why) for mode, why in [("a", ()), ("b", ("x",)), ("c", ()), ("d", ("y",))]
     ]
     payloads = [message.encode() for message in messages]
     expected = history(Status, payloads)
 
-    def page(*places):
-        return np.array(places), np.stack([np.frombuffer(payloads[k], np.uint8) for k in places])
+    def page(*indices):
+        return np.array(indices), np.stack([np.frombuffer(payloads[k], np.uint8) for k in indices])
 
     result = history_of_pages(Status, [page(0, 2), page(3), page(1)])
     assert list(result) == list(expected)
@@ -109,7 +109,7 @@ def test_history_can_be_pickled():
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 30])
 def test_incremental_columns_equal_complete_columns(monkeypatch, count):
-    """Pages of eight messages, with two shapes and texts."""
+    """Compare columns of pages of eight messages, with two shapes and texts."""
     monkeypatch.setattr(module, "PAGE", 8)
     output = [Status(header(k, "body"), phase="up" if k % 5 else "over there", armed=k > 3) for k in range(count)]
     payloads, gathered = [message.encode() for message in output], ColumnBuilder(Status)

@@ -15,7 +15,7 @@ def test_documented_topics_exist():
     assert len({topic.name for topic in TOPICS}) == len(TOPICS)
 
 
-def test_keys():
+def test_topic_keys():
     assert GPS.key("drone1") == "/drone1/gps/fix"
     assert GPS.zenoh_key("drone1", "lapwing/7") == "lapwing/7/drone1/gps/fix"
     assert CLOCK.key() == "/clock"

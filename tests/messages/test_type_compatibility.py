@@ -1,4 +1,4 @@
-"""A type as a log defines it beside this version's: what is read the same, and what is not."""
+"""Compatibility of recorded message types with those of this version."""
 
 import pytest
 
@@ -10,7 +10,7 @@ TEXT = TYPES[STATE].schema_text
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_every_type_is_its_own(name):
+def test_every_type_is_compatible_with_itself(name):
     text = TYPES[name].schema_text
     assert first_type_difference(name, text) == ""
     assert (
@@ -29,7 +29,7 @@ def test_nested_types_may_have_any_order():
 
 
 @pytest.mark.parametrize(
-    ("there", "here", "said"),
+    ("current", "recorded", "output"),
     [
         ("float64 air_density", "float32 air_density", "has float32 air_density where this version has float64 air_"),
         ("float64 air_density", "#", "has bool ground_contact where this version has float64 air_density"),
@@ -44,6 +44,6 @@ def test_nested_types_may_have_any_order():
         ("float64 air_density", "wide<=3 air_density", "has a definition that cannot be read"),
     ],
 )
-def test_first_type_difference_is_named(there, here, output):
-    assert there in TEXT
-    assert first_type_difference(STATE, TEXT.replace(there, here)).startswith(output)
+def test_first_type_difference_is_named(current, recorded, output):
+    assert current in TEXT
+    assert first_type_difference(STATE, TEXT.replace(current, recorded)).startswith(output)

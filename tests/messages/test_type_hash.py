@@ -1,4 +1,4 @@
-"""Type hashes: those that ROS 2 publishes, and those that the rosbags library computes."""
+"""Type hashes against published ones of ROS 2 and those of the rosbags library."""
 
 import pytest
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -8,20 +8,20 @@ from lapwing.messages.parse import parse
 from lapwing.messages.type_hash import known_type_hash, type_hash
 
 STANDARD = get_typestore(Stores.ROS2_JAZZY)
-PUBLISHED = {  # in the keys of rmw_zenoh's own documentation, and of ROS 2 nodes
+PUBLISHED = {  # from rmw_zenoh's documentation and ROS 2 nodes
     "std_msgs/msg/String": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
     "std_msgs/msg/Header": "RIHS01_f49fb3ae2cf070f793645ff749683ac6b06203e41c891e17701b1cb597ce6a01",
 }
 
 
 @pytest.mark.parametrize(("name", "published"), PUBLISHED.items())
-def test_hash_is_published_one(name, published):
+def test_hash_equals_published(name, published):
     assert known_type_hash(name) == published
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_hash_is_that_of_rosbags_library(name):
-    """Standard types use the library's own definition, others our text."""
+def test_hash_equals_rosbags_library(name):
+    """Compare with the library's definitions of standard types, and with Lapwing's text for the others."""
     store = STANDARD
     if name not in STANDARD.fielddefs:
         store = get_typestore(Stores.EMPTY)
@@ -29,7 +29,7 @@ def test_hash_is_that_of_rosbags_library(name):
     assert known_type_hash(name) == store.hash_rihs01(name)
 
 
-def test_every_kind_of_field_counts():
+def test_hash_covers_every_kind_of_field():
     text = """
 bool a
 byte b

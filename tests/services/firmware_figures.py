@@ -30,12 +30,12 @@ from lapwing.services.scene_resolver import load
 VARIABLES = {"px4": "LAPWING_PX4", "ardupilot": "LAPWING_ARDUCOPTER", "betaflight": "LAPWING_BETAFLIGHT"}
 SCRIPTED = {"px4": "px4/scripted_px4.py", "ardupilot": "ardupilot/scripted_ardupilot.py"}
 SQUARE = 10.0 * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])  # [m] of the shipped missions
-SLOW = 0.1  # [m/s] of a vehicle that hovers
-ALOFT = 1.0  # [m] above the start of a vehicle that flies
+SLOW = 0.1  # [m/s] highest speed in hover
+ALOFT = 1.0  # [m] lowest height above the start in flight
 
 
 def overrides(firmware: str, program: str) -> list[str]:
-    """Return the options of `lapwing run` that start a program; "" is the scripted one."""
+    """Return the options of `lapwing run` that start a program; "" is the scripted program."""
     if not program:
         command = [sys.executable, str(Path(__file__).parent / SCRIPTED[firmware])]
         return ["--set", f"autopilot.command={json.dumps(command)}"]
@@ -49,7 +49,7 @@ def overrides(firmware: str, program: str) -> list[str]:
 
 
 def hover_duty(scene_name: str) -> float:
-    """Return the motor output in hover by the airframe's constants: thrust k w^2, voltage K w."""
+    """Return the motor output in hover from the airframe's constants: thrust k w^2, voltage K w."""
     scene = load(scene_name)
     frame = airframe(scene)
     speed = math.sqrt(frame.mass.total * gravity(scene) / len(frame.rotors.position) / thrust_coefficient(scene))
@@ -106,7 +106,7 @@ def figures(log: Path, summary: Path, full: float) -> dict:
 
 
 def fly(firmware: str, program: str, folder: Path, name: str, *options: str) -> dict:
-    """Fly once, and return the figures."""
+    """Fly once. Return the figures."""
     scene, log, summary = f"{firmware}_quad", folder / f"{name}.mcap", folder / f"{name}.json"
     command = [sys.executable, "-m", "lapwing", "run", scene, "--mode", "single-process", "--log", str(log)]
     command += ["--json", str(summary), *overrides(firmware, program), *options]
@@ -118,7 +118,7 @@ def fly(firmware: str, program: str, folder: Path, name: str, *options: str) -> 
 
 
 def main() -> None:
-    """Fly, and print a line for each start and one for all."""
+    """Fly, and print a line for each flight and a summary."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("firmware", choices=VARIABLES)
     parser.add_argument("--scripted", action="store_true", help="fly the scripted program of the tests")

@@ -29,20 +29,20 @@ def free_instance(*ports):
     raise OSError("no free ports")
 
 
-def firmware_setup(firmware, own, instance, **changed):
+def firmware_setup(firmware, own, instance, **changes):
     """Return the configuration of a link with steps of 4 ms that waits for a peer."""
     setup = FirmwareSetup(
         firmware, (), "", {}, HOST, 0, instance, False, 20.0, 5.0, {}, "", (0, 2, 1, 3), 11.1,
         (0.0, 0.0, 0.11), 0.004, 4_000_000, 1, 25, (), (), own,
     )  # fmt: skip
-    return setup._replace(**changed)
+    return setup._replace(**changes)
 
 
 class Background:
-    """A function in a thread whose exception the test sees."""
+    """Function in a thread; `join` raises its exception."""
 
     def __init__(self, function, *arguments):
-        """Start it."""
+        """Start the thread."""
         self.result = self.error = None
 
         def run():
@@ -55,7 +55,7 @@ class Background:
         self._thread.start()
 
     def join(self, timeout=60.0):
-        """Wait for its end, and return its result."""
+        """Wait for the end of the function. Return its result."""
         self._thread.join(timeout)
         assert not self._thread.is_alive()
         if self.error:
@@ -64,14 +64,14 @@ class Background:
 
 
 def never(_):
-    """Wait without end of the run."""
+    """Do nothing: the run continues."""
 
 
 class Exchange:
-    """The compiled exchange of a link with fixed samples, and the outputs in the firmware's order."""
+    """Compiled exchange of a link with fixed samples, with outputs in the firmware's order."""
 
     def __init__(self, link, samples):
-        """Compile it; a sample is the value of a port."""
+        """Compile the exchange; a sample is the value of a port."""
         self.link, setup = link, link._setup
         self._rows = {port: pack_row(like)[None] for port, like in samples.items()}
         self._samples = dict(samples)
@@ -85,20 +85,20 @@ class Exchange:
         self._advance = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.c_void_p, ctypes.c_int64)(self._code.function)
 
     def step(self, tick, **samples):
-        """Exchange at a tick, with other samples from now on; return the outputs and the state."""
+        """Exchange at a tick; `samples` replace earlier ones. Return the outputs and the state."""
         for port, value in samples.items():
             self._rows[port][0], self._samples[port] = pack_row(value), value
         if self._advance(self._code.memory, tick) != CONTINUE:
             raise self._block.failure(tick)
-        *duty, armed, landed, finished, words, _, _, _ = self._command[0]
+        *duty, armed, landed, finished, text_id, _, _, _ = self._command[0]
         order = self.link._setup.order
         outputs = tuple(duty[order.index(k)] for k in range(len(order)))
-        text = self._block.words.table[int(words)]
+        text = self._block.status_texts.table[int(text_id)]
         return FirmwareOutput(outputs, bool(armed), bool(landed), bool(finished), text.mode, text.failsafe)
 
 
 class _Diagram:
-    """Diagram of one block whose inputs never change by themselves."""
+    """Diagram of one block with constant inputs."""
 
     def __init__(self, ports, rows, samples):
         self.ports, self._rows, self._samples = ports, rows, samples

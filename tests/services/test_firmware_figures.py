@@ -11,7 +11,7 @@ import pytest
 from tests.services.firmware_figures import distance_from_square, hover_duty
 
 
-def test_distance_from_square_is_that_to_nearest_side():
+def test_distance_from_square_is_to_nearest_side():
     points = np.array([(5.0, 0.5), (11.0, 5.0), (5.0, 5.0), (-3.0, -4.0), (0.0, 10.0)])
     assert distance_from_square(points) == pytest.approx([0.5, 1.0, 5.0, 5.0, 0.0])
 

@@ -1,4 +1,4 @@
-"""The recorder holds messages back until every service has handed over their ticks, and loses none."""
+"""Recorder: messages are complete_pages once every service has published their ticks, and none is lost."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ def batch(topic, ticks, stop, start=0):
     return pack_log_packet(pages, start, stop)
 
 
-def written(pending):
+def complete_pages(pending):
     return {
         page.topic.name: [int.from_bytes(p.tobytes(), "little") for p in page.payloads] for page in pending.complete()
     }
@@ -25,21 +25,21 @@ def written(pending):
 def test_messages_wait_for_slowest_service():
     pending = Pending(["plant", "autopilot"])
     pending.add("plant", batch(TRUTH, range(10), 10), 0)
-    assert written(pending) == {}
+    assert complete_pages(pending) == {}
     pending.add("autopilot", batch(ACTUATORS, range(4), 4), 0)
-    assert written(pending) == {TRUTH.name: [0, 1, 2, 3], ACTUATORS.name: [0, 1, 2, 3]}
-    assert written(pending) == {}
+    assert complete_pages(pending) == {TRUTH.name: [0, 1, 2, 3], ACTUATORS.name: [0, 1, 2, 3]}
+    assert complete_pages(pending) == {}
     pending.add("autopilot", batch(ACTUATORS, range(4, 12), 12, 4), 0)
-    assert written(pending) == {TRUTH.name: list(range(4, 10)), ACTUATORS.name: list(range(4, 10))}
+    assert complete_pages(pending) == {TRUTH.name: list(range(4, 10)), ACTUATORS.name: list(range(4, 10))}
     assert pending.written == 10
 
 
-def test_service_without_message_hands_over_its_ticks_too():
+def test_service_without_messages_completes_ticks():
     pending = Pending(["plant", "trajectory"])
     pending.add("plant", batch(POSE, [0, 5], 7), 0)
     assert pending.waits_for() == "the messages of trajectory from tick 0 on"
     pending.add("trajectory", batch(POSE, [], 6), 0)
-    assert written(pending) == {POSE.name: [0, 5]}
+    assert complete_pages(pending) == {POSE.name: [0, 5]}
 
 
 def test_recorder_ends_after_every_service():
@@ -50,10 +50,10 @@ def test_recorder_ends_after_every_service():
     assert not pending.ended
     pending.add("autopilot", b"", 2)
     assert pending.ended
-    assert written(pending) == {TRUTH.name: [0, 1], ACTUATORS.name: [0, 1]}
+    assert complete_pages(pending) == {TRUTH.name: [0, 1], ACTUATORS.name: [0, 1]}
 
 
-def test_lost_batch_is_error_that_names_its_service():
+def test_lost_batch_is_error_with_service_name():
     pending = Pending(["plant", "autopilot"])
     pending.add("plant", batch(TRUTH, range(4), 4), 0)
     with pytest.raises(LockStepError, match="the messages of plant of the ticks 4 to 7 are lost"):
@@ -69,4 +69,4 @@ def test_repeated_packet_and_end_are_ignored():
     for _ in range(2):
         pending.add("plant", b"", 4)
     assert pending.ended
-    assert written(pending) == {TRUTH.name: [0, 1, 2, 3]}
+    assert complete_pages(pending) == {TRUTH.name: [0, 1, 2, 3]}

@@ -1,4 +1,4 @@
-"""From a scene to a set-up."""
+"""Resolution of a scene to a run configuration."""
 
 import pytest
 

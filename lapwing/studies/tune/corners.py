@@ -12,7 +12,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
 from lapwing.services.autopilot.gains import GainSet
-from lapwing.services.common.autopilot_parameters import of_gains
+from lapwing.services.common.autopilot_parameters import gain_parameters
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import Effects, airframe, gravity, start_pose
 from lapwing.studies.campaign.campaign_config import TOPICS
@@ -48,7 +48,7 @@ def failure(flight: Mapping[str, Any]) -> str:
 
 def with_gains(setup: RunConfig, gains: GainSet) -> RunConfig:
     """Return the run with another gain set, which also replaces gains changed by the scene's parameters."""
-    own, changed = setup.services["autopilot"].parameters, {p.name: p for p in of_gains(gains)}
+    own, changed = setup.services["autopilot"].parameters, {p.name: p for p in gain_parameters(gains)}
     parameters = tuple(changed.get(p.name, p) for p in own.parameters)
     return _with(setup, "autopilot", own._replace(gains=gains.plain(), parameters=parameters))
 

@@ -7,7 +7,7 @@ from typing import Any
 from lapwing.services.autopilot.commander.command_handlers import Denied, handles
 from lapwing.services.autopilot.commander.flight_mode import value
 from lapwing.services.autopilot.commander.transitions import Context
-from lapwing.services.common.failure_types import KINDS, UNITS, possible, refusal, with_satellites
+from lapwing.services.common.failure_types import KINDS, UNITS, rejection_text, supported_types, with_satellites
 
 ENABLE = "SYS_FAILURE_EN"
 LEVEL = "SYS_FAIL_BAT_LVL"
@@ -28,8 +28,8 @@ def inject_failure(context: Context, command: Any) -> None:
         raise Denied(f"inject failure: {ENABLE} is 0; set it to 1 first")
     if unit not in constants.failing:
         raise Denied(f"inject failure: the vehicle has no {unit}")
-    if kind not in possible(unit):
-        raise Denied(f"inject failure: {refusal(unit)}")
+    if kind not in supported_types(unit):
+        raise Denied(f"inject failure: {rejection_text(unit)}")
     count = {"motor": constants.rotors, "gyro": constants.imus, "accelerometer": constants.imus}.get(unit, 1)
     numbers = _instances(unit, count, *values[2:])
     instances = f" {', '.join(map(str, numbers))}" if len(numbers) < count else ""

@@ -15,8 +15,8 @@ NO_MISSION = 1  # MISSION_STATE of MAVLink
 NO_ITEM = 65535
 
 
-class Words(NamedTuple):
-    """Part of the status message that the port does not have as numbers."""
+class StatusText(NamedTuple):
+    """Texts and mission numbers of the status message, which the port refers to by an index."""
 
     mode: str = ""
     failsafe: str = ""
@@ -29,25 +29,25 @@ class Words(NamedTuple):
     home: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-class StatusWords:
-    """Growing table of texts."""
+class StatusTextTable:
+    """Growing table of status texts."""
 
     def __init__(self) -> None:
-        """Create a table with the empty texts."""
-        self.table: list[Words] = [Words()]
-        self._numbers = {Words(): 0}
+        """Create a table whose first entry has empty texts."""
+        self.table: list[StatusText] = [StatusText()]
+        self._indices = {StatusText(): 0}
 
-    def number(self, output: FirmwareOutput) -> int:
-        """Return the number of an output's texts; append them if they are new."""
-        words = Words(output.mode, output.text, output.arming_blockers)
-        if words not in self._numbers:
-            self._numbers[words] = len(self.table)
-            self.table.append(words)
-        return self._numbers[words]
+    def index(self, output: FirmwareOutput) -> int:
+        """Return the index of an output's texts; append them if they are new."""
+        text = StatusText(output.mode, output.text, output.arming_blockers)
+        if text not in self._indices:
+            self._indices[text] = len(self.table)
+            self.table.append(text)
+        return self._indices[text]
 
 
 class FirmwareBlock:
-    """Steps a link every `period` ticks."""
+    """Python block that steps a link every `period` ticks."""
 
     def __init__(
         self,
@@ -60,10 +60,10 @@ class FirmwareBlock:
         self.name, self.inputs = f"{name}.link", inputs
         self._setup = setup
         self._link: Any = create(setup)
-        self._none = FirmwareCommand((0.0,) * len(setup.order))
-        self.outputs = (Port(COMMAND, self._none, LATCHED),)
-        self.words = StatusWords()
-        self._before: FirmwareOutput | None = None
+        self._zero = FirmwareCommand((0.0,) * len(setup.order))
+        self.outputs = (Port(COMMAND, self._zero, LATCHED),)
+        self.status_texts = StatusTextTable()
+        self._last_output: FirmwareOutput | None = None
         self._waits: Waits = lambda text: None
         self._opened = False
         self._cpu = self._own_cpu = 0.0  # [s] before the first exchange
@@ -79,7 +79,7 @@ class FirmwareBlock:
         self._cpu, self._own_cpu = self._link.cpu(), time.process_time()
 
     def close(self) -> None:
-        """End the connection."""
+        """Close the connection."""
         if self._opened:
             self._link.close()
         self._opened = False
@@ -102,13 +102,13 @@ class FirmwareBlock:
         if not self._opened:
             self.open(self._waits)
         graph, report = self._graph, self._link.report
-        started = time.perf_counter()
+        start = time.perf_counter()
         output = self._link.step(tick, lambda port: graph.latest(port, tick), self._waits)
-        report.wall += time.perf_counter() - started
+        report.wall += time.perf_counter() - start
         report.steps += 1
-        if output != self._before:
+        if output != self._last_output:
             graph.put(COMMAND, tick, self._command(tick, output))
-            self._before = output
+            self._last_output = output
         return tick + self._setup.period
 
     def _command(self, tick: int, output: FirmwareOutput) -> FirmwareCommand:
@@ -116,6 +116,6 @@ class FirmwareBlock:
         if len(values) < len(self._setup.order) or not all(map(math.isfinite, values)):
             at = f"at t = {tick * self._setup.interval:.3f} s"
             raise FirmwareError(f"{self._setup.firmware}: invalid motor outputs {values} {at}; check its motor setup")
-        duty = tuple(min(max(values[i], 0.0), 1.0) for i in self._setup.order) if output.armed else self._none.duty
-        words, attitude = self.words.number(output), output.attitude_reference
-        return FirmwareCommand(duty, output.armed, output.landed, output.finished, words, attitude)
+        duty = tuple(min(max(values[i], 0.0), 1.0) for i in self._setup.order) if output.armed else self._zero.duty
+        text_id, attitude = self.status_texts.index(output), output.attitude_reference
+        return FirmwareCommand(duty, output.armed, output.landed, output.finished, text_id, attitude)

@@ -1,4 +1,4 @@
-"""UDP socket whose datagrams compiled code and Python send and receive in the same memory."""
+"""UDP socket for compiled code and Python, which share the memory of its datagrams."""
 
 import ctypes
 import socket
@@ -10,7 +10,7 @@ import numpy as np
 from lapwing.kernels import always_inline
 from lapwing.kernels.native_calls import address_of, call_long
 
-SIZE = 2048  # [bytes] of a datagram, at most
+SIZE = 2048  # [bytes] largest datagram
 WAIT = 0.2  # [s] of one wait for a datagram
 _ADDRESS = 16  # [bytes] of a `struct sockaddr_in`
 
@@ -31,13 +31,13 @@ class Datagrams(NamedTuple):
 
 
 def datagrams() -> Datagrams:
-    """Return the memory of a socket that is not open yet."""
+    """Return the memory of a closed socket."""
     libc = ctypes.CDLL(None)
     sent, received = np.zeros(SIZE, np.uint8), np.zeros(SIZE, np.uint8)
     peer, sender, size = np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)
-    places = [part.ctypes.data for part in (sent, received, peer, sender, size)]
+    addresses = [part.ctypes.data for part in (sent, received, peer, sender, size)]
     return Datagrams(
-        np.full(1, -1), sent, np.zeros(1, np.int64), received, peer, sender, size, tuple(places),
+        np.full(1, -1), sent, np.zeros(1, np.int64), received, peer, sender, size, tuple(addresses),
         address_of(libc.sendto), address_of(libc.recvfrom),
     )  # fmt: skip
 
@@ -52,14 +52,14 @@ def send(d: Datagrams) -> bool:
 
 @always_inline
 def receive(d: Datagrams) -> int:
-    """Wait for a datagram at most 0.2 s. Return its size [bytes]; negative: none has come."""
+    """Wait for a datagram at most 0.2 s. Return its size [bytes], negative if none has arrived."""
     d.sender_size[0] = _ADDRESS
     return call_long(d.recvfrom, (d.descriptor[0], d.addresses[1], SIZE, 0, d.addresses[3], d.addresses[4]))
 
 
 @always_inline
 def is_from_peer(d: Datagrams) -> bool:
-    """Return True if the last datagram comes from the other end."""
+    """True if the last datagram comes from the other end."""
     return d.sender[0] == d.peer[0] and d.sender[1] == d.peer[1]
 
 
@@ -70,21 +70,21 @@ def unsigned16(data: Any, at: int) -> int:
 
 
 class DatagramSocket:
-    """The socket in Python.
+    """Python interface of the socket.
 
     Attributes:
-        memory: shared with compiled code.
+        memory: memory shared with compiled code.
     """
 
     def __init__(self) -> None:
-        """Create it without a socket."""
+        """Create the memory without a socket."""
         self.memory = datagrams()
         self._socket: socket.socket | None = None
         self._recvfrom: Any = ctypes.CDLL(None).recvfrom
         self._recvfrom.restype = ctypes.c_ssize_t
 
     def attach(self, bound: socket.socket) -> None:
-        """Use a bound socket; its receipts end after 0.2 s."""
+        """Use a bound socket; a receive call ends after 0.2 s."""
         bound.setblocking(True)
         whole, part = divmod(round(WAIT * 1e6), 1_000_000)
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("@ll", whole, part))
@@ -98,16 +98,16 @@ class DatagramSocket:
         self._socket = None
 
     def send(self) -> str:
-        """Send the message to the other end. Return the reason if that is impossible."""
+        """Send the message to the other end. Return the reason of a failure, "" otherwise."""
         if self._socket and self.has_peer and self.memory.sent_size[0]:
             try:
-                self._socket.sendto(self.memory.sent[: self.memory.sent_size[0]], _place(self.memory.peer))
+                self._socket.sendto(self.memory.sent[: self.memory.sent_size[0]], _host_and_port(self.memory.peer))
             except OSError as error:
                 return str(error.strerror)
         return ""
 
     def receive(self) -> int:
-        """Wait for a datagram at most 0.2 s. Return its size [bytes]; negative: none has come."""
+        """Wait for a datagram at most 0.2 s. Return its size [bytes], negative if none has arrived."""
         d = self.memory
         d.sender_size[0] = _ADDRESS
         pointers = [ctypes.c_void_p(place) for place in d.addresses]
@@ -120,17 +120,17 @@ class DatagramSocket:
 
     @property
     def sender(self) -> str:
-        """Return the sender of the last datagram, for messages."""
-        return "{}:{}".format(*_place(self.memory.sender))
+        """Sender of the last datagram, HOST:PORT."""
+        return "{}:{}".format(*_host_and_port(self.memory.sender))
 
     @property
     def has_peer(self) -> bool:
-        """Return True if the other end is known."""
+        """True if the other end is known."""
         return bool(self.memory.peer[0])
 
     @property
     def knows_sender(self) -> bool:
-        """Return True if the last datagram comes from the other end."""
+        """True if the last datagram comes from the other end."""
         return bool((self.memory.sender == self.memory.peer).all())
 
     def answer_sender(self) -> None:
@@ -138,6 +138,6 @@ class DatagramSocket:
         self.memory.peer[:] = self.memory.sender
 
 
-def _place(address: np.ndarray) -> tuple[str, int]:
+def _host_and_port(address: np.ndarray) -> tuple[str, int]:
     data = address.tobytes()
     return socket.inet_ntoa(data[4:8]), int.from_bytes(data[2:4], "big")

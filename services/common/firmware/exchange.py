@@ -1,8 +1,8 @@
 """Compiled exchange with a firmware: memory that it shares with Python, and the command that it publishes.
 
 The parameters of an adapter's exchange are a NamedTuple in whose module `step` sends the samples of a tick and receives
-the firmware's outputs. Python runs (`call_python`) only if these do not come at once or are not what is expected, and
-to poll the firmware's other link.
+the firmware's outputs. It calls Python (`call_python`) only if the outputs are late or unexpected, and to poll
+the firmware's MAVLink link.
 """
 
 import ctypes
@@ -22,9 +22,9 @@ from lapwing.services.common.firmware.hold import FirmwareCommand
 from lapwing.services.common.ports import PerRotor
 
 OPEN, WAIT, SEND, POLL, INVALID = range(5)
-"""Reasons to call Python: first exchange; no ordinary answer; not sent; poll is due; samples that cannot be sent."""
-ARMED, LANDED, FINISHED, WORDS = range(4)  # `flags`
-WAITING, BEGAN, LAST, ENDED = range(4)  # `seconds`
+"""Reasons to call Python: first exchange; missing or unexpected answer; sending failed; poll due; samples invalid."""
+ARMED, LANDED, FINISHED, STATUS_TEXT = range(4)  # `flags`
+WAITING, FIRST_START, LAST_START, LAST_END = range(4)  # `seconds`
 
 
 class Shared(NamedTuple):
@@ -35,16 +35,16 @@ class Shared(NamedTuple):
     order: tuple[int, ...]  # output that drives each rotor
     none: PerRotor  # zero for each rotor
     command: Any  # row of the port `hold.COMMAND`
-    outputs: Any  # (n,) of the firmware, 0 to 1
-    flags: Any  # int64: state of the vehicle by the firmware's other link, number of the status words
+    outputs: Any  # (n,) firmware outputs, 0 to 1
+    flags: Any  # int64: state of the vehicle from the MAVLink link, index of the status texts
     next_poll: Any  # (1,) tick
     steps: Any  # (1,) exchanges
-    seconds: Any  # [s] waited; wall time at the first exchange, at the last one, after it
+    seconds: Any  # [s] total wait; wall time at the start of the first and last exchange, end of the last
     clock: Any  # int64: `struct timespec`
     clock_address: int
     clock_id: int
     clock_gettime: int  # addresses of functions
-    python: int  # `python(tick, reason, number) -> 0 to go on`
+    python: int  # `python(tick, reason, number) -> 0 to continue`
 
 
 def shared_memory(setup: Any, command: np.ndarray, outputs: int, python: Any) -> Shared:
@@ -54,7 +54,7 @@ def shared_memory(setup: Any, command: np.ndarray, outputs: int, python: Any) ->
         setup: `FirmwareSetup` of the adapter.
         command: row of the port `hold.COMMAND`.
         outputs: number of outputs of the firmware.
-        python: function of ctypes that compiled code calls.
+        python: ctypes function that compiled code calls.
     """
     clock = np.zeros(2, np.int64)
     return Shared(
@@ -84,18 +84,18 @@ def now(e: Shared) -> float:
 
 @always_inline
 def call_python(e: Shared, tick: int, reason: int, number: int) -> bool:
-    """Return True if the run goes on."""
+    """Call Python. Return True if the run continues."""
     return call_long(e.python, (tick, reason, number)) == 0
 
 
 @always_inline
 def begin(e: Shared, tick: int) -> bool:
-    """Count an exchange, and store its wall time. Return False if there is no connection."""
+    """Count an exchange and store its wall time. Return False without a connection."""
     if e.steps[0] == 0:
         if not call_python(e, tick, OPEN, 0):
             return False
-        e.seconds[BEGAN] = now(e)
-    e.seconds[LAST] = now(e)
+        e.seconds[FIRST_START] = now(e)
+    e.seconds[LAST_START] = now(e)
     e.steps[0] += 1
     return True
 
@@ -107,8 +107,8 @@ def end(e: Shared, tick: int) -> bool:
     Return False if the run ends.
     """
     time = now(e)
-    e.seconds[WAITING] += time - e.seconds[LAST]
-    e.seconds[ENDED] = time
+    e.seconds[WAITING] += time - e.seconds[LAST_START]
+    e.seconds[LAST_END] = time
     return tick < e.next_poll[0] or call_python(e, tick, POLL, 0)
 
 
@@ -123,4 +123,4 @@ def publish(e: Shared, running: bool) -> None:
     """Write the command. `running`: the outputs prove that the vehicle is armed."""
     armed, landed = e.flags[ARMED] != 0 or running, e.flags[LANDED] != 0 and not running
     duty = map_tuple(_duty, (e.outputs, armed), e.order, e.none)
-    store(FirmwareCommand(duty, armed, landed, e.flags[FINISHED] != 0, e.flags[WORDS], ZERO), e.command, 0)
+    store(FirmwareCommand(duty, armed, landed, e.flags[FINISHED] != 0, e.flags[STATUS_TEXT], ZERO), e.command, 0)

@@ -1,4 +1,4 @@
-"""Block that exchanges samples with a firmware in compiled code (`exchange`), with its link for all that is unusual."""
+"""Block that exchanges samples with a firmware in compiled code (`exchange`); its link handles all exceptions."""
 
 import ctypes
 from typing import Any
@@ -10,13 +10,13 @@ from lapwing.kernels.cell import Cell
 from lapwing.services.common.firmware.block import FirmwareBlock
 from lapwing.services.common.firmware.exchange import (
     ARMED,
-    BEGAN,
-    ENDED,
     FINISHED,
+    FIRST_START,
     LANDED,
+    LAST_END,
     OPEN,
+    STATUS_TEXT,
     WAITING,
-    WORDS,
     Shared,
     shared_memory,
 )  # fmt: skip
@@ -26,13 +26,13 @@ _PYTHON = ctypes.CFUNCTYPE(*(ctypes.c_int64,) * 4)
 
 
 class ExchangeBlock(FirmwareBlock):
-    """Has compiled code exchange samples with the firmware, and an `ExchangeLink` do the rest."""
+    """Block whose compiled code exchanges samples with the firmware; an `ExchangeLink` does the rest."""
 
     _shared: Shared | None = None
     _error: BaseException | None = None
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Have the diagram run compiled code for this block."""
+        """Replace this block by compiled code in the diagram."""
         self._graph, self._python = graph, _PYTHON(self._on_call)
         self._shared = shared_memory(self._setup, graph.ring(COMMAND), self._link.outputs, self._python)
         parameters = self._link.exchange(self._shared, self._ring)
@@ -56,7 +56,7 @@ class ExchangeBlock(FirmwareBlock):
         if self._shared:
             report, seconds = self._link.report, self._shared.seconds
             report.steps, report.waiting = int(self._shared.steps[0]), float(seconds[WAITING])
-            report.wall = float(seconds[ENDED] - seconds[BEGAN])
+            report.wall = float(seconds[LAST_END] - seconds[FIRST_START])
         return super().reports
 
     def _ring(self, port: str) -> InputRing:
@@ -64,17 +64,19 @@ class ExchangeBlock(FirmwareBlock):
         return InputRing(graph.ports[port].like, graph.ring(port), graph.ports[port].period, 0)
 
     def _on_call(self, tick: int, reason: int, number: int) -> int:
-        """Run the link for compiled code. Return 0 to go on."""
+        """Handle a call from compiled code. Return 0 to continue, 1 to end the run."""
         try:
             if reason == OPEN:
                 if not self._opened:
                     self.open(self._waits)
                 return 0
-            output = self._link.attend(tick, reason, number, lambda port: self._graph.latest(port, tick), self._waits)
+            output = self._link.handle_call(
+                tick, reason, number, lambda port: self._graph.latest(port, tick), self._waits
+            )
             if output is not None and self._shared:
                 flags: Any = self._shared.flags
                 flags[[ARMED, LANDED, FINISHED]] = output.armed, output.landed, output.finished
-                flags[WORDS] = self.words.number(output)
+                flags[STATUS_TEXT] = self.status_texts.index(output)
         except BaseException as error:  # exceptions do not pass through compiled code; `failure` raises it
             self._error = error
             return 1

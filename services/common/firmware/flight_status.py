@@ -1,11 +1,11 @@
-"""State of a flight by the firmware's MAVLink link, as the output of an adapter."""
+"""State of a flight from the firmware's MAVLink link, as the output of an adapter."""
 
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput
 from lapwing.services.common.firmware.mission_client import MissionClient, Stage
 
 
 class FlightStatus:
-    """Polls the client of a link, and reports what it sees."""
+    """Flight state from the client of a MAVLink link."""
 
     def __init__(self, firmware: str, client: MissionClient):
         """Create the status of a client."""
@@ -13,7 +13,7 @@ class FlightStatus:
 
     @property
     def version(self) -> str:
-        """Return the version of the firmware, "" if it is not known."""
+        """Version of the firmware, "" if it is not known."""
         return self._client.version
 
     def poll(self, time: float) -> None:

@@ -10,7 +10,7 @@ _SIGNED, _SIGNATURE, _CHECKSUM = 0x01, 13, 2  # flag; [bytes]
 
 
 class FrameFilter:
-    """Passes the frames of some messages of a stream of bytes; checksums are left to the decoder."""
+    """Filter that passes frames of selected messages of a byte stream; the decoder verifies checksums."""
 
     def __init__(self, numbers: Collection[int]):
         """Create a filter that passes the message ids `numbers`."""
@@ -18,23 +18,23 @@ class FrameFilter:
         self._rest = b""
 
     def select(self, data: bytes) -> bytes:
-        """Return the wanted frames that `data` completes; bytes that begin no frame are dropped."""
+        """Return the selected frames that `data` completes; bytes outside of frames are dropped."""
         data, result = self._rest + data, []
         at, end = 0, len(data)
         while at < end:
-            mark = data[at]
-            if mark not in (V1, V2):
+            magic = data[at]
+            if magic not in (V1, V2):
                 at += 1
                 continue
-            head = 10 if mark == V2 else 6
+            head = 10 if magic == V2 else 6
             if at + head > end:
                 break
             length = head + data[at + 1] + _CHECKSUM
-            if mark == V2 and data[at + 2] & _SIGNED:
+            if magic == V2 and data[at + 2] & _SIGNED:
                 length += _SIGNATURE
             if at + length > end:
                 break
-            number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16 if mark == V2 else data[at + 5]
+            number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16 if magic == V2 else data[at + 5]
             if number in self._numbers:
                 result.append(data[at : at + length])
             at += length

@@ -12,12 +12,12 @@ from lapwing.services.common.ports import AutopilotStatus, Setpoint
 class HoldReference(NamedTuple):
     """Parameters of the block; its inputs are command, battery and trajectory."""
 
-    held: Hold
+    hold: Hold
 
 
 @always_inline
 def step(p: HoldReference, s: HeldState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[HeldState, tuple, int]:
     """Return the motor command, the status and the reference at `tick`."""
-    after, (motors, status), _ = hold.step(p.held, s, tick, inputs)
+    after, (motors, status), _ = hold.step(p.hold, s, tick, inputs)
     reference: Setpoint = inputs[2].value
     return after, (motors, AutopilotStatus(reference.phase, *status[1:]), reference), CONTINUE

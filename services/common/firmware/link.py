@@ -8,11 +8,11 @@ from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
 Read = Callable[[str], Any]  # newest sample of a port
-Waits = Callable[[str], None]  # called at least every 0.2 s while a link waits, with what for; raises to end the run
+Waits = Callable[[str], None]  # called at least every 0.2 s with the reason of a wait; raises to end the run
 
 
 class FirmwareError(LockStepError):
-    """A firmware does not answer, or breaks its protocol; the text names it, the time and what to do."""
+    """Error of a firmware that stalls or violates its protocol; the text has its name, the time and a remedy."""
 
 
 class FirmwareOutput(NamedTuple):
@@ -22,7 +22,7 @@ class FirmwareOutput(NamedTuple):
     armed: bool
     landed: bool = False
     finished: bool = False  # the mission is over: the run may end
-    mode: str = ""  # flight mode, for people
+    mode: str = ""  # flight mode, for display
     text: str = ""  # reason of an active failsafe; "": none
     arming_blockers: tuple[str, ...] = ()
     attitude_reference: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [rad] roll, pitch, yaw setpoints, if known
@@ -33,14 +33,14 @@ class LinkReport:
     """Counts of one link; the log's metadata and the summary show them."""
 
     firmware: str
-    version: str = ""  # of the firmware, as it reports it
+    version: str = ""  # reported by the firmware
     steps: int = 0  # exchanges
-    skew_max: float = 0.0  # [s] largest difference between the firmware's time and ours
-    resent: int = 0  # frames that the firmware or we have sent again
-    late: int = 0  # replies after the time at which they were due
-    missed: int = 0  # replies that never came
+    skew_max: float = 0.0  # [s] largest difference between the firmware's and the simulation time
+    resent: int = 0  # frames sent again by either side
+    late: int = 0  # replies after their due time
+    missed: int = 0  # replies that did not arrive
     rejected: int = 0  # packets that were malformed, non-finite or from elsewhere
-    reconnected: int = 0  # times that the firmware came back
+    reconnected: int = 0  # reconnections of the firmware
     waiting: float = 0.0  # [s] of wall time spent waiting for the firmware
     wall: float = 0.0  # [s] of wall time from the first exchange to the last
     cpu: float = 0.0  # [s] of CPU time of the firmware in flight, 0 if Lapwing has not started it
@@ -55,7 +55,7 @@ class LinkReport:
         return asdict(self)
 
     def note(self, text: str) -> None:
-        """Add a warning unless it is known."""
+        """Add a warning, each text once."""
         if text not in self.notes:
             self.notes.append(text)
 
@@ -81,7 +81,7 @@ class FirmwareLink(Protocol):
         """Store the configuration; open nothing."""
 
     def open(self, waits: Waits) -> None:
-        """Start or await the firmware, and connect."""
+        """Start the firmware or wait for it, and connect."""
 
     def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
         """Send the samples at `tick`, and return the firmware's outputs."""
@@ -90,7 +90,7 @@ class FirmwareLink(Protocol):
         """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
 
     def close(self) -> None:
-        """End the connection, and the program if this link has started it."""
+        """Close the connection, and end the program if this link has started it."""
 
 
 class ExchangeLink(Protocol):
@@ -111,15 +111,15 @@ class ExchangeLink(Protocol):
         """
 
     def open(self, waits: Waits) -> None:
-        """Start or await the firmware, and connect."""
+        """Start the firmware or wait for it, and connect."""
 
-    def attend(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
-        """Do what compiled code leaves to Python at `tick`: wait for outputs, send again, or poll the other link.
+    def handle_call(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
+        """Handle a call from compiled code at `tick`: wait for outputs, send again, or poll the MAVLink link.
 
         Args:
             tick: tick of the exchange.
             reason: WAIT, SEND, POLL or INVALID of `exchange`.
-            number: WAIT: result of the receipt [bytes].
+            number: for WAIT, size [bytes] of the datagram that compiled code received.
             read: returns the newest sample of a port.
             waits: see `FirmwareLink.step`.
 
@@ -131,4 +131,4 @@ class ExchangeLink(Protocol):
         """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
 
     def close(self) -> None:
-        """End the connection, and the program if this link has started it."""
+        """Close the connection, and end the program if this link has started it."""

@@ -5,8 +5,8 @@ import socket
 import time
 from typing import Protocol
 
-PIECE = 65536  # [bytes] read at once
-CONNECT_TIMEOUT, ATTEMPT_EVERY = 0.2, 0.5  # [s] of one attempt, and between two
+PIECE = 65536  # [bytes] most that one call reads
+CONNECT_TIMEOUT, ATTEMPT_EVERY = 0.2, 0.5  # [s] duration of one attempt, and between two
 
 
 class Transport(Protocol):
@@ -15,7 +15,7 @@ class Transport(Protocol):
     where: str  # address, for messages
 
     def receive(self) -> bytes:
-        """Return the bytes that have come since the last call."""
+        """Return the bytes that have arrived since the last call."""
 
     def send(self, data: bytes) -> None:
         """Send bytes; they are lost while there is no connection."""
@@ -28,7 +28,7 @@ class UdpTransport:
     """Socket on the port to which the firmware sends; answers go to the address of the last datagram."""
 
     def __init__(self, host: str, port: int):
-        """Open the socket. OSError: the port is in use."""
+        """Open the socket. Raise OSError if the port is in use."""
         self.where = f"udp {host}:{port}"
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -40,7 +40,7 @@ class UdpTransport:
         self._peer: tuple[str, int] | None = None
 
     def receive(self) -> bytes:
-        """Return the bytes that have come since the last call."""
+        """Return the bytes that have arrived since the last call."""
         result = b""
         with contextlib.suppress(OSError):
             while True:
@@ -60,17 +60,17 @@ class UdpTransport:
 
 
 class TcpTransport:
-    """Client of a firmware's TCP port; connects again after the connection is lost."""
+    """Client of a firmware's TCP port; reconnects after the connection is lost."""
 
     def __init__(self, host: str, port: int):
         """Store the address; `receive` connects."""
         self.where = f"tcp {host}:{port}"
         self._address = (host, port)
         self._socket: socket.socket | None = None
-        self._next = 0.0  # [s] of the wall clock, of the next attempt
+        self._next = 0.0  # [s] wall time of the next attempt
 
     def receive(self) -> bytes:
-        """Return the bytes that have come since the last call; connect first if there is no connection."""
+        """Return the bytes that have arrived since the last call; connect first if there is no connection."""
         if self._socket is None:
             if time.monotonic() < self._next:
                 return b""

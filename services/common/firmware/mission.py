@@ -1,4 +1,4 @@
-"""Mission of a scene that a firmware flies: read from a file, and turned into messages of the mission protocol."""
+"""Mission of a scene for a firmware: import from a file, and conversion to messages of the mission protocol."""
 
 import math
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ def with_mission(scene: Scene, table: type[MissionKeys], config: ServiceConfig) 
     """Return the configuration of an adapter with the commands that fly the scene's mission, if it has one.
 
     Raises:
-        ConfigError: the file is no mission.
+        ConfigError: the file is not a mission.
     """
     if not scene.has(table) or not scene[table].mission_text:
         return config
@@ -65,10 +65,10 @@ def item_message(items: Sequence[Any], number: int, target: int, seq: int, open_
 
     Args:
         items: MISSION_ITEM_INT messages.
-        number: of the item; -1: the home position, whose place the firmware knows.
+        number: index of the item; -1: the home position, which the firmware knows.
         target: system id of the firmware.
-        seq: number that the firmware asks for.
-        open_value: replaces NaN in the parameters.
+        seq: number that the firmware requests.
+        open_value: replacement of NaN in the parameters.
     """
     parameters: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     if number < 0:

@@ -1,4 +1,4 @@
-"""Client of a firmware's MAVLink link: sets parameters, uploads a mission, arms, and follows the flight.
+"""Client of a firmware's MAVLink link: sets parameters, uploads a mission, arms, and monitors the flight.
 
 It is polled from the lock step and never waits. All its times are simulation times, so that it does not depend on the
 speed of the run. Source: MAVLink guide, "Mission Protocol", "Parameter Protocol", "Command Protocol".
@@ -19,8 +19,8 @@ from lapwing.services.common.mavlink.frames import saturate
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
 RETRY = 1.0  # [s] until an unanswered message is sent again
-POLL_EVERY = 0.1  # [s] between two looks at the link
-REJECTIONS = 20  # uploads, one per second, after which the mission is wrong
+POLL_EVERY = 0.1  # [s] between two polls
+REJECTIONS = 20  # rejected uploads, one per second, after which the flight fails
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
 EVENT = 410  # message id; pymavlink has no constant for it
 NEEDED = (  # messages with a handler
@@ -50,7 +50,7 @@ class Stage(Enum):
 
 
 class MissionClient:
-    """Uploads a mission, arms, and follows the flight.
+    """Client that uploads a mission, arms, and monitors the flight.
 
     Attributes:
         stage: progress.
@@ -59,8 +59,8 @@ class MissionClient:
         mode: name of the flight mode.
         texts: status texts and events.
         error: reason why the flight is impossible, "" as long as it is possible.
-        version: of the firmware, "" until it reports it.
-        next_poll: [s] simulation time.
+        version: version of the firmware, "" until it reports it.
+        next_poll: simulation time [s] of the next poll.
         reached: number of the last item that the vehicle has reached, -1: none.
     """
 
@@ -71,22 +71,22 @@ class MissionClient:
 
         Args:
             transport: link to the firmware.
-            conventions: of the firmware.
-            items: MISSION_ITEM_INT messages; empty: only follow the flight.
+            conventions: conventions of the firmware.
+            items: MISSION_ITEM_INT messages; empty: only monitor the flight.
             parameters: firmware parameters to set before the upload.
         """
         self._transport, self._conventions, self._items = transport, conventions, list(items)
-        self._wanted = dict(parameters)
+        self._initial_parameters = dict(parameters)
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
         self._filter = FrameFilter(NEEDED)
         self.next_poll = self._beat = -1.0  # [s] of the next poll, heartbeat
         self.version = ""
-        self._begin()
+        self._reset()
 
-    def _begin(self) -> None:
-        """Forget the firmware."""
-        self._parameters = ParameterClient(self._wanted, self._conventions.bytewise)
+    def _reset(self) -> None:
+        """Reset to the state before the first heartbeat."""
+        self._parameters = ParameterClient(self._initial_parameters, self._conventions.bytewise)
         self._target = 0  # system id of the firmware
         self._sent = -1.0  # [s] of the last request
         self._in_mode = False
@@ -97,9 +97,9 @@ class MissionClient:
         self.reached = -1
 
     def restart(self) -> None:
-        """Begin again with a firmware that has started again: it has lost its state, and what it has sent is old."""
+        """Start over after a restart of the firmware, which has lost its state; discard its earlier messages."""
         self._transport.receive()
-        self._begin()
+        self._reset()
 
     def poll(self, time: float) -> None:
         """Read and answer messages at simulation `time` [s]."""
@@ -117,7 +117,7 @@ class MissionClient:
             self._request()
 
     def read(self) -> None:
-        """Connect if there is no connection, and take in the messages that have come."""
+        """Connect if there is no connection, and process the received messages."""
         for message in self._codec.parse_buffer(self._filter.select(self._transport.receive())) or ():
             self._handle(message)
 
@@ -155,7 +155,7 @@ class MissionClient:
         self.stage, self._sent = stage, -1.0
 
     def _request(self) -> None:
-        """Send what the stage needs next."""
+        """Send the next request of the stage."""
         if self.stage is Stage.PARAMETERS:
             if message := self._parameters.request(self._target):
                 self._send(message)
@@ -190,12 +190,12 @@ class MissionClient:
             self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, every)
             self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
             self._advance(Stage.PARAMETERS)
-        was, self.armed = self.armed, bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        was_armed, self.armed = self.armed, bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         self.mode = self._conventions.mode_name(message.custom_mode)
         if self.armed and self.stage is Stage.ARMING:
             self.texts.arm()
             self._advance(Stage.FLYING)
-        if was and not self.armed and self.stage is Stage.FLYING:
+        if was_armed and not self.armed and self.stage is Stage.FLYING:
             self._advance(Stage.FINISHED)
 
     def _on_autopilot_version(self, message: Any) -> None:

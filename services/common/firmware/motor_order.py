@@ -1,4 +1,4 @@
-"""Outputs of a firmware and the rotors of the airframe: which drives which."""
+"""Assignment of a firmware's outputs to the rotors of the airframe."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ def motor_order(frame: Airframe, layout: tuple[Output, ...], firmware: str) -> t
     A rotor belongs to the output in the same quarter (or, for more rotors, in the nearest direction).
 
     Raises:
-        ConfigError: other numbers of rotors, two rotors for one output, or another spin direction.
+        ConfigError: the number of rotors differs, two rotors share an output, or a spin direction differs.
     """
     places, spins = frame.rotors.position, frame.rotors.spin_direction
     if len(places) != len(layout):

@@ -40,7 +40,7 @@ class ParameterClient:
         return mavlink.MAVLink_param_set_message(target, 1, name.encode(), value, kind)
 
     def receive(self, message: Any) -> bool:
-        """Take in a PARAM_VALUE. Return False if it is not one of these parameters."""
+        """Process a PARAM_VALUE. Return False if it is not one of these parameters."""
         name = message.param_id
         if name not in self._values:
             return False

@@ -7,14 +7,14 @@ from collections.abc import Callable
 from lapwing.cosim.processes.cpu_starvation import starved_time
 from lapwing.kernels import math
 
-LONGEST = 6.0  # times the time-out after which starvation is no excuse
+LONGEST = 6.0  # multiple of the time-out, from which CPU starvation no longer extends it
 
 
 class Patience:
     """A time-out that starts when it is created."""
 
     def __init__(self, timeout: float, pid: int | None = None, clock: Callable[[], float] = time.monotonic):
-        """Start to count.
+        """Start the time-out.
 
         Args:
             timeout: [s].
@@ -26,17 +26,17 @@ class Patience:
         self.restart()
 
     def restart(self) -> None:
-        """Count from now."""
-        self._began = self._clock()
+        """Start the time-out again."""
+        self._start = self._clock()
         self._before: dict[int, float] = {}
 
     @property
     def over(self) -> bool:
         """True once the time-out has passed."""
-        passed = self._clock() - self._began
-        if passed > 0.5 * self._timeout and not self._before:  # reading it costs, and most waits are short
+        elapsed = self._clock() - self._start
+        if elapsed > 0.5 * self._timeout and not self._before:  # reading it takes time, and most waits are short
             self._before = {pid: starved_time(pid) for pid in self._pids}
-        if passed <= self._timeout:
+        if elapsed <= self._timeout:
             return False
         starved = math.total(max(0.0, starved_time(pid) - before) for pid, before in self._before.items())
-        return passed > LONGEST * self._timeout or passed - starved > self._timeout
+        return elapsed > LONGEST * self._timeout or elapsed - starved > self._timeout

@@ -1,4 +1,4 @@
-"""Python block that flies the recorded commands of a firmware again, without the firmware."""
+"""Python block that applies the recorded commands of a firmware, without the firmware."""
 
 from collections.abc import Iterable
 
@@ -12,11 +12,11 @@ from lapwing.services.common import ports
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand
 
 Recorded = dict[Topic, dict[int, bytes]]  # payloads by topic and tick
-TOPICS = (topic.ACTUATORS, topic.STATUS, topic.SETPOINT)  # that an adapter publishes
+TOPICS = (topic.ACTUATORS, topic.STATUS, topic.SETPOINT)  # topics of an adapter
 
 
 class Playback:
-    """Writes the recorded motor commands to the ports, and publishes the recorded messages."""
+    """Block that writes the recorded motor commands to the ports, and publishes the recorded messages."""
 
     def __init__(self, name: str, outputs: Iterable[Port], recorded: Recorded, service: Service):
         """Create the block.
@@ -36,9 +36,9 @@ class Playback:
 
     def on_tick(self, tick: int) -> int:
         """Write the samples at `tick`."""
-        for sent, payloads in self._recorded.items():
+        for name, payloads in self._recorded.items():
             if tick in payloads:
-                self._service.messages.append((sent, tick, payloads[tick]))
+                self._service.messages.append((name, tick, payloads[tick]))
         if tick not in self._recorded[topic.ACTUATORS]:
             raise LockStepError(f"the log has no actuator command of tick {tick}; expected one at each tick")
         command = Actuators.decode(self._recorded[topic.ACTUATORS][tick])

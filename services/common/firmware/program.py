@@ -16,7 +16,7 @@ from typing import Any
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
-GRACE = 2.0  # [s] from the request to end to SIGKILL
+GRACE = 2.0  # [s] from SIGTERM to SIGKILL
 TAIL = 3  # last lines of the output in a message
 _DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG
 
@@ -25,7 +25,7 @@ class Program:
     """The firmware's program, if Lapwing starts it."""
 
     def __init__(self, setup: FirmwareSetup, arguments: Sequence[str] = (), files: dict[str, str] | None = None):
-        """Start it.
+        """Start the program.
 
         Args:
             setup: command, working directory and environment.
@@ -79,12 +79,12 @@ class Program:
         """Raise FirmwareError if the program has ended."""
         code = self._process.poll()
         if code is not None:
-            how = f"signal {-code}" if code < 0 else f"exit code {code}"
+            reason = f"signal {-code}" if code < 0 else f"exit code {code}"
             last = " | ".join(self.text().splitlines()[-TAIL:])
-            raise FirmwareError(f"{self._firmware}: the program ended ({how}){when}: {last or 'no output'}")
+            raise FirmwareError(f"{self._firmware}: the program ended ({reason}){when}: {last or 'no output'}")
 
     def text(self) -> str:
-        """Return its output so far."""
+        """Return the output so far."""
         self._output.seek(0)
         return self._output.read().decode(errors="replace").strip()
 

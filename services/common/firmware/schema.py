@@ -35,7 +35,7 @@ class FirmwareKeys(SceneTable):
             tree[TABLE] |= {"parameters": {}, "parameter_text": text}
 
     def check_own(self) -> None:
-        """Raise ConfigError if a key of a foreign firmware is given for Lapwing's own autopilot."""
+        """Raise ConfigError if a key of another firmware is set for Lapwing's own autopilot."""
         for key in ("command", "directory", "environment", "port", "instance", "parameter_text"):
             if getattr(self, key):
                 raise ConfigError(f"{TABLE}.{key}", "is not used", f"{TABLE}.firmware = one of {', '.join(FIRMWARES)}")

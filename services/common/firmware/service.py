@@ -1,4 +1,4 @@
-"""The service of a firmware adapter: link, hold and encoders, or the playback of a log."""
+"""Service of a firmware adapter: link, hold and encoders, or the playback of a log."""
 
 from collections.abc import Callable
 from typing import Any
@@ -10,7 +10,7 @@ from lapwing.cosim.diagram.tick_schedule import InputPort
 from lapwing.kernels.cell import Cell
 from lapwing.messages import topics as topic
 from lapwing.services.common import ports
-from lapwing.services.common.command_encoder import actuators_wire, status_wire
+from lapwing.services.common.command_encoder import actuators_encoder, status_encoder
 from lapwing.services.common.firmware.block import FirmwareBlock
 from lapwing.services.common.firmware.exchange_block import ExchangeBlock
 from lapwing.services.common.firmware.hold import COMMAND, HeldState, Hold
@@ -33,7 +33,7 @@ def firmware_service(
         setup: run configuration of one vehicle.
         name: name of the service.
         create: class of the link.
-        recorded: messages of a log to fly again; None: fly the firmware.
+        recorded: messages of a log to resimulate; None: run the firmware.
     """
     config = setup.services[name]
     own: FirmwareSetup = config.parameters
@@ -44,17 +44,17 @@ def firmware_service(
         return service
     kind = ExchangeBlock if hasattr(create, "exchange") else FirmwareBlock
     link = kind(name, own, config.inputs, create)
-    none = (0.0,) * len(own.order)
-    parameters: Any = Hold(own.voltage_max, none)
+    zeros = (0.0,) * len(own.order)
+    parameters: Any = Hold(own.voltage_max, zeros)
     inputs = [InputPort(COMMAND), InputPort(ports.BATTERY)]
     if own.phases:
         parameters = HoldReference(parameters)
         inputs.append(InputPort(ports.TRAJECTORY))
     hold = Block(f"{name}.hold", parameters, Cell(HeldState(own.voltage_max)), tuple(inputs), config.ports)
     phases = own.phases or ("",)
-    wires = [
-        actuators_wire(setup.port(ports.ACTUATORS)),
-        status_wire(own.status_every, phases, link.words.table),
+    encoders = [
+        actuators_encoder(setup.port(ports.ACTUATORS)),
+        status_encoder(own.status_every, phases, link.status_texts.table),
         *([setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases)] if own.phases else []),
     ]
-    return Service(name, [link, hold], wires)
+    return Service(name, [link, hold], encoders)

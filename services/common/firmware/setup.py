@@ -28,7 +28,7 @@ class FirmwareSetup(NamedTuple):
     host: str
     port: int  # first port of its links; 0: the firmware's default, shifted by the instance
     instance: int  # from 0; -1: number of the vehicle
-    chooses: bool  # another instance may be taken if the ports of this one are in use
+    chooses: bool  # another instance is used if the ports of this one are in use
     start_timeout: float  # [s]
     step_timeout: float  # [s]
     parameters: dict[str, float]  # firmware parameters by name
@@ -62,7 +62,7 @@ def firmware_config(
         own: the adapter's own resolved values, a NamedTuple.
 
     Raises:
-        ConfigError: the airframe's rotors are not those that the firmware flies.
+        ConfigError: the airframe's rotors do not match the firmware's outputs.
     """
     table, frame, exchange = scene.section(TABLE), airframe(scene), scene[Communication]
     follows = follows_trajectory(scene)
@@ -119,7 +119,7 @@ def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[
 def first_free(setup: FirmwareSetup, count: int, claim: Callable[[FirmwareSetup], T]) -> tuple[FirmwareSetup, T]:
     """Return the configuration with the first instance whose ports are free, and the result of `claim`.
 
-    Runs side by side, as those of a campaign, get different instances in this way.
+    Runs side by side, as in a campaign, thus get different instances.
 
     Args:
         setup: configuration; its instance is the first that is tried, and the only one unless it `chooses`.

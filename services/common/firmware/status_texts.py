@@ -5,7 +5,7 @@ import re
 from lapwing.services.common.mavlink.dialect import mavlink
 
 BLOCKERS = 5  # last status texts kept while arming is rejected
-ACTIVATED = "Failsafe activated"  # status text beside an event that names cause and action
+ACTIVATED = "Failsafe activated"  # status text sent with an event that has cause and action
 FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNORECASE)  # in status texts
 
 
@@ -19,22 +19,22 @@ class StatusTexts:
     """
 
     def __init__(self) -> None:
-        """Create it without texts."""
+        """Create an empty record."""
         self.error = self.failsafe = ""
         self.blockers: list[str] = []
         self._has_event = False  # an event has named a failsafe
 
     def arm(self) -> None:
-        """Forget the failsafe and the reasons of before arming."""
+        """Clear the failsafe and the reasons from before arming."""
         self.failsafe = ""
         self.blockers.clear()
 
     def add_event(self, text: str) -> None:
-        """Take in the text of an event about a failsafe."""
+        """Store the text of an event about a failsafe."""
         self.failsafe, self._has_event = text, True
 
     def add(self, text: str, severity: int, armed: bool, is_arming: bool) -> None:
-        """Take in a status text of a MAV_SEVERITY."""
+        """Store a status text of a MAV_SEVERITY."""
         if severity <= mavlink.MAV_SEVERITY_ERROR:
             self.error = text
         if armed and FAILSAFE.search(text) and not (self._has_event and text.startswith(ACTIVATED)):

@@ -25,5 +25,5 @@ def name_of(number: int) -> str | None:
 
 
 def message_class(name: str) -> Any:
-    """Return the class of a message that pymavlink may lack; it takes the fields in the order of common.xml."""
+    """Return the class of a message that pymavlink may lack; arguments: the fields in the order of common.xml."""
     return mavlink.mavlink_map[_ids()[name]]

@@ -1,7 +1,7 @@
 """Messages of MAVLink's common set that pymavlink leaves out because they are marked as work in progress.
 
 PX4 sends them and QGroundControl reads them. Their fields are those of common.xml; the checksum seed follows from them.
-A pymavlink that has them keeps its own.
+If pymavlink has a message, its definition is used.
 """
 
 import struct
@@ -60,7 +60,7 @@ def _seed(name: str, ordered: list[_Field]) -> int:
 
 
 def _define(number: int, name: str, *texts: str) -> None:
-    """Add a message of these fields, in the order of common.xml."""
+    """Add a message with these fields, in the order of common.xml, unless pymavlink has it."""
     fields = [_parse(text) for text in texts]
     ordered = sorted(fields, key=lambda f: -struct.calcsize(_FORMATS[f.type]))  # stable
     unpacker = struct.Struct("<" + "".join(f.format for f in ordered))

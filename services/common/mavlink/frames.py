@@ -1,7 +1,7 @@
-"""World ENU and body FLU to and from MAVLink's NED and FRD, and floats to its whole numbers.
+"""Conversion of world ENU and body FLU to and from MAVLink's NED and FRD, and of floats to integer fields.
 
 NED is (north, east, down): C = [[0, 1, 0], [1, 0, 0], [0, 0, -1]] of ENU; FRD is D = diag(1, -1, -1) of FLU. Both are
-half turns, so the same functions lead there and back.
+half turns, so each function is its own inverse.
 """
 
 from lapwing.dynamics.vector import Vec3
@@ -22,7 +22,7 @@ def swap_body(v: Vec3) -> Vec3:
 
 
 def swap_yaw(yaw: float) -> float:
-    """Convert yaw from east, counterclockwise [rad], to heading from north, clockwise, or back; in (-pi, pi]."""
+    """Convert yaw from east, counterclockwise [rad], to heading from north, clockwise, and vice versa; in (-pi, pi]."""
     return wrap(0.5 * math.pi - yaw)
 
 
@@ -36,7 +36,7 @@ def wrap(angle: float) -> float:
 def swap_attitude(q: Quaternion) -> Quaternion:
     """Convert the attitude of FLU in ENU to that of FRD in NED, or back; the scalar part is not negative."""
     w, x, y, z = q
-    # (0, s, s, 0) * q * (0, 1, 0, 0), s = sqrt(1/2): C before, D behind
+    # (0, s, s, 0) * q * (0, 1, 0, 0), s = sqrt(1/2): C from the left, D from the right
     a, b, c, d = -_S * (x + y), _S * (w + z), _S * (w - z), _S * (y - x)
     return (b, -a, -d, c) if b > 0.0 else (-b, a, d, -c)
 
@@ -71,7 +71,7 @@ def saturate(value: float, bits: int, unsigned: bool = False, unknown: int | Non
     """Return the nearest integer that fits an integer field.
 
     Args:
-        value: in the field's unit.
+        value: value in the field's unit.
         bits: width of the field.
         unsigned: True for an unsigned field.
         unknown: result for a value that is not finite; None: the maximum.

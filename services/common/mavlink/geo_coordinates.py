@@ -9,10 +9,10 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import python_function
 from lapwing.services.common.mavlink.dialect import mavlink
 
-enu_to_geodetic = python_function(geodesy.enu_to_geodetic)  # the link's process runs nothing compiled
+enu_to_geodetic = python_function(geodesy.enu_to_geodetic)  # the link's process has no compiled code
 geodetic_to_enu = python_function(geodesy.geodetic_to_enu)
 
-NOT_GIVEN = 0x7FFFFFFF  # a coordinate that is not given, in messages of whole numbers
+UNSPECIFIED = 0x7FFFFFFF  # unspecified coordinate of integer messages
 
 ABOVE_SEA = {mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT}
 ABOVE_HOME = {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
@@ -22,7 +22,7 @@ class Datum(NamedTuple):
     """Reference of geographic coordinates and altitudes."""
 
     home: Home = Home()  # origin of the world frame
-    home_z: float = 0.0  # [m] world z from which relative altitudes count
+    home_z: float = 0.0  # [m] world z of relative altitude 0
     standing_height: float = 0.0  # [m] of the body frame's origin above the ground
 
 
@@ -31,7 +31,7 @@ def to_local(standing_height: float, position_world: Vec3) -> Vec3:
 
     Args:
         standing_height: height of the body frame's origin above the ground at the start [m].
-        position_world: [m].
+        position_world: world position [m].
     """
     x, y, z = position_world
     return y, x, standing_height - z
@@ -45,7 +45,7 @@ def from_local(standing_height: float, position_ned: Vec3) -> Vec3:
 
 def degrees(coordinate: int) -> float:
     """Convert a latitude or longitude from 1e-7 deg to deg; NaN if it is not specified."""
-    return math.nan if coordinate == NOT_GIVEN else coordinate * 1e-7
+    return math.nan if coordinate == UNSPECIFIED else coordinate * 1e-7
 
 
 def to_world(datum: Datum, frame: int, latitude: float, longitude: float, altitude: float) -> Vec3:
@@ -64,7 +64,7 @@ def to_world(datum: Datum, frame: int, latitude: float, longitude: float, altitu
     if frame not in ABOVE_SEA | ABOVE_HOME:
         raise ValueError(f"frame {frame}")
     if abs(latitude) > 90.0 or abs(longitude) > 180.0 or abs(altitude) > 1e5:  # NaN passes
-        raise ValueError(f"no place on Earth: {latitude}, {longitude}, {altitude}")
+        raise ValueError(f"not a position on Earth: {latitude}, {longitude}, {altitude}")
     home = datum.home
     height = altitude + (home.height + datum.home_z if frame in ABOVE_HOME else 0.0)
     if math.isnan(latitude) or math.isnan(longitude):

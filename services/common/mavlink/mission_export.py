@@ -1,4 +1,4 @@
-"""The autopilot's mission items as MAVLink messages: for missions that no endpoint of ours has uploaded."""
+"""Conversion of the autopilot's mission items to MAVLink messages, for missions that no endpoint has uploaded."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -9,8 +9,8 @@ from lapwing.services.common.mavlink.frames import saturate, swap_yaw
 from lapwing.services.common.mavlink.geo_coordinates import Datum, from_world
 
 GROUND_SPEED, NO_THROTTLE, DEFAULT_SPEED = 1.0, -1.0, -2.0  # parameters of DO_CHANGE_SPEED
-_PLACELESS = ("gripper", "return", "delay", "condition", "jump", "speed", "yaw")
-_NOWHERE = {"roi": mavlink.MAV_CMD_DO_SET_ROI_NONE}  # command of an action without a position
+_WITHOUT_POSITION = ("gripper", "return", "delay", "condition", "jump", "speed", "yaw")
+_POSITION_UNSET = {"roi": mavlink.MAV_CMD_DO_SET_ROI_NONE}  # command if the position is NaN
 _Params = tuple[float, ...]
 
 
@@ -65,16 +65,16 @@ def _item(number: int, item: Any, kind: int, datum: Datum) -> Any:
     command, parameters = _COMMANDS[item.action]
     if item.action == "condition" and item.radius > 0.0:
         command, parameters = mavlink.MAV_CMD_CONDITION_DISTANCE, lambda i: (i.radius,)
-    if item.action in _NOWHERE and math.isnan(item.position.x):
-        command = _NOWHERE[item.action]
+    if item.action in _POSITION_UNSET and math.isnan(item.position.x):
+        command = _POSITION_UNSET[item.action]
     params = (*parameters(item), 0.0, 0.0, 0.0, 0.0)[:4]
-    frame, place = _place(item, datum)
+    frame, place = _frame_and_position(item, datum)
     return mavlink.MAVLink_mission_item_int_message(0, 0, number, frame, command, 0, 1, *params, *place, kind)
 
 
-def _place(item: Any, datum: Datum) -> tuple[int, tuple[int, int, float]]:
+def _frame_and_position(item: Any, datum: Datum) -> tuple[int, tuple[int, int, float]]:
     """Return the MAV_FRAME and the position in it; an unspecified coordinate is 0, an unspecified altitude NaN."""
-    if item.action in _PLACELESS:
+    if item.action in _WITHOUT_POSITION:
         return mavlink.MAV_FRAME_MISSION, (0, 0, 0.0)
     frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
     x, y, z = item.position

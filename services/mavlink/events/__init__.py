@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from functools import cache
 
 from lapwing.dynamics import discovery
-from lapwing.services.mavlink.events.definition import DEFINITIONS, WATCHES, Definition, EventDetector
+from lapwing.services.mavlink.events.definition import DEFINITIONS, DETECTORS, Definition, EventDetector
 
-__all__ = ["Definition", "EventDetector", "definitions", "watches"]
+__all__ = ["Definition", "EventDetector", "definitions", "new_detectors"]
 
 
 @cache
@@ -16,7 +16,7 @@ def definitions() -> Mapping[str, Definition]:
     return DEFINITIONS
 
 
-def watches() -> list[EventDetector]:
+def new_detectors() -> list[EventDetector]:
     """Return new event detectors for a vehicle."""
     definitions()
-    return [kind() for kind in WATCHES]
+    return [kind() for kind in DETECTORS]

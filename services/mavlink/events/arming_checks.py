@@ -15,14 +15,14 @@ from lapwing.services.mavlink.events.definition import (
     Entry,
     Enumeration,
     Occurrence,
+    detector,
     event,
-    watch,
 )
 from lapwing.services.mavlink.telemetry.system_status import healthy, sensor_health
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-INTERVAL = 1_000_000_000  # [ns] between two looks at the sensors
-WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that can be entered where it is not known
+INTERVAL = 1_000_000_000  # [ns] between two checks of the sensors
+WITHOUT_POSITION = ("altitude_control", "stabilized", "acro")  # modes that need no position
 MODES = tuple(dict.fromkeys(mode.kind for mode in firmware.get("px4").MODES))
 _GPS = ("gps", "GPS")
 _OF_SOURCE = {  # PX4's names
@@ -79,7 +79,7 @@ def _check(name: str, message: str, *more: Argument) -> Definition:
 
 
 READINGS = _check("check_readings", "No good readings of the {3}", Argument("source", _SOURCE))
-FAILED = {  # by how its reason begins: the event, the component
+FAILED = {  # event and component by the beginning of the reason
     status_texts.NOT_STARTED: (_check("check_started", "The estimator has not started"), "attitude_estimate"),
     status_texts.POSITION_UNCERTAIN: (_check("check_position", "The position is uncertain"), "local_position_estimate"),
     status_texts.ATTITUDE_UNCERTAIN: (_check("check_attitude", "The attitude is uncertain"), "attitude_estimate"),
@@ -91,9 +91,9 @@ OTHER = _check("check_other", "The vehicle cannot be armed"), "none"
 _READINGS = {status_texts.NO_READINGS.format(source): source for source in SOURCES}
 
 
-@watch
-class ArmingWatch:
-    """Reports on every change, and to new endpoints."""
+@detector
+class ArmingDetector:
+    """Detector of changed arming checks, which also reports to new endpoints."""
 
     def __init__(self) -> None:
         self._announced: tuple = ()  # values whose change is reported immediately

@@ -20,7 +20,7 @@ EMERGENCY, CRITICAL, WARNING = (
     mavlink.MAV_SEVERITY_WARNING,
 )
 INFO = mavlink.MAV_SEVERITY_INFO
-PROTOCOL = 8  # not for people
+PROTOCOL = 8  # not displayed
 _COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 
 
@@ -29,7 +29,7 @@ class Entry(NamedTuple):
 
     value: int
     name: str
-    text: str  # for people
+    text: str  # displayed
 
 
 class Enumeration(NamedTuple):
@@ -42,14 +42,14 @@ class Enumeration(NamedTuple):
 
 
 class Argument(NamedTuple):
-    """A number that comes with an event."""
+    """Numeric argument of an event."""
 
     name: str
     type: str | Enumeration
 
     @property
     def base(self) -> str:
-        """The type that travels."""
+        """Type of the argument in messages."""
         return self.type.type if isinstance(self.type, Enumeration) else self.type
 
 
@@ -94,7 +94,7 @@ Kind = TypeVar("Kind", bound=Callable[[], EventDetector])
 
 DEFINITIONS: dict[str, Definition] = {}
 """All declared events by name."""
-WATCHES: list[Callable[[], EventDetector]] = []
+DETECTORS: list[Callable[[], EventDetector]] = []
 """Event detectors."""
 
 
@@ -113,7 +113,7 @@ def event(
     Args:
         name: unique name.
         kind: name in lapwing.services.common.event_kinds; determines the severity if `level` is None.
-        message: one line, with the arguments' places.
+        message: one line; "{1}" is the first argument.
         arguments: arguments in their order.
         level: MAV_SEVERITY, or PROTOCOL.
         group: group of libevents.
@@ -127,7 +127,7 @@ def event(
     return definition
 
 
-def watch(detector: Kind) -> Kind:
-    """Declare a class that detects events."""
-    WATCHES.append(detector)
-    return detector
+def detector(cls: Kind) -> Kind:
+    """Declare a class as a detector of events."""
+    DETECTORS.append(cls)
+    return cls

@@ -11,8 +11,8 @@ from lapwing.services.mavlink.events.definition import (
     Entry,
     Enumeration,
     Occurrence,
+    detector,
     event,
-    watch,
 )
 from lapwing.services.mavlink.events.flight import mode_number, mode_type
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
@@ -35,9 +35,9 @@ BATTERY = (
 )
 
 
-@watch
-class FailureWatch:
-    """Compares each status with the one before."""
+@detector
+class FailureDetector:
+    """Detector of failures in the autopilot's status."""
 
     def __init__(self) -> None:
         self._failsafe, self._motor, self._battery = "", 0, 0

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from lapwing.services.mavlink import firmware
-from lapwing.services.mavlink.events.definition import Argument, Entry, Enumeration, Occurrence, event, watch
+from lapwing.services.mavlink.events.definition import Argument, Entry, Enumeration, Occurrence, detector, event
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 ON_GROUND, NO_TAKEOFF, IN_AIR = range(3)
@@ -34,9 +34,9 @@ def mode_number(mode: str) -> int:
     return MODES.index(mode) if mode in MODES else UNKNOWN
 
 
-@watch
-class FlightWatch:
-    """Compares each status with the one before."""
+@detector
+class FlightDetector:
+    """Detector of changes of mode, landed state and arming state."""
 
     def __init__(self) -> None:
         self._armed, self._landed, self._mode = False, True, ""

@@ -1,4 +1,4 @@
-"""Emulated autopilot firmware: one module each, found by name."""
+"""Emulated autopilot firmware: a module for each, selected by name."""
 
 from collections.abc import Mapping, Sequence
 from typing import Protocol, cast
@@ -13,12 +13,12 @@ class Firmware(Protocol):
     """Interface of a firmware module."""
 
     AUTOPILOT: int  # MAV_AUTOPILOT
-    HOME_FIRST: bool  # whether item 0 of a mission is home
-    GUIDED: bool  # whether setpoints are followed without a mode of their own
+    HOME_FIRST: bool  # True if item 0 of a mission is home
+    GUIDED: bool  # True if setpoints are followed without an offboard mode
     EVENTS: bool  # True if its ground stations read events; otherwise they get texts only
-    TAKEOFF_ABOVE_SEA: bool  # whether a take-off's altitude counts from the sea level; else from home
+    TAKEOFF_ABOVE_SEA: bool  # True if a take-off's altitude is above sea level, otherwise above home
     PARAMETER_ENCODING: int  # MAV_PROTOCOL_CAPABILITY of the encoding of integer parameters
-    MODES: Sequence[FlightMode]  # that an operator may choose
+    MODES: Sequence[FlightMode]  # modes that an operator may select
     RATES: Mapping[str, float]  # rates of messages [Hz] that differ from the telemetry's table
 
     def facts(self, description: VehicleDescription) -> Sequence[Fact]:

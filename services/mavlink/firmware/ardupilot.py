@@ -1,4 +1,4 @@
-"""ArduPilot's copter: modes by number; whole numbers travel as floats of the same value."""
+"""ArduPilot's copter: modes by number; integers are sent as floats of the same value."""
 
 import math
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""PX4: a mode is main << 16 | sub << 24; whole numbers travel as their bytes."""
+"""PX4: a mode is main << 16 | sub << 24; integers are sent as their bytes."""
 
 import struct
 
@@ -19,7 +19,7 @@ def custom_mode(main: float, sub: float) -> int:
     return int(main) << 16 | int(sub) << 24
 
 
-MODES = (  # standard and advanced as PX4's lib/modes has them
+MODES = (  # standard and advanced as in PX4's lib/modes
     FlightMode("altitude_control", "Altitude", custom_mode(2, 0), mavlink.MAV_STANDARD_MODE_ALTITUDE_HOLD, False),
     FlightMode("position_control", "Position", custom_mode(3, 0), mavlink.MAV_STANDARD_MODE_POSITION_HOLD, False),
     FlightMode("stabilized", "Stabilized", custom_mode(7, 0)),
@@ -31,10 +31,10 @@ MODES = (  # standard and advanced as PX4's lib/modes has them
     FlightMode("takeoff", "Takeoff", custom_mode(4, 2), mavlink.MAV_STANDARD_MODE_TAKEOFF),
     FlightMode("land", "Land", custom_mode(4, 6), mavlink.MAV_STANDARD_MODE_LAND),
 )
-ORBIT = custom_mode(3, 1)  # that is entered by DO_ORBIT alone
+ORBIT = custom_mode(3, 1)  # entered by DO_ORBIT only
 _NUMBERS = {mode.kind: mode.number for mode in MODES} | {"orbit": ORBIT}
 _KINDS = {mode.number: mode.kind for mode in MODES} | {custom_mode(1, 0): "stabilized"}  # PX4's Manual of a multirotor
-_SHOWN_AS = {"goto": "hold", "descend": "land"}  # modes that PX4 has no number for
+_SHOWN_AS = {"goto": "hold", "descend": "land"}  # substitutes for modes without a number in PX4
 
 
 def mode_number(mode: str) -> int:

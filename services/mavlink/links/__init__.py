@@ -1,4 +1,4 @@
-"""Links to endpoints: one file for each kind, found by the scheme of its URL."""
+"""Links to endpoints: one file for each kind, selected by the scheme of the URL."""
 
 from functools import cache
 from selectors import BaseSelector

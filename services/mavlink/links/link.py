@@ -8,7 +8,7 @@ from typing import ClassVar
 
 from lapwing.services.mavlink.links.receiver import Receiver
 
-ROUND = 64  # pieces of bytes read from one socket before others get their turn
+ROUND = 64  # pieces of bytes read from one socket before the next socket is read
 PIECE = 2048  # [bytes] longest piece
 MAX_RATE = 2000.0  # [1/s] pieces that a link reads; more are dropped
 
@@ -49,7 +49,7 @@ class Link:
 
     @classmethod
     def for_vehicle_index(cls, rest: str, i: int) -> str:
-        """Return the rest of the URL for vehicle i (from 0): the next port if it listens, else the same."""
+        """Return the rest of the URL for vehicle i (from 0): the next port if the link listens, otherwise unchanged."""
         return next_port(rest, i) if cls.LISTENS else rest
 
     def may_read(self) -> bool:

@@ -1,10 +1,10 @@
-"""The adapter as links see it. They do not import it: a URL is checked without the MAVLink protocol."""
+"""Interface of the adapter for links, which do not import it, so that URLs are checked without pymavlink."""
 
 from collections import Counter
 from collections.abc import Callable
 from typing import Any, Protocol
 
-Endpoint = Any  # made by a receiver, opaque to links but for the time of its last message
+Endpoint = Any  # created by a receiver
 
 
 class Receiver(Protocol):

@@ -22,7 +22,7 @@ class Serial(Link):
     def for_vehicle_index(cls, rest: str, i: int) -> str:
         """Return the rest of the URL. Raise ValueError for a second vehicle."""
         if i:
-            raise ValueError(f"serial:{rest}: has room for one vehicle; expected udpout, udpin or tcpin")
+            raise ValueError(f"serial:{rest}: serves one vehicle; expected udpout, udpin or tcpin")
         return rest
 
     def __init__(self, rest: str, adapter: Receiver, selector: BaseSelector):

@@ -1,4 +1,4 @@
-"""UDP: to a ground station that listens on a port, or listening on a port for any endpoint."""
+"""UDP links: to one listening ground station, or listening on a port for any endpoint."""
 
 import socket
 import time

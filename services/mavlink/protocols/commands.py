@@ -1,4 +1,4 @@
-"""COMMAND_LONG and COMMAND_INT: by a rule for each command to the autopilot, its acknowledgement and progress back."""
+"""COMMAND_LONG and COMMAND_INT: a rule for each command, and acknowledgements with progress."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ class Command(NamedTuple):
     """Command of a COMMAND_LONG or COMMAND_INT."""
 
     number: int  # MAV_CMD
-    params: tuple[float, ...]  # the first four
+    params: tuple[float, ...]  # parameters 1 to 4
     frame: int
     latitude: float  # [deg], or another meaning of parameter 5
     longitude: float
@@ -82,20 +82,20 @@ def execute(session: Session, command: Command) -> None:
     elif command.number not in READ_ONLY and not session.trusted:
         outcome = DENIED
         if session.endpoint.last_heartbeat is None:
-            session.say("command rejected: send a HEARTBEAT first")
+            session.send_text("command rejected: send a HEARTBEAT first")
     else:
         try:
             outcome = function(session, command)
-        except (ValueError, OverflowError):  # a place that is none, a number that is not finite
+        except (ValueError, OverflowError):  # an invalid position, a non-finite number
             outcome = DENIED
-            session.count("senseless command")
+            session.count("invalid command")
 
     def acknowledge(result: int, progress: int = NO_PROGRESS) -> None:
         session.send(mavlink.MAVLink_command_ack_message(command.number, result, progress, 0, *session.address))
 
-    def on_acknowledgement(by_autopilot: Any) -> None:
-        progress = round(100.0 * by_autopilot.progress) if by_autopilot.result == IN_PROGRESS else NO_PROGRESS
-        acknowledge(by_autopilot.result, progress)
+    def on_acknowledgement(acknowledgement: Any) -> None:
+        progress = round(100.0 * acknowledgement.progress) if acknowledgement.result == IN_PROGRESS else NO_PROGRESS
+        acknowledge(acknowledgement.result, progress)
 
     if isinstance(outcome, Request):
         session.command(outcome.kind, outcome.values, on_acknowledgement)

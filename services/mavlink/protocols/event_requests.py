@@ -17,7 +17,7 @@ def request_events(session: Session, m: Any) -> None:
 
 @rule(mavlink.MAV_CMD_RUN_PREARM_CHECKS, changes=False)
 def report(session: Session, c: Command) -> Outcome:
-    """Ask for a report of the arming checks, which run all the time; it comes with the next status."""
+    """Request a report of the arming checks, which is sent with the next status."""
     if not session.vehicle.firmware.EVENTS:
         return UNSUPPORTED
     session.vehicle.report_requests += 1

@@ -1,6 +1,6 @@
-"""The command that injects failures."""
+"""Command that injects failures."""
 
-from lapwing.services.common.failure_types import UNITS, possible, refusal
+from lapwing.services.common.failure_types import UNITS, rejection_text, supported_types
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.protocols.commands import UNSUPPORTED, Command, Outcome, Request, rule
 from lapwing.services.mavlink.session import Session
@@ -22,11 +22,11 @@ _UNITS = {  # by FAILURE_UNIT
 @rule(mavlink.MAV_CMD_INJECT_FAILURE)
 def inject_failure(session: Session, c: Command) -> Outcome:
     """Inject a failure of a unit, or repair it."""
-    unit, kind = _UNITS.get(int(c.params[0])), int(c.params[1])  # our kinds bear the numbers of FAILURE_TYPE
+    unit, kind = _UNITS.get(int(c.params[0])), int(c.params[1])  # kinds have the numbers of FAILURE_TYPE
     if unit is None:
-        session.say(f"INJECT_FAILURE: unit {c.params[0]:.0f} unsupported")
+        session.send_text(f"INJECT_FAILURE: unit {c.params[0]:.0f} unsupported")
         return UNSUPPORTED
-    if kind not in possible(unit):
-        session.say(f"INJECT_FAILURE: type {kind} unsupported; {refusal(unit)}")
+    if kind not in supported_types(unit):
+        session.send_text(f"INJECT_FAILURE: type {kind} unsupported; {rejection_text(unit)}")
         return UNSUPPORTED
     return Request("inject_failure", (UNITS.index(unit), kind, *c.params[2:]))

@@ -1,4 +1,4 @@
-"""Commands that fly the vehicle: modes, arming, take-off and landing, places, missions, speed."""
+"""Flight commands: modes, arming, take-off and landing, positions, missions, speed."""
 
 import math
 from typing import Any
@@ -13,10 +13,10 @@ from lapwing.services.mavlink.session import Session
 
 @handles("SET_MODE")
 def set_mode(session: Session, m: Any) -> None:
-    """Change the mode by the deprecated message, which is not acknowledged."""
+    """Handle SET_MODE, the deprecated message without acknowledgement."""
     kind = session.vehicle.firmware.mode_kind(m.custom_mode)
     if kind is None:
-        session.say(f"no flight mode {m.custom_mode}")
+        session.send_text(f"no flight mode {m.custom_mode}")
     elif session.trusted:
         session.command(kind)
 
@@ -26,11 +26,11 @@ def do_set_mode(session: Session, c: Command) -> Outcome:
     """Enter a custom flight mode."""
     firmware = session.vehicle.firmware
     if not int(c.params[0]) & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        session.say("flight modes only by their custom numbers")
+        session.send_text("flight modes only by their custom numbers")
         return UNSUPPORTED
     kind = firmware.mode_kind(firmware.custom_mode(c.params[1], c.params[2]))
     if kind is None:
-        session.say(f"no flight mode {c.params[1]:.0f}, {c.params[2]:.0f}")
+        session.send_text(f"no flight mode {c.params[1]:.0f}, {c.params[2]:.0f}")
         return UNSUPPORTED
     return Request(kind)
 
@@ -44,7 +44,7 @@ def do_set_standard_mode(session: Session, c: Command) -> Outcome:
     return Request(kind) if kind else UNSUPPORTED
 
 
-SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; nothing measures the air's
+SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; airspeed is not controlled
 DEFAULT_ORBIT_SPEED = 1.0  # [m/s]
 FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's parameter to skip the arming checks
 
@@ -71,42 +71,42 @@ def takeoff(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
 def land(session: Session, c: Command) -> Outcome:
-    """Land where the vehicle is."""
+    """Land at the current position."""
     return Request("land")
 
 
 @rule(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
 def return_(session: Session, c: Command) -> Outcome:
-    """Return to where home is, and land."""
+    """Fly to the home position and land."""
     return Request("return")
 
 
 @rule(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
 def loiter(session: Session, c: Command) -> Outcome:
-    """Hold the present position."""
+    """Hold the current position."""
     return Request("hold")
 
 
 @rule(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
 def pause(session: Session, c: Command) -> Outcome:
-    """Continue the mission if the first parameter is 1; otherwise hold the present position."""
+    """Continue the mission if the first parameter is 1; otherwise hold the current position."""
     return Request("mission", (math.nan,)) if c.params[0] == 1.0 else Request("hold")
 
 
 @rule(mavlink.MAV_CMD_DO_REPOSITION)
 def reposition(session: Session, c: Command) -> Outcome:
-    """Fly to a position; unspecified coordinates keep their present values. Yaw is a heading [rad]."""
+    """Fly to a position; unspecified coordinates keep their current values. Yaw is a heading [rad]."""
     estimate = session.vehicle.estimate
-    there = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
+    target = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
     yaw = swap_yaw(c.params[3])
-    if estimate is None or all(map(math.isnan, there)):
-        return Request("hold", (yaw,))  # a heading alone turns it on the spot
-    place = [
-        here if math.isnan(requested) else requested
-        for here, requested in zip(estimate.position_world, there, strict=True)
+    if estimate is None or all(map(math.isnan, target)):
+        return Request("hold", (yaw,))  # a heading without a position: turn in place
+    position = [
+        current if math.isnan(requested) else requested
+        for current, requested in zip(estimate.position_world, target, strict=True)
     ]
     speed = c.params[0] if c.params[0] > 0.0 else math.nan
-    return Request("goto", (*place, yaw, speed))
+    return Request("goto", (*position, yaw, speed))
 
 
 @rule(mavlink.MAV_CMD_DO_ORBIT)
@@ -115,8 +115,8 @@ def orbit(session: Session, c: Command) -> Outcome:
     radius, speed, behaviour, turns = c.params
     x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
     clockwise = math.copysign(1.0, radius) * math.copysign(1.0, speed) > 0.0
-    pace = DEFAULT_ORBIT_SPEED if math.isnan(speed) else abs(speed)
-    return Request("orbit", (x, y, z, abs(radius), -pace if clockwise else pace, behaviour, turns))
+    magnitude = DEFAULT_ORBIT_SPEED if math.isnan(speed) else abs(speed)
+    return Request("orbit", (x, y, z, abs(radius), -magnitude if clockwise else magnitude, behaviour, turns))
 
 
 @rule(mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI)
@@ -136,7 +136,7 @@ def no_roi(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_SET_HOME)
 def set_home(session: Session, c: Command) -> Outcome:
-    """Return to where it is, or to a place."""
+    """Set home to the current position or to another one."""
     if c.params[0] == 1.0:
         return Request("set_home")
     x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
@@ -149,21 +149,21 @@ def set_home(session: Session, c: Command) -> Outcome:
 def gripper(session: Session, c: Command) -> Outcome:
     """Release the payload; it cannot be grabbed again."""
     if not session.vehicle.description.gripper:
-        session.say("DO_GRIPPER: there is no payload to release")
+        session.send_text("DO_GRIPPER: the vehicle has no payload")
         return UNSUPPORTED
     return Request("gripper", (0.0,)) if c.params[1] == mavlink.GRIPPER_ACTION_RELEASE else UNSUPPORTED
 
 
 @rule(mavlink.MAV_CMD_DO_CHANGE_ALTITUDE)
 def change_altitude(session: Session, c: Command) -> Outcome:
-    """Change the altitude here; the second parameter is its frame."""
+    """Change the altitude at the current position; the second parameter is its frame."""
     _, _, height = to_world(session.vehicle.datum, int(c.params[1]), math.nan, math.nan, c.params[0])
     return Request("goto", (math.nan, math.nan, height))
 
 
 @rule(mavlink.MAV_CMD_CONDITION_YAW)
 def turn(session: Session, c: Command) -> Outcome:
-    """Turn on the spot to a heading [deg], or by an angle in a direction."""
+    """Turn in place to a heading [deg], or by an angle in a direction."""
     heading, relative = math.radians(c.params[0]), c.params[3] == 1.0
     if relative:
         estimate = session.vehicle.estimate
@@ -185,9 +185,9 @@ def set_mission_current(session: Session, c: Command) -> Outcome:
 
 @rule(mavlink.MAV_CMD_DO_CHANGE_SPEED)
 def change_speed(session: Session, c: Command) -> Outcome:
-    """Fly at another speed over the ground; -1 changes nothing, -2 is the parameter's again."""
+    """Fly at another speed over the ground; -1 leaves it unchanged, -2 restores that of the parameter."""
     if int(c.params[0]) not in (SPEED_AIR, SPEED_GROUND):
-        session.say("DO_CHANGE_SPEED: only the speed over the ground")
+        session.send_text("DO_CHANGE_SPEED: only the speed over the ground")
         return UNSUPPORTED
     if c.params[1] == DEFAULT_SPEED:
         return Request("speed", (math.nan,))

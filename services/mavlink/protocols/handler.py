@@ -9,7 +9,7 @@ from lapwing.services.mavlink.session import Session
 Handler = Callable[[Session, Any], None]
 
 HANDLERS: dict[int, Handler] = {}
-"""The handlers that have been declared, by the number of their message."""
+"""Declared handlers by message number."""
 
 
 def handles(*names: str) -> Callable[[Handler], Handler]:

@@ -26,12 +26,12 @@ def stop(session: Session, m: Any) -> None:
 
 
 @handles("LOG_ERASE")
-def refuse_to_erase(session: Session, m: Any) -> None:
+def reject_erasure(session: Session, m: Any) -> None:
     """Reject the erasure of the run's log with a text."""
-    session.say("LOG_ERASE: the log of a run cannot be erased")
+    session.send_text("LOG_ERASE: the log of a run cannot be erased")
 
 
 @handles("SERIAL_CONTROL")
-def refuse_console(session: Session, m: Any) -> None:
+def reject_console(session: Session, m: Any) -> None:
     """Answer a console request with an empty reply: the vehicle has no console."""
     session.send(mavlink.MAVLink_serial_control_message(m.device, mavlink.SERIAL_CONTROL_FLAG_REPLY, 0, 0, 0, [0] * 70))

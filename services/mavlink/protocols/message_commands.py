@@ -1,4 +1,4 @@
-"""Commands about messages: how often one is sent, and a request for one."""
+"""Commands for message intervals and single messages."""
 
 import math
 

@@ -14,7 +14,7 @@ EXACT = 1e7  # [1/deg] resolution of MISSION_ITEM_INT
 
 @handles("MISSION_COUNT")
 def count(session: Session, m: Any) -> None:
-    """Begin an upload of `count` items; denied to endpoints that are not trusted."""
+    """Start an upload of `count` items; denied to endpoints that are not trusted."""
     if session.trusted:
         session.missions.begin(session.endpoint, m.mission_type, m.count)
     else:
@@ -25,7 +25,7 @@ def count(session: Session, m: Any) -> None:
 def item_int(session: Session, m: Any) -> None:
     """Handle an item of an upload or, from ArduPilot's ground stations, a position to fly to."""
     if m.current not in (GUIDED, GUIDED_ALTITUDE):
-        session.missions.take(session.endpoint, m)
+        session.missions.add_item(session.endpoint, m)
         return
     try:
         x, y, z = to_world(session.vehicle.datum, m.frame, degrees(m.x), degrees(m.y), m.z)
@@ -36,12 +36,12 @@ def item_int(session: Session, m: Any) -> None:
         _reply(session, m.mission_type, mavlink.MAV_MISSION_DENIED)
         return
 
-    def acknowledged(a: Any) -> None:
-        accepted = a.result == mavlink.MAV_RESULT_ACCEPTED
+    def on_acknowledgement(acknowledgement: Any) -> None:
+        accepted = acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED
         _reply(session, m.mission_type, mavlink.MAV_MISSION_ACCEPTED if accepted else mavlink.MAV_MISSION_DENIED)
 
     altitude_only = m.current == GUIDED_ALTITUDE
-    session.command("goto", (math.nan if altitude_only else x, math.nan if altitude_only else y, z), acknowledged)
+    session.command("goto", (math.nan if altitude_only else x, math.nan if altitude_only else y, z), on_acknowledgement)
 
 
 @handles("MISSION_ITEM")
@@ -80,12 +80,12 @@ def request_item(session: Session, m: Any) -> None:
     i = items[m.seq]
     fields = i.command, int(session.vehicle.status.mission_current == m.seq), i.autocontinue
     params = i.param1, i.param2, i.param3, i.param4
-    to = *session.address, m.seq, i.frame
+    target = *session.address, m.seq, i.frame
     if m.get_type() == "MISSION_REQUEST_INT":
-        reply = mavlink.MAVLink_mission_item_int_message(*to, *fields, *params, i.x, i.y, i.z, m.mission_type)
+        reply = mavlink.MAVLink_mission_item_int_message(*target, *fields, *params, i.x, i.y, i.z, m.mission_type)
     else:
         position = i.x / EXACT, i.y / EXACT, i.z
-        reply = mavlink.MAVLink_mission_item_message(*to, *fields, *params, *position, m.mission_type)
+        reply = mavlink.MAVLink_mission_item_message(*target, *fields, *params, *position, m.mission_type)
     session.send(reply)
 
 

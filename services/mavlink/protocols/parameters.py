@@ -20,5 +20,5 @@ def request_read(session: Session, m: Any) -> None:
 
 @handles("PARAM_SET")
 def set_(session: Session, m: Any) -> None:
-    """Ask the autopilot for another value of a parameter."""
+    """Request another value of a parameter from the autopilot."""
     session.parameters.set(session.endpoint, m.param_id, m.param_value, m.param_type, session.trusted)

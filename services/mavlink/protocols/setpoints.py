@@ -24,8 +24,8 @@ _LOCAL = _BODY | _FROM_HERE | {mavlink.MAV_FRAME_LOCAL_NED}
 FORCE = mavlink.POSITION_TARGET_TYPEMASK_FORCE_SET
 IGNORE_YAW = mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 IGNORE_YAW_RATE = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
-THRUST_BODY = 1 << 5  # ATTITUDE_TARGET_TYPEMASK_THRUST_BODY_SET, which pymavlink leaves out
-CENTRE = 500.0  # of the throttle stick, which is the only one from 0 to 1000
+THRUST_BODY = 1 << 5  # ATTITUDE_TARGET_TYPEMASK_THRUST_BODY_SET, which pymavlink lacks
+CENTRE = 500.0  # of the throttle stick, whose range is 0 to 1000
 _GUIDED = ("hold", "goto", "offboard")  # modes that ArduPilot's GUIDED covers
 
 
@@ -49,7 +49,7 @@ def local_target(session: Session, m: Any) -> None:
     """Handle SET_POSITION_TARGET_LOCAL_NED: setpoints relative to the local origin or the vehicle."""
     estimate = session.vehicle.estimate
     if m.coordinate_frame not in _LOCAL or estimate is None:
-        _refuse(session, f"SET_POSITION_TARGET_LOCAL_NED: frame {m.coordinate_frame} unsupported")
+        _reject(session, f"SET_POSITION_TARGET_LOCAL_NED: frame {m.coordinate_frame} unsupported")
         return
     position = apply_mask(m.type_mask, 0, m.x, m.y, m.z)
     velocity = apply_mask(m.type_mask, 3, m.vx, m.vy, m.vz)
@@ -62,9 +62,9 @@ def local_target(session: Session, m: Any) -> None:
     if m.coordinate_frame in _FROM_HERE:
         n, e, d = estimate.position_ned
         position = position[0] + n, position[1] + e, position[2] + d
-    turned = heading if session.vehicle.firmware.GUIDED and m.coordinate_frame in _BODY else 0.0
+    yaw_reference = heading if session.vehicle.firmware.GUIDED and m.coordinate_frame in _BODY else 0.0
     position_world = from_local(session.vehicle.description.standing_height, position)
-    _put(session, m, position_world, velocity, acceleration, turned)
+    _put(session, m, position_world, velocity, acceleration, yaw_reference)
 
 
 @handles("SET_POSITION_TARGET_GLOBAL_INT")
@@ -72,7 +72,7 @@ def global_target(session: Session, m: Any) -> None:
     """Handle SET_POSITION_TARGET_GLOBAL_INT: setpoints with a geographic position."""
     estimate = session.vehicle.estimate
     if m.coordinate_frame not in ABOVE_SEA | ABOVE_HOME or estimate is None:
-        _refuse(session, f"SET_POSITION_TARGET_GLOBAL_INT: frame {m.coordinate_frame} unsupported")
+        _reject(session, f"SET_POSITION_TARGET_GLOBAL_INT: frame {m.coordinate_frame} unsupported")
         return
     latitude, longitude, altitude = apply_mask(m.type_mask, 0, degrees(m.lat_int), degrees(m.lon_int), m.alt)
     if math.isnan(latitude) != math.isnan(longitude):
@@ -81,7 +81,7 @@ def global_target(session: Session, m: Any) -> None:
     try:
         position_world = to_world(session.vehicle.datum, m.coordinate_frame, latitude, longitude, altitude)
     except ValueError:
-        _refuse(session, "SET_POSITION_TARGET_GLOBAL_INT: no place on Earth")
+        _reject(session, "SET_POSITION_TARGET_GLOBAL_INT: invalid position")
         return
     velocity = apply_mask(m.type_mask, 3, m.vx, m.vy, m.vz)
     acceleration = apply_mask(m.type_mask, 6, m.afx, m.afy, m.afz)
@@ -93,18 +93,18 @@ def _unless(ignored: int, value: float) -> float:
 
 
 def _put(
-    session: Session, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3, turned: float = 0.0
+    session: Session, m: Any, position_world: Vec3, velocity: Vec3, acceleration: Vec3, yaw_reference: float = 0.0
 ) -> None:
-    """Send a setpoint; velocity and acceleration in NED, `turned` [rad] is the reference of its yaw."""
-    yaw = swap_yaw(turned + _unless(m.type_mask & IGNORE_YAW, m.yaw))
+    """Send a setpoint; velocity and acceleration in NED, yaw relative to `yaw_reference` [rad]."""
+    yaw = swap_yaw(yaw_reference + _unless(m.type_mask & IGNORE_YAW, m.yaw))
     rate = -_unless(m.type_mask & IGNORE_YAW_RATE, m.yaw_rate)
     values = (*position_world, *swap_world(velocity), *swap_world(acceleration), yaw, rate)
     if m.type_mask & FORCE:
-        _refuse(session, f"{m.get_type()}: forces unsupported")
+        _reject(session, f"{m.get_type()}: forces unsupported")
     elif all(map(math.isnan, values)):
-        _refuse(session, f"{m.get_type()}: nothing to follow")
+        _reject(session, f"{m.get_type()}: nothing to follow")
     elif session.vehicle.firmware.GUIDED and all(map(math.isnan, (*values[3:9], rate))):
-        if _follows_setpoint(session, m):  # ArduPilot flies to a place that is sent once
+        if _follows_setpoint(session, m):  # ArduPilot flies to a position that is sent once
             _send(session, m, "goto", (*position_world, yaw))
     else:
         _send(session, m, "offboard_position", values)
@@ -116,16 +116,16 @@ def attitude_target(session: Session, m: Any) -> None:
     ignored = m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_ATTITUDE_IGNORE
     norm = math.sqrt(sum(e * e for e in m.q))
     if not ignored and not 0.5 < norm < 2.0:  # NaN fails too
-        _refuse(session, "SET_ATTITUDE_TARGET: no attitude")
+        _reject(session, "SET_ATTITUDE_TARGET: no attitude")
         return
     unit = (math.nan,) * 4 if ignored else swap_attitude(tuple(e / norm for e in m.q))  # type: ignore[arg-type]
     rates = apply_mask(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
     if ignored and all(map(math.isnan, rates)):
-        _refuse(session, "SET_ATTITUDE_TARGET: nothing to follow")
+        _reject(session, "SET_ATTITUDE_TARGET: nothing to follow")
         return
     thrust, climb_rate = _unless(m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE, m.thrust), 0.0
     if m.type_mask & THRUST_BODY:
-        _refuse(session, "SET_ATTITUDE_TARGET: thrust_body unsupported")
+        _reject(session, "SET_ATTITUDE_TARGET: thrust_body unsupported")
         return
     if session.vehicle.firmware.GUIDED and not math.isnan(thrust):
         climb_rate = (2.0 * thrust - 1.0) * session.parameters.value("MPC_Z_VEL_MAX_UP")
@@ -148,7 +148,7 @@ def _stick(value: float) -> float:
 
 def _send(session: Session, m: Any, kind: str, values: tuple[float, ...]) -> None:
     if any(map(math.isinf, values)):
-        _refuse(session, f"{m.get_type()}: not finite")
+        _reject(session, f"{m.get_type()}: not finite")
         return
     guided = session.vehicle.firmware.GUIDED
     if not session.trusted or (guided and not _follows_setpoint(session, m)):
@@ -166,10 +166,10 @@ def _follows_setpoint(session: Session, m: Any) -> bool:
     status = session.vehicle.status
     if status.mode in _GUIDED and not status.landed:
         return True
-    _refuse(session, f"{m.get_type()}: only in GUIDED, flying")
+    _reject(session, f"{m.get_type()}: only in GUIDED, flying")
     return False
 
 
-def _refuse(session: Session, reason: str) -> None:
-    session.count("senseless setpoint")
-    session.say(reason)
+def _reject(session: Session, reason: str) -> None:
+    session.count("invalid setpoint")
+    session.send_text(reason)

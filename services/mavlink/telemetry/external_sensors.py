@@ -11,10 +11,10 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 CENTIMETRE = 0.01
 SONAR_ID, RANGEFINDER_ID = 0, 1
-SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] that an airspeed is indicated for
+SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] reference of indicated airspeed
 EIGHTH = 45.0  # [deg] between two of MAV_SENSOR_ROTATION's headings
-QUALITY = 255  # of a flow that is seen
-NO_ROTATION = (0.0, 0.0, 0.0, 0.0)  # of an orientation that has a name
+QUALITY = 255  # of a measured flow
+NO_ROTATION = (0.0, 0.0, 0.0, 0.0)  # for a named orientation
 DOWN = (mavlink.MAV_SENSOR_ROTATION_PITCH_270, NO_ROTATION)
 
 
@@ -50,7 +50,7 @@ def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaterni
     """Return the MAV_SENSOR_ORIENTATION of a ray, and for a custom one the rotation in FRD from x to the ray.
 
     Args:
-        azimuth_deg: from body x towards y (left).
+        azimuth_deg: from body x direction y (left).
         elevation_deg: above the body's xy plane.
     """
     if abs(elevation_deg) == 90.0:
@@ -68,12 +68,12 @@ def distance_sensors(v: VehicleCache) -> Any:
     if (sonar := v.get(SONAR)) is not None:
         messages.append(_distance(v, sonar, SONAR_ID, mavlink.MAV_DISTANCE_SENSOR_ULTRASOUND, DOWN))
     if (laser := v.get(RANGEFINDER)) is not None:
-        towards = orientation(*v.description.ray_deg)
-        messages.append(_distance(v, laser, RANGEFINDER_ID, mavlink.MAV_DISTANCE_SENSOR_LASER, towards))
+        direction = orientation(*v.description.ray_deg)
+        messages.append(_distance(v, laser, RANGEFINDER_ID, mavlink.MAV_DISTANCE_SENSOR_LASER, direction))
     return [message for message in messages if message is not None]
 
 
-def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[int, Quaternion]) -> Any:
+def _distance(v: VehicleCache, m: Any, number: int, kind: int, direction: tuple[int, Quaternion]) -> Any:
     if math.isnan(m.range):
         return None
     minimum, maximum = (saturate(metres / CENTIMETRE, 16, unsigned=True) for metres in (m.min_range, m.max_range))
@@ -85,11 +85,11 @@ def _distance(v: VehicleCache, m: Any, number: int, kind: int, towards: tuple[in
         min(distance, 0xFFFF),
         kind,
         number,
-        towards[0],
+        direction[0],
         saturate(m.variance / CENTIMETRE**2, 8, unsigned=True),
         m.field_of_view,
         m.field_of_view,
-        list(towards[1]),
+        list(direction[1]),
     )
 
 
@@ -106,11 +106,11 @@ def optical_flow(v: VehicleCache) -> Any:
         v.boot_us,
         0,
         round(1e6 * interval),
-        interval * flow_x,  # about FRD's x, and about its y, which points the other way than FLU's
+        interval * flow_x,  # about FRD's x, and about its y, which is opposite to FLU's
         -interval * flow_y,
         interval * turn_x,
         -interval * turn_y,
-        0.0,  # its gyroscopes are those of x and y
+        0.0,  # no gyroscope about z
         0,
         QUALITY if is_good else 0,
         0,

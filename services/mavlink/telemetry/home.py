@@ -11,7 +11,7 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 # Outputs of the estimator: attitude, velocities, position relative and absolute, height; nothing over terrain.
-_GIVEN = (
+_OUTPUTS = (
     mavlink.ESTIMATOR_ATTITUDE
     | mavlink.ESTIMATOR_VELOCITY_HORIZ
     | mavlink.ESTIMATOR_VELOCITY_VERT
@@ -53,5 +53,5 @@ def estimator_status(v: VehicleCache) -> Any:
         return None
     spread = math.hypot(e.position_std.x, e.position_std.y)
     return mavlink.MAVLink_estimator_status_message(
-        v.boot_us, 0 if e.health_flags else _GIVEN, *(0.0,) * 6, spread, e.position_std.z
+        v.boot_us, 0 if e.health_flags else _OUTPUTS, *(0.0,) * 6, spread, e.position_std.z
     )

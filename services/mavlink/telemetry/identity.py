@@ -19,7 +19,7 @@ _CAPABILITIES = (
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
 )
-VERSION = (1 << 24) | (16 << 16) | (0 << 8) | 255  # of the PX4 that is emulated: 1.16.0, a release
+VERSION = (1 << 24) | (16 << 16) | (0 << 8) | 255  # emulated PX4: release 1.16.0
 MAVLINK_1, MAVLINK_2 = 100, 200  # protocol versions
 CHANNELS, NO_CHANNEL, NO_SIGNAL_STRENGTH = 18, 0xFFFF, 255
 
@@ -27,11 +27,11 @@ CHANNELS, NO_CHANNEL, NO_SIGNAL_STRENGTH = 18, 0xFFFF, 255
 @stream("AUTOPILOT_VERSION")
 def autopilot_version(v: VehicleCache) -> Any:
     """Return the capabilities, including the encoding of integer parameters."""
-    nobody = [0] * 8
+    zeros = [0] * 8
     return mavlink.MAVLink_autopilot_version_message(
         _CAPABILITIES | v.firmware.PARAMETER_ENCODING,
         *(VERSION, VERSION, VERSION, 0),
-        *(nobody, nobody, nobody),
+        *(zeros, zeros, zeros),
         *(0, 0, v.description.system_id),
     )
 
@@ -39,16 +39,16 @@ def autopilot_version(v: VehicleCache) -> Any:
 @stream("PROTOCOL_VERSION")
 def protocol_version(v: VehicleCache) -> Any:
     """Return version 2, with version 1 as the minimum."""
-    nobody = [0] * 8
-    return message_class("PROTOCOL_VERSION")(MAVLINK_2, MAVLINK_1, MAVLINK_2, nobody, nobody)
+    zeros = [0] * 8
+    return message_class("PROTOCOL_VERSION")(MAVLINK_2, MAVLINK_1, MAVLINK_2, zeros, zeros)
 
 
 @stream("COMPONENT_METADATA")
 def metadata(v: VehicleCache) -> Any:
     """Return the URI of the general metadata file, which names the others."""
     general = component_metadata.files(v.description)[component_metadata.GENERAL]
-    place = component_metadata.uri(component_metadata.GENERAL).encode()
-    return message_class("COMPONENT_METADATA")(v.boot_ms, crc32(general), place)
+    uri = component_metadata.uri(component_metadata.GENERAL).encode()
+    return message_class("COMPONENT_METADATA")(v.boot_ms, crc32(general), uri)
 
 
 @stream("RC_CHANNELS")

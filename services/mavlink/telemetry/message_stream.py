@@ -13,7 +13,7 @@ class Stream(NamedTuple):
     """Message that is sent periodically, or on request only if its rates are 0."""
 
     name: str
-    ground: float  # [Hz] to a ground station, as PX4 sends it there
+    ground: float  # [Hz] to a ground station, as in PX4
     onboard: float  # [Hz] to a companion computer
     build: Builder
 
@@ -33,16 +33,16 @@ STREAMS: dict[int, Stream] = {}
 """Streams by message id, without messages that the dialect lacks."""
 
 
-Requested = Callable[[VehicleCache, float], list[Any]]  # the messages for parameter 2 of the request
+RequestBuilder = Callable[[VehicleCache, float], list[Any]]  # returns the messages for parameter 2 of the request
 
-ON_REQUEST: dict[int, Requested] = {}
+ON_REQUEST: dict[int, RequestBuilder] = {}
 """Messages that are sent on request only and depend on a parameter of it, by number."""
 
 
-def on_request(name: str) -> Callable[[Requested], Requested]:
+def on_request(name: str) -> Callable[[RequestBuilder], RequestBuilder]:
     """Declare the builder of messages that the second parameter of a request selects."""
 
-    def declare(build: Requested) -> Requested:
+    def declare(build: RequestBuilder) -> RequestBuilder:
         number = id_of(name)
         if number is not None:
             ON_REQUEST[number] = build
@@ -52,7 +52,7 @@ def on_request(name: str) -> Callable[[Requested], Requested]:
 
 
 def stream(name: str, ground: float = 0.0, onboard: float | None = None) -> Callable[[Builder], Builder]:
-    """Declare the builder of a message; `onboard` is `ground` where it is left out."""
+    """Declare the builder of a message; `onboard` defaults to `ground`."""
 
     def declare(build: Builder) -> Builder:
         number = id_of(name)

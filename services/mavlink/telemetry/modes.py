@@ -26,9 +26,9 @@ def available_modes(v: VehicleCache, index: float) -> list[Any]:
     messages = []
     for number, mode in enumerate(modes, start=1):
         if desired in (0, number):
-            named = mode.standard == mavlink.MAV_STANDARD_MODE_NON_STANDARD  # the others bear their standard's name
+            has_name = mode.standard == mavlink.MAV_STANDARD_MODE_NON_STANDARD  # others have a standard name
             properties = mavlink.MAV_MODE_PROPERTY_ADVANCED if mode.advanced else 0
-            name = mode.name.encode() if named else b""
+            name = mode.name.encode() if has_name else b""
             messages.append(
                 mavlink.MAVLink_available_modes_message(
                     len(modes), number, mode.standard, mode.number, properties, name

@@ -10,7 +10,7 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import motor_fractions
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-_NO_OFFSET = (0.0, 0.0, 0.0, 0.0)  # of the axes that a display shows from those of the vehicle
+_NO_OFFSET = (0.0, 0.0, 0.0, 0.0)  # rotation of the displayed axes from those of the vehicle
 
 
 @stream("ATTITUDE", 50.0)

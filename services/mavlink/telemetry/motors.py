@@ -10,13 +10,13 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 BATCH = 4  # motors of one message
-RPM = 60.0 / math.tau  # of 1 rad/s
+RPM = 60.0 / math.tau  # [1/min] per rad/s
 SERIAL = 1  # ESC_CONNECTION_TYPE_SERIAL
 UNKNOWN_TEMPERATURE = 0x7FFF
 
 
-def _pad(values: Any, nothing: Any) -> list[Any]:
-    return [*list(values)[:BATCH], *[nothing] * (BATCH - min(BATCH, len(values)))]
+def _pad(values: Any, filler: Any) -> list[Any]:
+    return [*list(values)[:BATCH], *[filler] * (BATCH - min(BATCH, len(values)))]
 
 
 @stream("ESC_STATUS", 1.0, 10.0)
@@ -33,7 +33,7 @@ def esc_status(v: VehicleCache) -> Any:
 
 @stream("ESC_INFO", 1.0, 1.0)
 def esc_info(v: VehicleCache) -> Any:
-    """Return the present speed controllers, all without a fault."""
+    """Return the available speed controllers, all without faults."""
     truth = v.get(TRUTH)
     if truth is None or not truth.rotor_speed:
         return None

@@ -18,12 +18,12 @@ LEVEL_DEG = 2.5  # [deg] elevation up to which a point of a cloud is an obstacle
 
 
 def sector_distances(azimuth: np.ndarray, distance: np.ndarray, most: float) -> list[int]:
-    """Return the least distance [cm] of each sector, clockwise from ahead; one above `most` where it is free.
+    """Return the smallest distance [cm] of each sector, clockwise from ahead; one above `most` where it is free.
 
     Args:
         azimuth: (n,) [rad] from body x towards y (left).
         distance: (n,) [m], inf or NaN without a return.
-        most: [m] greatest range.
+        most: maximum range [m].
     """
     sector = np.round(-np.degrees(azimuth) / WIDTH_DEG).astype(int) % SECTORS
     nearest = np.full(SECTORS, np.inf)

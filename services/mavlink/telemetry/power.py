@@ -10,9 +10,9 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 PULSE_MIN, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
-OUTPUTS, ACTUATORS_MAX = 8, 32  # that SERVO_OUTPUT_RAW and ACTUATOR_OUTPUT_STATUS have room for
-CELLS, MORE_CELLS = 10, 4  # that BATTERY_STATUS has room for in its two lists
-EMPTY = 0xFFFF  # a cell that is not there, in the first list; in the second it is 0
+OUTPUTS, ACTUATORS_MAX = 8, 32  # outputs in SERVO_OUTPUT_RAW and ACTUATOR_OUTPUT_STATUS
+CELLS, MORE_CELLS = 10, 4  # cells in the two lists of BATTERY_STATUS
+EMPTY = 0xFFFF  # absent cell of the first list; in the second list it is 0
 _STATES = (
     mavlink.MAV_BATTERY_CHARGE_STATE_OK,
     mavlink.MAV_BATTERY_CHARGE_STATE_LOW,
@@ -62,7 +62,7 @@ def battery_status(v: VehicleCache) -> Any:
         return None
     cells = [saturate(1e3 * u, 16, unsigned=True) for u in b.cell_voltage] or [saturate(1e3 * b.voltage, 16, True)]
     first, more = cells[:CELLS], cells[CELLS:][:MORE_CELLS]
-    known = math.isfinite(b.percentage)
+    is_known = math.isfinite(b.percentage)
     used = 1e3 * (b.design_capacity - b.charge)  # [mA h]
     return mavlink.MAVLink_battery_status_message(
         0,
@@ -74,7 +74,7 @@ def battery_status(v: VehicleCache) -> Any:
         saturate(used, 32, unknown=-1),
         -1,
         remaining_charge(b),
-        charge_state=_STATES[v.status.battery_warning] if known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED,
+        charge_state=_STATES[v.status.battery_warning] if is_known else mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED,
         voltages_ext=more + [0] * (MORE_CELLS - len(more)),
     )
 

@@ -101,8 +101,8 @@ def gps_raw(v: VehicleCache) -> Any:
     """Return the receiver's fix; without a receiver, the estimated position."""
     if not v.description.sensors:
         return _estimated_fields(v)
-    fix, moving = v.get(GPS), v.get(GPS_VELOCITY)
-    if fix is None or moving is None:
+    fix, twist = v.get(GPS), v.get(GPS_VELOCITY)
+    if fix is None or twist is None:
         return None
     details = v.get(GPS_DETAILS)
     if not good_gps(v):
@@ -111,16 +111,16 @@ def gps_raw(v: VehicleCache) -> Any:
         return mavlink.MAVLink_gps_raw_int_message(
             v.boot_us, mavlink.GPS_FIX_TYPE_NO_FIX, 0, 0, 0, *(UNKNOWN_16,) * 4, visible
         )
-    east, north, _ = moving.twist.twist.linear
+    east, north, _ = twist.twist.twist.linear
     spread = math.sqrt(fix.position_covariance[0]), math.sqrt(fix.position_covariance[8])
-    place = (fix.latitude, fix.longitude, fix.altitude)
+    position = (fix.latitude, fix.longitude, fix.altitude)
     velocity = (north, east)
     if details is None or details.status.status not in DETAILED_FIX_TYPES:
-        return _fix(v, FIX_TYPES[fix.status.status], place, velocity, spread, moving.twist.covariance[0])
+        return _fix(v, FIX_TYPES[fix.status.status], position, velocity, spread, twist.twist.covariance[0])
     kind = DETAILED_FIX_TYPES[details.status.status]
     dilution = [saturate(100.0 * d, 16, unsigned=True) if d > 0.0 else UNKNOWN_16 for d in (details.hdop, details.vdop)]
     satellites = details.status.satellites_visible or UNKNOWN_8
-    return _fix(v, kind, place, velocity, spread, moving.twist.covariance[0], dilution, satellites)
+    return _fix(v, kind, position, velocity, spread, twist.twist.covariance[0], dilution, satellites)
 
 
 def _satellites(v: VehicleCache) -> int:
@@ -138,15 +138,15 @@ def _estimated_fields(v: VehicleCache) -> Any:
 def _fix(
     v: VehicleCache,
     fix_type: int,
-    place: Any,
-    moving: Any,
+    position: Any,
+    velocity: Any,
     spread: tuple[float, float],
     speed_variance: float,
     dilution: Sequence[int] = (100, 100),  # of precision, in hundredths
     satellites: int | None = None,
 ) -> Any:
-    latitude, longitude, altitude = place
-    north, east = moving
+    latitude, longitude, altitude = position
+    north, east = velocity
     height = saturate(altitude * 1e3, 32)
     return mavlink.MAVLink_gps_raw_int_message(
         v.boot_us,
@@ -166,5 +166,5 @@ def _fix(
 
 @stream("VIBRATION", 0.5, 0.5)
 def vibration(v: VehicleCache) -> Any:
-    """Return no vibration, which the model does not have but displays expect."""
+    """Return zero vibration: it is not modelled, but displays expect the message."""
     return mavlink.MAVLink_vibration_message(v.boot_us, 0.0, 0.0, 0.0, 0, 0, 0)

@@ -70,5 +70,5 @@ def attitude_target(v: VehicleCache) -> Any:
         return None
     attitude = swap_attitude(from_euler(*actuators.attitude_reference))
     fractions = motor_fractions(v)
-    thrust = sum(f * f for f in fractions) / max(1, len(fractions))  # static thrust goes with the square of the voltage
+    thrust = sum(f * f for f in fractions) / max(1, len(fractions))  # static thrust grows with the squared voltage
     return mavlink.MAVLink_attitude_target_message(v.boot_ms, _RATES_IGNORED, list(attitude), 0.0, 0.0, 0.0, thrust)

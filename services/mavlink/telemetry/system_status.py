@@ -14,7 +14,7 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.mavlink.vehicle_type import vehicle_type
 
 NONE = 0xFFFF  # no item of a mission
-MANUAL = ("position_control", "altitude_control", "stabilized", "acro")  # modes under the sticks
+MANUAL = ("position_control", "altitude_control", "stabilized", "acro")  # modes flown with the sticks
 CRITICAL = 2  # Status.battery_warning
 
 _CONTROL = (
@@ -26,7 +26,7 @@ _CONTROL = (
     | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
     | mavlink.MAV_SYS_STATUS_LOGGING
 )
-_SENSORS = {  # with the name that the estimator has for them
+_SENSORS = {  # validity check, and name of the source in the estimator
     mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: (good_imu, "imu"),
     mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: (good_mag, "magnetometer"),
     mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: (good_baro, "barometer"),
@@ -39,7 +39,7 @@ _OPTIONAL = {  # by sensor; reported only if one of the sensors is fitted
 }
 
 
-_BETWEEN = {  # ground and air, by the mode or the item of a mission
+_TRANSITIONS = {  # landed state between ground and air, by mode or mission item
     "takeoff": mavlink.MAV_LANDED_STATE_TAKEOFF,
     mavlink.MAV_CMD_NAV_TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
     mavlink.MAV_CMD_NAV_VTOL_TAKEOFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
@@ -97,15 +97,15 @@ def sys_status(v: VehicleCache) -> Any:
     """Return presence and health of the sensors, arming permission, and battery."""
     present = _CONTROL | mavlink.MAV_SYS_STATUS_AHRS | mavlink.MAV_SYS_STATUS_PREARM_CHECK
     present |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
-    sound = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
-    sound |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
-    sound &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else sound
+    health = _CONTROL | mavlink.MAV_SYS_STATUS_GEOFENCE
+    health |= mavlink.MAV_SYS_STATUS_SENSOR_BATTERY if v.status.battery_warning < CRITICAL else 0
+    health &= ~mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS if v.status.failed_motor else health
     for _, bits, good in sensor_health(v):
         present |= bits
-        sound |= bits if good else 0
-    sound |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
-    sound |= 0 if v.status.arming_blockers else mavlink.MAV_SYS_STATUS_PREARM_CHECK
-    return mavlink.MAVLink_sys_status_message(present, present, sound, 0, *power(v), *(0,) * 6)
+        health |= bits if good else 0
+    health |= mavlink.MAV_SYS_STATUS_AHRS if healthy(v) else 0
+    health |= 0 if v.status.arming_blockers else mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    return mavlink.MAVLink_sys_status_message(present, present, health, 0, *power(v), *(0,) * 6)
 
 
 @stream("EXTENDED_SYS_STATE", 1.0, 5.0)
@@ -116,8 +116,8 @@ def extended_state(v: VehicleCache) -> Any:
         state = mavlink.MAV_LANDED_STATE_ON_GROUND
     else:
         items = v.mission() if s.mode == "mission" else ()
-        doing = items[s.mission_current].command if s.mission_current < len(items) else s.mode
-        state = _BETWEEN.get(doing, mavlink.MAV_LANDED_STATE_IN_AIR)
+        activity = items[s.mission_current].command if s.mission_current < len(items) else s.mode
+        state = _TRANSITIONS.get(activity, mavlink.MAV_LANDED_STATE_IN_AIR)
     return mavlink.MAVLink_extended_sys_state_message(mavlink.MAV_VTOL_STATE_UNDEFINED, state)
 
 

@@ -42,7 +42,7 @@ def read_state(data):
 
 
 class ArduPilotPeer:
-    """One scripted ArduPilot."""
+    """Scripted ArduPilot."""
 
     def __init__(self, port, host="127.0.0.1"):
         """Open a socket that sends to the simulator's port."""
@@ -57,7 +57,7 @@ class ArduPilotPeer:
         self._socket.sendto(data, self._address)
 
     def receive(self, timeout=RESEND):
-        """Return the next state message, None if none comes."""
+        """Return the next state message, None if none arrives."""
         self._socket.settimeout(timeout)
         try:
             return self._socket.recv(65536)

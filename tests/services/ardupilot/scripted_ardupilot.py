@@ -1,4 +1,4 @@
-"""Program that stands for ArduPilot in whole runs: climbs to 2 m, descends and ends its motors.
+"""Replacement of ArduPilot in complete runs: climbs to 2 m, descends and stops the motors.
 
 It is started as `python scripted_ardupilot.py --instance N ...`. With `--die` it ends in the air.
 """
@@ -11,11 +11,11 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.services.ardupilot.peer import ArduPilotPeer
 
-HOVER, HEIGHT = 0.62, 2.0  # duty that carries the vehicle; [m]
+HOVER, HEIGHT = 0.62, 2.0  # duty in hover; [m]
 
 
 def main():
-    """Fly."""
+    """Run the flight."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--instance", type=int)
     parser.add_argument("--die", action="store_true")

@@ -12,13 +12,13 @@ from lapwing.services.ardupilot.decimal_text import LIMIT, write_number
 
 
 @kernel
-def written(out, value, decimals, scale):
+def write(out, value, decimals, scale):
     return write_number(out, 0, value, decimals, scale)
 
 
 def text(value, decimals=9):
     out = np.zeros(40, np.uint8)
-    return out[: written(out, value, decimals, 10**decimals)].tobytes().decode()
+    return out[: write(out, value, decimals, 10**decimals)].tobytes().decode()
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def text(value, decimals=9):
         (899999999.5, "899999999.5"), (1234.5, "1234.5"),
     ],
 )  # fmt: skip
-def test_number_is_shortest_text_of_its_digits(value, result):
+def test_number_has_no_trailing_zeros(value, result):
     assert text(value) == result
 
 

@@ -1,4 +1,4 @@
-"""Whole runs with ArduPilot in the autopilot's place: a scripted program, or the real one (LAPWING_ARDUCOPTER)."""
+"""Complete runs with ArduPilot as the autopilot: a scripted program, or the real one (LAPWING_ARDUCOPTER)."""
 
 import json
 import os
@@ -19,7 +19,7 @@ PEER = Path(__file__).parent / "scripted_ardupilot.py"
 
 
 def run(command, *options, timeout=900):
-    """Run the scene with a program in ArduPilot's place."""
+    """Run the scene with a program as ArduPilot."""
     instance = free_instance((socket.SOCK_DGRAM, PORT, STRIDE), (socket.SOCK_STREAM, MAVLINK_PORT, STRIDE))
     arguments = [sys.executable, "-m", "lapwing", "run", "ardupilot_quad", "--mode", "single-process"]
     arguments += ["--set", f"autopilot.command={json.dumps(command)}", "--set", f"autopilot.instance={instance}"]
@@ -39,7 +39,7 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
 
 
 @pytest.mark.long
-def test_program_that_ends_in_flight_is_named(tmp_path):
+def test_program_end_in_flight_is_reported(tmp_path):
     flights = run([sys.executable, str(PEER), "--die"], "--log", str(tmp_path / "flight.mcap"))
     assert flights.returncode != 0
     assert "ardupilot: the program ended (exit code 1) at t = 4.00" in flights.stderr
@@ -52,7 +52,7 @@ def test_slow_exchange_is_rejected():
         resolve(load("ardupilot_quad", ["communication.rate=250"]))
 
 
-def test_missing_imu_is_named():
+def test_missing_imu_is_rejected():
     with pytest.raises(ConfigError, match="needs an IMU"):
         resolve(load("ardupilot_quad", ["ardupilot.inertial=sensors"]))
 

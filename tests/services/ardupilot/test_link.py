@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from lapwing.services.ardupilot.link import FORGOTTEN, MAVLINK_PORT, PORT, STRIDE, ArduPilotLink
+from lapwing.services.ardupilot.link import MAVLINK_PORT, PEER_TIMEOUT, PORT, STRIDE, ArduPilotLink
 from lapwing.services.ardupilot.resolve import ArduPilotSetup
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.link import FirmwareError
@@ -30,11 +30,11 @@ def link():
     link.close()
 
 
-def fly(link, steps, begin=0):
-    return [link.steps.step(tick) for tick in range(begin, begin + steps)]
+def fly(link, steps, first=0):
+    return [link.steps.step(tick) for tick in range(first, first + steps)]
 
 
-def begun(link, script):
+def begin(link, script):
     """Run a script with a peer in the background, and open the link."""
     peer = ArduPilotPeer(link.address[1])
     background = Background(script, peer)
@@ -46,7 +46,7 @@ def test_every_step_is_answered(link):
     def script(peer):
         return [peer.exchange((1000 + k,) * 4 + (0,) * 12) for k in range(101)]
 
-    background = begun(link, script)
+    background = begin(link, script)
     outputs = fly(link, 100)
     link._send()  # answers the last frame
     states = background.join()
@@ -58,7 +58,7 @@ def test_every_step_is_answered(link):
 
 
 def test_clock_of_whole_microseconds_does_not_drift(link):
-    """ArduPilot adds the difference of two timestamps to a clock of whole microseconds, and cuts the rest."""
+    """ArduPilot adds the difference of two timestamps to a clock of whole microseconds, and truncates the rest."""
 
     def script(peer):
         clock, last = 0, 0.0
@@ -67,7 +67,7 @@ def test_clock_of_whole_microseconds_does_not_drift(link):
             clock, last = int(clock + (time_s - last) * 1e6), time_s
         return clock
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 2000)
     link._send()
     assert background.join() in (1999 * 4000, 2000 * 4000)
@@ -84,7 +84,7 @@ def test_resent_frame_is_answered_without_step(link):
         peer.exchange()
         return states
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 2)
     link._send()
     states = background.join()
@@ -92,8 +92,8 @@ def test_resent_frame_is_answered_without_step(link):
     assert link.report.resent == 2
 
 
-def test_frame_resent_before_its_answer_delays_no_later_step(link):
-    """ArduPilot takes each datagram as the answer to its newest frame."""
+def test_frame_resent_before_answer_does_not_delay_later_steps(link):
+    """Check that each frame has one answer: ArduPilot uses each datagram for its newest frame."""
 
     def script(peer):
         peer.exchange()
@@ -101,14 +101,14 @@ def test_frame_resent_before_its_answer_delays_no_later_step(link):
             peer.send(servo_packet(1))
         return [peer.exchange()["timestamp"][0] for _ in range(5)]
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 5)
     link._send()
     assert background.join() == pytest.approx([0.004 * k for k in (1, 2, 3, 4, 4)], abs=1e-6)
     assert link.report.resent == 2
 
 
-def test_malformed_packets_are_counted_and_named(link):
+def test_malformed_packets_are_counted_and_reported(link):
     def script(peer):
         peer.exchange()
         for data in (b"x", servo_packet(9, magic=1), servo_packet(9)[:-1], servo_packet(9, (65535,) * 16)):
@@ -116,7 +116,7 @@ def test_malformed_packets_are_counted_and_named(link):
         peer.exchange()
         peer.exchange()
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 2)
     link._send()
     background.join()
@@ -132,14 +132,14 @@ def test_restart_with_same_address_is_counted(link):
         for _ in range(5):
             peer.exchange()
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 9)
     link._send()
     background.join()
     assert link.report.reconnected == 1
 
 
-def test_second_firmware_is_rejected_while_first_lives(link):
+def test_second_firmware_is_rejected_while_first_runs(link):
     def script(peer):
         peer.exchange()
         other = ArduPilotPeer(link.address[1])
@@ -149,7 +149,7 @@ def test_second_firmware_is_rejected_while_first_lives(link):
         peer.exchange()
         return other.receive(0.1)
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 2)
     link._send()
     assert background.join() is None
@@ -162,16 +162,16 @@ def test_restarted_firmware_with_new_address_takes_over(link):
         peer.exchange()
         peer.exchange()
         peer.close()
-        time.sleep(FORGOTTEN + 0.1)
+        time.sleep(PEER_TIMEOUT + 0.1)
         other = ArduPilotPeer(link.address[1])
         return [other.exchange() for _ in range(3)]
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 4)
     link._send()
     states = background.join()
     assert link.report.reconnected == 1
-    assert states[0]["timestamp"][0] >= 0.004 - 1e-6  # the plant goes on where it was
+    assert states[0]["timestamp"][0] >= 0.004 - 1e-6  # the plant continues from its state
 
 
 def test_restarted_firmware_is_connected_to_before_its_first_frame(link):
@@ -188,22 +188,22 @@ def test_restarted_firmware_is_connected_to_before_its_first_frame(link):
                 return [other.exchange() for _ in range(3)]
 
     link._setup = link._setup._replace(step_timeout=15.0)
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 4)
     link._send()
     background.join()
     assert link.report.reconnected == 1
 
 
-def test_stall_is_named(link):
+def test_stall_is_reported(link):
     link._setup = link._setup._replace(step_timeout=0.5)
-    background = begun(link, lambda peer: peer.exchange())
+    background = begin(link, lambda peer: peer.exchange())
     with pytest.raises(FirmwareError, match=r"ardupilot: no servo packet for 0.5 s at t = 0.00[04] s"):
         fly(link, 3)
     background.join()
 
 
-def test_absent_firmware_is_named(link):
+def test_absent_firmware_is_reported(link):
     link._setup = link._setup._replace(start_timeout=0.5)
     with pytest.raises(FirmwareError, match=r"no servo packet for 0.5 s at t = 0.000 s; start arducopter"):
         link.open(never)
@@ -219,22 +219,22 @@ def test_mavlink_port_is_tried_until_it_listens(link):
             server.accept()[0].close()
         return peer.exchange()
 
-    begun(link, script)
+    begin(link, script)
 
 
-def test_port_in_use_is_named(link):
+def test_port_in_use_is_reported(link):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(link.address)
         with pytest.raises(FirmwareError, match=r"cannot listen on udp 127.0.0.1:.*in use"):
             link.open(never)
 
 
-def test_slow_loop_rate_is_noted(link):
-    begun(link, lambda peer: peer.exchange(rate=400))
+def test_slow_loop_rate_is_reported(link):
+    begin(link, lambda peer: peer.exchange(rate=400))
     assert "SIM_RATE_HZ is 400" in link.report.notes[0]
 
 
 def test_non_finite_state_ends_run(link):
-    begun(link, lambda peer: peer.exchange())
+    begin(link, lambda peer: peer.exchange())
     with pytest.raises(ValueError, match="not finite"):
         link.steps.step(0, truth=TrueState(position_world=(math.nan, 0.0, 0.0)))

@@ -23,14 +23,14 @@ def yawed(yaw):
 
 
 @kernel
-def written(out, time, state, extras):
+def write(out, time, state, extras):
     return write_state(out, time, state, extras)
 
 
 def encode(time, state, extras=NO_EXTRAS):
     """Return the message."""
     out = np.zeros(2048, np.uint8)
-    size = written(out, time, state, extras)
+    size = write(out, time, state, extras)
     return out[:size].tobytes() if size != INVALID else None
 
 
@@ -67,7 +67,7 @@ def test_servo_packet_of_16_and_32_channels():
         (packet(pwm=(65535,) * 16), "pulse width of 65535 us"),
     ],
 )
-def test_malformed_servo_packet_names_fault(data, message):
+def test_malformed_servo_packet_is_rejected(data, message):
     with pytest.raises(ValueError, match=message):
         decode(data)
 
@@ -119,7 +119,7 @@ def test_attitude_maps_specific_force_to_gravity():
         np.testing.assert_allclose(world, (0.0, 0.0, -9.81), atol=1e-6)
 
 
-def test_message_has_no_space_and_frames_itself():
+def test_message_has_no_spaces_and_ends_with_newline():
     data = encode(12.345678901, VehicleState(), Extras((1.0, math.inf, 2.5), 3.0, 11.1, 4.0))
     assert data.startswith(b"\n{")
     assert data.endswith(b"}\n")
@@ -131,8 +131,8 @@ def test_message_has_no_space_and_frames_itself():
     assert result["battery"] == {"voltage": 11.1, "current": 4}
 
 
-def test_keys_are_no_prefix_of_later_sections():
-    """ArduPilot finds a key by its first occurrence as a part of the text."""
+def test_keys_are_not_prefixes_of_later_sections():
+    """Check the keys in the text, where ArduPilot searches their first occurrence."""
     text = encode(1.0, VehicleState(), Extras((1.0,) * 6, 3.0, 11.1, 4.0)).decode()
     for key in ("timestamp", "imu", "gyro", "accel_body", "position", "quaternion", "velocity", "airspeed", "battery"):
         assert text.count(key) == 1

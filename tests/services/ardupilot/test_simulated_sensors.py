@@ -17,7 +17,7 @@ OWN = ArduPilotSetup(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False, Tru
 
 
 class Transport:
-    """Link to a firmware that sends one heartbeat and stores the parameters that it gets."""
+    """Link to a firmware that sends one heartbeat and stores the parameters that it receives."""
 
     where = "a test"
 
@@ -39,8 +39,8 @@ class Transport:
                 self.parameters.append((message.param_id, round(message.param_value, 3)))
 
 
-def flown(times, gps=True, charge=math.nan, throttle=0.0):
-    """Return the parameters that are set at `times`; `gps(t)`: the receiver has a fix."""
+def fly(times, gps=True, charge=math.nan, throttle=0.0):
+    """Return the parameters set at `times`; `gps(t)`: True if the receiver has a fix."""
     transport = Transport()
     client = MissionClient(transport, CONVENTIONS, (), {})
     sensors = SimulatedSensors(OWN, client)
@@ -53,23 +53,23 @@ def flown(times, gps=True, charge=math.nan, throttle=0.0):
     return transport.parameters
 
 
-def test_gps_outage_disables_receiver_and_its_end_enables_it():
-    result = flown((0.0, 1.0, 2.0, 3.0, 4.0), gps=lambda t: t not in (2.0, 3.0))
+def test_gps_outage_disables_receiver_until_end():
+    result = fly((0.0, 1.0, 2.0, 3.0, 4.0), gps=lambda t: t not in (2.0, 3.0))
     assert result == [("SIM_GPS_DISABLE", 1.0), ("SIM_GPS1_ENABLE", 0.0),
                       ("SIM_GPS_DISABLE", 0.0), ("SIM_GPS1_ENABLE", 1.0)]  # fmt: skip
 
 
-def test_outage_before_connection_is_set_later():
-    assert flown((0.0, 1.0), gps=False) == [("SIM_GPS_DISABLE", 1.0), ("SIM_GPS1_ENABLE", 0.0)]
+def test_outage_before_connection_is_sent_after_connection():
+    assert fly((0.0, 1.0), gps=False) == [("SIM_GPS_DISABLE", 1.0), ("SIM_GPS1_ENABLE", 0.0)]
 
 
 def test_battery_voltage_is_set_every_fifth_of_second():
-    result = flown((0.0, 0.1, 0.2, 0.35, 0.4), charge=0.5, throttle=0.5)
+    result = fly((0.0, 0.1, 0.2, 0.35, 0.4), charge=0.5, throttle=0.5)
     assert result == [("SIM_BATT_VOLTAGE", 11.35)] * 2  # ArduPilot subtracts 0.7 V times the throttle
 
 
-def test_battery_that_no_effect_models_is_left_to_ardupilot():
-    assert flown((0.0, 1.0, 2.0)) == []
+def test_battery_without_effect_is_left_to_ardupilot():
+    assert fly((0.0, 1.0, 2.0)) == []
 
 
 def test_receiver_of_scene_is_an_input():

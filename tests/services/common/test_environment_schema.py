@@ -41,7 +41,7 @@ def test_all_services_share_environment():
     filter_ = setup.services["autopilot"].parameters.estimator
     assert (filter_.home, filter_.atmosphere, filter_.gravity) == (around.home, around.atmosphere, around.gravity)
     assert filter_.magnetic_field_world == around.magnetic_field_world != STANDARD.magnetic_field_world
-    assert filter_.sonar_height_max == 0.0  # the filter takes the ground for level
+    assert filter_.sonar_height_max == 0.0  # the filter assumes level ground
     assert setup.auxiliary["mavlink"].home == around.home
     assert setup.auxiliary["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
 
@@ -100,7 +100,10 @@ def test_recorded_scene_needs_no_terrain_file(tmp_path):
             {"terrain": {"grid": {"heights": [[0.0, 1.0], [0.0, 1.0]], "reach": 5.0}}},
             "grid.reach: needs a GeoTIFF",
         ),
-        ({"terrain": {"steps": {"distance": [1.0], "rise": []}}}, "steps.rise: expected one for each of the 1, got 0"),
+        (
+            {"terrain": {"steps": {"distance": [1.0], "rise": []}}},
+            "steps.rise: expected one for each distance (1), got 0",
+        ),
     ],
 )
 def test_invalid_environment_is_rejected(table, message):
@@ -113,7 +116,7 @@ def test_invalid_environment_is_rejected(table, message):
 def test_start_inside_obstacle_is_rejected():
     pillar = {"environment.terrain.cylinder": [{"position": [0.0, 0.0], "radius": 0.1, "top": 0.6}]}
     with pytest.raises(
-        SceneError, match=r"environment.terrain: buries the start: the vehicle's \(0, 0, 0\) m would be"
+        SceneError, match=r"environment.terrain: buries the start: the vehicle's point \(0, 0, 0\) m would be"
     ):
         resolve(load("hover", pillar))
 
@@ -126,7 +129,7 @@ def test_start_inside_obstacle_is_rejected():
     ],
 )
 def test_start_on_wall_is_rejected(terrain):
-    with pytest.raises(SceneError, match=r"environment.terrain: no room .* it would lean by 8\d degrees"):
+    with pytest.raises(SceneError, match=r"environment.terrain: no room .* it would tilt by 8\d degrees"):
         resolve(load("hover", {"environment.terrain": terrain}))
 
 

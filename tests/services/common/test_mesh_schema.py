@@ -1,4 +1,4 @@
-"""Airframe mesh: file formats, and the way from file to report."""
+"""Airframe mesh: file formats, and their use in the report."""
 
 import base64
 import json
@@ -17,7 +17,7 @@ from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.view3d.vehicle_bodies import motion
 from tests.studies import synthetic_flights
 
-# A pyramid on a square, its top off the middle: no two axes can be mistaken for one another.
+# A pyramid on a square with an eccentric apex, so that swapped axes are detected.
 CORNERS = np.array([(0, 0, 0), (0.4, 0, 0), (0.4, 0.3, 0), (0, 0.3, 0), (0.1, 0.05, 0.2)], np.float32)
 FACES = [(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]
 VOLUME = 0.4 * 0.3 * 0.2 / 3.0
@@ -45,9 +45,9 @@ def obj():
 
 
 def gltf(scale=1.0, **changes):
-    """The pyramid in a node that is moved, turned by 90 degrees about y (up) and scaled; y is up, z ahead."""
+    """Return the pyramid in a node that is moved, turned by 90 degrees about y (up) and scaled; y up, z forward."""
     ahead, left, up = CORNERS.T
-    turned = np.column_stack([-ahead, up, left]) / scale - np.array([0.0, 1.0, 0.0])  # undone by the node
+    turned = np.column_stack([-ahead, up, left]) / scale - np.array([0.0, 1.0, 0.0])  # inverse of the node's transform
     points = turned.astype("<f4").tobytes()
     rows = np.array(FACES, "<u2").tobytes()
     half = 0.5**0.5
@@ -73,7 +73,7 @@ def gltf(scale=1.0, **changes):
     return tree, points + rows
 
 
-def embedded(tree, binary):
+def with_embedded_buffer(tree, binary):
     uri = "data:application/octet-stream;base64," + base64.b64encode(binary).decode()
     return json.dumps({**tree, "buffers": [{"uri": uri, "byteLength": len(binary)}]}).encode()
 
@@ -99,13 +99,13 @@ def volume(mesh):
         ("b.stl", ascii_stl()),
         ("c.obj", obj()),
         ("d.glb", glb(*gltf())),
-        ("e.gltf", embedded(*gltf(scale=0.5))),
+        ("e.gltf", with_embedded_buffer(*gltf(scale=0.5))),
     ],
 )
 def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
     mesh = read(tmp_path / name)
-    assert len(mesh.vertices) == len(CORNERS)  # corners at the same place are one
+    assert len(mesh.vertices) == len(CORNERS)  # equal corners are merged
     assert volume(mesh) == pytest.approx(VOLUME, rel=1e-6)
     assert sorted(map(tuple, mesh.vertices.round(6))) == sorted(map(tuple, CORNERS.round(6)))
     again = unpack(pack(mesh))

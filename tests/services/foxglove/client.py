@@ -7,7 +7,7 @@ import socket
 from contextlib import suppress
 
 CLOSE, PONG = 8, 10  # kinds of frames
-PATIENCE = 0.05  # [s] for a pong, which a server does not give that waits for the rest of a frame
+PATIENCE = 0.05  # [s] for a pong; a server that waits for the rest of a frame sends none
 
 
 class Client:
@@ -15,8 +15,8 @@ class Client:
 
     def __init__(self, port, timeout=30.0):
         self._socket = socket.create_connection(("127.0.0.1", port), timeout=timeout)
-        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # else a frame waits 40 ms behind others
-        self._received = b""  # and not yet read
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)  # otherwise a frame waits 40 ms
+        self._received = b""  # bytes not yet read
         self._pings = 0
         key = base64.b64encode(os.urandom(16)).decode()
         lines = ["GET / HTTP/1.1", f"Host: 127.0.0.1:{port}", "Upgrade: websocket", "Connection: Upgrade"]
@@ -28,7 +28,7 @@ class Client:
         assert b" 101 " in answer, answer
 
     def next(self):
-        """A text as JSON has it, or bytes; None at the end."""
+        """Return the next message: decoded JSON or bytes; None at the end."""
         while True:
             try:
                 kind, data = self._frame()
@@ -39,13 +39,13 @@ class Client:
             if kind in (1, 2):
                 return json.loads(data) if kind == 1 else data
 
-    def say(self, **message):
+    def send_json(self, **message):
         data = json.dumps(message).encode()
         assert len(data) < 65536
         self.send(bytes([0x81, 0xFE]) + len(data).to_bytes(2, "big") + bytes(4) + data)
 
     def send(self, data):
-        """Bytes as they are."""
+        """Send bytes unchanged."""
         self._socket.sendall(data)
 
     def answers(self):
@@ -62,7 +62,9 @@ class Client:
         number = self._pings.to_bytes(4, "big")
         try:
             self.send(data + bytes([0x89, 0x84, *bytes(4)]) + number)
-            if hasattr(socket, "TCP_QUICKACK"):  # else a second answer waits 40 ms for the first one's confirmation
+            if hasattr(
+                socket, "TCP_QUICKACK"
+            ):  # otherwise a second answer waits 40 ms for the acknowledgement of the first
                 self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_QUICKACK, 1)
             while (frame := self._frame()) != (PONG, number):
                 if frame[0] == CLOSE:
@@ -72,7 +74,7 @@ class Client:
         return True
 
     def end(self, data):
-        """Send these bytes and no more, and read until the server closes, too."""
+        """Send these bytes, close the sending side, and read until the server closes."""
         with suppress(EOFError, ConnectionError):
             self.send(data)
             self._socket.shutdown(socket.SHUT_WR)
@@ -83,18 +85,18 @@ class Client:
         self._socket.close()
 
     def subscribe(self, *topics):
-        """All of these are advertised, and subscribed to by their place."""
+        """Wait until all topics are advertised, and subscribe to them with their index as id."""
         channels = {}
         while not set(topics) <= set(channels):
             message = self.next()
             if isinstance(message, dict) and message["op"] == "advertise":
                 channels |= {channel["topic"]: channel for channel in message["channels"]}
         expected = [{"id": k, "channelId": channels[topic]["id"]} for k, topic in enumerate(topics)]
-        self.say(op="subscribe", subscriptions=expected)
+        self.send_json(op="subscribe", subscriptions=expected)
         return [channels[topic] for topic in topics]
 
     def _frame(self):
-        """Its kind, and what it holds."""
+        """Return kind and content of the next frame."""
         first, size = self._read(2)
         if size >= 126:
             size = int.from_bytes(self._read(2 if size == 126 else 8), "big")
@@ -114,7 +116,7 @@ class Client:
 
 
 def patient(port, process):
-    """A client of a process that may not listen yet, and may wait for kernels that are compiled."""
+    """Return a client of a process that may still be starting or compiling."""
     while process.poll() is None:
         try:
             return Client(port, timeout=300.0)

@@ -34,7 +34,7 @@ def test_payloads_are_forwarded_with_simulation_time():
         )
         assert channel["schema"] == Imu.schema_text
         sent, actual, times, k = [], [], [], 0
-        while len(actual) < 5:  # what is put before the subscription has arrived goes to nobody
+        while len(actual) < 5:  # messages before the subscription are lost
             k += 1
             sent.append((k * TICK, Imu(header(k * TICK, "base")).encode()))
             server.put("/drone1/imu", *sent[-1])
@@ -107,7 +107,7 @@ def test_viewer_is_accepted(headers):
         (OWN_HOST, "Origin: file://", "Origin: https://attacker.example"),
     ],
 )
-def test_foreign_page_is_refused(headers):
+def test_foreign_page_is_rejected(headers):
     with Server("127.0.0.1:0") as server:
         assert " 403 " in handshake(server.port, *headers)
         assert " 101 " in handshake(server.port, OWN_HOST)
@@ -161,11 +161,11 @@ def test_remote_viewers_need_insecure(text):
 
 
 @pytest.mark.parametrize("text", ["127.0.0.1:1", "127.8.0.1:1", "[::1]:1", "localhost:1"])
-def test_this_machine_alone_may_always_look_on(text):
+def test_local_address_is_accepted(text):
     check_address(text, False)
 
 
-def test_run_that_other_machines_could_look_on_is_refused(tmp_path):
+def test_run_with_remote_viewers_is_rejected(tmp_path):
     words = ["run", "hover", "--foxglove", "0.0.0.0:8799", "--log", str(tmp_path / "a.mcap")]
     run = subprocess.run([sys.executable, "-m", "lapwing", *words], capture_output=True, text=True, timeout=300)
     assert run.returncode == 2
@@ -205,7 +205,7 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
                 _, subscription, time_ns = struct.unpack_from("<BIQ", message)
                 (events if subscription else actual).append((time_ns, message[13:]))
             if len(actual) > 100 and events and not stopped:
-                run.send_signal(signal.SIGINT)  # however long the client took to subscribe
+                run.send_signal(signal.SIGINT)  # independent of the client's subscription time
                 stopped = True
         assert run.wait(timeout=60) == 130
     with LogReader(path) as read:
@@ -213,10 +213,10 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
         flights = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/ground_truth"])]
     first = flights.index(actual[0])
     both = min(len(actual), len(flights) - first)  # the viewer may see a few messages more than an aborted run records
-    assert actual[:both] == flights[first : first + both]  # none is missing, and all in order
+    assert actual[:both] == flights[first : first + both]  # complete and in order
     assert both > 90
     assert events
     assert set(events) <= set(kept)
-    # a viewer that subscribes late receives the earlier events as well; `kept` also has events found afterwards
+    # a viewer that subscribes late receives the earlier events as well; `kept` has later events too
     assert {e for e in kept if e[0] < 100_000_000} <= set(events)
     assert {e for e in kept if e[0] <= actual[-1][0] and b"phase" in e[1]} <= set(events)

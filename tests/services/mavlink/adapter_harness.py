@@ -1,8 +1,8 @@
-"""An adapter and a stand-in vehicle without sockets or threads; time goes on when the test says so."""
+"""Adapter and fake vehicle without sockets or threads; the test advances the time."""
 
 import random
 
-from fake_vehicle import PARAMETERS, PERIOD, StandIn
+from fake_vehicle import PARAMETERS, PERIOD, FakeVehicle
 
 from lapwing.messages import OperatorInput
 from lapwing.services.common.mavlink.dialect import mavlink
@@ -12,12 +12,12 @@ from lapwing.services.scene_resolver import load
 
 
 class Bench:
-    """The vehicle, its adapter, and whoever has connected."""
+    """Vehicle, its adapter, and connected stations."""
 
     period = PERIOD  # [s] of a step
 
     def __init__(self, *overrides, recorded=False, starting=False, **options):
-        self.vehicle = StandIn()
+        self.vehicle = FakeVehicle()
         put = None if recorded else lambda command: self.vehicle.operate(OperatorInput(commands=(command,)).encode())
         self.adapter = Adapter(
             describe(load("lapwing/scenes/hover.toml", overrides))._replace(parameters=PARAMETERS), put, **options
@@ -35,23 +35,23 @@ class Bench:
         return station
 
     def step(self, count=1):
-        """So many steps of the telemetry; wall time runs as simulation time does."""
+        """Run `count` steps of the telemetry; wall time equals simulation time."""
         for _ in range(count):
             for topic, message in self.vehicle.messages():
-                self.adapter.take(topic, self.vehicle.time_ns, message.encode(), self.vehicle.seconds)
+                self.adapter.handle(topic, self.vehicle.time_ns, message.encode(), self.vehicle.seconds)
             for station in self.stations:
                 station.step()
 
-    def until(self, true, seconds=10.0):
+    def until(self, condition, seconds=10.0):
         for _ in range(round(seconds / self.period)):
-            if true():
+            if condition():
                 return True
             self.step()
-        return bool(true())
+        return bool(condition())
 
 
 class Station:
-    """A client; on its way to and from it a share of the datagrams gets lost, and some come twice."""
+    """Client with a lossy link: a share of the datagrams is lost, some arrive twice."""
 
     def __init__(self, bench, loss=0.0, twice=0.0, seed=0, local=True, system=255, key=None, link=0, heartbeat=True):
         self.codec = mavlink.MAVLink(None, system, 190)
@@ -63,22 +63,22 @@ class Station:
         self.bench, self.loss, self.twice = bench, loss, twice
         self.random = random.Random(seed)
         self.got, self.sent = [], []
-        self.endpoint = bench.adapter.connect(local, True, self._hear)
-        if heartbeat:  # without which no command is accepted
+        self.endpoint = bench.adapter.connect(local, True, self._receive)
+        if heartbeat:  # required before commands
             self.endpoint.last_heartbeat = bench.adapter.clock.now
-        self.watch = lambda message: None  # called with each message
+        self.on_message = lambda message: None  # called with each message
 
     def _times(self):
         return 0 if self.random.random() < self.loss else 2 if self.random.random() < self.twice else 1
 
-    def _hear(self, data):
+    def _receive(self, data):
         for _ in range(self._times()):
             for message in self.codec.parse_buffer(data) or ():
                 self.got.append(message)
-                self.watch(message)
+                self.on_message(message)
 
     def step(self):
-        """Called at each step of the telemetry."""
+        """Hook called at each step of the telemetry."""
 
     def raw(self, data):
         self.sent.append(data)
@@ -98,7 +98,7 @@ class Station:
         return result[-1] if result else None
 
     def command(self, number, *params, seconds=3.0):
-        """Result of a command, given once."""
+        """Send a command once. Return its result."""
         self.got.clear()
         self.send("command_long", 1, 1, number, 0, *params, *[0.0] * (7 - len(params)))
         self.bench.until(lambda: self.last("COMMAND_ACK"), seconds)
@@ -108,6 +108,6 @@ class Station:
 
 
 def item(seq, command=16, frame=6, kind=0, north=10.0, up=5.0, params=(0.0, 0.0, 0.0, float("nan"))):
-    """Fields of a MISSION_ITEM_INT."""
+    """Return the fields of a MISSION_ITEM_INT."""
     latitude = round((40.7686 + north / 111_000) * 1e7)
     return 1, 1, seq, frame, command, 0, 1, *params, latitude, 147907000, up, kind

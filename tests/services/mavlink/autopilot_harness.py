@@ -1,4 +1,4 @@
-"""An adapter on the real autopilot in one process: the vehicle flies as fast as it goes while a station talks to it."""
+"""Adapter on the real autopilot in one process: the vehicle flies as fast as possible with a connected station."""
 
 from adapter_harness import Bench
 
@@ -9,28 +9,28 @@ from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 
-OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false", "run.duration=1e4"]
+OPERATED = ["autopilot.accept_commands=condition", "autopilot.follow_trajectory=false", "run.duration=1e4"]
 
 
-class Flown(Bench):
-    """A scene's vehicle, its adapter, and whoever has connected."""
+class AutopilotBench(Bench):
+    """Vehicle of a scene, its adapter, and connected stations."""
 
     period = 0.04
 
     def __init__(self, scene="hover", *overrides):
         setup = resolve(load(scene, [*OPERATED, *overrides]))
-        self.waiting, self.stations = [], []
+        self.queue, self.stations = [], []
         self._interval_ns, self._ticks = setup.interval_ns, round(self.period * setup.rate)
-        self.graph = BlockDiagram(setup, create_all(setup, self._given), PAGE)
-        self.adapter = Adapter(setup.auxiliary["mavlink"], self.waiting.append)
+        self.graph = BlockDiagram(setup, create_all(setup, self._take_commands), PAGE)
+        self.adapter = Adapter(setup.auxiliary["mavlink"], self.queue.append)
 
-    def _given(self, tick):
-        commands = list(self.waiting)
-        self.waiting.clear()
+    def _take_commands(self, tick):
+        commands = list(self.queue)
+        self.queue.clear()
         return commands
 
     def station_of(self, kind):
-        """A station that has connected."""
+        """Return a connected station."""
         station = kind(self)
         self.stations.append(station)
         return station
@@ -44,9 +44,9 @@ class Flown(Bench):
             first = self.graph.tick
             self.graph.advance(first + self._ticks)
             pages = self.graph.record_batches(first, first + self._ticks)
-            for page in sorted(pages, key=lambda page: page.topic is ESTIMATE):  # which moves time on
+            for page in sorted(pages, key=lambda page: page.topic is ESTIMATE):  # the estimate advances the time
                 newest = slice(None) if page.topic in (STATUS, COMMAND_ACKS) else slice(-1, None)
                 for tick, payload in zip(page.ticks[newest], page.payloads[newest], strict=True):
-                    self.adapter.take(page.topic, int(tick) * self._interval_ns, payload.tobytes(), self.seconds)
+                    self.adapter.handle(page.topic, int(tick) * self._interval_ns, payload.tobytes(), self.seconds)
             for station in self.stations:
                 station.step()

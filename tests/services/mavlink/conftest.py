@@ -1,4 +1,4 @@
-"""The helpers of these tests are imported by name."""
+"""Makes the helpers of these tests importable by name."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A vehicle that keeps the autopilot's side of the interface, moves like a point, and needs no kernels.
+"""Vehicle with the autopilot's side of the interface; it moves as a point mass and needs no kernels.
 
 It serves to prove the link: that clients which we did not write can say what they want, and hear what became of it.
 """
@@ -50,8 +50,8 @@ PARAMETERS = (
 )
 
 
-class StandIn:
-    """The vehicle: commands in, estimate, status and answers out."""
+class FakeVehicle:
+    """Fake vehicle: input are commands; outputs are estimate, status and acknowledgements."""
 
     def __init__(self):
         self.time_ns = 0
@@ -65,10 +65,10 @@ class StandIn:
         self.setpoint = self.stick = None
         self.setpoint_at = -1e9
         self.commands, self.answers, self.text, self.arming_blockers = [], [], [], ()
-        self.deaf = set()  # kinds that are not answered
+        self.unanswered = set()  # kinds that are not acknowledged
         self.status, self.more = {}, []  # other fields of the status, and other messages
         self.kinds = {}
-        self.rejected = ()  # sources that the estimator refuses
+        self.rejected = ()  # sources that the estimator rejects
 
     @property
     def seconds(self):
@@ -78,11 +78,11 @@ class StandIn:
         self.commands += OperatorInput.decode(payload).commands
 
     def messages(self):
-        """One step: (topic, message)."""
+        """Run one step. Return the (topic, message) pairs."""
         self.time_ns += round(PERIOD * 1e9)
         for command in self.commands:
             self.kinds[command.kind] = command
-            if command.kind not in self.deaf:
+            if command.kind not in self.unanswered:
                 self.answers.append(self.handle(command))
         self.commands = []
         self.fly()
@@ -91,7 +91,7 @@ class StandIn:
         pose = Pose(Point(*self.position), Quaternion(0.0, 0.0, math.sin(half), math.cos(half)))
         status = Status(
             head, self.mode, self.mode, self.armed, self.landed, False, "", self.current, len(self.items), self.reached,
-            self.state, self.fresh, self.arming_blockers, False,
+            self.state, self.has_setpoint, self.arming_blockers, False,
         )  # fmt: skip
         yield STATUS, status._replace(**self.status)
         yield from self.more
@@ -100,7 +100,7 @@ class StandIn:
         self.answers, self.text = [], []
 
     @property
-    def fresh(self):
+    def has_setpoint(self):
         return self.seconds - self.setpoint_at < 1.0
 
     def handle(self, c):
@@ -169,7 +169,7 @@ class StandIn:
         return 0
 
     def do_offboard(self, c):
-        if not self.fresh:
+        if not self.has_setpoint:
             self.text.append("offboard refused: no setpoints")
             return 2
         self.mode, self.landed = "offboard", False
@@ -194,7 +194,7 @@ class StandIn:
         return 0, c.values[0]
 
     def fly(self):
-        """Move towards the target, or with the setpoint."""
+        """Move towards the target, or follow the setpoint."""
         self.velocity = (0.0, 0.0, 0.0)
         if not self.armed:
             return
@@ -246,10 +246,10 @@ def free_port(kind=socket.SOCK_DGRAM):
 
 
 class Running:
-    """A stand-in on its links, in a thread of its own."""
+    """Fake vehicle with its links in a separate thread."""
 
     def __init__(self, *urls, speed=1.0, overrides=(), **options):
-        self.vehicle = StandIn()
+        self.vehicle = FakeVehicle()
         scene = load("lapwing/scenes/hover.toml", overrides)
         description = describe(scene)._replace(parameters=PARAMETERS)
         self.hub = LinkServer(description, Options(urls, speed=speed, **options), self.vehicle.operate)
@@ -268,7 +268,7 @@ class Running:
                 self.hub.wait(left)
             self.hub.wait(0.0)
             for topic, message in self.vehicle.messages():
-                self.hub.take(topic, self.vehicle.time_ns, message.encode())
+                self.hub.handle(topic, self.vehicle.time_ns, message.encode())
             due += PERIOD / self._speed
 
     def end(self):
@@ -286,9 +286,9 @@ def flying(*urls, **more):
         running.end()
 
 
-def until(true, seconds=10.0):
-    """Wait until something is so; says whether it is."""
+def until(condition, seconds=10.0):
+    """Wait for a condition. Return True if it holds."""
     deadline = time.monotonic() + seconds
-    while not true() and time.monotonic() < deadline:
+    while not condition() and time.monotonic() < deadline:
         time.sleep(0.01)
-    return bool(true())
+    return bool(condition())

@@ -13,7 +13,7 @@ NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 
 
 def table(required, **more):
-    """The schema of an object that has these keys, and none but these and those of `more`."""
+    """Return the schema of an object with these keys and the optional ones of `more`."""
     return {"type": "object", "properties": required | more, "required": list(required), "additionalProperties": False}
 
 
@@ -94,18 +94,18 @@ SCHEMA = table(
 
 
 @pytest.fixture(scope="module")
-def served():
+def metadata():
     return files(describe(load("groundstation")))
 
 
-def test_actuator_metadata_match_schema(served):
-    jsonschema.validate(json.loads(served[ACTUATORS]), SCHEMA)
+def test_actuator_metadata_match_schema(metadata):
+    jsonschema.validate(json.loads(metadata[ACTUATORS]), SCHEMA)
 
 
-def test_every_required_motor_is_driven_by_output(served):
-    """QGroundControl's summary would otherwise request a setup."""
-    described = json.loads(served[ACTUATORS])
-    values = {p["name"]: p["default"] for p in json.loads(served[PARAMETERS])["parameters"]}
+def test_every_required_motor_is_driven_by_output(metadata):
+    """Check the outputs: QGroundControl's summary would otherwise request a setup."""
+    described = json.loads(metadata[ACTUATORS])
+    values = {p["name"]: p["default"] for p in json.loads(metadata[PARAMETERS])["parameters"]}
     (subgroup,) = described["outputs_v1"][0]["subgroups"]
     (function,) = subgroup["per-channel-parameters"]
     driven = [values[function["name"].replace("${i}", str(c["param-index"]))] for c in subgroup["channels"]]
@@ -118,9 +118,9 @@ def test_every_required_motor_is_driven_by_output(served):
     assert values["CA_ROTOR_COUNT"] == geometry["actuators"][0]["count"] == 4
 
 
-def test_geometry_is_forward_right_down(served):
-    """Rotor 1 of the delivery drone sits ahead on the left and turns clockwise (its airframe)."""
-    (group,) = json.loads(served[ACTUATORS])["mixer_v1"]["config"][0]["actuators"]
+def test_geometry_is_forward_right_down(metadata):
+    """Check rotor 1 of the delivery drone: front left and clockwise, as in its airframe."""
+    (group,) = json.loads(metadata[ACTUATORS])["mixer_v1"]["config"][0]["actuators"]
     value = {p["function"]: p["value"] for p in group["per-item-parameters"]}
     arm = 0.35171491
     assert value["posx"] == pytest.approx([arm, -arm, -arm, arm])
@@ -130,6 +130,6 @@ def test_geometry_is_forward_right_down(served):
 
 
 def test_ardupilot_stations_get_no_facts():
-    served = files(describe(load("groundstation", ["mavlink.firmware=ardupilot"])))
-    assert ACTUATORS not in served
-    assert len(json.loads(served[GENERAL])["metadataTypes"]) == 1  # the parameters
+    metadata = files(describe(load("groundstation", ["mavlink.firmware=ardupilot"])))
+    assert ACTUATORS not in metadata
+    assert len(json.loads(metadata[GENERAL])["metadataTypes"]) == 1  # the parameters

@@ -1,5 +1,6 @@
-"""MAVLink's Events Interface: what happens is told by numbers, in order and without gaps, and the metadata says what
-they mean. The reader is libevents' README and receiver put anew."""
+"""MAVLink's Events Interface: events are sent as numbers, in order and without gaps; the metadata defines their text.
+
+The reader is an independent implementation of libevents' README and receiver."""
 
 import json
 import re
@@ -17,7 +18,7 @@ from lapwing.services.common import status_texts
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.services.common.mavlink.dialect import mavlink, message_class
 from lapwing.services.mavlink.component_metadata import EVENTS, GENERAL, files
-from lapwing.services.mavlink.event_log import KEPT, EventLog
+from lapwing.services.mavlink.event_log import CAPACITY, EventLog
 from lapwing.services.mavlink.event_metadata import events
 from lapwing.services.mavlink.events import arming_checks, definitions, flight
 from lapwing.services.mavlink.resolve import describe
@@ -27,10 +28,10 @@ NUMBERS = {"uint8_t": "B", "uint16_t": "H", "uint32_t": "I", "float": "f"}
 
 
 class Reader:
-    """A ground station's: takes events in order, asks for what it lacks, and puts the arguments into the words."""
+    """Reader of a ground station: requests missing events, and inserts the arguments in the texts."""
 
     def __init__(self, station, described):
-        self.station, self.told, self.lost, self.last = station, [], 0, None
+        self.station, self.events, self.lost, self.last = station, [], 0, None
         self.component = described["components"]["1"]
         self.known = {
             int(sub_id): (group, event)
@@ -38,12 +39,12 @@ class Reader:
             for sub_id, event in content["events"].items()
         }
         self.newest = None
-        station.watch, station.step = self.take, self.step
+        station.on_message, station.step = self.take, self.step
 
     def step(self):
-        """It asks again, as a timer of 0.1 s does."""
+        """Repeat the request, like a timer of 0.1 s."""
         if self.newest is not None and 0 < (self.newest - self.last) % 65536 < 32768:
-            self.ask()
+            self.request()
 
     def take(self, m):
         kind = m.get_type()
@@ -54,18 +55,18 @@ class Reader:
         elif kind == "RESPONSE_EVENT_ERROR" and m.sequence == (self.last + 1) % 65536:
             self.lost += (m.sequence_oldest_available - self.last - 1) % 65536
             self.last = (m.sequence_oldest_available - 1) % 65536
-            self.ask()
+            self.request()
         elif kind == "EVENT":
             if self.last is None:
                 self.last = (m.sequence - 1) % 65536
             gap = (m.sequence - self.last - 1) % 65536
             if gap == 0:
                 self.last = m.sequence
-                self.told.append(self.read(m))
+                self.events.append(self.read(m))
             elif gap < 32768:
-                self.ask()
+                self.request()
 
-    def ask(self):
+    def request(self):
         expected = (self.last + 1) % 65536
         self.station.send_own("REQUEST_EVENT", 1, 1, expected, expected)
 
@@ -94,8 +95,8 @@ class Reader:
 
         return group, event["name"], re.sub(r"\{(\d)(?::\.(\d))?[^}]*\}", put, event["message"])
 
-    def said(self, group="default"):
-        return [text for of, _, text in self.told if of == group]
+    def texts(self, group="default"):
+        return [text for of, _, text in self.events if of == group]
 
 
 def reader(bench, **more):
@@ -129,7 +130,7 @@ def test_flight_is_reported():
     bench.step()
     bench.vehicle.status, bench.vehicle.armed, bench.vehicle.landed = {}, False, True
     bench.step()
-    assert one.said() == [
+    assert one.texts() == [
         "Armed",
         "Flight mode: takeoff",
         "Takeoff detected",
@@ -154,7 +155,7 @@ def test_every_failsafe_has_number(reason):
     bench.step(2)
     bench.vehicle.status = {"failsafe": True, "text": reason}
     bench.step()
-    assert one.said()[-1] == f"Failsafe: {reason}, now hold"
+    assert one.texts()[-1] == f"Failsafe: {reason}, now hold"
 
 
 def test_contact_and_saturation_are_reported():
@@ -166,12 +167,12 @@ def test_contact_and_saturation_are_reported():
     bench.step(3)
     bench.vehicle.more = [(ACTUATORS, Actuators(motor_voltage=(0.5 * highest, highest, 0.3, 0.0)))]
     bench.step(40)
-    assert "Motor 2|4 at the limit" not in one.said()
+    assert "Motor 2|4 at the limit" not in one.texts()
     bench.step(100)
     bench.vehicle.more = [(TRUTH, VehicleState(ground_contact=True))]
     bench.step(3)
-    assert one.said().count("Motor 2|4 at the limit") == 1
-    assert one.said()[-1] == "Touches the ground"
+    assert one.texts().count("Motor 2|4 at the limit") == 1
+    assert one.texts()[-1] == "Touches the ground"
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -182,27 +183,29 @@ def test_lost_events_are_sent_again_on_request(seed):
         bench.vehicle.armed = bool(k % 2)
         bench.step(3)
     bench.step(600)  # the number of the last one comes every 3 s
-    whole = sound.said()
+    whole = sound.texts()
     assert len(whole) == 59
-    assert one.said() == whole[len(whole) - len(one.said()) :]
-    assert len(one.said()) >= 55  # none before the first that it got is asked for
+    assert one.texts() == whole[len(whole) - len(one.texts()) :]
+    assert len(one.texts()) >= 55  # events before the first received one are not requested
     assert not one.lost
 
 
 def test_expired_event_request_names_oldest_available():
     log = EventLog()
-    for k in range(KEPT + 5):
+    for k in range(CAPACITY + 5):
         log.add(1, 6, bytes([k]), k)
     (error,) = log.replies(3, 3, (255, 190))
     assert (error.target_system, error.sequence, error.sequence_oldest_available) == (255, 3, 6)
     result = list(log.replies(6, 8, (255, 190)))
     assert [(m.get_type(), m.sequence) for m in result] == [("EVENT", 6), ("EVENT", 7), ("EVENT", 8)]
-    everything = list(log.replies(106, 105, (255, 190)))  # the whole round: an error for the part that cannot be there
-    assert len(everything) == KEPT + 1
+    everything = list(
+        log.replies(106, 105, (255, 190))
+    )  # all sequence numbers: an error for the range that is not stored
+    assert len(everything) == CAPACITY + 1
     assert everything[0].get_type() == "RESPONSE_EVENT_ERROR"
 
 
-def test_sequence_numbers_begin_again():
+def test_sequence_numbers_wrap_around():
     log = EventLog()
     log.sequence = 65534
     assert log.current().flags == 1
@@ -222,10 +225,10 @@ def test_arming_checks_are_reported_in_protocol_order():
     )
     one = reader(bench)
     bench.step(2)
-    result = [(group, name) for group, name, _ in one.told]
+    result = [(group, name) for group, name, _ in one.events]
     assert result[0] == ("arming_check", "arming_check_summary")
     assert result[-1] == ("health", "health_summary")
-    assert one.said("arming_check")[1:] == [
+    assert one.texts("arming_check")[1:] == [
         "No good readings of the gps",
         "The battery is low",
         "The vehicle does not stand level",
@@ -246,26 +249,26 @@ def test_report_is_sent_on_change_and_to_new_station():
     bench = Bench()
     one = reader(bench)
     bench.step(100)
-    one.told.clear()
+    one.events.clear()
     bench.step(300)
-    assert not one.told
+    assert not one.events
     two = bench.station(system=254, heartbeat=False)
     two.send("heartbeat", 6, 8, 0, 0, 0, 3)
     bench.step(2)
-    assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]
+    assert [name for _, name, _ in one.events] == ["arming_check_summary", "health_summary"]
     two.send("heartbeat", 6, 8, 0, 0, 0, 3)
     bench.step(100)
-    assert len(one.told) == 2
+    assert len(one.events) == 2
 
 
 def test_report_is_sent_on_request():
     bench = Bench()
     one = reader(bench)
     bench.step(100)
-    one.told.clear()
+    one.events.clear()
     assert one.station.command(mavlink.MAV_CMD_RUN_PREARM_CHECKS) == mavlink.MAV_RESULT_ACCEPTED
     bench.step(10)
-    assert [name for _, name, _ in one.told] == ["arming_check_summary", "health_summary"]
+    assert [name for _, name, _ in one.events] == ["arming_check_summary", "health_summary"]
 
 
 def test_texts_with_event_end_with_tab():
@@ -304,7 +307,7 @@ def test_ardupilot_stations_get_texts_without_events():
     assert GENERAL in result
 
 
-def test_all_that_autopilot_knows_has_its_number():
+def test_every_autopilot_text_has_number():
     assert {failsafe.reason for failsafe in FAILSAFES} == set(status_texts.FAILSAFES)
     assert set(MODES) <= set(flight.MODES)
     assert set(NAMES) <= set(arming_checks.SOURCES)
@@ -313,11 +316,11 @@ def test_all_that_autopilot_knows_has_its_number():
 
 
 def test_every_event_kind_has_definition():
-    not_of_the_link = {"warning", "phase", "slack"}  # of the run, the models, a scene's trajectory, a load
+    not_of_the_link = {"warning", "phase", "slack"}  # events of the run, the models, a trajectory, a load
     assert {d.kind for d in definitions().values()} == set(KINDS) - not_of_the_link
 
 
-def test_metadata_keeps_rules_of_libevents():
+def test_metadata_follows_rules_of_libevents():
     described = json.loads(files(describe(load("lapwing/scenes/groundstation.toml")))[EVENTS])
     assert described["version"] == 2
     component = described["components"]["1"]

@@ -29,7 +29,7 @@ END = 900.0  # [s] of wall time after which the test has failed
 
 
 class Station:
-    """Ground station on a link of its own: heartbeats, and all parameters again and again."""
+    """Ground station on a separate link: sends heartbeats and requests all parameters repeatedly."""
 
     def __init__(self):
         self.port = free_port()

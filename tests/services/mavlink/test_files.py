@@ -1,4 +1,4 @@
-"""MAVLink FTP: files are read whole over a bad line, and nothing else can be done with them."""
+"""MAVLink FTP: files are read over a lossy link and cannot be changed."""
 
 import json
 import struct
@@ -32,12 +32,12 @@ def server():
     return FileServer({"etc/a.bin": CONTENT, "etc/b/c.txt": b"hello"})
 
 
-def refused(server, *arguments, **more):
+def error_code(server, *arguments, **more):
     ((*_, data),) = [parsed(p) for p in server.replies(request(*arguments, **more))]
     return data[0]
 
 
-def test_file_is_opened_and_read_by_pieces(server):
+def test_file_is_read_in_pieces(server):
     sequence, session, opcode, of, _, _, data = parsed(server.replies(request(OPEN, b"/etc/a.bin"))[0])
     assert (sequence, opcode, of, struct.unpack("<I", data)[0]) == (8, 128, OPEN, len(CONTENT))
     result = b""
@@ -46,7 +46,7 @@ def test_file_is_opened_and_read_by_pieces(server):
         assert parsed(reply)[5] == len(result)
         result += parsed(reply)[6]
     assert result == CONTENT
-    assert refused(server, READ, session=session, size=DATA, offset=len(CONTENT)) == 6  # end of file
+    assert error_code(server, READ, session=session, size=DATA, offset=len(CONTENT)) == 6  # end of file
 
 
 def test_burst_is_numbered_and_marks_its_end(server):
@@ -68,21 +68,21 @@ def test_repeated_request_gets_same_reply_in_same_session(server):
     assert parsed(server.replies(request(OPEN, b"etc/a.bin", sequence=9))[0])[1] == 1
 
 
-def test_sessions_end_and_are_few(server):
+def test_sessions_are_closed_and_limited(server):
     for k in range(4):
         server.replies(request(OPEN, b"etc/a.bin", sequence=k))
-    assert refused(server, OPEN, b"etc/a.bin", sequence=5) == 5
+    assert error_code(server, OPEN, b"etc/a.bin", sequence=5) == 5
     server.replies(request(1, session=2, sequence=6))
     assert parsed(server.replies(request(OPEN, b"etc/a.bin", sequence=8))[0])[1] == 2
     server.replies(request(2, sequence=9))
-    assert refused(server, READ, session=2, size=10, sequence=10) == 4
+    assert error_code(server, READ, session=2, size=10, sequence=10) == 4
 
 
 def test_folders_are_listed(server):
     assert parsed(server.replies(request(3, b"/"))[0])[6] == b"Detc\0"
     assert parsed(server.replies(request(3, b"/etc"))[0])[6] == b"Db\0Fa.bin\t25600\0"
     assert parsed(server.replies(request(3, b"etc", offset=1))[0])[6] == b"Fa.bin\t25600\0"
-    assert refused(server, 3, b"etc", offset=2) == 6
+    assert error_code(server, 3, b"etc", offset=2) == 6
 
 
 @pytest.mark.parametrize(
@@ -99,10 +99,10 @@ def test_folders_are_listed(server):
     ],
 )
 def test_impossible_file_request_is_rejected_with_reason(server, arguments, error):
-    assert refused(server, *arguments) == error
+    assert error_code(server, *arguments) == error
 
 
-def test_checksum_is_protocols(server):
+def test_checksum_matches_protocol(server):
     def slow(data):
         crc = 0
         for byte in data:
@@ -115,7 +115,7 @@ def test_checksum_is_protocols(server):
     assert struct.unpack("<I", parsed(server.replies(request(14, b"etc/b/c.txt"))[0])[6])[0] == slow(b"hello")
 
 
-def test_metadata_describes_every_parameter_that_is_listed():
+def test_metadata_describes_every_listed_parameter():
     bench = Bench()
     station = bench.station()
     bench.step(2)

@@ -1,4 +1,4 @@
-"""Several vehicles at one ground station: a link and a system for each, and who is told to fly flies."""
+"""Several vehicles with one ground station: each has a link and a system id, and obeys only its own commands."""
 
 import math
 import subprocess
@@ -17,24 +17,24 @@ from lapwing.services.mavlink.links import for_vehicle_index
 SETS = ("autopilot.follow_trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=20")
 
 
-def heard(station, kind, system, seconds=120.0):
-    """The next message of this kind from a system."""
+def next_message(station, kind, system, seconds=120.0):
+    """Return the next message of a kind from a system."""
     while message := station.recv_match(type=kind, blocking=True, timeout=seconds):
         if message.get_srcSystem() == system:
             return message
     raise AssertionError(f"no {kind} from system {system}")
 
 
-def order(station, system, number, *params):
+def send_command(station, system, number, *params):
     """Return the acknowledgement of a system to a command."""
     station.mav.command_long_send(system, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
-    while (ack := heard(station, "COMMAND_ACK", system)).command != number:
+    while (ack := next_message(station, "COMMAND_ACK", system)).command != number:
         pass
     return ack.result
 
 
 @pytest.mark.long
-def test_each_system_flies_by_its_own_orders(tmp_path):
+def test_each_system_obeys_its_own_commands(tmp_path):
     port, log = free_port(), tmp_path / "fleet.mcap"
     first, second = (mavutil.mavlink_connection(f"udpout:127.0.0.1:{port + i}") for i in range(2))
     sets = [part for each in SETS for part in ("--set", each)]
@@ -45,12 +45,12 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
             while not station.recv_match(type="HEARTBEAT", blocking=True, timeout=0.5):
                 assert process.poll() is None
                 station.mav.heartbeat_send(6, 8, 0, 0, 0)
-            assert heard(station, "GLOBAL_POSITION_INT", system)  # it has started
-        assert order(second, 2, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-        assert order(second, 2, mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
-        while heard(second, "GLOBAL_POSITION_INT", 2).relative_alt < 1000:
+            assert next_message(station, "GLOBAL_POSITION_INT", system)  # the vehicle has started
+        assert send_command(second, 2, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+        assert send_command(second, 2, mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
+        while next_message(second, "GLOBAL_POSITION_INT", 2).relative_alt < 1000:
             pass
-        home = heard(second, "HOME_POSITION", 2)
+        home = next_message(second, "HOME_POSITION", 2)
         assert (home.x, home.y) == (pytest.approx(-3.0, abs=0.1), pytest.approx(0.0, abs=0.1))  # north, east
     assert process.returncode in (0, 3, 4)
     with LogReader(log) as read:
@@ -67,7 +67,7 @@ def test_each_system_flies_by_its_own_orders(tmp_path):
             name: max(VehicleState.decode(m).pose.position.z for *_, m in read.messages([f"/{name}/ground_truth"]))
             for name in reported
         }
-    assert set(reported["left"]) | set(reported["scout"]) <= {"link"}  # that a station is there
+    assert set(reported["left"]) | set(reported["scout"]) <= {"link"}  # a connected station
     assert {"arm", "takeoff"} <= set(reported["right"])
     assert up["right"] > 1.0 > max(up["left"], up["scout"])
     before, after = resimulate(log)
@@ -87,9 +87,9 @@ def test_listening_links_get_ports_and_sending_share(url, links):
 
 
 @pytest.mark.parametrize(
-    ("url", "said"),
+    ("url", "text"),
     [
-        ("serial:/dev/ttyS0:57600", "has room for one vehicle; expected udpout, udpin or tcpin"),
+        ("serial:/dev/ttyS0:57600", "serves one vehicle; expected udpout, udpin or tcpin"),
         ("udpin:127.0.0.1:65535", "port 65535: the link of vehicle 1 would be at 65536"),
     ],
 )

@@ -1,4 +1,4 @@
-"""Frames: against rotation matrices written out, and the words of the compass."""
+"""Frames against explicit rotation matrices and compass directions."""
 
 import math
 
@@ -66,7 +66,7 @@ def test_angles_are_wrapped():
     assert math.isnan(wrap(math.inf))
 
 
-def test_whole_numbers_are_cut_off_at_limits_of_their_field():
+def test_integers_saturate_at_limits_of_field():
     assert saturate(1.6, 8) == 2
     assert saturate(1e9, 16) == 32767
     assert saturate(-1e9, 16) == -32768

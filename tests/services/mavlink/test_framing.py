@@ -1,4 +1,4 @@
-"""Frames against pymavlink's own, byte by byte."""
+"""Frames against those of pymavlink, byte by byte."""
 
 import random
 import struct
@@ -18,7 +18,7 @@ SIZES = {"b": 8, "B": 8, "h": 16, "H": 16, "i": 32, "I": 32, "q": 64, "Q": 64}
 
 
 def value(rng, code, length, empty):
-    """A value of a field, by struct's letter for it."""
+    """Return a value of a field with this `struct` format character."""
     if code in "cs":
         size = rng.randrange(length + 1) if length else 1
         return bytes(1) * (not length) if empty else bytes(rng.randrange(1, 128) for _ in range(size))
@@ -33,14 +33,14 @@ def value(rng, code, length, empty):
 
 
 def arguments(kind, seed, empty=False):
-    """Random arguments of a message class."""
+    """Return random arguments of a message class."""
     rng, codes = random.Random(seed), kind.native_format.decode()[1:]
     by_wire = [value(rng, code, kind.array_lengths[i], empty) for i, code in enumerate(codes)]
     return tuple(by_wire[i] for i in kind.orders)
 
 
 def example(kind, seed, empty=False):
-    """A message of a class with random fields."""
+    """Return a message of a class with random fields."""
     return kind(*arguments(kind, seed, empty))
 
 

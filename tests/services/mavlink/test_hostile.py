@@ -35,7 +35,7 @@ def test_random_bytes_are_ignored(shared, data):
 
 
 def frames(bench):
-    """A sound frame of every kind of message the dialect has, all fields zero."""
+    """Return a valid frame of every message of the dialect, with all fields zero."""
     codec = mavlink.MAVLink(None, 255, 190)
     for cls in mavlink.mavlink_map.values():
         fields = []
@@ -80,7 +80,7 @@ def test_all_handled_messages_survive_odd_values():
 
 
 def odd(cls, chance):
-    """A message for us whose other fields are unusual."""
+    """Return a message for this vehicle with unusual values."""
 
     def value(kind):
         if kind in ODD:
@@ -103,7 +103,7 @@ def odd(cls, chance):
     return cls(*fields)
 
 
-def test_vehicle_that_has_lost_its_mind_is_still_reported():
+def test_non_finite_estimate_is_still_reported():
     bench = Bench()
     station = bench.station()
     bench.vehicle.armed, bench.vehicle.mode = True, "offboard"
@@ -114,7 +114,7 @@ def test_vehicle_that_has_lost_its_mind_is_still_reported():
     assert station.last("HEARTBEAT")
 
 
-def test_wrong_checksum_costs_only_its_own_frame():
+def test_wrong_checksum_affects_only_one_frame():
     bench = Bench()
     station = bench.station()
     good = mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(station.codec)
@@ -124,7 +124,7 @@ def test_wrong_checksum_costs_only_its_own_frame():
     assert bench.counts["wrong checksum"] == 1
 
 
-def test_others_commands_are_not_ours():
+def test_commands_for_other_systems_are_ignored():
     bench = Bench()
     station = bench.station()
     for system, component in ((2, 1), (1, 100)):
@@ -136,7 +136,7 @@ def test_others_commands_are_not_ours():
 
 
 @pytest.mark.parametrize("count", [1001, 10_000, 65_535])  # -1 is 65 535 on the wire
-def test_missions_of_too_many_items_are_refused_at_once(count):
+def test_mission_with_too_many_items_is_rejected(count):
     bench = Bench()
     station = bench.station()
     station.send("mission_count", 1, 1, count, 0)
@@ -174,7 +174,7 @@ def test_unknown_mission_kind_is_rejected():
         (203, (), mavlink.MAV_RESULT_UNSUPPORTED),
     ],
 )
-def test_senseless_commands_are_answered(number, params, result):
+def test_invalid_commands_are_acknowledged(number, params, result):
     assert Bench().station().command(number, *params) == result
 
 
@@ -190,7 +190,7 @@ def test_invalid_setpoints_do_not_move_vehicle(bad):
     assert bench.vehicle.position == [0.0, 0.0, 0.0]
 
 
-def test_intervals_that_are_too_short_do_not_flood_client():
+def test_short_interval_does_not_flood_client():
     bench = Bench()
     station = bench.station()
     assert station.command(511, 30.0, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # ATTITUDE each microsecond
@@ -207,7 +207,7 @@ def test_too_long_interval_is_clamped():
     assert station.last("MESSAGE_INTERVAL").interval_us == 0x7FFFFFFF
 
 
-def test_flood_is_bounded_and_vehicle_flies_on():
+def test_flood_is_limited_and_flight_continues():
     port = free_port()
     frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
     began = time.monotonic()
@@ -222,7 +222,7 @@ def test_flood_is_bounded_and_vehicle_flies_on():
         assert received <= MAX_RATE * (1.0 + time.monotonic() - began)
 
 
-def test_many_strangers_get_no_room():
+def test_number_of_endpoints_is_limited():
     port = free_port()
     with flying(f"udpin:127.0.0.1:{port}") as running:
         sockets = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(12)]

@@ -1,4 +1,4 @@
-"""Links: frames in pieces over TCP and a serial line; and the measure of their evenness."""
+"""Links: frames in pieces over TCP and a serial line, rate limit and jitter."""
 
 import os
 import pty
@@ -17,33 +17,33 @@ def frame():
     return mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(mavlink.MAVLink(None, 255, 190))
 
 
-def heard(read):
+def receives(read):
     codec, result = mavlink.MAVLink(None), []
     codec.robust_parsing = True
 
-    def look():
+    def poll():
         result.extend(m.get_type() for m in codec.parse_buffer(read()) or ())
         return "PARAM_VALUE" in result
 
-    return until(look)
+    return until(poll)
 
 
-def test_frames_in_pieces_over_tcp_and_client_that_goes():
+def test_tcp_frames_in_pieces_and_disconnect():
     port = free_port(socket.SOCK_STREAM)
     with flying(f"tcpin:127.0.0.1:{port}") as running:
         with socket.create_connection(("127.0.0.1", port)) as client:
             for byte in frame():
                 client.sendall(bytes([byte]))
                 time.sleep(0.001)
-            assert heard(lambda: client.recv(4096))
+            assert receives(lambda: client.recv(4096))
         assert until(lambda: not running.hub.adapter.sessions)
 
 
-def test_serial_line_is_watched_but_its_commands_are_refused():
+def test_serial_line_gets_telemetry_but_commands_are_rejected():
     master, slave = pty.openpty()
     with flying(f"serial:{os.ttyname(slave)}:57600") as running:
         os.write(master, frame())
-        assert heard(lambda: os.read(master, 4096))
+        assert receives(lambda: os.read(master, 4096))
         os.write(master, mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(mavlink.MAVLink(None, 255, 190)))
         arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1.0, *(0.0,) * 6).pack(mavlink.MAVLink(None, 255, 190))
         os.write(master, arm)
@@ -53,22 +53,22 @@ def test_serial_line_is_watched_but_its_commands_are_refused():
     os.close(slave)
 
 
-def test_used_port_is_named():
+def test_used_port_is_reported():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         url = f"tcpin:127.0.0.1:{taken.getsockname()[1]}"
         with pytest.raises(ValueError, match=f"--mavlink {url}: address already in use"), flying(url):
             pass
 
 
-def test_budget_is_seconds_worth():
+def test_budget_allows_one_second_of_messages():
     budget = Budget(100.0)
     assert 100 <= sum(budget.take() for _ in range(1000)) < 200
 
 
-def test_jitter_is_step_beyond_its_due_and_pacing_widest_lag():
+def test_jitter_and_lag_of_telemetry_steps():
     pacing = Pacing(2.0)
     for simulated, wall in ((0.0, 10.0), (0.02, 10.01), (0.04, 10.025), (0.06, 10.03)):
         pacing.note(simulated, wall)
     assert pacing.jitter() == pytest.approx([0.0, 0.005, 0.005])
     assert pacing.behind() == pytest.approx(0.005)
-    assert "no pace" in Pacing(None).report()
+    assert "no real-time factor" in Pacing(None).report()

@@ -1,4 +1,4 @@
-"""MAVProxy, a ground station that we did not write, on the link; and its log of the session read back."""
+"""MAVProxy, an independent ground station, on the link, and its log of the session."""
 
 import importlib.util
 import socket
@@ -25,7 +25,7 @@ MISSION = """QGC WPL 110
 
 
 class Console:
-    """A MAVProxy that is typed at."""
+    """MAVProxy with typed commands."""
 
     def __init__(self, port, folder):
         self.output = folder / "output.txt"
@@ -54,7 +54,7 @@ class Console:
 
 @pytest.fixture
 def station(tmp_path):
-    """Starts a vehicle and a MAVProxy on it."""
+    """Return a function that starts a vehicle and MAVProxy on its link."""
     ends = []
 
     def start(*overrides):
@@ -88,7 +88,7 @@ def test_missions_parameters_arming_and_log(station, tmp_path):
     assert console.shows("ARMED")
     assert running.vehicle.armed
     assert "fence breach" not in console.output.read_text()
-    assert set(running.counts) == {"received"}  # nothing refused
+    assert set(running.counts) == {"received"}  # nothing rejected
 
     time.sleep(1.0)
     console.end()
@@ -105,14 +105,14 @@ def test_missions_parameters_arming_and_log(station, tmp_path):
     assert "autopilot : 12" in output
 
 
-def test_arducopters_modes(station):
-    """MAVProxy cannot set PX4's modes, which have two numbers; ArduPilot's it can."""
+def test_arducopter_modes(station):
+    """Set modes of ArduPilot; MAVProxy cannot set PX4's modes, which have two numbers."""
     running, console = station("mavlink.firmware=ardupilot")
     console.type("arm throttle")
     assert until(lambda: running.vehicle.armed)
     for name, mode in {"LOITER": "position_control", "RTL": "return", "LAND": "land"}.items():
         console.type(f"mode {name}")
         assert until(lambda mode=mode: running.vehicle.mode == mode), name
-        assert console.shows(f"{name}>"), console.output.read_text()  # its prompt
+        assert console.shows(f"{name}>"), console.output.read_text()  # the prompt
         running.vehicle.armed = True
         running.vehicle.position[2] = 30.0

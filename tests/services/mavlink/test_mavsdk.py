@@ -1,4 +1,4 @@
-"""MAVSDK, a client that we did not write, flies the vehicle through the link."""
+"""MAVSDK, an independent client, flies the fake vehicle through the link."""
 
 import asyncio
 import math
@@ -24,14 +24,14 @@ from mavsdk.param import ParamError  # noqa: E402
 
 pytestmark = pytest.mark.long
 
-END = 60.0  # [s] a session is held to have failed after
+END = 60.0  # [s] time-out of a session
 SPEED = 2.0  # simulated seconds per second
 
 
-async def first(stream, true):
-    """The first value of a stream of which something is so."""
+async def first(stream, condition):
+    """Return the first value of a stream that meets a condition."""
     async for value in stream:
-        if true(value):
+        if condition(value):
             return value
 
 
@@ -44,10 +44,10 @@ async def connected(port):
 
 
 def session(story, **options):
-    """Tell a story, of a drone and the vehicle behind it, against the clock."""
+    """Run `story(drone, vehicle)` with a time-out."""
     port = free_port()
 
-    async def tell(running):
+    async def run_story(running):
         drone = await connected(port)
         try:
             await story(drone, running.vehicle)
@@ -55,7 +55,7 @@ def session(story, **options):
             drone._stop_mavsdk_server()
 
     with flying(f"udpout:127.0.0.1:{port}", speed=SPEED, **options) as running:
-        asyncio.run(asyncio.wait_for(tell(running), END))
+        asyncio.run(asyncio.wait_for(run_story(running), END))
     return running
 
 
@@ -154,7 +154,7 @@ def test_offboard_flight_by_position_velocity_and_attitude():
         )
         assert vehicle.setpoint[9] == pytest.approx(0.0, abs=1e-6)
         await drone.offboard.set_velocity_ned(VelocityNedYaw(0.0, 1.0, -1.0, 0.0))
-        await first(  # not only climbing: the way to the position before it ended in a climb as well
+        await first(  # not only climbing: the previous leg ended in a climb too
             drone.telemetry.position_velocity_ned(),
             lambda o: abs(o.velocity.north_m_s) < 0.1 and abs(o.velocity.down_m_s + 1.0) < 0.1,
         )

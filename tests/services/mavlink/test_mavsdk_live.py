@@ -1,4 +1,4 @@
-"""MAVSDK, a client that we did not write, flies the whole vehicle: plant, sensors, estimator, autopilot, link.
+"""MAVSDK, an independent client, flies the complete vehicle: plant, sensors, estimator, autopilot, link.
 
 The run is faster than real time; whatever the client waits for is bounded by END.
 """
@@ -31,23 +31,23 @@ from lapwing.runs.resimulate import resimulate  # noqa: E402
 pytestmark = pytest.mark.long
 
 SCENE = "lapwing/scenes/groundstation.toml"
-END = 150.0  # [s] of wall time a session is held to have failed after
+END = 150.0  # [s] wall-clock time-out of a session
 SPEED = 3.0  # simulated seconds per second
 
 
-async def first(stream, true, seconds=60.0):
-    """The first value of a stream of which something is so."""
+async def first(stream, condition, seconds=60.0):
+    """Return the first value of a stream that meets a condition."""
 
-    async def look():
+    async def wait():
         async for value in stream:
-            if true(value):
+            if condition(value):
                 return value
 
-    return await asyncio.wait_for(look(), seconds)
+    return await asyncio.wait_for(wait(), seconds)
 
 
 async def started(url):
-    """MAVSDK, listening; its server now and then does not come up on a busy machine, and is then started again."""
+    """Return a listening MAVSDK; its server may not start on a busy machine, and is then restarted."""
     for seconds in (60.0, 240.0):
         drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
         try:
@@ -59,13 +59,13 @@ async def started(url):
 
 
 def session(tmp_path, key_prefix, story, *sets):
-    """Tell a story to the drone of a live run; its log."""
+    """Run `story(drone)` on a live run. Return its log."""
     port, log = free_port(), tmp_path / f"{key_prefix}.mcap"
     command = [sys.executable, "-m", "lapwing", "run", SCENE, "--key-prefix", key_prefix, "--log", str(log)]
     command += ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", f"{SPEED:g}"]
     command += [part for each in ("run.duration=900", *sets) for part in ("--set", each)]
 
-    async def tell():
+    async def run_story():
         drone = await started(f"udpin://127.0.0.1:{port}")
         try:
             await first(drone.core.connection_state(), lambda state: state.is_connected, 120.0)
@@ -76,7 +76,7 @@ def session(tmp_path, key_prefix, story, *sets):
 
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as process:
         try:
-            asyncio.run(asyncio.wait_for(tell(), END))
+            asyncio.run(asyncio.wait_for(run_story(), END))
         except BaseException:
             process.send_signal(signal.SIGTERM)
             print(process.communicate(timeout=60)[0])
@@ -87,7 +87,7 @@ def session(tmp_path, key_prefix, story, *sets):
 
 
 async def started_offboard(drone):
-    """Enter offboard mode, once setpoints have gone out."""
+    """Enter offboard mode after the first setpoints."""
     while True:
         try:
             return await drone.offboard.start()
@@ -101,7 +101,7 @@ def near(position, place):
     return math.hypot(north, east) < 0.5 and abs(position.relative_altitude_m - place[2]) < 0.5
 
 
-def test_arm_take_off_go_to_return_disarm_and_log_is_flown_again(tmp_path):
+def test_flight_with_return_and_resimulation_of_log(tmp_path):
     async def story(drone):
         health = await first(drone.telemetry.health(), lambda h: h.is_armable)
         assert health.is_global_position_ok
@@ -178,7 +178,7 @@ def test_offboard_by_position_velocity_and_attitude(tmp_path):
     async def story(drone):
         state = drone.telemetry.position_velocity_ned
         await drone.action.arm()
-        with pytest.raises(OffboardError):  # no setpoints come
+        with pytest.raises(OffboardError):  # no setpoints arrive
             await drone.offboard.start()
         await drone.offboard.set_position_ned(PositionNedYaw(3.0, 2.0, -4.0, 90.0))
         await started_offboard(drone)
@@ -224,16 +224,16 @@ def test_parameters_rates_sticks_and_refusals(tmp_path):
         gaps = [b - a for a, b in pairwise(stamps[5:])]
         assert sum(gaps) / len(gaps) == pytest.approx(0.1, rel=0.1)  # simulated seconds
 
-        with pytest.raises(ActionError):  # it stands on the ground
+        with pytest.raises(ActionError):  # the vehicle is on the ground
             await drone.action.land()
         await drone.action.arm()
         stick = drone.manual_control.set_manual_control_input
         await stick(0.0, 0.0, 0.5, 0.0)
         await drone.manual_control.start_position_control()
 
-        async def push(forward, throttle, true):
+        async def push(forward, throttle, condition):
             stream = drone.telemetry.position_velocity_ned()
-            looking = asyncio.ensure_future(first(stream, true, 30.0))
+            looking = asyncio.ensure_future(first(stream, condition, 30.0))
             while not looking.done():
                 await stick(forward, 0.0, throttle, 0.0)
                 await asyncio.sleep(0.05)
@@ -241,7 +241,7 @@ def test_parameters_rates_sticks_and_refusals(tmp_path):
 
         await push(0.0, 0.9, lambda o: o.position.down_m < -2.0)
         start = await push(0.0, 0.5, lambda o: abs(o.velocity.down_m_s) < 0.1)
-        # it faces east
+        # the vehicle faces east
         await push(0.6, 0.5, lambda o: o.position.east_m > start.position.east_m + 4.0)
         reported = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "flies" in s.text))
         await asyncio.sleep(0.3)

@@ -1,4 +1,4 @@
-"""Missions that no client has uploaded: written as MAVLink they are the same missions."""
+"""Missions that no client has uploaded: their MAVLink form has the same items."""
 
 import math
 
@@ -73,27 +73,27 @@ def test_mission_upload_and_download_are_equal(items, kind):
         assert after.values == pytest.approx(before.values, nan_ok=True)
 
 
-def given(bench, time_ns, command, result):
-    """Somebody else gives the autopilot a command, and it answers."""
-    bench.adapter.take(
+def external_command(bench, time_ns, command, result):
+    """Send a command of another sender to the autopilot, with its acknowledgement."""
+    bench.adapter.handle(
         COMMAND_ACKS,
         time_ns,
         CommandAcks(header(time_ns, ""), (CommandAck(command.source, command.id, result),)).encode(),
         0.0,
     )
-    bench.adapter.take(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
+    bench.adapter.handle(OPERATOR, time_ns, OperatorInput(header(time_ns, ""), (command,)).encode(), 0.0)
 
 
 def test_accepted_plan_is_downloadable_and_rejected_is_not():
     bench = Bench()
     station = bench.station()
     bench.step(5)
-    given(bench, 0, OperatorCommand("mission_upload", "plan", 1, (), "", tuple(ITEMS)), CommandAck.ACCEPTED)
-    given(bench, 0, OperatorCommand("fence_upload", "plan", 2, (), "", tuple(FENCE)), CommandAck.DENIED)
+    external_command(bench, 0, OperatorCommand("mission_upload", "plan", 1, (), "", tuple(ITEMS)), CommandAck.ACCEPTED)
+    external_command(bench, 0, OperatorCommand("fence_upload", "plan", 2, (), "", tuple(FENCE)), CommandAck.DENIED)
     for kind, count in ((0, len(ITEMS)), (1, 0)):
         station.send("mission_request_list", 1, 1, kind)
         assert station.last("MISSION_COUNT").count == count
     station.send("mission_request_int", 1, 1, 1, 0)
     result = station.last("MISSION_ITEM_INT")
     assert (result.command, result.param1, result.frame) == (16, 3.0, 6)
-    assert result.z == pytest.approx(24.65, abs=0.02)  # above home, where it stands 0.35 m above the ground
+    assert result.z == pytest.approx(24.65, abs=0.02)  # above home; the body origin at rest is 0.35 m above the ground

@@ -1,4 +1,4 @@
-"""Parameters: the autopilot's, and the facts that PX4's ground stations ask for; changes reach every station."""
+"""Parameters of the autopilot and facts for PX4's ground stations; changes are sent to every station."""
 
 import math
 import struct
@@ -13,7 +13,7 @@ from lapwing.services.mavlink.px4_facts import px4_facts
 from lapwing.services.mavlink.resolve import describe
 from lapwing.services.scene_resolver import load
 
-ASKED = {  # by QGroundControl's PX4 plug-in of a multicopter, where a lack opens a dialog; by its files, 2020 to now
+REQUESTED = {  # by QGroundControl's PX4 plug-in for multicopters, which shows a dialog if one is missing; by file
     "PX4AutoPilotPlugin.cc": "SYS_HITL COM_RC_IN_MODE",
     "AirframeComponent.cc, AirframeComponentSummary.qml": "SYS_AUTOSTART MAV_SYS_ID",
     "SensorsComponent.cc, SensorsComponentSummary.qml, SensorsSetup.qml": (
@@ -55,10 +55,10 @@ def facts(scene, *overrides):
     return {fact.name: fact.value(values) for fact in px4_facts(description)}
 
 
-@pytest.mark.parametrize("page", ASKED)
+@pytest.mark.parametrize("page", REQUESTED)
 def test_parameters_of_ground_station_pages_exist(page):
     scene = load("lapwing/scenes/groundstation.toml")
-    assert not set(ASKED[page].split()) - set(facts("lapwing/scenes/groundstation.toml")) - set(table(scene))
+    assert not set(REQUESTED[page].split()) - set(facts("lapwing/scenes/groundstation.toml")) - set(table(scene))
 
 
 def test_ground_station_requires_no_setup():
@@ -79,7 +79,7 @@ def test_missing_sensor_is_declared():
     assert facts("lapwing/scenes/delivery_full.toml")["PD_GRIPPER_EN"] == 1
 
 
-def test_names_fit_into_their_field_and_none_is_there_twice():
+def test_names_fit_field_and_are_unique():
     names = [fact.name for fact in px4_facts(describe(load("lapwing/scenes/groundstation.toml")))]
     assert max(map(len, names)) <= 16
     assert len(set(names)) == len(names)
@@ -108,7 +108,7 @@ def test_parameter_change_is_broadcast_with_dependent_facts():
     three = struct.unpack("<f", struct.pack("<i", 3))[0]
     one.send("param_set", 1, 1, b"FS_FENCE_ACT", three, mavlink.MAV_PARAM_TYPE_INT32)
     bench.step(3)
-    twice = 2 * [("FS_FENCE_ACT", 3), ("GF_ACTION", 5)]  # as PX4 does: MAVSDK's subscriptions rely on it
+    twice = 2 * [("FS_FENCE_ACT", 3), ("GF_ACTION", 5)]  # as in PX4: MAVSDK's subscriptions need it
     assert [(m.param_id, integer(m)) for m in two.all("PARAM_VALUE")] == twice
     assert [(m.param_id, integer(m)) for m in one.all("PARAM_VALUE")] == twice
 
@@ -195,7 +195,7 @@ def test_parameter_of_other_type_is_rejected(name):
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, 1e9])
-def test_ardupilot_rejects_integer_that_is_none(value):
+def test_ardupilot_rejects_non_integer(value):
     bench = Bench("mavlink.firmware=ardupilot")
     station = bench.station()
     station.send("param_set", 1, 1, b"NAV_DLL_ACT", value, mavlink.MAV_PARAM_TYPE_REAL32)
@@ -204,7 +204,7 @@ def test_ardupilot_rejects_integer_that_is_none(value):
     assert station.last("PARAM_VALUE").param_value == 2.0
 
 
-def test_ardupilot_has_none_of_px4s():
+def test_ardupilot_has_no_px4_facts():
     bench = Bench("mavlink.firmware=ardupilot")
     station = bench.station()
     read(station, "SYS_AUTOSTART")

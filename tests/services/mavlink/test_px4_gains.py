@@ -1,10 +1,10 @@
-"""Gains of PX4's cascade over MAVLink: listed with PX4's names, set in flight, and in effect."""
+"""Gains of PX4's cascade over MAVLink: listed with PX4's names and changed in flight."""
 
 import math
 
 import pytest
 from adapter_harness import Station
-from autopilot_harness import Flown
+from autopilot_harness import AutopilotBench
 
 from lapwing.services.common.mavlink.dialect import mavlink
 
@@ -15,7 +15,7 @@ NAN = math.nan
 
 def roll_after_step(**gains):
     """Return the roll angles [rad] in the 2 s after a step of the velocity to the side, with gains set in flight."""
-    bench = Flown("quad_x", 'autopilot.controller="px4"', "autopilot.estimator=ground_truth")
+    bench = AutopilotBench("quad_x", 'autopilot.controller="px4"', "autopilot.estimator=ground_truth")
     station = bench.station_of(Station)
     bench.step(10)
     above = station.last("GLOBAL_POSITION_INT").alt * 1e-3
@@ -31,7 +31,7 @@ def roll_after_step(**gains):
     for _ in range(50):
         station.send(
             "set_position_target_local_ned", 0, 1, 1, 1, 0xDC7, *[0.0] * 3, 3.0, *[0.0] * 7
-        )  # north; it faces east
+        )  # north; the vehicle faces east
         station.send("set_mode", 1, 1, 6 << 16)
         bench.step()
     return [m.roll for m in station.all("ATTITUDE")]

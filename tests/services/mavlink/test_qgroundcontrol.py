@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 from adapter_harness import Station, item
-from autopilot_harness import Flown
+from autopilot_harness import AutopilotBench
 
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.firmware import px4
@@ -24,7 +24,7 @@ NORTH, EAST = 111_013.0, 84_420.0  # [m] of a degree at home
 
 
 class QGroundControl(Station):
-    """The buttons: each sends what QGroundControl sends, and gives the result that it would show."""
+    """Buttons of QGroundControl: each sends its messages and returns the displayed result."""
 
     def step(self):
         if self.bench.graph.tick % 250 < 10:
@@ -36,7 +36,7 @@ class QGroundControl(Station):
 
     @property
     def altitude(self):
-        """[m] above the sea; as it shows it."""
+        """Displayed altitude above sea level [m]."""
         return self.newest("GLOBAL_POSITION_INT").alt * 1e-3
 
     @property
@@ -53,7 +53,7 @@ class QGroundControl(Station):
         return bool(self.newest("HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
 
     def at(self, command, *params, frame=mavlink.MAV_FRAME_GLOBAL):
-        """A command with a place, as COMMAND_INT: the vehicle says that it knows it."""
+        """Send a command with a position as COMMAND_INT, which the vehicle supports."""
         *four, latitude, longitude, altitude = params
         self.got.clear()
         place = round(latitude * 1e7), round(longitude * 1e7), altitude
@@ -61,7 +61,7 @@ class QGroundControl(Station):
         return self.newest("COMMAND_ACK").result
 
     def set_mode(self, name):
-        """It has no acknowledgement: QGroundControl waits until the heartbeat shows the mode."""
+        """Set a mode without acknowledgement: QGroundControl waits until the heartbeat shows it."""
         self.send("set_mode", 1, mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED, MODES[name])
         self.got.clear()
         return 0 if self.bench.until(lambda: self.last("HEARTBEAT") and self.mode == MODES[name], 1.5) else None
@@ -136,7 +136,7 @@ ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 
 @pytest.fixture
 def station():
-    flight = Flown()
+    flight = AutopilotBench()
     flight.step(25)
     return flight.station_of(QGroundControl)
 
@@ -151,11 +151,11 @@ def test_buttons_of_flight_without_mission(station):
         return math.degrees(station.newest("ATTITUDE").yaw)
 
     def bearing_of(place):
-        """[deg] of a place, from north to the right."""
+        """Return the bearing [deg] of a position, clockwise from north."""
         latitude, longitude = station.place
         return math.degrees(math.atan2((place[1] - longitude) * EAST, (place[0] - latitude) * NORTH))
 
-    assert station.set_mode("Hold") == 0  # which older versions do before a take-off
+    assert station.set_mode("Hold") == 0  # as in older versions before a take-off
     assert station.takeoff(6.0) == ACCEPTED
     assert until(lambda: station.mode == MODES["Hold"] and above() > 5.5, 20.0)
     assert above() == pytest.approx(6.0, abs=0.2)

@@ -15,16 +15,16 @@ NAN = math.nan
 ACCEPTED = mavlink.MAV_RESULT_ACCEPTED
 
 
-def ask(bench, station, name, parameter=0.0):
+def request(bench, station, name, parameter=0.0):
     assert station.command(mavlink.MAV_CMD_REQUEST_MESSAGE, id_of(name), parameter) == ACCEPTED, name
     return station.last(name)
 
 
 @pytest.mark.parametrize(
-    ("name", "seed"),  # CRC_EXTRA in the headers that MAVLink's generator makes
+    ("name", "seed"),  # CRC_EXTRA in the headers of MAVLink's generator
     [("ESC_INFO", 251), ("ESC_STATUS", 10), ("PROTOCOL_VERSION", 217), ("COMPONENT_METADATA", 182)],
 )
-def test_messages_that_pymavlink_lacks_have_mavlinks_checksum(name, seed):
+def test_additional_messages_have_checksums_of_mavlink(name, seed):
     assert message_class(name).crc_extra == seed
 
 
@@ -32,7 +32,7 @@ def test_all_modes_are_listed_and_each_can_be_chosen():
     bench = Bench()
     bench.vehicle.armed = True
     station = bench.station()
-    ask(bench, station, "AVAILABLE_MODES")
+    request(bench, station, "AVAILABLE_MODES")
     modes = station.all("AVAILABLE_MODES")
     assert [m.mode_index for m in modes] == list(range(1, modes[0].number_modes + 1))
     assert {m.mode_name for m in modes if m.standard_mode == 0} == {"Hold", "Offboard", "Stabilized", "Acro"}
@@ -40,7 +40,7 @@ def test_all_modes_are_listed_and_each_can_be_chosen():
     assert not any(m.properties & mavlink.MAV_MODE_PROPERTY_NOT_USER_SELECTABLE for m in modes)
     for m in modes:
         assert bench.adapter.vehicle.firmware.mode_kind(m.custom_mode)
-    assert ask(bench, station, "AVAILABLE_MODES", 3.0).mode_index == 3
+    assert request(bench, station, "AVAILABLE_MODES", 3.0).mode_index == 3
     assert len(station.all("AVAILABLE_MODES")) == 1
     assert station.command(512, id_of("AVAILABLE_MODES"), 99.0) == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 
@@ -50,7 +50,7 @@ def test_current_mode_is_available():
     bench.vehicle.mode = "return"
     bench.step(2)
     station = bench.station()
-    m = ask(bench, station, "CURRENT_MODE")
+    m = request(bench, station, "CURRENT_MODE")
     assert (m.standard_mode, m.custom_mode) == (mavlink.MAV_STANDARD_MODE_SAFE_RECOVERY, 4 << 16 | 5 << 24)
     assert m.intended_custom_mode == m.custom_mode
 
@@ -81,7 +81,7 @@ def followed(armed=True, **changed):
 def test_setpoint_is_shown_in_ned_and_on_earth():
     _, station = followed()
     m = station.last("POSITION_TARGET_LOCAL_NED")
-    assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, -10.0))  # from where it stood
+    assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, -10.0))  # from the start position
     assert (m.vx, m.vy, m.vz) == (2.0, 1.0, -3.0)
     assert (m.yaw, m.yaw_rate) == pytest.approx((0.5 * math.pi, -0.1))
     assert m.type_mask == 0
@@ -103,7 +103,7 @@ def test_setpoint_is_empty_while_disarmed():
         assert station.last(kind) is None
 
 
-def test_attitude_setpoint_faces_where_vehicle_shall():
+def test_attitude_setpoint_has_commanded_heading():
     bench, station = followed()
     m = station.last("ATTITUDE_TARGET")
     w, x, y, z = m.q
@@ -127,13 +127,13 @@ def test_motors_and_their_outputs():
     assert (m.voltage[0], m.current[2], m.index) == (10.0, 3.0, 0)
     m = station.last("ESC_INFO")
     assert (m.count, m.info, m.failure_flags) == (4, 0b1111, [0] * 4)
-    m = ask(bench, station, "ACTUATOR_OUTPUT_STATUS")
+    m = request(bench, station, "ACTUATOR_OUTPUT_STATUS")
     assert m.active == 0b1111
     assert m.actuator[0] == pytest.approx(1000.0 + 4000.0 / bench.adapter.vehicle.description.max_voltage)
     assert m.actuator[4] == 0.0
 
 
-def test_odometry_has_estimators_variances_along_its_axes():
+def test_odometry_has_variances_of_estimator_in_ned():
     bench = Bench()
     bench.vehicle.position = [1.0, 2.0, 3.0]
     plain = bench.vehicle.messages
@@ -147,8 +147,8 @@ def test_odometry_has_estimators_variances_along_its_axes():
 
     bench.vehicle.messages = messages
     bench.step(2)
-    m = ask(bench, bench.station(), "ODOMETRY")
-    assert (m.x, m.y, m.z) == pytest.approx((2.0, 1.0, 0.35 - 3.0))  # from where it stood
+    m = request(bench, bench.station(), "ODOMETRY")
+    assert (m.x, m.y, m.z) == pytest.approx((2.0, 1.0, 0.35 - 3.0))  # from the start position
     assert (m.frame_id, m.child_frame_id) == (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_FRAME_LOCAL_NED)
     assert [m.pose_covariance[k] for k in (0, 6, 11)] == pytest.approx([0.04, 0.01, 0.09])
     assert math.isnan(m.pose_covariance[1])
@@ -159,17 +159,17 @@ def test_flight_times():
     bench = Bench()
     station = bench.station()
     bench.step(50)
-    assert ask(bench, station, "FLIGHT_INFORMATION").flight_uuid == 0
+    assert request(bench, station, "FLIGHT_INFORMATION").flight_uuid == 0
     bench.vehicle.armed = True
     bench.step(50)
-    armed = ask(bench, station, "FLIGHT_INFORMATION")
+    armed = request(bench, station, "FLIGHT_INFORMATION")
     assert armed.arming_time_utc == pytest.approx(1e6 * (bench.vehicle.seconds - 1.0), abs=3e5)
     assert (armed.takeoff_time_utc, armed.flight_uuid) == (0, 1)
     bench.vehicle.landed = False
     bench.step(50)
     bench.vehicle.landed = True
     bench.step(5)
-    m = ask(bench, station, "FLIGHT_INFORMATION")
+    m = request(bench, station, "FLIGHT_INFORMATION")
     assert m.arming_time_utc == armed.arming_time_utc
     assert armed.arming_time_utc < m.takeoff_time_utc < 1e3 * m.landing_time
 
@@ -178,42 +178,42 @@ def test_identity_and_missing_parts():
     bench = Bench()
     bench.step(2)
     station = bench.station()
-    assert ask(bench, station, "PROTOCOL_VERSION").max_version == 200
+    assert request(bench, station, "PROTOCOL_VERSION").max_version == 200
     station.got.clear()
     assert station.command(mavlink.MAV_CMD_REQUEST_PROTOCOL_VERSION, 1.0) == ACCEPTED
     assert station.last("PROTOCOL_VERSION")
-    m = ask(bench, station, "RC_CHANNELS")
+    m = request(bench, station, "RC_CHANNELS")
     assert (m.chancount, m.chan1_raw, m.rssi) == (0, 0xFFFF, 255)
 
 
 @pytest.mark.parametrize(("firmware", "bit"), [("px4", "BYTEWISE"), ("ardupilot", "C_CAST")])
-def test_encoding_of_whole_parameters_is_announced(firmware, bit):
+def test_encoding_of_integer_parameters_is_announced(firmware, bit):
     bench = Bench(f"mavlink.firmware={firmware}")
     bench.step(2)
-    m = ask(bench, bench.station(), "AUTOPILOT_VERSION")
+    m = request(bench, bench.station(), "AUTOPILOT_VERSION")
     encodings = {
         name: getattr(mavlink, f"MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_{name}") for name in ("BYTEWISE", "C_CAST")
     }
     assert [name for name, mask in encodings.items() if m.capabilities & mask] == [bit]
 
 
-def test_inertial_readings_in_whole_numbers():
+def test_scaled_imu_has_integer_readings():
     bench = Bench()
     imu = Imu(linear_acceleration=Vector3(0.0, 0.0, 9.80665), angular_velocity=Vector3(0.1, 0.2, 0.3))
     bench.vehicle.more = [(IMU, imu), (MAG, MagneticField(magnetic_field=Vector3(1e-6, 25e-6, -38e-6)))]
     bench.step(2)
-    m = ask(bench, bench.station(), "SCALED_IMU")
+    m = request(bench, bench.station(), "SCALED_IMU")
     assert (m.xacc, m.yacc, m.zacc) == (0, 0, -1000)
     assert (m.xgyro, m.ygyro, m.zgyro) == (100, -200, -300)
     assert (m.xmag, m.ymag, m.zmag) == (10, -250, 380)
 
 
-def test_wind_is_velocity_of_air_where_vehicle_is():
+def test_wind_is_air_velocity_at_vehicle():
     bench = Bench()
     truth = VehicleState(wind=Vector3(3.0, 1.0, 0.5))
     truth = truth._replace(pose=truth.pose._replace(position=truth.pose.position._replace(z=12.0)))
     bench.vehicle.more = [(TRUTH, truth)]
     bench.step(2)
-    m = ask(bench, bench.station(), "WIND_COV")
+    m = request(bench, bench.station(), "WIND_COV")
     assert (m.wind_x, m.wind_y, m.wind_z) == (1.0, 3.0, -0.5)
     assert m.wind_alt == pytest.approx(292.0)

@@ -37,7 +37,7 @@ def key(tmp_path, monkeypatch):
 
 
 class Station:
-    """A pymavlink client, whose sent frames are kept."""
+    """A pymavlink client that stores its sent frames."""
 
     def __init__(self, url, key=None):
         self.link, self.sent = mavutil.mavlink_connection(url, retries=100), []
@@ -100,7 +100,7 @@ def test_signing_client_flies_and_replayed_frames_are_rejected(tmp_path, key):
     ):
         thief.connect(("127.0.0.1", port))
         observer = Station(f"udpout:127.0.0.1:{port}", key)
-        observer.link.mav.srcComponent = 77  # a stream of its own
+        observer.link.mav.srcComponent = 77  # a separate stream
         observer.await_vehicle(process)
         for frame in station.sent:
             thief.send(frame)

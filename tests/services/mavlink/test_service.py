@@ -1,4 +1,4 @@
-"""The link beside a run: what it tells and what it asks, and that it can neither stop nor slow the flight."""
+"""MAVLink process of a run: telemetry and commands; it can neither stop nor slow the flight."""
 
 import math
 import os
@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 import pytest
-from fake_vehicle import StandIn, free_port, until
+from fake_vehicle import FakeVehicle, free_port, until
 from pymavlink import mavutil
 
 from lapwing.cosim.log import LogReader, LogWriter
@@ -36,12 +36,12 @@ def run(tmp_path, key_prefix, *more, **options):
 
 
 def adapter_of(process):
-    """Process id of the link of a run, once it is there."""
+    """Return the process id of a run's link once it has started."""
     assert until(lambda: "mavlink" in participants(process.pid), 120.0)
     return participants(process.pid)["mavlink"]
 
 
-def heard(connection, kind, seconds=120.0):
+def next_message(connection, kind, seconds=120.0):
     message = connection.recv_match(type=kind, blocking=True, timeout=seconds)
     assert message, f"no {kind}"
     return message
@@ -51,9 +51,9 @@ def test_client_flies_autopilot_of_live_run(tmp_path):
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
 
-    def order(number, *params):
+    def send_command(number, *params):
         station.mav.command_long_send(1, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
-        while (ack := heard(station, "COMMAND_ACK")).command != number:
+        while (ack := next_message(station, "COMMAND_ACK")).command != number:
             pass
         return ack.result
 
@@ -61,18 +61,20 @@ def test_client_flies_autopilot_of_live_run(tmp_path):
     more = [part for each in sets for part in ("--set", each)]
     url = f"udpout:127.0.0.1:{port}"
     with run(tmp_path, "test-mavlink", "--mavlink", url, "--speed", "5", *more) as process:
-        heard(station, "HEARTBEAT")
+        next_message(station, "HEARTBEAT")
         station.mav.heartbeat_send(6, 8, 0, 0, 0)
-        assert heard(station, "SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_GPS
+        assert next_message(station, "SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_GPS
         station.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
-        assert heard(station, "PARAM_VALUE").param_value == 1.5
-        assert order(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED  # no setpoints come
-        assert order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-        assert order(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
-        while heard(station, "GLOBAL_POSITION_INT").relative_alt < 1400:
+        assert next_message(station, "PARAM_VALUE").param_value == 1.5
+        assert (
+            send_command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED
+        )  # no setpoints arrive
+        assert send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+        assert send_command(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
+        while next_message(station, "GLOBAL_POSITION_INT").relative_alt < 1400:
             pass
-        assert order(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
-        while heard(station, "HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
+        assert send_command(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
+        while next_message(station, "HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
             pass
         output, _ = process.communicate(timeout=600)
     station.close()
@@ -82,13 +84,13 @@ def test_client_flies_autopilot_of_live_run(tmp_path):
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds processes in /proc")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGSTOP])
-def test_link_that_dies_or_freezes_does_not_hold_up_flight(tmp_path, how):
+def test_dead_or_stopped_link_does_not_delay_flight(tmp_path, how):
     port, key_prefix = free_port(), f"test-mavlink-{how.name.lower()}"
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--speed", "4"]
     with run(tmp_path, key_prefix, *more) as process:
         adapter = adapter_of(process)
-        heard(station, "ATTITUDE")
+        next_message(station, "ATTITUDE")
         os.kill(adapter, how)
         output, _ = process.communicate(timeout=600)
     station.close()
@@ -113,9 +115,9 @@ def test_invalid_url_is_rejected_with_valid_forms(url, fault):
         check(url)
 
 
-def test_replayed_log_shows_on_link_and_takes_no_commands(tmp_path):
+def test_replayed_log_has_telemetry_but_rejects_commands(tmp_path):
     log = tmp_path / "flight.mcap"
-    vehicle = StandIn()
+    vehicle = FakeVehicle()
     vehicle.armed, vehicle.mode, vehicle.target = True, "takeoff", [0.0, 0.0, 30.0]
     with LogWriter(log, {}, {"scene.json": b'{"vehicle": {"name": "drone1"}}'}) as writer:
         for _ in range(300):
@@ -126,18 +128,18 @@ def test_replayed_log_shows_on_link_and_takes_no_commands(tmp_path):
     command = [sys.executable, "-m", "lapwing", "replay", str(log), "--key-prefix", "test-mavlink-replay"]
     command += ["--listen", endpoint, "--mavlink", f"udpout:127.0.0.1:{port}"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        heard(station, "HEARTBEAT")
+        next_message(station, "HEARTBEAT")
         station.mav.heartbeat_send(6, 8, 0, 0, 0)
         station.mav.command_long_send(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
-        assert heard(station, "COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-        while heard(station, "GLOBAL_POSITION_INT").relative_alt < 500:
+        assert next_message(station, "COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+        while next_message(station, "GLOBAL_POSITION_INT").relative_alt < 500:
             pass
         process.terminate()
         process.communicate(timeout=30)
     station.close()
 
 
-def test_flood_does_not_change_bit_of_flight(tmp_path):
+def test_flood_leaves_flight_bit_for_bit_identical(tmp_path):
     port, sent = free_port(), 0
     frame = mavlink.MAVLink_command_long_message(1, 1, 60_000, 0, *(0.0,) * 7).pack(mavlink.MAVLink(None, 255, 190))
     more = ["--mavlink", f"udpin:127.0.0.1:{port}", "--speed", "2"]
@@ -149,7 +151,7 @@ def test_flood_does_not_change_bit_of_flight(tmp_path):
                 try:
                     attacker.send(frame)
                     sent += 1
-                except OSError:  # nobody listens yet, or any more
+                except OSError:  # nothing listens yet, or the link has closed
                     break
             time.sleep(0.001)
         output, _ = process.communicate(timeout=600)
@@ -167,15 +169,17 @@ def test_mission_of_plan_can_be_downloaded(tmp_path):
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = ["--mavlink", f"udpout:127.0.0.1:{port}", "--plan", "lapwing/scenes/plans/delivery.plan", "--speed", "2"]
     with run(tmp_path, "test-mavlink-plan", *more) as process:
-        heard(station, "HEARTBEAT")
+        next_message(station, "HEARTBEAT")
         station.mav.mission_request_list_send(1, 1, 0)
         result = []
-        for number in range(heard(station, "MISSION_COUNT").count):
+        for number in range(next_message(station, "MISSION_COUNT").count):
             station.mav.mission_request_int_send(1, 1, number, 0)
-            result.append(heard(station, "MISSION_ITEM_INT"))
+            result.append(next_message(station, "MISSION_ITEM_INT"))
         process.send_signal(signal.SIGTERM)
         process.communicate(timeout=60)
     station.close()
     assert [m.command for m in result] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
     assert result[5].param1 == 5.0
-    assert result[4].z == pytest.approx(10.0, abs=0.02)  # above home: it stands 0.35 m above the ground
+    assert result[4].z == pytest.approx(
+        10.0, abs=0.02
+    )  # above home; the body origin at rest is 0.35 m above the ground

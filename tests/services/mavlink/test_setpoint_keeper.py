@@ -11,18 +11,18 @@ TIMEOUT, STEP = 1.0, 0.02  # [s], of simulation time
 
 
 class Autopilot:
-    """Takes commands; knows how old its newest setpoint is."""
+    """Receiver of commands that stores the time of the newest setpoint."""
 
     def __init__(self, clock):
-        self.clock, self.at, self.given = clock, 0.0, []
+        self.clock, self.at, self.commands = clock, 0.0, []
 
     def put(self, kind, source, values=()):
         self.at = self.clock.now.time_ns * 1e-9
-        self.given.append((kind, source, tuple(values)))
+        self.commands.append((kind, source, tuple(values)))
 
 
 def loss(speed):
-    """Simulation time [s] of the loss after one setpoint at 0, and the commands that were repeated."""
+    """Return the simulation time [s] of the loss after one setpoint at 0, and the repeated commands."""
     clock = Clock()
     clock.now = Instant(0, 0.0)
     autopilot = Autopilot(clock)
@@ -33,7 +33,7 @@ def loss(speed):
         clock.now = Instant(round(t * 1e9), t / speed)
         keeper.step()
         if t - autopilot.at > TIMEOUT:
-            return t, autopilot.given
+            return t, autopilot.commands
     raise AssertionError("it is never lost")
 
 
@@ -60,7 +60,7 @@ def test_newer_setpoint_replaces_older():
     keeper.hold("offboard_attitude", "1/2", (2.0,))
     clock.now = Instant(400_000_000, 0.1)
     keeper.step()
-    assert autopilot.given == [("offboard_attitude", "1/2", (2.0,))]
+    assert autopilot.commands == [("offboard_attitude", "1/2", (2.0,))]
 
 
 def test_setpoint_is_not_repeated_without_timeout():
@@ -70,4 +70,4 @@ def test_setpoint_is_not_repeated_without_timeout():
     keeper.hold("offboard_position", "1/2", (1.0,))
     clock.now = Instant(400_000_000, 0.1)
     keeper.step()
-    assert autopilot.given == []
+    assert autopilot.commands == []

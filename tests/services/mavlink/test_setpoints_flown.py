@@ -1,10 +1,10 @@
-"""Setpoints of either firmware, flown by the autopilot: each does what its mask and its frame say."""
+"""Setpoints of both firmwares, flown by the autopilot according to mask and frame."""
 
 import math
 
 import pytest
 from adapter_harness import Station
-from autopilot_harness import Flown
+from autopilot_harness import AutopilotBench
 
 pytestmark = pytest.mark.long
 
@@ -15,7 +15,7 @@ FAR = 0.35  # [m]
 
 
 class Client(Station):
-    """Streams setpoints at 12.5 Hz."""
+    """Station that streams setpoints at 12.5 Hz."""
 
     def stream(self, seconds, send):
         self.got.clear()
@@ -44,11 +44,11 @@ class Client(Station):
 
 @pytest.mark.parametrize("firmware", ["px4", "ardupilot"])
 def test_mavlink_setpoints_are_flown(firmware):
-    bench = Flown("hover", f"mavlink.firmware={firmware}")
+    bench = AutopilotBench("hover", f"mavlink.firmware={firmware}")
     station = bench.station_of(Client)
     station.px4 = firmware == "px4"
     bench.step(10)
-    assert station.last("LOCAL_POSITION_NED").z == pytest.approx(0.0, abs=0.02)  # where it stands
+    assert station.last("LOCAL_POSITION_NED").z == pytest.approx(0.0, abs=0.02)  # start position
     above = station.last("GLOBAL_POSITION_INT").alt * 1e-3 if station.px4 else 0.0
     assert station.command(176, 1.0, 4.0, 3.0) == station.command(400, 1.0) == 0
     assert station.command(22, -1.0, 0.0, 0.0, NAN, NAN, NAN, above + 5.0) == 0
@@ -73,6 +73,6 @@ def test_mavlink_setpoints_are_flown(firmware):
     at, _, _ = station.world(6.0, 5, 280.35 + 6.0)
     assert math.dist(at, (0.0, 0.0, -6.0)) < FAR
     _, v, _ = station.local(0.8, 1, BOTH, 0.0, 0.0, -6.0, 0.5)
-    assert 0.0 < v[0] < 0.5  # the velocity leads it away from the place, the place holds it
+    assert 0.0 < v[0] < 0.5  # the velocity leads away from the position setpoint
     _, v, _ = station.local(1.0, 7, POSITION, 3.0, 0.0, 0.0)
-    assert v[0] > 0.5  # 3 m north of where it is, again and again
+    assert v[0] > 0.5  # repeatedly 3 m north of the current position

@@ -1,4 +1,4 @@
-"""Signed links: only the key's holder is heard, and only once; without a key only this machine commands."""
+"""Signed links: only frames with the key are accepted, each once; without a key only local commands."""
 
 import hashlib
 
@@ -13,7 +13,7 @@ REFUSED = "unsigned, forged or replayed"
 ARM = (1, 1, 400, 0, 1.0, *(0.0,) * 6)
 
 
-def test_signed_commands_are_taken_and_answered_signed():
+def test_signed_commands_get_signed_acknowledgements():
     bench = Bench(key=KEY)
     station = bench.station(key=KEY, local=False)
     station.send("command_long", *ARM)
@@ -23,7 +23,7 @@ def test_signed_commands_are_taken_and_answered_signed():
 
 
 @pytest.mark.parametrize("key", [None, hashlib.sha256(b"wrong").digest()])
-def test_unsigned_and_wrongly_signed_are_refused_and_counted(key):
+def test_unsigned_and_forged_frames_are_rejected_and_counted(key):
     bench = Bench(key=KEY)
     station = bench.station(key=key)
     station.send("command_long", *ARM)
@@ -32,7 +32,7 @@ def test_unsigned_and_wrongly_signed_are_refused_and_counted(key):
     assert bench.counts[REFUSED] == 1
 
 
-def test_replayed_packet_is_refused_also_by_another_way():
+def test_replayed_packet_is_rejected_on_other_endpoint():
     bench = Bench(key=KEY)
     station, thief = bench.station(key=KEY), bench.station(local=False)
     station.send("command_long", *ARM)
@@ -45,7 +45,7 @@ def test_replayed_packet_is_refused_also_by_another_way():
     assert bench.counts[REFUSED] == 2
 
 
-def test_forged_time_stamp_does_not_shut_out_keys_holder():
+def test_forged_time_stamp_does_not_block_valid_sender():
     bench = Bench(key=KEY)
     station = bench.station(key=KEY)
     station.send("heartbeat", 6, 8, 0, 0, 0, 3)
@@ -58,7 +58,7 @@ def test_forged_time_stamp_does_not_shut_out_keys_holder():
     assert bench.vehicle.armed
 
 
-def test_without_key_other_machines_watch_but_do_not_command():
+def test_without_key_other_machines_get_telemetry_only():
     bench = Bench()
     stranger = bench.station(local=False)
     assert stranger.command(400, 1.0) == mavlink.MAV_RESULT_DENIED
@@ -76,7 +76,7 @@ def test_without_key_other_machines_watch_but_do_not_command():
     assert {m.type for m in stranger.all("MISSION_ACK")} == {mavlink.MAV_MISSION_DENIED}
 
 
-def test_insecure_takes_commands_from_anywhere():
+def test_insecure_accepts_remote_commands():
     bench = Bench(insecure=True)
     assert bench.station(local=False).command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
 
@@ -133,7 +133,7 @@ def test_new_stream_older_than_minute_is_rejected():
     assert not bench.vehicle.armed
 
 
-def test_key_file_holds_one_passphrase(tmp_path):
+def test_key_file_has_one_passphrase(tmp_path):
     path = tmp_path / "key"
     path.write_text("correct horse\n")
     assert read_key(path) == KEY

@@ -1,4 +1,4 @@
-"""Watch of sockets: one wake-up until they have been served."""
+"""Watch of sockets: one wake-up until `resume`."""
 
 import queue
 import selectors
@@ -7,7 +7,7 @@ import socket
 from lapwing.services.mavlink.socket_watch import SocketWatch
 
 
-def test_wakes_once_until_socket_has_been_served():
+def test_watch_wakes_once_until_resumed():
     wakes = queue.SimpleQueue()
     near, far = socket.socketpair()
     with near, far, selectors.DefaultSelector() as selector:
@@ -21,7 +21,7 @@ def test_wakes_once_until_socket_has_been_served():
                 assert wakes.empty()
                 for key, _ in selector.select(0.0):
                     key.data()
-                watch.served()
+                watch.resume()
 
 
 def test_watch_ends_while_ready_socket_has_not_been_read():

@@ -1,4 +1,4 @@
-"""Before the vehicle speaks: the link is there, says that it starts, and serves what needs no vehicle."""
+"""Link before the first message of the vehicle: it reports the start and serves static data."""
 
 from adapter_harness import Bench
 
@@ -31,7 +31,7 @@ def test_parameters_and_identity_are_sent_during_start():
     assert station.last("AUTOPILOT_VERSION")
 
 
-def test_commands_are_turned_away_for_time_being():
+def test_commands_are_temporarily_rejected():
     bench = Bench(starting=True)
     station = bench.station()
     station.send("command_long", 1, 1, 400, 0, 1.0, *[0.0] * 6)

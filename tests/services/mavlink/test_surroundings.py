@@ -1,4 +1,4 @@
-"""Telemetry of the sensors that look outside."""
+"""Telemetry of external sensors."""
 
 import math
 
@@ -41,7 +41,7 @@ FITTED = [f"sensors.{name}.preset=ideal" for name in SENSORS]
 
 
 def shown(*messages, more=FITTED, steps=120):
-    """A station that is shown messages of sensors, (topic, message)."""
+    """Return a station of a vehicle that publishes these sensor messages, (topic, message)."""
     bench = Bench(*more)
     bench.vehicle.more = list(messages)
     station = bench.station()
@@ -49,8 +49,8 @@ def shown(*messages, more=FITTED, steps=120):
     return station
 
 
-def turned(q, v):
-    """v turned by the quaternion q: v + 2 w (u x v) + 2 u x (u x v)."""
+def rotate(q, v):
+    """Return v rotated by the quaternion q: v + 2 w (u x v) + 2 u x (u x v)."""
     w, *u = q
 
     def cross(a, b):
@@ -61,7 +61,7 @@ def turned(q, v):
     return [v[k] + 2.0 * w * once[k] + 2.0 * twice[k] for k in range(3)]
 
 
-def test_directions_have_numbers_of_mavlink():
+def test_directions_have_mavlink_numbers():
     names = {(0, 0): "NONE", (-45, 0): "YAW_45", (90, 0): "YAW_270", (180, 0): "YAW_180", (30, 90): "PITCH_90"}
     names |= {(0, -90): "PITCH_270"}
     for (azimuth, elevation), name in names.items():
@@ -70,12 +70,12 @@ def test_directions_have_numbers_of_mavlink():
 
 
 @pytest.mark.parametrize(("azimuth", "elevation"), [(20.0, 0.0), (0.0, -45.0), (-100.0, 30.0)])
-def test_any_other_direction_is_turn_from_ahead(azimuth, elevation):
+def test_other_direction_is_rotation_from_forward(azimuth, elevation):
     number, q = orientation(azimuth, elevation)
     assert number == mavlink.MAV_SENSOR_ROTATION_CUSTOM
     a, e = math.radians(azimuth), math.radians(elevation)
     flu = (math.cos(e) * math.cos(a), math.cos(e) * math.sin(a), math.sin(e))
-    assert turned(q, [1.0, 0.0, 0.0]) == pytest.approx((flu[0], -flu[1], -flu[2]))
+    assert rotate(q, [1.0, 0.0, 0.0]) == pytest.approx((flu[0], -flu[1], -flu[2]))
 
 
 def test_sonar_and_rangefinder_are_two_distance_sensors():
@@ -90,7 +90,7 @@ def test_sonar_and_rangefinder_are_two_distance_sensors():
 
 
 def test_flow_has_signs_of_mavlink():
-    """Ahead makes the flow about y positive, to the right that about x negative; a right-handed turn is positive."""
+    """Check the signs: forward motion makes the flow about y positive, motion to the right that about x negative."""
     v, d = (2.0, -3.0), 4.0  # [m/s] ahead, to the right (FLU), [m]
     flow = OpticalFlow(HEAD, (v[1] / d, -v[0] / d), (0.1, 0.2), d, 1e-4)
     station = shown((OPTICAL_FLOW, flow))
@@ -105,7 +105,7 @@ def test_flow_has_signs_of_mavlink():
     assert (m.quality, m.distance) == (0, -1.0)
 
 
-def test_airspeed_is_that_of_tube_and_over_ground_without_one():
+def test_airspeed_is_ground_speed_without_sensor():
     tail = shown((AIRSPEED, FluidPressure(HEAD, -5.0, 0.0))).last("VFR_HUD")
     ahead = shown((AIRSPEED, FluidPressure(HEAD, 0.5 * 1.225 * 8.0**2, 0.0))).last("VFR_HUD")
     assert (tail.airspeed, ahead.airspeed) == pytest.approx((0.0, 8.0))
@@ -167,7 +167,7 @@ def test_status_shows_rejected_sources(source, bit):
 
 
 def test_obstacles_are_clockwise_from_ahead():
-    """A wall to the left (azimuth 90 degrees) is in sector 54 of 72, 270 degrees clockwise."""
+    """Check a wall to the left (azimuth 90 degrees): sector 54 of 72, 270 degrees clockwise."""
     ranges = [math.inf] * 360
     ranges[180 + 90], ranges[180] = 3.0, -math.inf
     scan = LaserScan(HEAD, -math.pi, math.radians(179.0), math.radians(1.0), 0.0, 0.1, 0.15, 12.0, tuple(ranges), ())
@@ -177,7 +177,7 @@ def test_obstacles_are_clockwise_from_ahead():
     assert m.frame == mavlink.MAV_FRAME_BODY_FRD
 
 
-def test_obstacles_of_point_cloud_leave_ground_out():
+def test_obstacles_of_point_cloud_exclude_ground():
     fields = tuple(PointField(name, 4 * k, PointField.FLOAT32, 1) for k, name in enumerate("xyz"))
     points = np.array([[4.0, 0.0, 0.1], [2.0, 0.0, -0.5], [math.nan] * 3], "<f4")
     cloud = PointCloud2(HEAD, 1, 3, fields, False, 12, 36, tuple(points.tobytes()), False)
@@ -194,7 +194,7 @@ def test_obstacles_of_point_cloud_leave_ground_out():
         (GPSStatus.STATUS_RTK_FIX, mavlink.GPS_FIX_TYPE_RTK_FIXED),
     ],
 )
-def test_receiver_tells_kind_of_fix_dilution_and_satellites(status, fix_type):
+def test_gps_reports_fix_type_dilution_and_satellites(status, fix_type):
     details = GPSFix(
         HEAD, GPSStatus(HEAD, satellites_used=7, satellites_visible=9, status=status), hdop=0.92, vdop=1.37
     )
@@ -207,7 +207,7 @@ def test_receiver_tells_kind_of_fix_dilution_and_satellites(status, fix_type):
     assert (m.fix_type, m.eph, m.epv, m.satellites_visible) == (fix_type, 92, 137, 9)
 
 
-def test_receiver_without_fix_tells_satellites_in_view():
+def test_gps_without_fix_reports_visible_satellites():
     station = shown(
         (GPS, NavSatFix(HEAD, NavSatStatus(NavSatStatus.STATUS_NO_FIX))),
         (GPS_VELOCITY, TwistWithCovarianceStamped(HEAD)),

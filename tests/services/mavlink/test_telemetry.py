@@ -1,4 +1,4 @@
-"""Telemetry: units, frames and rates, against what was put in."""
+"""Telemetry: units, frames and rates against the published messages."""
 
 import math
 
@@ -24,15 +24,15 @@ def moved():
 
 def test_position_on_earth():
     m = shown(moved(), "GLOBAL_POSITION_INT")
-    assert (m.lat - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)  # metres to a degree there
+    assert (m.lat - 407686000) * 1e-7 * 111_049 == pytest.approx(40.0, rel=2e-3)  # metres per degree at home
     assert (m.lon - 147907000) * 1e-7 * 84_418 == pytest.approx(30.0, rel=2e-3)
-    assert (m.alt, m.relative_alt) == (292_000, 11_650)  # it stood 0.35 m above the ground
+    assert (m.alt, m.relative_alt) == (292_000, 11_650)  # the body origin at rest is 0.35 m above the ground
     assert m.hdg == 6000  # 30 degrees north of east
 
 
 def test_local_position_is_north_east_down():
     m = shown(moved(), "LOCAL_POSITION_NED")
-    assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, 0.35 - 12.0))  # from where it stood
+    assert (m.x, m.y, m.z) == pytest.approx((40.0, 30.0, 0.35 - 12.0))  # from the start position
 
 
 def test_stream_rates_have_defaults_and_can_be_changed():
@@ -77,7 +77,7 @@ def test_odometry_in_free_fall_is_along_body_axes():
     truth = VehicleState(acceleration=Vector3(0.0, 9.80665, 0.0))
     q = truth.pose.orientation._replace(w=math.cos(half), z=math.sin(half))  # the nose points north
     truth = truth._replace(pose=truth.pose._replace(orientation=q))
-    bench.adapter.take(TRUTH, 0, truth.encode(), 0.0)
+    bench.adapter.handle(TRUTH, 0, truth.encode(), 0.0)
     m = shown(bench, "HIL_STATE_QUATERNION")
     assert (m.xacc, m.yacc, m.zacc) == (1000, 0, 0)
 

@@ -1,4 +1,4 @@
-"""Missions and parameters over a bad line: one in ten lost both ways, one in ten twice."""
+"""Missions and parameters over a lossy link: one in ten datagrams is lost in each direction, one in ten doubled."""
 
 import socket
 import struct
@@ -14,7 +14,7 @@ BAD = {"loss": 0.1, "twice": 0.1}
 
 
 class RetryingStation(Station):
-    """Asks again after half a second, as ground stations do."""
+    """Station that repeats its requests after half a second, like ground stations."""
 
     def step(self):
         self.age = getattr(self, "age", 0) + 1
@@ -34,7 +34,7 @@ class RetryingStation(Station):
             if not self.all("MISSION_REQUEST_INT"):
                 self.send("mission_count", 1, 1, len(items), 0)
 
-        self.watch, self.again = answer, again
+        self.on_message, self.again = answer, again
         self.send("mission_count", 1, 1, len(items), 0)
         assert self.bench.until(lambda: self.last("MISSION_ACK"), 60.0)
         return self.last("MISSION_ACK").type
@@ -42,7 +42,7 @@ class RetryingStation(Station):
     def download(self):
         result = {}
 
-        def ask():
+        def request():
             if (count := self.last("MISSION_COUNT")) is None:
                 self.send("mission_request_list", 1, 1, 0)
             elif len(result) < count.count:
@@ -52,10 +52,10 @@ class RetryingStation(Station):
             if m.get_type() == "MISSION_ITEM_INT" and m.seq == len(result):
                 result[m.seq] = m
             if m.get_type() in ("MISSION_COUNT", "MISSION_ITEM_INT"):
-                ask()
+                request()
 
-        self.watch, self.again = answer, ask
-        ask()
+        self.on_message, self.again = answer, request
+        request()
         assert self.bench.until(
             lambda: self.last("MISSION_COUNT") and len(result) == self.last("MISSION_COUNT").count, 60
         )
@@ -77,7 +77,7 @@ class RetryingStation(Station):
             if not result:
                 self.send("param_request_list", 1, 1)
 
-        self.watch, self.again = answer, again
+        self.on_message, self.again = answer, again
         self.send("param_request_list", 1, 1)
         assert self.bench.until(lambda: result and len(result) == count(), 60.0)
         return result
@@ -108,7 +108,7 @@ def test_items_of_mission_show_in_landed_state():
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_transfers_complete_over_bad_line(seed):
+def test_transfers_complete_over_lossy_link(seed):
     bench = Bench()
     client = retrying_station(bench, seed=seed, **BAD)
     items = [item(k, north=float(k), up=2.0 + k) for k in range(60)]
@@ -146,7 +146,7 @@ def test_lost_last_acknowledgement_is_repeated():
     client.send("mission_item_int", *item(0))
     bench.step(2)
     client.got.clear()
-    client.send("mission_request_list", 1, 1, 0)  # it goes on: it has got it
+    client.send("mission_request_list", 1, 1, 0)  # the next request: the client has received it
     bench.step(100)
     assert not client.all("MISSION_ACK")
 
@@ -247,7 +247,7 @@ def test_everything_is_cleared_with_one_acknowledgement():
     assert [m.type for m in client.all("MISSION_ACK")] == [mavlink.MAV_MISSION_ACCEPTED]
 
 
-def test_ardupilots_first_item_is_home_and_not_flown_to():
+def test_first_item_of_ardupilot_is_home():
     bench = Bench("mavlink.firmware=ardupilot")
     client = bench.station()
     client.send("mission_count", 1, 1, 2, 0)
@@ -257,7 +257,7 @@ def test_ardupilots_first_item_is_home_and_not_flown_to():
     assert [i.action for i in bench.vehicle.items] == ["delay", "waypoint"]
 
 
-def test_whole_parameters_travel_as_bytes_or_by_value():
+def test_integer_parameters_are_sent_as_bytes_or_by_value():
     for overrides, wire in (((), struct.unpack("<f", struct.pack("<i", 3))[0]), (("mavlink.firmware=ardupilot",), 3.0)):
         bench = Bench(*overrides)
         client = bench.station()
@@ -318,7 +318,7 @@ def test_mavsdk_uploads_mission_over_lossy_udp():
 
 
 def lossy_relay(near, far, over):
-    """Datagrams from one port to another and back; some are lost, some come twice."""
+    """Forward datagrams between two ports; some are lost, some are doubled."""
     station = Station.__new__(Station)
     import random
 

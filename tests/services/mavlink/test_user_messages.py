@@ -52,7 +52,7 @@ def test_user_message_is_sent_at_its_rate(scene):
         (MODULE.replace("NAMED_VALUE_FLOAT", "NAMED_VALUE_FLAOT"), "mavlink.module: own_messages declares no message"),
     ],
 )
-def test_invalid_module_is_named(scene, text, message):
+def test_invalid_module_is_rejected(scene, text, message):
     with pytest.raises(SceneError, match=message):
         scene(text)
 

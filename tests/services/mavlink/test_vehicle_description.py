@@ -1,4 +1,4 @@
-"""The one description of a vehicle: from a scene, and from a log; and who may know of what."""
+"""Description of a vehicle from a scene and a log, and import rules of the service."""
 
 import ast
 from pathlib import Path
@@ -11,7 +11,7 @@ from lapwing.services.scene_resolver import load
 FOLDER = Path("services/mavlink")
 
 
-def test_scenes_vehicle_is_described_whole():
+def test_vehicle_of_scene_is_described():
     d = describe(
         load("lapwing/scenes/groundstation.toml", ["vehicle.name=bee", "mavlink.system_id=7", "communication.rate=500"])
     )
@@ -54,14 +54,14 @@ def imports(path):
             yield from (name.name for name in node.names)
 
 
-def test_scene_is_known_to_description_alone():
+def test_only_description_imports_scene():
     for path in FOLDER.rglob("*.py"):
         if path.name not in ("resolve.py", "schema.py"):
             result = {n for n in imports(path) if n.startswith(SCENE)}
             assert not result, path
 
 
-def test_handlers_and_telemetry_know_neither_adapter_nor_hub():
+def test_handlers_and_telemetry_import_no_adapter():
     for path in (*FOLDER.glob("protocols/*.py"), *FOLDER.glob("telemetry/*.py")):
         assert not {n for n in imports(path) if ".adapter" in n or ".link_server" in n or ".endpoint" in n}, path
 

@@ -14,10 +14,10 @@ STARTING = 15  # messages before the first answer: 60 ms at 250 Hz
 
 
 class Px4Peer:
-    """One scripted PX4."""
+    """Scripted PX4."""
 
     def __init__(self, port, host="127.0.0.1", attempts=200):
-        """Connect; tried again, as PX4 does, until the simulator listens."""
+        """Connect; repeat as PX4 does until the simulator listens."""
         for _ in range(attempts):
             try:
                 self._socket = socket.create_connection((host, port), timeout=0.1)
@@ -27,7 +27,7 @@ class Px4Peer:
         self._socket.settimeout(60.0)
         self.codec = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._waiting = []
-        self.passed = []  # messages of other kinds
+        self.skipped = []  # messages of other kinds
         self.armed = False
         self.send(mavlink.MAVLink_command_long_message(0, 0, 511, 0, 115, 5000, 0, 0, 0, 0, 0))
         self.send(mavlink.MAVLink_heartbeat_message(0, 12, 0, 0, 0, 3))
@@ -47,7 +47,7 @@ class Px4Peer:
                 message = self._waiting.pop(0)
                 if message.get_type() == kind:
                     return message
-                self.passed.append(message)
+                self.skipped.append(message)
             data = self._socket.recv(65536)
             if not data:
                 return None

@@ -1,4 +1,4 @@
-"""Program that stands for PX4 in whole runs: takes a mission, arms, climbs to 2 m, descends and disarms.
+"""Replacement of PX4 in complete runs: accepts a mission, arms, climbs to 2 m, descends and disarms.
 
 It is started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops to answer in the air; with `--starts
 FILE` it appends its instance and process id to a file.
@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from tests.services.px4.peer import Px4Peer
 
-HOVER, HEIGHT = 0.62, 2.0  # duty that carries the vehicle; [m]
+HOVER, HEIGHT = 0.62, 2.0  # duty in hover; [m]
 
 
 class VehicleSide:
@@ -32,7 +32,7 @@ class VehicleSide:
         self.mode = 0
 
     def poll(self, beat):
-        """Answer what has come; send a heartbeat if `beat`."""
+        """Answer the received messages; send a heartbeat if `beat`."""
         if beat:
             self._send(mavlink.MAVLink_heartbeat_message(2, 12, 128 * self.armed | 1, self.mode, 4, 3))
         while True:
@@ -66,7 +66,7 @@ class VehicleSide:
 
 
 def main():
-    """Fly."""
+    """Run the flight."""
     parser = argparse.ArgumentParser()
     parser.add_argument("-i", type=int)
     parser.add_argument("--stall", action="store_true")

@@ -16,7 +16,7 @@ NUMBERS = {
 
 
 @pytest.mark.parametrize("name", NUMBERS)
-def test_id_is_that_of_metadata(name):
+def test_event_id_equals_metadata(name):
     assert event_id(name) == (1 << 24) + NUMBERS[name]
 
 
@@ -30,9 +30,9 @@ def test_id_is_that_of_metadata(name):
         ("commander_failsafe_enter", struct.pack("<IBB", 4, 99, 98), "98: 99"),  # of a later version
     ],
 )
-def test_text_names_cause_and_action(name, arguments, text):
+def test_text_has_cause_and_action(name, arguments, text):
     assert failsafe_text(event_id(name), arguments.ljust(40, b"\0")) == text
 
 
-def test_other_events_are_no_failsafe():
+def test_other_events_have_no_text():
     assert failsafe_text((1 << 24) + 961599, bytes(40)) == ""

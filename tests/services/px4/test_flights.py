@@ -1,4 +1,4 @@
-"""Whole runs with PX4 in the autopilot's place: a scripted program, and the real one where LAPWING_PX4 names it."""
+"""Complete runs with PX4 as the autopilot: a scripted program, and the real one if LAPWING_PX4 is set."""
 
 import json
 import os
@@ -21,7 +21,7 @@ SCENE = Path(__file__).parents[3] / "lapwing/scenes/px4_quad.toml"
 
 
 def run(command, *options, timeout=600):
-    """Run the scene with a program in PX4's place."""
+    """Run the scene with a program as PX4."""
     instance = free_instance((socket.SOCK_STREAM, PORT, 1), (socket.SOCK_DGRAM, MAVLINK_PORT, 1))
     arguments = [sys.executable, "-m", "lapwing", "run", "px4_quad", "--mode", "single-process"]
     arguments += ["--set", f"autopilot.command={json.dumps(command)}", "--set", f"autopilot.instance={instance}"]
@@ -42,7 +42,7 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
 
 
 @pytest.mark.long
-def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
+def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     log = tmp_path / "flight.mcap"
     flights = run([sys.executable, str(PEER), "--stall"], "--log", str(log), "--set", "autopilot.step_timeout=2.0")
     assert flights.returncode != 0
@@ -54,7 +54,7 @@ def test_stalled_firmware_is_named_and_log_is_readable(tmp_path):
 
 
 @pytest.mark.long
-def test_program_that_does_not_exist_is_named(tmp_path):
+def test_missing_program_is_reported(tmp_path):
     log = tmp_path / "flight.mcap"
     flights = run(["/nowhere/px4"], "--log", str(log))
     assert flights.returncode == 2
@@ -64,7 +64,7 @@ def test_program_that_does_not_exist_is_named(tmp_path):
 
 
 @pytest.mark.long
-def test_working_directory_that_does_not_exist_is_named(tmp_path):
+def test_missing_working_directory_is_reported(tmp_path):
     flights = run(
         [sys.executable], "--set", f"autopilot.directory={tmp_path}/nowhere", "--log", str(tmp_path / "a.mcap")
     )
@@ -72,14 +72,14 @@ def test_working_directory_that_does_not_exist_is_named(tmp_path):
     assert "autopilot.directory: no folder" in flights.stderr
 
 
-def test_missing_sensor_is_named(tmp_path):
+def test_missing_sensor_is_rejected(tmp_path):
     scene = SCENE.read_text().replace("[sensors.barometer]\n", "").replace("plans/", f"{SCENE.parent}/plans/")
     (tmp_path / "scene.toml").write_text(scene)
     with pytest.raises((ConfigError, SceneError), match=r"needs \[sensors.barometer\]"):
         resolve(load(tmp_path / "scene.toml"))
 
 
-def test_mission_that_is_none_is_named(tmp_path):
+def test_invalid_mission_is_rejected(tmp_path):
     (tmp_path / "bad.plan").write_text("{}")
     (tmp_path / "scene.toml").write_text(SCENE.read_text().replace("plans/square_px4.plan", "bad.plan"))
     checked = subprocess.run(

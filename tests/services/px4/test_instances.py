@@ -1,4 +1,4 @@
-"""Several PX4 on one machine: fleets, campaigns, runs side by side. A scripted program stands for PX4."""
+"""Several PX4 on one machine: fleets, campaigns, runs side by side. A scripted program replaces PX4."""
 
 import json
 import os
@@ -20,26 +20,26 @@ PEER = Path(__file__).parent / "scripted_px4.py"
 SCENE = Path(__file__).parents[3] / "lapwing/scenes/px4_quad.toml"
 
 
-def claim(taken):
+def claim(used):
     def result(setup):
-        if setup.instance in taken:
+        if setup.instance in used:
             raise FirmwareError(f"px4: instance {setup.instance} is in use")
         return setup.instance
 
     return result
 
 
-def test_next_free_instance_is_taken():
+def test_next_free_instance_is_used():
     setup, actual = first_free(firmware_setup("px4", None, 2, chooses=True), 10, claim({2, 3}))
     assert (setup.instance, actual) == (4, 4)
 
 
-def test_given_instance_is_only_one():
+def test_configured_instance_is_the_only_candidate():
     with pytest.raises(FirmwareError, match="instance 2 is in use"):
         first_free(firmware_setup("px4", None, 2), 10, claim({2}))
 
 
-def test_last_instance_is_named_if_all_are_in_use():
+def test_last_instance_is_reported_if_all_are_in_use():
     with pytest.raises(FirmwareError, match="instance 9 is in use"):
         first_free(firmware_setup("px4", None, 0, chooses=True), 10, claim(set(range(10))))
 
@@ -64,7 +64,7 @@ def is_running(pid):
 
 @pytest.fixture
 def program(tmp_path):
-    """Override that starts the scripted program, and the file with its starts."""
+    """Return the override that starts the scripted program, and the file with its starts."""
     command = [sys.executable, str(PEER), "--starts", str(tmp_path / "starts.txt")]
     return f"autopilot.command={json.dumps(command)}", tmp_path / "starts.txt"
 
@@ -86,17 +86,17 @@ def test_campaign_starts_and_ends_one_program_for_each_run(program, tmp_path):
 
 
 @pytest.mark.long
-def test_run_beside_another_takes_next_instance(program, tmp_path):
+def test_concurrent_run_uses_next_instance(program, tmp_path):
     command, file = program
     with ExitStack() as stack:
-        for instance in range(2):  # as if two others flew
+        for instance in range(2):  # simulates two other runs
             s = stack.enter_context(socket.socket())
             s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:
                 s.bind((HOST, PORT + instance))
                 s.listen()
             except OSError:
-                continue  # another one flies
+                continue  # in use by another run
         done = lapwing("run", "px4_quad", "--mode", "single-process", "--log", str(tmp_path / "a.mcap"),
                        "--set", command)  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr

@@ -43,11 +43,11 @@ def port_of(link):
     return PORT + link._setup.instance
 
 
-def fly(link, steps, begin=0, samples=SAMPLES):
-    return [link.steps.step(tick, **samples) for tick in range(begin, begin + steps)]
+def fly(link, steps, first=0, samples=SAMPLES):
+    return [link.steps.step(tick, **samples) for tick in range(first, first + steps)]
 
 
-def begun(link, script):
+def begin(link, script):
     """Run a script with a started peer in the background, and open the link."""
 
     def run():
@@ -62,7 +62,7 @@ def begun(link, script):
 
 
 def at_start(peer):
-    """Answer up to the first message of the run, which is a full second of PX4's clock; return it."""
+    """Answer up to the first message of the run, which is a full second of PX4's clock; return this message."""
     while True:
         message = peer.receive()
         peer.answer(message.time_usec)
@@ -77,7 +77,7 @@ def test_every_step_is_answered_with_its_time(link):
         peer.armed = True
         return first, peer.run(99, lambda message: (0.1, 0.2, 0.3, message.time_usec % 1_000_000 * 1e-6))
 
-    background = begun(link, script)
+    background = begin(link, script)
     outputs = fly(link, 100)
     first, rest = background.join()
     times = [message.time_usec - first.time_usec for message in rest]
@@ -103,11 +103,11 @@ def test_free_wheel_shows_vehicle_at_rest(link):
     assert [b.time_usec - a.time_usec for a, b in itertools.pairwise(result)] == [4000] * 14
     assert all(finite(message) for message in result)
     assert all(message.zacc == pytest.approx(-9.81, abs=0.1) for message in result)
-    assert len({message.xacc for message in result}) > 1  # PX4 rejects a sensor that repeats its value
+    assert len({message.xacc for message in result}) > 1  # PX4 rejects a sensor with constant values
 
 
-def test_sensors_have_their_own_rates(link):
-    background = begun(link, lambda peer: [at_start(peer), *peer.run(49)])
+def test_sensors_have_individual_rates(link):
+    background = begin(link, lambda peer: [at_start(peer), *peer.run(49)])
     fly(link, 50)
     masks = [message.fields_updated for message in background.join()]
     assert masks[0] == 0x3F | 0x1C0 | 0x1A00
@@ -115,7 +115,7 @@ def test_sensors_have_their_own_rates(link):
     assert masks[1] == 0x3F
 
 
-def test_gps_comes_at_its_rate(link):
+def test_gps_is_sent_at_its_rate(link):
     def run():
         peer = Px4Peer(port_of(link))
         peer.answer(peer.start().time_usec)
@@ -150,7 +150,7 @@ def test_lost_imu_does_not_block(link):
                 peer.answer(message.time_usec)
         return masks
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 10)
     fly(link, 10, 10, SAMPLES | {ports.IMU: ImuReading(valid=False)})
     fly(link, 11, 20)
@@ -160,7 +160,7 @@ def test_lost_imu_does_not_block(link):
     assert link.report.missed == 0
 
 
-def test_program_that_ends_while_imu_is_lost_is_named(link):
+def test_program_end_during_imu_loss_is_reported(link):
     class Ended:
         pid = None
 
@@ -174,7 +174,7 @@ def test_program_that_ends_while_imu_is_lost_is_named(link):
         at_start(peer)
         peer.close()
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 1)
     background.join()
     link._program = Ended()
@@ -190,7 +190,7 @@ def test_missed_answer_is_counted_and_outputs_are_held(link):
         peer.receive()  # not answered
         peer.run(3, lambda _: (0.6,) * 4)
 
-    background = begun(link, script)
+    background = begin(link, script)
     outputs = fly(link, 8)
     background.join()
     assert [o.outputs[0] for o in outputs[1:]] == pytest.approx([0.5] * 4 + [0.6] * 3)
@@ -206,28 +206,28 @@ def test_late_answer_is_counted(link):
         time.sleep(0.05)
         peer.answer(message.time_usec)
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 2)
     background.join()
     assert link.report.late >= 1
     assert link.report.missed == 0
 
 
-def test_stall_is_named(link):
+def test_stall_is_reported(link):
     link._setup = link._setup._replace(step_timeout=2.0)
-    background = begun(link, lambda peer: (peer, at_start(peer)))  # stays connected
+    background = begin(link, lambda peer: (peer, at_start(peer)))  # keep the connection
     with pytest.raises(FirmwareError, match=r"px4: no HIL_ACTUATOR_CONTROLS for 2 s at t = 0.008 s; check"):
         fly(link, 5)
     background.join()
 
 
-def test_absent_firmware_is_named(link):
+def test_absent_firmware_is_reported(link):
     link._setup = link._setup._replace(start_timeout=0.5)
     with pytest.raises(FirmwareError, match=r"px4: no connection for 0.5 s at t = 0.000 s; start px4 with"):
         link.open(never)
 
 
-def test_firmware_that_never_answers_is_named(link):
+def test_firmware_without_answers_is_reported(link):
     link._setup = link._setup._replace(start_timeout=1.0)
     background = Background(lambda: (peer := Px4Peer(port_of(link)), peer.start()))
     with pytest.raises(FirmwareError, match=r"px4: no HIL_ACTUATOR_CONTROLS for 1 s"):
@@ -245,15 +245,15 @@ def test_reconnect_keeps_time(link):
         other.answer(message.time_usec)
         return first.time_usec, other.run(3)
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 10)
-    begin, messages = background.join()
+    start, messages = background.join()
     assert link.report.reconnected == 1
-    assert messages[0].time_usec > begin + 6 * 4000
+    assert messages[0].time_usec > start + 6 * 4000
     assert "PX4 closed its connection" in link.report.notes[0]
 
 
-def test_second_firmware_is_refused(link):
+def test_second_firmware_is_rejected(link):
     def script(peer):
         at_start(peer)
         other = socket.create_connection(("127.0.0.1", port_of(link)))
@@ -262,7 +262,7 @@ def test_second_firmware_is_refused(link):
         with suppress(ConnectionResetError):
             assert other.recv(1) == b""
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 601)
     background.join()
     assert "a second PX4" in link.report.notes[0]
@@ -275,7 +275,7 @@ def test_garbage_is_counted(link):
         peer.send_bytes(b"GET / HTTP/1.0\r\n\r\n" + bytes(50))
         peer.run(5)
 
-    background = begun(link, script)
+    background = begin(link, script)
     fly(link, 6)
     background.join()
     assert link.report.rejected >= 1
@@ -288,29 +288,29 @@ def test_non_finite_outputs_are_held(link):
         peer.run(1, lambda _: (0.5,) * 4)
         peer.run(1, lambda _: (math.nan,) * 4)
 
-    background = begun(link, script)
+    background = begin(link, script)
     outputs = fly(link, 3)
     background.join()
     assert outputs[2].outputs == (0.5,) * 4
     assert "non-finite outputs at t = 0.008 s" in link.report.notes[0]
 
 
-def test_free_running_firmware_is_named(link):
+def test_free_running_firmware_is_reported(link):
     def script(peer):
         message = peer.receive()
         peer.answer(message.time_usec, flags=0)
 
     with pytest.raises(FirmwareError, match="runs without lock step"):
-        begun(link, script)
+        begin(link, script)
 
 
-def test_port_in_use_is_named(link):
+def test_port_in_use_is_reported(link):
     message = r"cannot listen on tcp 127.0.0.1:.*in use"
     with socket.create_server(("127.0.0.1", port_of(link))), pytest.raises(FirmwareError, match=message):
         link.open(never)
 
 
-def test_battery_of_scene_is_told_to_firmware(link):
+def test_battery_of_scene_is_sent_to_firmware(link):
     link._setup = link._setup._replace(own=OWN._replace(battery=True))
     samples = {**SAMPLES, ports.BATTERY: BatteryReading(0.42, 11.2, 20.0)}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
@@ -322,7 +322,7 @@ def test_battery_of_scene_is_told_to_firmware(link):
             vehicle.sendto(beat.pack(codec), ("127.0.0.1", MAVLINK_PORT + link._setup.instance))
             peer.run(10**6)
 
-        background = begun(link, script)
+        background = begin(link, script)
         events = []
         for tick in range(300):
             link.steps.step(tick, **samples)

@@ -61,7 +61,7 @@ def test_pressure_is_in_hectopascal():
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_compiled_frame_has_bytes_of_struct(seed):
+def test_compiled_frame_equals_struct_packing(seed):
     random = np.random.default_rng(seed)
     readings = {
         "omega_body": tuple(random.normal(size=3)),
@@ -82,7 +82,7 @@ def controls(data, size, m):
     return read_controls(data, size, m)
 
 
-def test_compiled_reading_accepts_one_frame_only():
+def test_compiled_reader_accepts_exactly_one_frame():
     values = (2**40, 1, *np.linspace(0.0, 0.75, 16).tolist(), 129)
     data = frame(HIL_ACTUATOR_CONTROLS, 7, values, 1, 1)
     m = payload()
@@ -119,7 +119,7 @@ def test_pressure_altitude_of_standard_atmosphere(pressure, altitude):
         ({"dynamic_pressure": 10.0}, 0x400),
     ],
 )
-def test_mask_names_updated_fields(readings, mask):
+def test_mask_marks_updated_fields(readings, mask):
     bits = {0x7: "ACC", 0x38: "GYRO", 0x1C0: "MAG"}
     assert sensor(**readings).fields_updated == mask
     if mask in bits:
@@ -143,7 +143,7 @@ def test_gps_units():
     ("velocity", "course"),
     [((0.0, 1.0, 0.0), 0), ((1.0, 0.0, 0.0), 9000), ((0, -1.0, 0), 18000), ((-1.0, 0, 0), 27000)],
 )
-def test_gps_course_counts_from_north_to_east(velocity, course):
+def test_gps_course_is_clockwise_from_north(velocity, course):
     assert gps(GpsReading(valid=True, velocity_world=velocity)).cog == course
 
 

@@ -1,4 +1,4 @@
-"""The reverse role: Lapwing's autopilot as the firmware of a simulator that speaks PX4's interface."""
+"""Reverse role: Lapwing's autopilot as the firmware of a simulator with PX4's interface."""
 
 import json
 import re
@@ -70,7 +70,7 @@ def test_fix_inverts_message_to_its_resolution():
     assert actual.velocity_variance == 0.01
 
 
-def test_sensors_without_update_give_no_reading():
+def test_sensors_without_update_have_no_reading():
     assert readings(HIL_SENSOR.number, sensor_values(4000, Sensors(pressure=95000.0)), NOMINAL).keys() == {"barometer"}
     assert readings(HIL_GPS.number, gps_values(4000, GpsReading()), NOMINAL) == {}
     distance = distance_values(4000, DistanceReading(1.23, 0.0, True))
@@ -79,7 +79,7 @@ def test_sensors_without_update_give_no_reading():
 
 
 class Simulator:
-    """A scripted simulator with one connection."""
+    """Scripted simulator with one connection."""
 
     def __init__(self):
         self._server = socket.create_server(("127.0.0.1", 0))
@@ -148,20 +148,20 @@ def test_closed_connection_ends_messages(connected):
     assert client.report.rejected == 1
 
 
-def test_silent_simulator_is_named(connected):
+def test_silent_simulator_is_reported(connected):
     _, client = connected
     with pytest.raises(FirmwareError, match=r"no HIL_SENSOR from tcp .* for 0.1 s at t = 2 s; check that it runs"):
         client.receive(never, 0.1, "at t = 2 s")
 
 
-def configured(*overrides):
+def configure(*overrides):
     scene = load("quad_x", ["communication.rate=250", *overrides])
     with scene.located():
         return on_simulator(scene, resolve(scene), "127.0.0.1", 4560)
 
 
 def test_configuration_has_no_plant_and_no_sensors():
-    setup = configured()
+    setup = configure()
     assert set(setup.services) == {"autopilot", "trajectory", "simulator"}
     own = setup.services["simulator"].parameters
     assert own.order == resolve(load("px4_quad")).services["px4"].parameters.order
@@ -177,7 +177,7 @@ def test_configuration_has_no_plant_and_no_sensors():
         ("px4_quad", "run.seed=1", "autopilot.firmware"),
     ],
 )
-def test_scene_that_no_simulator_flies_is_named(scene, override, key):
+def test_scene_unsuitable_for_simulator_is_rejected(scene, override, key):
     loaded = load(scene, [override])
     with pytest.raises(ConfigError, match=key.replace(".", r"\.")), loaded.located():
         on_simulator(loaded, resolve(loaded), "127.0.0.1", 4560)
@@ -190,14 +190,14 @@ def lapwing(*arguments, timeout=900):
 
 @pytest.mark.long
 @pytest.mark.parametrize("address", ["4560", "host:", "host:70000", ":4560"])
-def test_bad_address_is_named(address, tmp_path):
+def test_invalid_address_is_rejected(address, tmp_path):
     done = lapwing("autopilot", "quad_x", "--px4-sim", address, "--log", str(tmp_path / "a.mcap"))
     assert done.returncode == 2
     assert f"--px4-sim {address}: expected HOST:PORT" in done.stderr
 
 
 @pytest.mark.long
-def test_absent_simulator_is_named(tmp_path):
+def test_absent_simulator_is_reported(tmp_path):
     with socket.socket() as s:
         s.bind(("127.0.0.1", 0))
         done = lapwing(
@@ -210,7 +210,7 @@ def test_absent_simulator_is_named(tmp_path):
 
 
 @pytest.mark.long
-def test_other_step_of_simulator_is_named(tmp_path):
+def test_different_simulator_step_is_reported(tmp_path):
     simulator = Simulator()
 
     def run():
@@ -227,7 +227,7 @@ def test_other_step_of_simulator_is_named(tmp_path):
     simulator.close()
     assert done.returncode == 1
     assert "it steps by 1 ms, the scene's IMU by 4 ms; set communication.rate" in done.stderr
-    with pytest.raises(OSError):  # its connection was closed
+    with pytest.raises(OSError):  # the connection was closed
         running.join()
 
 

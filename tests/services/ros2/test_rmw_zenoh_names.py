@@ -1,4 +1,4 @@
-"""Keys and tokens against zenoh-ros2-sdk, which others wrote for the same middleware."""
+"""Keys and tokens against zenoh-ros2-sdk, an independent implementation for the same middleware."""
 
 import re
 from pathlib import Path
@@ -14,7 +14,7 @@ from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpo
 SESSION = "5a16d9fcc7d8d7d0a7d6c4a6d2a4d1b8"
 
 
-def test_key_of_topic_is_that_of_design_document():
+def test_topic_key_equals_design_document():
     assert Endpoint("/chatter", "std_msgs/msg/String").key(0) == (
         "0/chatter/std_msgs::msg::dds_::String_/RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
     )
@@ -22,7 +22,7 @@ def test_key_of_topic_is_that_of_design_document():
 
 @pytest.mark.parametrize("kind", [PUBLISHER, SUBSCRIPTION])
 @pytest.mark.parametrize("name", ["sensor_msgs/msg/Imu", "lapwing_msgs/msg/Status"])
-def test_keys_and_tokens_are_those_of_another_implementation(name, kind):
+def test_keys_and_tokens_equal_other_implementation(name, kind):
     pytest.importorskip("zenoh_ros2_sdk", reason="needs the extra `clients`")
     from zenoh_ros2_sdk import entity, keyexpr, qos, utils
 
@@ -43,7 +43,7 @@ def test_keys_and_tokens_are_those_of_another_implementation(name, kind):
     assert node_token(7, SESSION) == keyexpr.node_liveliness_keyexpr(theirs.node)
 
 
-def test_attachment_is_that_of_another_implementation():
+def test_attachment_equals_other_implementation():
     pytest.importorskip("zenoh_ros2_sdk", reason="needs the extra `clients`")
     from zenoh_ros2_sdk.attachment import Attachment
 

@@ -1,4 +1,4 @@
-"""A run as a node of a ROS 2 graph, seen and commanded by zenoh-ros2-sdk, which others wrote."""
+"""A run as a node of a ROS 2 graph, observed and commanded by zenoh-ros2-sdk, an independent client."""
 
 import os
 import queue
@@ -23,7 +23,7 @@ from tests.endpoints import loopback_endpoints
 pytestmark = pytest.mark.long
 
 DOMAIN = 7
-PATIENCE = 120.0  # [s] the run gets to compile and to begin
+PATIENCE = 120.0  # [s] for the run to compile and start
 
 
 @pytest.fixture
@@ -34,12 +34,12 @@ def port():
 
 @pytest.fixture
 def graph(port, tmp_path):
-    """Publishers and subscribers of another program on a router; its session begins with the first."""
+    """Return publishers and subscribers of another program on a router; the first opens its session."""
     pytest.importorskip("zenoh_ros2_sdk", reason="needs the extra `clients`")
     from zenoh_ros2_sdk import message_registry
     from zenoh_ros2_sdk.session import ZenohSession
 
-    for path in FOLDER.glob("*/*.msg"):  # so that none is fetched from elsewhere
+    for path in FOLDER.glob("*/*.msg"):  # so that no definition is downloaded
         copy = tmp_path / "msg" / path.parent.name / "msg" / path.name
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text())
@@ -55,14 +55,14 @@ def graph(port, tmp_path):
 
 
 class Graph:
-    """The other program's view of the ROS 2 graph."""
+    """View of the other program on the ROS 2 graph."""
 
     def __init__(self, port):
         self._where = {"domain_id": DOMAIN, "router_ip": "127.0.0.1", "router_port": port}
         self.entities = []
 
     def topics(self):
-        """Types by topic."""
+        """Return the types by topic."""
         from zenoh_ros2_sdk import discovery
 
         return dict(discovery.get_topic_names_and_types(**self._where))
@@ -75,7 +75,7 @@ class Graph:
         return result
 
     def subscribe(self, topic, message):
-        """A queue of what comes."""
+        """Return a queue of the received messages."""
         from zenoh_ros2_sdk import ROS2Subscriber
 
         arrived = queue.SimpleQueue()
@@ -83,7 +83,7 @@ class Graph:
         return arrived
 
     def type_(self, name):
-        """The other program's class of a message."""
+        """Return the other program's class of a message."""
         from zenoh_ros2_sdk.session import ZenohSession
 
         return ZenohSession.get_instance().store.types[name]
@@ -109,7 +109,7 @@ def await_listener(process, port):
 
 
 def plain(message):
-    """A message of either program as numbers and texts."""
+    """Return a message of either program as numbers and texts."""
     if hasattr(message, "_fields"):
         return {name: plain(getattr(message, name)) for name in message._fields}
     if hasattr(message, "__msgtype__"):
@@ -133,7 +133,7 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
         while received[-1].header.stamp.sec < 13:
             received.append(poses.get(timeout=PATIENCE))
             if received[-1].header.stamp.sec >= 6:  # the estimator has settled
-                if poses.empty():  # not for each of those that wait
+                if poses.empty():  # not for every queued message
                     target.publish(header=received[-1].header, pose=there)
                 if not started and received[-1].header.stamp.nanosec > 500_000_000:
                     started = True
@@ -148,7 +148,7 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
         types = {topic: [kind] for topic, kind in log.topics().items()}
         recorded = [PoseStamped.decode(payload) for *_, payload in log.messages(["/drone1/pose"])]
         inputs = [OperatorInput.decode(payload) for *_, payload in log.messages(["/drone1/vehicle_command"])]
-    types.pop("/wall_time")  # made by who writes the log
+    types.pop("/wall_time")  # published by the recorder
     assert types.items() <= topics.items()
     place = recorded.index(next(m for m in recorded if plain(m) == plain(received[0])))
     assert [plain(m) for m in received] == [plain(m) for m in recorded[place : place + len(received)]]
@@ -174,7 +174,7 @@ def test_node_drives_motors(tmp_path, port, graph):
         while (pose := poses.get(timeout=PATIENCE)).header.stamp.sec < 11:
             none = graph.type_("geometry_msgs/msg/Vector3")(0.0, 0.0, 0.0)
             motors.publish(header=pose.header, motor_voltage=volts, armed=False, thrust=volts, attitude_reference=none)
-            if pose.header.stamp.sec > second:  # as often as it takes, where the node comes late
+            if pose.header.stamp.sec > second:  # repeated, since the node may start late
                 second = pose.header.stamp.sec
                 mode.publish(data="offboard")
                 arm.publish(data=True)
@@ -269,7 +269,7 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
     assert ("arming", "armed") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
 
-def test_second_node_on_machine_joins_first_ones_router(port):
+def test_second_node_joins_router_of_first(port):
     with Node(DOMAIN, f"127.0.0.1:{port}") as first, Node(DOMAIN, f"127.0.0.1:{port}") as second:
         requested = second.subscribe({"/clock": Clock})
         first.declare("/clock", Clock.type_name)
@@ -277,7 +277,7 @@ def test_second_node_on_machine_joins_first_ones_router(port):
         first.put("/foreign", 0, b"")
         sent = Clock(stamp(5)).encode()
         deadline, result = time.monotonic() + PATIENCE, None
-        while result is None and time.monotonic() < deadline:  # the subscription takes a while to be known
+        while result is None and time.monotonic() < deadline:  # the subscription may be discovered late
             first.put("/clock", 5, sent)
             result = requested.get()
     assert result == ("/clock", sent)
@@ -343,25 +343,25 @@ def test_ros2_installation_observes_and_commands_run(tmp_path, port):
     nodes["ZENOH_CONFIG_OVERRIDE"] = f'connect/endpoints=["tcp/127.0.0.1:{port}"]'
     environment = os.environ | nodes
 
-    def said_by(*command):
+    def output_of(*command):
         return subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, timeout=PATIENCE).stdout
 
     def publish(topic, kind, value):
-        said_by("ros2", "topic", "pub", "--once", "-w", "1", f"/drone1/command/{topic}", kind, value)
+        output_of("ros2", "topic", "pub", "--once", "-w", "1", f"/drone1/command/{topic}", kind, value)
 
     target = None
     run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=90")
     try:
-        listed = said_by("ros2", "topic", "list", "--no-daemon").split()
+        listed = output_of("ros2", "topic", "list", "--no-daemon").split()
         assert {"/clock", "/drone1/imu", "/drone1/command/arm"} <= set(listed)
         pose = ("/drone1/pose", "geometry_msgs/msg/PoseStamped")
-        assert "frame_id: world" in said_by("ros2", "topic", "echo", "--no-daemon", "--once", *pose)
-        assert "average rate: " in said_by("timeout", "--signal=INT", "8", "ros2", "topic", "hz", pose[0])
-        assert 0 < int(said_by("/usr/bin/python3", "-c", SIMULATION_TIME)) < 90e9
+        assert "frame_id: world" in output_of("ros2", "topic", "echo", "--no-daemon", "--once", *pose)
+        assert "average rate: " in output_of("timeout", "--signal=INT", "8", "ros2", "topic", "hz", pose[0])
+        assert 0 < int(output_of("/usr/bin/python3", "-c", SIMULATION_TIME)) < 90e9
         there = "{pose: {position: {x: 2.0, y: 1.0, z: 3.0}, orientation: {w: 1.0}}}"
         command = ["ros2", "topic", "pub", "-r", "20", "/drone1/command/pose", pose[1], there]
         target = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL)
-        time.sleep(5.0)  # the mode is accepted while setpoints come
+        time.sleep(5.0)  # the mode is accepted only while setpoints arrive
         publish("mode", "std_msgs/msg/String", "{data: offboard}")
         publish("arm", "std_msgs/msg/Bool", "{data: true}")
         output = run.communicate(timeout=PATIENCE)[0]

@@ -49,7 +49,7 @@ def test_values_that_are_finitely_many(text, values):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "output"),
     [
         ("normal(1)", "normal: got '1'"),
         ("normal(a, b)", "normal: got 'a, b'"),
@@ -117,7 +117,7 @@ def test_sweep_keeps_rows_together(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "output"),
     [
         ("", "expected a line of keys"),
         ("a,b\n", "expected a line of keys, each once, and a line of values for each run"),
@@ -149,7 +149,7 @@ def test_rejection_text_is_independent_of_file_place():
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "output"),
     [
         ({"runs": 40_000_000_000}, "--runs 40000000000: expected a number from 1 to 10000000"),
         ({"runs": 0}, "--runs 0: expected a number from 1 to 10000000"),

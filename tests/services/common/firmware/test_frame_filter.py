@@ -1,4 +1,4 @@
-"""Selection of MAVLink frames: what passes, in any pieces and after any garbage."""
+"""Selection of MAVLink frames, in any pieces and after any garbage."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -41,6 +41,6 @@ def test_signed_frame_passes_as_one():
     assert FrameFilter(NEEDED).select(beat + beat) == beat + beat
 
 
-def test_each_handled_message_is_needed():
+def test_needed_messages_equal_handled_ones():
     handled = {name.removeprefix("_on_").upper() for name in vars(MissionClient) if name.startswith("_on_")}
     assert {mavlink.mavlink_map[number].msgname for number in NEEDED} == handled

@@ -24,17 +24,17 @@ ITEMS = (
 
 
 class Vehicle:
-    """Vehicle's end of the link, and the transport."""
+    """Vehicle's end of the link, also the transport."""
 
     where = "a test"
 
-    def __init__(self, refusals=0, uploads_rejected=0):
-        """Create a vehicle that refuses to arm, or a mission, some times."""
+    def __init__(self, arm_rejections=0, uploads_rejected=0):
+        """Create a vehicle that rejects arming `arm_rejections` times and a mission `uploads_rejected` times."""
         self.codec = mavlink.MAVLink(None, srcSystem=7, srcComponent=1)
         self.reader = mavlink.MAVLink(None)
         self.out, self.items, self.sent = b"", {}, []
         self.parameters = {"COM_RC_IN_MODE": (0, mavlink.MAV_PARAM_TYPE_INT32), "MPC_XY_VEL_MAX": (12.0, 9)}
-        self.refusals, self.uploads_rejected, self.count = refusals, uploads_rejected, 0
+        self.arm_rejections, self.uploads_rejected, self.count = arm_rejections, uploads_rejected, 0
         self.armed, self.closed = False, False
 
     def receive(self):
@@ -49,37 +49,37 @@ class Vehicle:
     def close(self):
         self.closed = True
 
-    def tell(self, message):
+    def emit(self, message):
         self.out += message.pack(self.codec)
 
     def beat(self, custom_mode=0):
-        self.tell(mavlink.MAVLink_heartbeat_message(2, 12, 1 | 128 * self.armed, custom_mode, 4, 3))
+        self.emit(mavlink.MAVLink_heartbeat_message(2, 12, 1 | 128 * self.armed, custom_mode, 4, 3))
 
     def mission_count(self, message):
         if self.uploads_rejected:
             self.uploads_rejected -= 1
-            self.tell(mavlink.MAVLink_mission_ack_message(245, 190, mavlink.MAV_MISSION_NO_SPACE))
+            self.emit(mavlink.MAVLink_mission_ack_message(245, 190, mavlink.MAV_MISSION_NO_SPACE))
             return
         self.count, self.items = message.count, {}
-        self.tell(mavlink.MAVLink_mission_request_message(245, 190, 0))
+        self.emit(mavlink.MAVLink_mission_request_message(245, 190, 0))
 
     def mission_item_int(self, message):
         self.items[message.seq] = message
         if len(self.items) < self.count:
-            self.tell(mavlink.MAVLink_mission_request_int_message(245, 190, len(self.items)))
+            self.emit(mavlink.MAVLink_mission_request_int_message(245, 190, len(self.items)))
         else:
-            self.tell(mavlink.MAVLink_mission_ack_message(245, 190, 0))
+            self.emit(mavlink.MAVLink_mission_ack_message(245, 190, 0))
 
     def command_long(self, message):
         result = 0
         if message.command == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
-            if self.refusals:
-                self.refusals -= 1
+            if self.arm_rejections:
+                self.arm_rejections -= 1
                 result = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-                self.tell(mavlink.MAVLink_statustext_message(3, b"Preflight Fail: no position"))
+                self.emit(mavlink.MAVLink_statustext_message(3, b"Preflight Fail: no position"))
             else:
                 self.armed = True
-        self.tell(mavlink.MAVLink_command_ack_message(message.command, result))
+        self.emit(mavlink.MAVLink_command_ack_message(message.command, result))
 
     def param_request_read(self, message):
         value, kind = self.parameters[message.param_id]
@@ -95,7 +95,7 @@ class Vehicle:
     def value(self, name, value, kind):
         if kind == mavlink.MAV_PARAM_TYPE_INT32:
             value = struct.unpack("<f", struct.pack("<i", value))[0]
-        self.tell(mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0))
+        self.emit(mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0))
 
 
 def fly(vehicle, client, seconds, begin=0.0):
@@ -139,8 +139,8 @@ def test_parameters_are_set_with_their_types():
     assert client.stage is Stage.FLYING
 
 
-def test_refused_arming_is_tried_again_and_blockers_are_named():
-    vehicle = Vehicle(refusals=3)
+def test_rejected_arming_is_retried_and_blockers_reported():
+    vehicle = Vehicle(arm_rejections=3)
     client = make(vehicle)
     fly(vehicle, client, 2.5)
     assert client.texts.blockers == ["Preflight Fail: no position"]
@@ -149,7 +149,7 @@ def test_refused_arming_is_tried_again_and_blockers_are_named():
     assert client.texts.blockers == []
 
 
-def test_mission_without_space_is_tried_again():
+def test_mission_without_space_is_retried():
     vehicle = Vehicle(uploads_rejected=3)
     client = make(vehicle)
     fly(vehicle, client, 8.0)
@@ -164,12 +164,12 @@ def test_rejected_mission_ends_run():
         FlightStatus("px4", client).poll(30.0)
 
 
-def test_disarmed_vehicle_has_finished_and_failsafe_is_reported():
+def test_disarming_finishes_flight_and_failsafe_is_reported():
     vehicle = Vehicle()
     client = make(vehicle)
     fly(vehicle, client, 3.0)
     vehicle.beat()
-    vehicle.tell(mavlink.MAVLink_statustext_message(3, b"Failsafe activated: RTL\t"))
+    vehicle.emit(mavlink.MAVLink_statustext_message(3, b"Failsafe activated: RTL\t"))
     client.poll(3.5)
     assert FlightStatus("px4", client).output((0.5,) * 4, True).text == "Failsafe activated: RTL"
     vehicle.armed = False
@@ -178,12 +178,12 @@ def test_disarmed_vehicle_has_finished_and_failsafe_is_reported():
     assert FlightStatus("px4", client).output((0.0,) * 4, False).finished
 
 
-def test_restarted_firmware_gets_mission_again_and_is_armed():
+def test_restarted_firmware_gets_mission_and_is_armed():
     vehicle = Vehicle()
     client = make(vehicle, parameters={"MPC_XY_VEL_MAX": 5.0})
     fly(vehicle, client, 5.0)
     assert client.stage is Stage.FLYING
-    vehicle.beat()  # the last one of the old program, armed
+    vehicle.beat()  # last heartbeat of the old program, armed
     vehicle.armed, vehicle.items = False, {}
     vehicle.parameters["MPC_XY_VEL_MAX"] = (12.0, 9)
     client.restart()
@@ -200,9 +200,9 @@ def test_event_names_cause_and_action_of_failsafe():
     fly(vehicle, client, 3.0)
     event = mavlink.mavlink_map[410]
     arguments = struct.pack("<IBB34x", 4, 6, 3)  # mode, return, low battery
-    vehicle.tell(event(0, 0, (1 << 24) + 9751178, 30_000, 7, 0x42, tuple(arguments)))
-    vehicle.tell(mavlink.MAVLink_statustext_message(2, b"Failsafe activated\t"))
-    vehicle.tell(event(0, 0, (1 << 24) + 961599, 30_100, 8, 0x66, (0,) * 40))  # about sticks
+    vehicle.emit(event(0, 0, (1 << 24) + 9751178, 30_000, 7, 0x42, tuple(arguments)))
+    vehicle.emit(mavlink.MAVLink_statustext_message(2, b"Failsafe activated\t"))
+    vehicle.emit(event(0, 0, (1 << 24) + 961599, 30_100, 8, 0x66, (0,) * 40))  # event about sticks
     client.poll(3.5)
     assert client.texts.failsafe == "low battery: return"
 
@@ -221,7 +221,7 @@ def test_px4_mode_names(mode, name):
     assert px4.mode_name(mode) == name
 
 
-def test_battery_is_told_as_battery_of_vehicle():
+def test_battery_is_sent_as_battery_of_vehicle():
     vehicle = Vehicle()
     client = MissionClient(vehicle, px4.CONVENTIONS, (), {})
     client.send_battery(14.2, 12.5, 0.37)
@@ -242,6 +242,6 @@ def test_version_of_firmware_is_requested():
     client.poll(0.0)
     requested = [m for m in vehicle.sent if m.get_type() == "COMMAND_LONG" and m.command == 512]
     assert [m.param1 for m in requested] == [148.0]
-    vehicle.tell(mavlink.MAVLink_autopilot_version_message(0, 0x01110080, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0))
+    vehicle.emit(mavlink.MAVLink_autopilot_version_message(0, 0x01110080, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0))
     client.poll(0.1)
     assert FlightStatus("px4", client).version == "1.17.0"

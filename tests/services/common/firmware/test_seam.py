@@ -1,4 +1,4 @@
-"""The seam of foreign firmwares: motor order, volts, time-outs, playback of the recorded commands."""
+"""Common parts of firmware adapters: motor order, volts, time-outs, playback of recorded commands."""
 
 import json
 import re
@@ -42,7 +42,7 @@ def test_each_rotor_gets_output_of_its_quarter():
         assert rotors.spin_direction[k] == LAYOUT[i].spin
 
 
-def test_wrong_spin_direction_names_rotor():
+def test_wrong_spin_direction_is_rejected():
     wrong = tuple(Output(o.forward, o.left, "cw" if o.spin == "ccw" else "ccw") for o in LAYOUT)
     with pytest.raises(ConfigError, match=r"rotor 1 turns cw, output 3 of betaflight expects ccw"):
         motor_order(frame(), wrong, "betaflight")
@@ -78,8 +78,8 @@ def test_timeout_counts_from_restart():
     assert patience.over
 
 
-class Thrower:
-    """A link whose firmware lifts off at 0.2 s: rotors in the firmware's order get 0.6."""
+class TakeoffLink:
+    """Link whose firmware takes off at 0.2 s: rotors in the firmware's order get 0.6."""
 
     opened = closed = 0
 
@@ -102,11 +102,11 @@ class Thrower:
         type(self).closed += 1
 
 
-class Counted(Thrower):
+class Counted(TakeoffLink):
     opened = closed = 0
 
 
-class Broken(Thrower):
+class NonFiniteLink(TakeoffLink):
     def step(self, tick, read, waits):
         return FirmwareOutput((float("nan"),) * 4, True)
 
@@ -133,7 +133,7 @@ def test_recorded_commands_fly_again_to_recorded_digest(tmp_path, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize(("accuracy", "code"), [(1e-4, 0), (1e-12, 1)])
 def test_accuracy_of_recorded_commands_is_measured(tmp_path, monkeypatch, accuracy, code):
-    with_link(monkeypatch, Thrower)
+    with_link(monkeypatch, TakeoffLink)
     log = tmp_path / "flight.mcap"
     fly_single(resolve(load("betaflight_quad", QUAD)), log)
     result = lapwing_check(tmp_path, log, "--json", "a.json", "--set", f"solver.accuracy={accuracy}")
@@ -154,7 +154,7 @@ def test_accuracy_of_recorded_commands_is_measured(tmp_path, monkeypatch, accura
     ],
 )
 def test_check_of_log_rejects_invalid_request(tmp_path, monkeypatch, options, message):
-    with_link(monkeypatch, Thrower)
+    with_link(monkeypatch, TakeoffLink)
     log = tmp_path / "flight.mcap"
     fly_single(resolve(load("betaflight_quad", ["run.duration=0.01", "run.real_time_factor=1000.0"])), log)
     result = lapwing_check(tmp_path, log, *options)
@@ -177,7 +177,7 @@ def lapwing_check(folder, scene, *options):
 def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):
     from lapwing.flight import Flight
 
-    with_link(monkeypatch, Thrower)
+    with_link(monkeypatch, TakeoffLink)
     log = tmp_path / "flight.mcap"
     fly_single(resolve(load("betaflight_quad", QUAD)), log)
     flight = Flight.read(log)
@@ -185,8 +185,8 @@ def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):
     assert flight.status.mode[-1] == "test"
 
 
-def test_non_finite_outputs_end_run_and_name_time(monkeypatch, tmp_path):
-    with_link(monkeypatch, Broken)
+def test_non_finite_outputs_end_run(monkeypatch, tmp_path):
+    with_link(monkeypatch, NonFiniteLink)
     with pytest.raises(FirmwareError, match=r"betaflight: invalid motor outputs .* at t = 0.000 s"):
         fly_single(resolve(load("betaflight_quad", QUAD)), tmp_path / "flight.mcap")
 
@@ -220,11 +220,11 @@ def test_program_and_its_children_end():
     assert not program.running
     state = Path(f"/proc/{child}/stat")
     patience = Patience(60.0)
-    while state.exists() and ") Z " not in state.read_text():  # a zombie has ended
+    while state.exists() and ") Z " not in state.read_text():  # a zombie has ended too
         assert not patience.over
 
 
-def test_missing_program_is_named():
+def test_missing_program_is_reported():
     with pytest.raises(FirmwareError, match=r"cannot start no-such-program .*check autopilot.command"):
         Program(setup_of(["no-such-program"]))
 
