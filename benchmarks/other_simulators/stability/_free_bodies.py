@@ -20,8 +20,8 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         c = intermediate_axis
         result: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
         for name, march in methods.items():
-            y = march(c.INERTIA, c.start(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
-            for row, values in zip(result, c.compared(y, c.EPSILON), strict=True):
+            y = march(c.INERTIA, c.initial_state(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
+            for row, values in zip(result, c.figures_of_run(y, c.EPSILON), strict=True):
                 result[row][name] = float(values.max())
         return result
 
@@ -29,7 +29,9 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         c = looping
         return {
             "momentum": {
-                name: float(drift(c.momentum(march(c.INERTIA, c.start(c.ASIDE), c.DURATION, c.STEPS, c.SAMPLES))).max())
+                name: float(
+                    drift(c.momentum(march(c.INERTIA, c.initial_state(c.OFFSET), c.DURATION, c.STEPS, c.SAMPLES))).max()
+                )
                 for name, march in methods.items()
             }
         }
@@ -39,8 +41,8 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         return {
             body: {
                 name: float(
-                    c.drifted(
-                        march(inertia, c.RigidBody(c.ASKEW, omega), c.DURATION, c.STEPS, c.SAMPLES), inertia
+                    c.drifts_of_run(
+                        march(inertia, c.RigidBody(c.ATTITUDE, omega), c.DURATION, c.STEPS, c.SAMPLES), inertia
                     ).max()
                 )
                 for name, march in methods.items()
