@@ -1,7 +1,7 @@
-"""Round-off error: the same steps in double and in extended precision.
+"""Round-off error: comparison of equal steps in double and in extended precision.
 
-Both runs execute the source of the same kernels with the same step and the same coefficients, so that their difference
-is the rounding of doubles alone. Extended numbers are numpy's `longdouble`: 64 bits of mantissa on x86-64 (2048 times
+Both runs execute the source of the same kernels with the same step and coefficients, so their difference is only the
+round-off of doubles. Extended numbers are numpy's `longdouble`: 64 bits of mantissa on x86-64 (2048 times
 as fine as a double), 113 on aarch64. Random numbers are doubles in both runs.
 """
 
@@ -20,12 +20,12 @@ from lapwing.studies.accuracy.coordinates import coordinates, error
 from lapwing.studies.accuracy.problem import Problem
 
 Number: type = np.longdouble
-FINER = 1000.0  # times as fine as a double, at least: a long double of other systems is a double
-STEPS = 400  # at least
+FINER = 1000.0  # required ratio of the resolutions; on some systems a long double is a double
+STEPS = 400  # smallest number of steps
 METHOD = "rk4_renormalised"
-_FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "expm1", "log", "log1p", "tanh", "hypot", "cbrt", "floor")
+_NUMPY_FUNCTIONS = ("sqrt", "sin", "cos", "tan", "exp", "expm1", "log", "log1p", "tanh", "hypot", "cbrt", "floor")
 _MATH = SimpleNamespace(
-    **{name: getattr(np, name) for name in _FUNCTIONS},
+    **{name: getattr(np, name) for name in _NUMPY_FUNCTIONS},
     **{name: getattr(np, f"arc{name[1:]}") for name in ("asin", "acos", "atan", "atan2")},
     pow=np.power,
     sincos=lambda x: (np.sin(x), np.cos(x)),
@@ -41,26 +41,26 @@ _MATH = SimpleNamespace(
 class RoundOff(NamedTuple):
     """Round-off error at the end of a run."""
 
-    way: str
+    method: str
     steps: int
     error: float  # largest difference of coordinates, relative to 1 + size
 
 
 def is_available() -> bool:
-    """Return True if this machine has numbers finer than doubles."""
+    """Return True if this machine has extended numbers."""
     return bool(np.finfo(float).eps > FINER * np.finfo(Number).eps)
 
 
 def measure(problem: Problem) -> RoundOff | None:
-    """Return the round-off error of a problem, None if its methods or this machine have no extended numbers."""
-    way = next((way for way in problem.ways if way.name == METHOD), None)
-    if way is None or way.extended is None or not is_available():
+    """Return the round-off error of a problem; None if its methods or this machine have no extended numbers."""
+    method = next((method for method in problem.methods if method.name == METHOD), None)
+    if method is None or method.extended is None or not is_available():
         return None
-    settings = [h for h in way.settings if round(problem.duration / h) >= STEPS]
-    outcome = way.read(settings[0], way.prepare(settings[0])()) if settings else None
+    settings = [h for h in method.settings if round(problem.duration / h) >= STEPS]
+    outcome = method.read(settings[0], method.prepare(settings[0])()) if settings else None
     if outcome is None or not np.isfinite(outcome.samples).all():
         return None
-    exact = way.extended(settings[0])
+    exact = method.extended(settings[0])
     return RoundOff(METHOD, round(problem.duration / settings[0]), error(outcome.samples[-1].astype(Number), exact))
 
 
@@ -81,10 +81,10 @@ def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, step
     state, p = in_extended_precision(x), in_extended_precision(p)
     for n in range(steps):
         state = step(rate, p, Number(n * h), state, Number(h))
-    return coordinates_in_extended_numbers(x, state)
+    return coordinates_in_extended_precision(x, state)
 
 
-def coordinates_in_extended_numbers(x: Any, state: Any) -> np.ndarray:
+def coordinates_in_extended_precision(x: Any, state: Any) -> np.ndarray:
     """Return the coordinates of a state in extended numbers, shape (n,).
 
     Args:
@@ -106,7 +106,7 @@ def in_extended_precision(tree: Any) -> Any:
 
 
 def extend(function: Any) -> Callable[..., Any]:
-    """Return the Python function of a kernel, in which all that it calls computes with extended numbers."""
+    """Return the Python function of a kernel that computes, with all its callees, in extended numbers."""
     return _extend(function, {})
 
 
@@ -149,7 +149,7 @@ class _Module:
 
 
 def _generator(function: Any) -> Callable[..., Any] | None:
-    """Return the generator of a function that compiled code alone has, None for a function written in Python."""
+    """Return the generator of a function that exists only in compiled code; None for a Python function."""
     if not isinstance(function, FunctionType):
         return None
     code = function.__code__

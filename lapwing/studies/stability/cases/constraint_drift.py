@@ -18,7 +18,7 @@ from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
 from lapwing.kernels.state_tree import flatten
-from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, STILL, flight
+from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, ZERO, flight
 from lapwing.studies.accuracy.systems.delivery_drone import initial_bodies as drone_bodies
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.drone import PAPER, delivery_drone, spinning_state
@@ -50,7 +50,7 @@ def plant_hinge_error(stabilisation: str, seconds: float) -> float:
     frame = load_airframe(AIRFRAME)
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     p = multirotor_multibody.parameters(frame, (), "speed", stabilisation)
-    out = np.empty((2, len(flatten(Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)))))
+    out = np.empty((2, len(flatten(Motion(ZERO, NO_ROTATION, ZERO, ZERO, (0.0,) * 4)))))
     state = MultirotorState(drone_bodies(p, frame), ())
     return float(flight(METHOD.Method(), p, state, volts, 2e-3, round(seconds / 2e-3), out))
 
