@@ -10,14 +10,14 @@ import sys
 import time
 
 from lapwing.studies.campaign.cluster import dask
-from lapwing.studies.campaign.folder import MOST
+from lapwing.studies.campaign.folder import MAX_SHARD_SIZE as RUNS
 from lapwing.studies.metrics import METRICS
 
 
 def rows(shard):
     """Rows of a shard as they come from a flight, made up."""
     numbers = {name: 1.0 / (1 + k) for k, name in enumerate(METRICS)}
-    return [{"run": MOST * shard + k, "seed": k + 1, **numbers} for k in range(MOST)]
+    return [{"run": RUNS * shard + k, "seed": k + 1, **numbers} for k in range(RUNS)]
 
 
 def main(shards=2000):
@@ -28,7 +28,7 @@ def main(shards=2000):
         for _ in dask(cluster.scheduler_address)(rows, [(k,) for k in range(shards)]):
             pass
         each = (time.process_time() - began) / shards
-    print(f"{1e3 * each:.2f} ms of processor time for a shard: {1 / each:.0f} shards, {MOST / each:.0f} runs a second")
+    print(f"{1e3 * each:.2f} ms of processor time for a shard: {1 / each:.0f} shards, {RUNS / each:.0f} runs a second")
     return []
 
 

@@ -17,7 +17,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.fmi.fmu import export_fmu
 from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.accuracy.error_budget import _clean, _exchange
+from lapwing.studies.accuracy.error_budget import noise_overrides, rate_overrides
 from lapwing.studies.simulate import fly
 
 FINEST = 2  # times the highest rate
@@ -107,7 +107,7 @@ def main(scene: str, *rates: str) -> None:
 
     def settings(rate: int) -> list[str]:
         step = 1.0 / (FINEST * max(chosen))  # the same for all rates
-        return [*_clean(loaded), *_exchange(loaded, rate), f"solver.step={step!r}"]
+        return [*noise_overrides(loaded), *rate_overrides(loaded, rate), f"solver.step={step!r}"]
 
     finest = flown(scene, settings(FINEST * max(chosen)), "gauss_seidel")
     print("| rate | FMPy Gauss-Seidel to `lapwing run` | FMPy Jacobi to `lapwing run` with Jacobi |", end="")

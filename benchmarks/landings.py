@@ -1,4 +1,4 @@
-"""python -m benchmarks.landings: error got over error asked in 200 random landings and other kinds; in pieces."""
+"""python -m benchmarks.landings: error over accuracy in 200 random landings and other kinds; in pieces."""
 
 import argparse
 from collections.abc import Collection
@@ -39,7 +39,7 @@ def show(landings: Collection[LandingErrors]) -> None:
     """Print the distribution of the ratios, and the landings that miss their accuracy."""
     table = ratios(landings)
     events = sum(landing.events for landing in landings)
-    print(f"{len(landings)} landings, {events} located events; error got over error asked, whole state, every 4 ms")
+    print(f"{len(landings)} landings, {events} located events; error over accuracy, entire state, every 4 ms")
     print(f"{'asked':>8} {'median':>9} {'nine in ten':>12} {'largest':>9} {'above 1':>8} {'ms each':>9}")
     seconds = np.array([landing.seconds for landing in landings])
     for k, accuracy in enumerate(ACCURACIES):

@@ -25,7 +25,7 @@ def best(points: list[Point], level: float) -> Point | None:
 
 def simulator(point: Point) -> str:
     """Return the simulator of a point: "Lapwing", or the first word of its method's name."""
-    return point.way.split()[0] if " " in point.way else "Lapwing"
+    return point.method.split()[0] if " " in point.method else "Lapwing"
 
 
 def table(title: str, points: list[Point]) -> None:
@@ -44,7 +44,7 @@ def table(title: str, points: list[Point]) -> None:
             if other is None:
                 line += f"{'not reached':>30} {'':>6}"
             else:
-                method = other.way.partition(" ")[2]
+                method = other.method.partition(" ")[2]
                 line += f"{method + f' {1e3 * other.time:.3g}':>30} {other.time / ours.time:6.1f}"
         print(line)
 

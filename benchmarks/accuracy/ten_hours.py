@@ -1,7 +1,7 @@
 """Ten hours of gyrostat: the compiled time of 60 000 steps of RKMK4, of the cheapest runs, and their errors."""
 
 from lapwing.studies.accuracy.coordinates import of_state
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import DOP853, dop853
 from lapwing.studies.accuracy.systems import gyrostat
@@ -22,14 +22,14 @@ def problem(name: str) -> Problem:
     p = CASES[name]
     # of all the counts of steps, one is the paper's
     return Problem(
-        f"gyrostat, {name}", "min", DURATION, ways(p, gyrostat.START, DURATION, SEED_STEPS // 32),
+        f"gyrostat, {name}", "min", DURATION, solver_methods(p, gyrostat.START, DURATION, SEED_STEPS // 32),
         lambda: dop853(lambda t, y: gyrostat.right_hand_side(p, t, y), of_state(gyrostat.START), DURATION),
         DOP853, {},
     )  # fmt: skip
 
 
 def text(point: Point | None) -> str:
-    return f"{point.way} {1e3 * point.time:.2g} ({point.error:.0e})" if point else "-"
+    return f"{point.method} {1e3 * point.time:.2g} ({point.error:.0e})" if point else "-"
 
 
 def main() -> None:
@@ -37,7 +37,7 @@ def main() -> None:
           + "".join(f"{level:>32.0e}" for level in LEVELS))  # fmt: skip
     for name in CASES:
         points = measure(problem(name))
-        of_seed = [p for p in points if p.way == "rkmk4" and abs(p.setting - DURATION / SEED_STEPS) < 1e-9]
+        of_seed = [p for p in points if p.method == "rkmk4" and abs(p.setting - DURATION / SEED_STEPS) < 1e-9]
         cells: list[Point | None] = [*of_seed] or [None]  # none where fewer steps reach round-off
         for level in LEVELS:
             cells.append(min((p for p in points if p.error <= level), key=lambda p: p.time, default=None))

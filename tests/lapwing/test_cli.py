@@ -44,7 +44,7 @@ BAD = {
     "zero divisor": ([HOVER, "--set", 'success.require=["1/0 > 1"]'], "cannot be computed: division by zero"),
     "no expression": ([HOVER, "--set", 'success.require=["exit()"]'], "expected an expression over metrics of the"),
     "run alone": ([HOVER, "--run", "3"], "--run and --campaign: belong together; expected both"),
-    "no campaign": ([HOVER, "--run", "3", "--campaign", "scenes"], "scenes: no campaign there; expected the folder"),
+    "no campaign": ([HOVER, "--run", "3", "--campaign", "scenes"], "scenes: not a campaign; expected a folder"),
     "no value": ([HOVER, "--set", "run.seed"], "--set run.seed: expected KEY=VALUE"),
     "two lines": ([HOVER, "--set", 'run.title="a\nb'], "is not a TOML value"),
     "index": ([HOVER, "--set", "trajectory.phase.9.duration=1"], "expected an index from 0 to 3, got 9"),

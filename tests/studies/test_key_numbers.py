@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import synthetic_flights
 
-from lapwing.studies.effects.console_output import percent
+from lapwing.studies.effects.console_output import format_percent
 from lapwing.studies.flight_events import Event
 from lapwing.studies.report import write
 from lapwing.studies.report.key_numbers import key_numbers, trouble
@@ -105,7 +105,7 @@ def test_flights_of_comparison_have_their_names():
 
 @pytest.mark.parametrize(("share", "text"), [(-1.0, "-100 %"), (0.123, "+12 %"), (0.0123, "+1.2 %"), (0.0, "0 %")])
 def test_percent_has_no_exponent(share, text):
-    assert percent(share) == text
+    assert format_percent(share) == text
 
 
 @pytest.mark.long

@@ -20,7 +20,7 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         c = intermediate_axis
         result: dict[str, dict[str, float]] = {"rates": {}, "energy": {}, "momentum": {}}
         for name, march in methods.items():
-            y = march(c.INERTIA, c.start(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
+            y = march(c.INERTIA, c.initial_state(c.EPSILON), c.DURATION, c.STEPS, c.SAMPLES)
             for row, values in zip(result, c.figures_of_run(y, c.EPSILON), strict=True):
                 result[row][name] = float(values.max())
         return result
@@ -29,7 +29,9 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
         c = looping
         return {
             "momentum": {
-                name: float(drift(c.momentum(march(c.INERTIA, c.start(c.ASIDE), c.DURATION, c.STEPS, c.SAMPLES))).max())
+                name: float(
+                    drift(c.momentum(march(c.INERTIA, c.initial_state(c.OFFSET), c.DURATION, c.STEPS, c.SAMPLES))).max()
+                )
                 for name, march in methods.items()
             }
         }
@@ -40,7 +42,7 @@ def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
             body: {
                 name: float(
                     c.drifts_of_run(
-                        march(inertia, c.RigidBody(c.ASKEW, omega), c.DURATION, c.STEPS, c.SAMPLES), inertia
+                        march(inertia, c.RigidBody(c.ATTITUDE, omega), c.DURATION, c.STEPS, c.SAMPLES), inertia
                     ).max()
                 )
                 for name, march in methods.items()

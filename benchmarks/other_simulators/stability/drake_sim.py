@@ -170,7 +170,7 @@ def four_bars(n: int = 2) -> Errors:
     for joint, angle, rate in joints:
         joint.set_angle(model.context, angle)
         joint.set_angular_rate(model.context, rate)
-    t = np.linspace(0.0, c.END, c.STEPS // c.LOOKS + 1)
+    t = np.linspace(0.0, c.END, c.STEPS // c.RECORD_EVERY + 1)
     off = []
     for at, exact in zip(t[1:], c.tips(t, n)[1:], strict=True):
         model.simulator.AdvanceTo(at)

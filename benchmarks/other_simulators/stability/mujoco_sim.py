@@ -114,8 +114,8 @@ def four_bars(n: int = 2) -> Errors:
         data = mujoco.MjData(model)
         data.qvel[:] = [-1.0, 1.0] * n + [-1.0]  # tips at 1 m/s, couplers do not turn
         tip = []
-        for _ in range(c.STEPS // c.LOOKS):
-            mujoco.mj_step(model, data, c.LOOKS)
+        for _ in range(c.STEPS // c.RECORD_EVERY):
+            mujoco.mj_step(model, data, c.RECORD_EVERY)
             mujoco.mj_kinematics(model, data)
             tip.append(2.0 * data.body("crank0").xipos)
         t = np.linspace(0.0, c.END, len(tip) + 1)

@@ -1,6 +1,6 @@
-"""Work-precision study: every integrator over its steps or tolerances, on systems with a known solution.
+"""Work-precision study: every integrator at several steps or tolerances, on systems with a known solution.
 
-`lapwing accuracy TARGET`; a target is a problem of `systems/`, or a scene's file.
+`lapwing accuracy TARGET`; a target is a problem of `systems/`, or a scene.
 """
 
 from lapwing.studies.accuracy.problem import Problem

@@ -1,4 +1,4 @@
-"""`lapwing accuracy`: a target studied, and what was found shown, written and drawn."""
+"""`lapwing accuracy`: study of a target, with printed, written and plotted results."""
 
 import sys
 import threading
@@ -12,14 +12,14 @@ from lapwing.services.common.vehicle_schema import Effects
 from lapwing.studies import terminal
 from lapwing.studies.accuracy import console_output, error_budget, round_off, scenes
 from lapwing.studies.accuracy import work_precision_plot as picture
-from lapwing.studies.accuracy.error_budget import Part
+from lapwing.studies.accuracy.error_budget import ErrorSource
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.round_off import RoundOff
 from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure
 from lapwing.studies.effects.cost import costs
 
-WIDTH = 120  # letters of a table that goes to no terminal
+WIDTH = 120  # characters of a table without a terminal
 SLOW = 3.0  # [s] after which the reason is printed
 
 
@@ -29,14 +29,14 @@ class Study(NamedTuple):
     target: str
     problem: Problem
     points: list[Point]
-    chosen: Point | None  # the cheapest that meets the goal
-    parts: list[Part]  # the errors of a scene's flight
-    rounding: RoundOff | None  # None for a problem whose steps cannot be made in extended precision
-    cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, standing
+    selected: Point | None  # cheapest point that meets the goal; None without a goal
+    parts: list[ErrorSource]  # error sources of a scene's flight
+    rounding: RoundOff | None  # None for a problem without steps in extended precision
+    cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, on the ground
 
 
 def console() -> Console:
-    """Return the terminal, or a page of fixed width if the output is redirected."""
+    """Return the console, of fixed width if the output is redirected."""
     return terminal.console(None if sys.stdout.isatty() else WIDTH)
 
 
@@ -65,28 +65,28 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     notice.start()
     try:
         points = measure(problem)
-        chosen = None if goal is None else cheapest(points, goal)
+        selected = None if goal is None else cheapest(points, goal)
         parts = error_budget.errors(scene) if scene else []
-        cost = costs(scene, [scene[Effects].tables])[0][:2] if scene and error_budget.touches(scene) else None
-        return Study(target, problem, points, chosen, parts, round_off.measure(problem), cost)
+        cost = costs(scene, [scene[Effects].tables])[0][:2] if scene and error_budget.has_contact(scene) else None
+        return Study(target, problem, points, selected, parts, round_off.measure(problem), cost)
     finally:
         notice.cancel()
 
 
 def show(screen: Console, study: Study) -> None:
-    """Print the table, and that of the errors of a scene's flight."""
-    console_output.show(screen, study.problem, study.points, study.chosen, study.rounding)
+    """Print the table of the points, and the error sources of a scene's flight."""
+    console_output.show(screen, study.problem, study.points, study.selected, study.rounding)
     if study.parts:
-        console_output.show_parts(screen, study.parts, study.cost)
+        console_output.show_error_sources(screen, study.parts, study.cost)
 
 
 def write_json(path: Path, study: Study) -> None:
     """Write all points for other programs."""
     console_output.write_json(
-        path, study.target, study.problem, study.points, study.chosen, study.parts, study.rounding, study.cost
+        path, study.target, study.problem, study.points, study.selected, study.parts, study.rounding, study.cost
     )
 
 
 def plot(path: Path, study: Study) -> None:
-    """Draw error over time."""
+    """Plot error over wall time."""
     picture.draw(path, study.problem.title, study.points, study.parts)

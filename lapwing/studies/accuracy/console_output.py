@@ -1,4 +1,4 @@
-"""The study's points as a table and as JSON."""
+"""Results of the accuracy study as tables and as JSON."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ from rich.console import Console
 from rich.table import Table
 
 from lapwing.studies import json_file
-from lapwing.studies.accuracy.error_budget import Part
+from lapwing.studies.accuracy.error_budget import ErrorSource
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.round_off import RoundOff
 from lapwing.studies.accuracy.work_precision import Point, pareto_points
 
-LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors whose cheapest points are shown
+LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors for which the cheapest points are printed
 
 
 def setting(point: Point, unit: str) -> str:
@@ -22,14 +22,14 @@ def setting(point: Point, unit: str) -> str:
 
 def sentence(point: Point, unit: str) -> str:
     """Format a point as one line."""
-    what = "tolerance" if point.unit == "tol" else "step"
+    setting_name = "tolerance" if point.unit == "tol" else "step"
     text = f"{point.setting:.0e}" if point.unit == "tol" else f"{point.setting:.6g} {unit}"
     cost = "" if point.evaluations is None else f", {point.evaluations} evaluations"
-    return f"{point.way}, {what} {text}: error {point.error:.1e}, {1e3 * point.time:.3g} ms{cost}"
+    return f"{point.method}, {setting_name} {text}: error {point.error:.1e}, {1e3 * point.time:.3g} ms{cost}"
 
 
 def show(
-    console: Console, problem: Problem, points: list[Point], chosen: Point | None, rounding: RoundOff | None = None
+    console: Console, problem: Problem, points: list[Point], selected: Point | None, rounding: RoundOff | None = None
 ) -> None:
     """Print the cheapest points of each method at a few errors, and the round-off error."""
     console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
@@ -38,45 +38,46 @@ def show(
     drifts = ["drift of\n" + name.replace(" ", "\n") for name in _drifts(points)]
     for name in ("error", "time\n[ms]", "evaluations", *drifts):
         table.add_column(name, justify="right", no_wrap=True)
-    before = None
+    previous = None
     for point in pareto_points(points, LEVELS):
-        if point.way != before:
-            table.add_row(f"{point.way} ({point.order})")
+        if point.method != previous:
+            table.add_row(f"{point.method} ({point.order})")
         table.add_row(
             f"    {setting(point, problem.unit)}", f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
             "" if point.evaluations is None else str(point.evaluations),
             *(f"{point.drift[n]:.0e}" for n in _drifts(points)),
         )  # fmt: skip
-        before = point.way
+        previous = point.method
     console.print(table)
     if rounding is not None:
         text = (
-            f"round-off: {rounding.error:.1e}, the same {rounding.steps} steps of {rounding.way} in extended precision"
+            f"round-off: {rounding.error:.1e}, against {rounding.steps} equal steps of {rounding.method} "
+            "in extended precision"
         )
         console.print(text, highlight=False)
-    if chosen is not None:
-        console.print(f"cheapest: {sentence(chosen, problem.unit)}", highlight=False)
+    if selected is not None:
+        console.print(f"cheapest: {sentence(selected, problem.unit)}", highlight=False)
 
 
 def _drifts(points: list[Point]) -> list[str]:
     return list(points[0].drift) if points else []
 
 
-def show_parts(console: Console, parts: list[Part], cost: tuple[float, float] | None) -> None:
-    """Print the errors of a flight, and what a step of the plant costs [ns]: hovering, and standing."""
-    console.print("What the flight loses to each, in closed loop without noise; nine ticks in ten are below:")
+def show_error_sources(console: Console, parts: list[ErrorSource], cost: tuple[float, float] | None) -> None:
+    """Print the error sources of a flight, and the cost of a plant step [ns]: hovering, on the ground."""
+    console.print("Error sources of the flight, in closed loop without noise (90th percentile over the ticks):")
     table = Table(box=SIMPLE, pad_edge=False)
     table.add_column("source", no_wrap=True)
     table.add_column("setting", no_wrap=True)
     table.add_column("position (m)", justify="right")
     table.add_column("attitude (rad)", justify="right")
     table.add_column("largest (m)", justify="right")
-    before = None
+    previous = None
     for part in parts:
-        source = part.source if part.source != before else ""
+        source = part.source if part.source != previous else ""
         errors = (part.position, part.attitude, part.largest_position)
         table.add_row(source, part.label, *(f"{error:.1e}" for error in errors))
-        before = part.source
+        previous = part.source
     console.print(table)
     if cost:
         air, ground = cost
@@ -88,12 +89,12 @@ def write_json(
     target: str,
     problem: Problem,
     points: list[Point],
-    chosen: Point | None,
-    parts: list[Part],
+    selected: Point | None,
+    parts: list[ErrorSource],
     rounding: RoundOff | None = None,
     cost: tuple[float, float] | None = None,
 ) -> None:
-    """Write all points, and of a scene its errors and what a step of its plant costs, for other programs."""
+    """Write all points, and for a scene its error sources and the cost [ns] of a plant step."""
     data = {
         "target": target,
         "title": problem.title,
@@ -101,9 +102,9 @@ def write_json(
         "time_unit": problem.unit,
         "reference": problem.source,
         "points": points,
-        "cheapest": chosen,
+        "cheapest": selected,
         "round_off": rounding,
-        "apart": parts,
+        "error_sources": parts,
         "step_ns": dict(zip(("hovering", "in contact"), cost, strict=True)) if cost else None,
     }
     json_file.write_json(path, data)

@@ -1,4 +1,4 @@
-"""States as plain columns of numbers, with attitudes as matrices: what errors are measured in."""
+"""Coordinates of states for errors: plain columns of numbers, with attitudes as matrices."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -10,7 +10,7 @@ from lapwing.kernels.state_tree import flatten, normalise, unflatten
 
 
 def matrices(q: np.ndarray) -> np.ndarray:
-    """Return R_world_body in row order, shape (k, 9), of quaternions wxyz, shape (k, 4)."""
+    """Return R_world_body, row-major, shape (k, 9), of quaternions wxyz, shape (k, 4)."""
     w, x, y, z = q.T
     return np.column_stack(
         [
@@ -33,7 +33,7 @@ def _parts(x: Any) -> Iterator[bool]:
 
 
 def coordinates(x: Any, rows: np.ndarray) -> np.ndarray:
-    """Return the rows of the stored numbers of states shaped like x, shape (k, m), with each quaternion as a matrix."""
+    """Return the coordinates, shape (k, m), of states like `x` with stored numbers `rows`: quaternions as matrices."""
     columns, at = [], 0
     for turned in _parts(x):
         columns.append(matrices(rows[:, at : at + 4]) if turned else rows[:, at : at + 1])

@@ -1,7 +1,7 @@
 """Error budget of a flight: solver step, ground contact, communication step, coupling.
 
-The scene is flown in memory, closed loop, each time with one of the four changed. Sensors and random winds would hide
-what is looked for: the autopilot gets the true state, and winds their mean.
+The scene is flown in memory in closed loop, each time with one of the four changed. The autopilot receives the ground
+truth, and winds have their mean values, because noise would hide the errors.
 """
 
 import math
@@ -18,70 +18,76 @@ from lapwing.studies.accuracy.plant import longest_step
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 
-LONGEST = 20.0  # [s] of a motion without an end
-WHOLE = 200.0  # [s] of a mission, from take-off to rest
-MOST_TICKS = 5000  # of the former, at the scene's own rate
-SOURCES = ("plant step", "contact", "exchange interval", "coupling delay")
-ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6)  # asked of the contact
-FINEST_ACCURACY = 1e-9  # of the contact, in whatever else is compared
-STEPS = (1, 2, 4, 8)  # in an exchange interval, of the scene's integrator
-FINEST_STEPS = 32  # in the scene's exchange interval, of rkmk4
-FINER = (1, 2, 4)  # times the scene's exchange rate
-MOST = 0.9  # of the ticks
-FINEST_RATE = 8  # times that rate, of what the others are compared with
+MAX_DURATION = 20.0  # [s] of a scene without contact
+MAX_MISSION = 200.0  # [s] of a scene with contact, from take-off to rest
+MAX_TICKS = 5000  # ticks of a scene without contact
+SOURCES = ("plant step", "contact", "communication step", "coupling delay")
+ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6)  # accuracies of the contact
+REFERENCE_ACCURACY = 1e-9  # of the contact, in all other comparisons
+STEPS = (1, 2, 4, 8)  # steps of the scene's integrator per communication step
+REFERENCE_STEPS = 32  # steps of rkmk4 per communication step
+RATE_FACTORS = (1, 2, 4)  # multiples of the scene's communication rate
+QUANTILE = 0.9  # of the differences over the ticks
+REFERENCE_RATE = 8  # multiple of that rate in the reference
 
 
-class Part(NamedTuple):
-    """One source of error at one setting: differences that nine ticks in ten of the flight stay below, and the largest.
+class ErrorSource(NamedTuple):
+    """Error by one source at one setting: 90th percentiles over the ticks, and the largest position error.
 
-    The largest is often that of the one tick in which the vehicle touches down a moment sooner or later.
+    The largest error often belongs to a single tick at touchdown, whose time differs.
     """
 
     source: str
-    setting: float  # [s] step, or exchange interval; of the contact the accuracy
+    setting: float  # [s] step or communication step; accuracy of the contact
     label: str
     position: float  # [m]
     attitude: float  # [rad]
     largest_position: float  # [m]
 
 
-def errors(scene: Scene) -> list[Part]:
-    """Return the errors of a scene with a given integrator and step, each at several settings.
+def errors(scene: Scene) -> list[ErrorSource]:
+    """Return the error sources of a scene, each at several settings.
 
     Raises:
-        ValueError: a flight does not end.
+        ValueError: a flight fails.
     """
-    base = [*scene.overrides, *_clean(scene), f"run.duration={_duration(scene)!r}"]
+    base = [*scene.overrides, *noise_overrides(scene), f"run.duration={_duration(scene)!r}"]
     rate, interval = scene[Communication].rate, scene[Communication].interval
 
     def flight_with(factor: int, coupling: str, solver: list[str]) -> FlightData:
-        settings = [*base, *_exchange(scene, rate * factor), f"communication.coupling={coupling}", *solver]
+        settings = [*base, *rate_overrides(scene, rate * factor), f"communication.coupling={coupling}", *solver]
         flight: FlightData = fly(load(scene.path, settings), (TRUTH,))
         if flight.failure:
             raise ValueError(f"{scene.path}: {flight.failure}")
         return flight
 
-    def fine(factor: int, accuracy: float = FINEST_ACCURACY) -> list[str]:
-        step = interval / max(FINEST_STEPS, factor)
+    def fine_solver(factor: int, accuracy: float = REFERENCE_ACCURACY) -> list[str]:
+        step = interval / max(REFERENCE_STEPS, factor)
         return ["solver.integrator=rkmk4", f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]
 
     coupling = scene[Communication].coupling
     parts = []
-    exact = flight_with(1, coupling, fine(1))
+    exact = flight_with(1, coupling, fine_solver(1))
     for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
-        flight = flight_with(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={FINEST_ACCURACY!r}"])
-        parts.append(_part(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", flight, exact))
-    for accuracy in ACCURACIES if touches(scene) else ():
-        flight = flight_with(1, coupling, fine(1, accuracy))
-        parts.append(_part(SOURCES[1], accuracy, f"accuracy {accuracy:g}", flight, exact))
-    sequential = {factor: flight_with(factor, "gauss_seidel", fine(factor)) for factor in (*FINER, FINEST_RATE)}
-    for factor in FINER:
+        flight = flight_with(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={REFERENCE_ACCURACY!r}"])
+        parts.append(
+            _error_source(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", flight, exact)
+        )
+    for accuracy in ACCURACIES if has_contact(scene) else ():
+        flight = flight_with(1, coupling, fine_solver(1, accuracy))
+        parts.append(_error_source(SOURCES[1], accuracy, f"accuracy {accuracy:g}", flight, exact))
+    sequential = {
+        factor: flight_with(factor, "gauss_seidel", fine_solver(factor)) for factor in (*RATE_FACTORS, REFERENCE_RATE)
+    }
+    for factor in RATE_FACTORS:
         label = f"{rate * factor} Hz"
-        parts.append(_part(SOURCES[2], interval / factor, label, sequential[factor], sequential[FINEST_RATE]))
-    for factor in FINER:
+        parts.append(
+            _error_source(SOURCES[2], interval / factor, label, sequential[factor], sequential[REFERENCE_RATE])
+        )
+    for factor in RATE_FACTORS:
         label = f"Jacobi at {rate * factor} Hz"
-        parallel = flight_with(factor, "jacobi", fine(factor))
-        parts.append(_part(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
+        parallel = flight_with(factor, "jacobi", fine_solver(factor))
+        parts.append(_error_source(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
     return parts
 
 
@@ -90,19 +96,19 @@ def scene_integrator(scene: Scene) -> str:
     return str(scene.lookup("solver.integrator"))
 
 
-def touches(scene: Scene) -> bool:
+def has_contact(scene: Scene) -> bool:
     """Return True if the scene's vehicle can touch the ground."""
     return "ground_contact" in scene.tables("effects")
 
 
 def _duration(scene: Scene) -> float:
-    if touches(scene):
-        return min(scene[Run].duration, WHOLE)
+    if has_contact(scene):
+        return min(scene[Run].duration, MAX_MISSION)
     interval = scene[Communication].interval
-    return min(scene[Run].duration, max(min(LONGEST, MOST_TICKS * interval), 1000 * interval))
+    return min(scene[Run].duration, max(min(MAX_DURATION, MAX_TICKS * interval), 1000 * interval))
 
 
-def _clean(scene: Scene) -> list[str]:
+def noise_overrides(scene: Scene) -> list[str]:
     """Return the overrides that remove noise."""
     result = ["autopilot.estimator=ground_truth"] if scene.has("autopilot") else []
     if "random_wind_force" in scene.tables("effects"):
@@ -110,28 +116,28 @@ def _clean(scene: Scene) -> list[str]:
     return result
 
 
-def _exchange(scene: Scene, rate: int) -> list[str]:
-    """Return the overrides for another communication rate; what is due at every tick stays so."""
+def rate_overrides(scene: Scene, rate: int) -> list[str]:
+    """Return the overrides for another communication rate; topics due at every tick remain so."""
     bodies = [f"rates.body_states={rate}"] if scene[Rates].body_states == scene[Communication].rate else []
     return [f"communication.rate={rate}", *bodies]
 
 
-def _part(source: str, setting: float, label: str, flight: FlightData, exact: FlightData) -> Part:
-    return Part(source, setting, label, *difference(flight, exact))
+def _error_source(source: str, setting: float, label: str, flight: FlightData, exact: FlightData) -> ErrorSource:
+    return ErrorSource(source, setting, label, *difference(flight, exact))
 
 
 def difference(one: FlightData, other: FlightData) -> tuple[float, float, float]:
     """Return the 90th percentiles of distance [m] and angle [rad] between two flights, and the maximum distance.
 
-    Compared at the ticks of the flight with fewer ticks.
+    They are compared at the ticks of the flight with fewer ticks.
     """
-    coarse, fine = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
-    every = round(coarse.setup.interval / fine.setup.interval)
-    n = min(len(coarse.truth), -(-len(fine.truth) // every))
+    coarse, fine_solver = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
+    stride = round(coarse.setup.interval / fine_solver.setup.interval)
+    n = min(len(coarse.truth), -(-len(fine_solver.truth) // stride))
     p, q = coarse.truth.position[:n], coarse.truth.orientation[:n]
-    r, s = fine.truth.position[::every][:n], fine.truth.orientation[::every][:n]
-    # twice the arc sine of half the chord: exact for small angles, where the arc cosine is not
+    r, s = fine_solver.truth.position[::stride][:n], fine_solver.truth.orientation[::stride][:n]
+    # twice the arc sine of half the chord, which is accurate for small angles, unlike the arc cosine
     chord = np.minimum(np.linalg.norm(q - s, axis=1), np.linalg.norm(q + s, axis=1))
     angle = 4.0 * np.arcsin(np.minimum(0.5 * chord, math.sqrt(0.5)))
     distance = np.linalg.norm(p - r, axis=1)
-    return float(np.quantile(distance, MOST)), float(np.quantile(angle, MOST)), float(distance.max())
+    return float(np.quantile(distance, QUANTILE)), float(np.quantile(angle, QUANTILE)), float(distance.max())

@@ -1,9 +1,9 @@
-"""Error of a scene's own flight: flown as it is and with much finer steps, and compared at every tick.
+"""Error of a scene's flight: comparison with much finer steps at every tick.
 
-Both flights are closed loops with the same random numbers. Their difference is the error of the solver, in the state of
-each vehicle as it is recorded, with all that the autopilot makes of it. Some closed loops make a difference of a
-ten-thousandth of the accuracy in the start larger than the accuracy (`sensitivity`): no solver can be accurate enough.
-There the error of the solver is measured under recorded commands (`open_loop`), and the closed loop is shown beside it.
+Both flights are closed loops with the same random numbers. Their difference is the error of the solver in the recorded
+state of each vehicle, including the response of the autopilot. Some closed loops amplify an initial difference of a
+ten-thousandth of the accuracy beyond the accuracy (`sensitivity`), so no solver can meet it. Then the error of the
+solver is measured under recorded commands (`open_loop`), and that of the closed loop is reported in addition.
 """
 
 from collections.abc import Callable, Mapping
@@ -17,41 +17,43 @@ from lapwing.services.common.communication_schema import Communication
 from lapwing.services.plant.schema import Solver
 from lapwing.services.process_table import foreign_firmware
 from lapwing.services.scene_resolver import from_resolved, load, resolve
-from lapwing.studies.accuracy.open_loop import PART, fly_parts, inputs_of_plant
+from lapwing.studies.accuracy.open_loop import PART_LENGTH, fly_parts, inputs_of_plant
 from lapwing.studies.accuracy.sensitivity import Signal, first_signal, start_difference, with_start_shifted
 from lapwing.studies.accuracy.state_errors import TOPICS, Quantity, differences_of_all, worst_of
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly_with_ports
 
-FINER = 8  # times as many steps in a communication step
-STRICTER = 1e-3  # times the accuracy, in contact
-STRICTEST = 1e-10  # beyond which contact is limited by round-off
+FINER = 8  # factor of the number of steps in the finer flight
+STRICTER = 1e-3  # factor of the accuracy in contact
+STRICTEST = 1e-10  # limit of the accuracy in contact by round-off
 MISSING = "missing; set the error to compare with, e.g. --set solver.accuracy=1e-4"
-Work = Callable[[Callable[[int], None]], Any]  # flies, and calls its argument with the tick that is reached
-Progress = Callable[[RunConfig, str, Work], Any]  # of a run and the description of the work, whose result it returns
+WorkFunction = Callable[[Callable[[int], None]], Any]  # flies, and calls its argument with the current tick
+Progress = Callable[
+    [RunConfig, str, WorkFunction], Any
+]  # of a run and the description of the work, whose result it returns
 
 
 class ClosedLoop(NamedTuple):
-    """Flights of a closed loop that makes any difference larger than the error asked for."""
+    """Flights of a closed loop that amplifies any difference beyond the accuracy."""
 
     quantities: list[Quantity]  # differences between the flight and the one with finer steps
-    start_apart: float  # relative, between the starts of two flights with the finer steps
-    apart: Quantity  # largest difference between these two
-    signal: Signal | None  # first output of sensors or autopilot that differs by more than the error asked for
-    true_difference: float  # largest one in the true state at that moment
+    start_difference: float  # relative, between the initial states of two flights with the finer steps
+    difference: Quantity  # largest difference between these two flights
+    signal: Signal | None  # first output of sensors or autopilot that differs by more than the accuracy
+    true_difference: float  # largest difference of the true state at that time
 
 
 class FlightAccuracy(NamedTuple):
     """Accuracy of a flight."""
 
-    asked: float
+    accuracy: float  # required, relative to 1 + size
     integrator: str
     step: float  # [s]
     reference_step: float  # [s]
-    step_selected: bool  # False if the scene sets it, whatever accuracy is asked
-    duration: float  # [s] that both flights last
-    quantities: list[Quantity]  # that count
-    part: float | None = None  # [s] length of the parts that `quantities` are measured in; None: of the closed loop
+    step_selected: bool  # False if the scene sets it, independent of the accuracy
+    duration: float  # [s] common to both flights
+    quantities: list[Quantity]  # errors that decide
+    part_length: float | None = None  # [s] length of the parts for `quantities`; None: entire closed loop
     closed_loop: ClosedLoop | None = None
 
     @property
@@ -61,8 +63,8 @@ class FlightAccuracy(NamedTuple):
 
     @property
     def met(self) -> bool:
-        """True if no error exceeds what was asked for."""
-        return self.worst.error <= self.asked
+        """True if no error exceeds the accuracy."""
+        return self.worst.error <= self.accuracy
 
 
 class _Flight(NamedTuple):
@@ -76,11 +78,11 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
 
     Args:
         scene: any scene.
-        progress: does the work on a run with a description, and shows it.
-        step_selected: True if its step was selected for its accuracy.
+        progress: executes work on a run and shows its progress with a description.
+        step_selected: True if the step was selected for the accuracy.
 
     Raises:
-        SceneError: the scene asks for no accuracy.
+        SceneError: the scene has no accuracy.
         ValueError: a flight fails, or a foreign firmware flies.
     """
     solver = (scene.vehicles or (scene,))[0][Solver]
@@ -89,7 +91,7 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
     setup = resolve(scene)
     if firmware := foreign_firmware(setup):
         raise ValueError(
-            f"{scene.path}: no two runs of {firmware} are equal; record one with lapwing run, and check its log"
+            f"{scene.path}: runs of {firmware} are not repeatable; record one with lapwing run, and check its log"
         )
     step, overrides = _finer(scene, solver.accuracy)
     finer = resolve(load(scene.path, [*scene.overrides, *overrides]))
@@ -103,27 +105,27 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
     if result.met or not inputs_of_plant(coarse.graph):
         return result
     shift = start_difference(solver.accuracy)
-    description = f"{finer_name}, start {shift:g} apart"
+    description = f"{finer_name}, start shifted by {shift:g}"
     shifted = _fly(scene, with_start_shifted(finer, shift), progress, description)
-    apart = worst_of(differences_of_all(shifted.vehicles, fine.vehicles))
-    if apart.error <= solver.accuracy:
+    difference = worst_of(differences_of_all(shifted.vehicles, fine.vehicles))
+    if difference.error <= solver.accuracy:
         return result
-    closed_loop = ClosedLoop(quantities, shift, apart, *_cause(coarse, fine, solver.accuracy))
+    closed_loop = ClosedLoop(quantities, shift, difference, *_first_signal(coarse, fine, solver.accuracy))
     return result._replace(
-        quantities=_in_parts(coarse, finer, progress, finer_name), part=PART, closed_loop=closed_loop
+        quantities=_in_parts(coarse, finer, progress, finer_name), part_length=PART_LENGTH, closed_loop=closed_loop
     )
 
 
 def measure_recorded(
-    setup: RunConfig, flown: Mapping[str, Any], progress: Progress, accuracy: float | None = None
+    setup: RunConfig, commands: Mapping[str, Any], progress: Progress, accuracy: float | None = None
 ) -> FlightAccuracy:
-    """Return the accuracy of the solver in a recorded run, whose commands need not be those of Lapwing's autopilot.
+    """Return the accuracy of the solver in a recorded run, under its commands from any autopilot.
 
     Args:
         setup: configuration of the run, of one vehicle, that ends at its last recorded tick.
-        flown: its commands, keyword arguments of `fly_with_ports`.
+        commands: recorded commands, keyword arguments of `fly_with_ports`.
         progress: see `measure`.
-        accuracy: error to compare with; None: that of the run.
+        accuracy: error to compare with; None: the accuracy of the run.
 
     Raises:
         SceneError: neither has an accuracy.
@@ -132,17 +134,17 @@ def measure_recorded(
     if not setup.vehicle:
         raise ValueError(f"{setup.scene}: has {len(setup.vehicles)} vehicles; expected the log of one vehicle")
     scene = from_resolved(setup.resolved, setup.scene)
-    solver, asked = scene[Solver], accuracy or scene[Solver].accuracy
-    if asked is None:
+    solver, accuracy = scene[Solver], accuracy or scene[Solver].accuracy
+    if accuracy is None:
         raise SceneError("solver.accuracy", MISSING)
-    step, overrides = _finer(scene, asked)
+    step, overrides = _finer(scene, accuracy)
     finer = resolve(from_resolved(with_values(setup.resolved, overrides)))._replace(last_tick=setup.last_tick)
     coarse = _fly(
-        scene, setup, progress, f"recorded commands, {solver.integrator}, step {1e3 * FINER * step:g} ms", flown
+        scene, setup, progress, f"recorded commands, {solver.integrator}, step {1e3 * FINER * step:g} ms", commands
     )
     quantities = _in_parts(coarse, finer, progress, f"{solver.integrator}, step {1e3 * step:g} ms")
     duration = float(coarse.vehicles[0].truth.times[-1])
-    return FlightAccuracy(asked, solver.integrator, FINER * step, step, False, duration, quantities, PART)
+    return FlightAccuracy(accuracy, solver.integrator, FINER * step, step, False, duration, quantities, PART_LENGTH)
 
 
 def _finer(scene: Scene, accuracy: float) -> tuple[float, list[str]]:
@@ -154,7 +156,9 @@ def _finer(scene: Scene, accuracy: float) -> tuple[float, list[str]]:
 
 def _in_parts(coarse: _Flight, finer: RunConfig, progress: Progress, name: str) -> list[Quantity]:
     """Return the largest errors of a flight in parts with finer steps."""
-    parts = progress(finer, f"{name}, parts of {PART:g} s", lambda show: fly_parts(coarse.graph, finer, TOPICS, show))
+    parts = progress(
+        finer, f"{name}, parts of {PART_LENGTH:g} s", lambda show: fly_parts(coarse.graph, finer, TOPICS, show)
+    )
     errors = [q for part in parts for q in differences_of_all(coarse.vehicles, part.flights, part.spans)]
     names = dict.fromkeys((q.vehicle, q.name) for q in errors)
     return [worst_of(q for q in errors if (q.vehicle, q.name) == name) for name in names]
@@ -165,17 +169,17 @@ def _fly(
     setup: RunConfig,
     progress: Progress,
     description: str,
-    flown: Mapping[str, Any] = MappingProxyType({}),
+    commands: Mapping[str, Any] = MappingProxyType({}),
 ) -> _Flight:
-    flights, graph = progress(setup, description, lambda show: fly_with_ports(setup, TOPICS, show, **flown))
+    flights, graph = progress(setup, description, lambda show: fly_with_ports(setup, TOPICS, show, **commands))
     for flight in flights:
         if flight.failure:
             raise ValueError(f"{scene.path}: {flight.failure}")
     return _Flight(setup, flights, graph)
 
 
-def _cause(flight: _Flight, exact: _Flight, limit: float) -> tuple[Signal | None, float]:
-    """Return the first signal that differs by more than a limit, and the largest true difference at that moment."""
+def _first_signal(flight: _Flight, exact: _Flight, limit: float) -> tuple[Signal | None, float]:
+    """Return the first signal that differs by more than a limit, and the largest true difference at that time."""
     signal = first_signal(flight.graph, exact.graph, limit)
     if signal is None:
         return None, 0.0

@@ -1,4 +1,4 @@
-"""Accuracy of a scene's own flight as a table and as JSON."""
+"""Accuracy of a scene's flight as a table and as JSON."""
 
 import math
 from pathlib import Path
@@ -14,7 +14,7 @@ from lapwing.studies.accuracy.state_errors import worst_of
 
 
 def show(console: Console, result: FlightAccuracy) -> None:
-    """Print the errors as one table, and what they mean."""
+    """Print the errors as a table, and their interpretation."""
     lines = [
         f"{result.integrator}, step {1e3 * result.step:g} ms, against steps of {1e3 * result.reference_step:g} ms; "
         f"{result.duration:g} s, errors relative to 1 + size",
@@ -30,68 +30,71 @@ def show(console: Console, result: FlightAccuracy) -> None:
 
 def _table(result: FlightAccuracy) -> Table:
     fleet = _is_fleet(result)
-    closed = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if fleet and closed else (0, 1))  # within 80 columns
-    names = ["quantity", "solver error" if result.part else "largest error", "got / asked", "at (s)"]
-    for name in [*names, *(["closed loop", "at (s)"] if closed else [])]:
+    closed_loop = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if fleet and closed_loop else (0, 1))  # within 80 columns
+    names = ["quantity", "solver error" if result.part_length else "largest error", "error / accuracy", "at (s)"]
+    for name in [*names, *(["closed loop", "at (s)"] if closed_loop else [])]:
         table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
     for q in result.quantities:
         label = f"{q.vehicle}: {q.name}" if fleet else q.name
-        cells = [label, f"{q.error:.1e}", f"{q.error / result.asked:.2g}", f"{q.time:.3f}"]
-        if closed:
-            other = closed[q.vehicle, q.name]
+        cells = [label, f"{q.error:.1e}", f"{q.error / result.accuracy:.2g}", f"{q.time:.3f}"]
+        if closed_loop:
+            other = closed_loop[q.vehicle, q.name]
             cells += [f"{other.error:.1e}", f"{other.time:.3f}"]
         table.add_row(*cells)
     return table
 
 
 def _column_legend(result: FlightAccuracy) -> list[str]:
-    """Return the meaning of the columns, in a table that has errors of parts."""
-    if result.part is None:
+    """Return the meaning of the columns in a table with errors of parts."""
+    if result.part_length is None:
         return []
     lines = [
-        f"solver error: each {result.part:g} s of the flight again with finer steps, from its own states and under its "
-        "own motor commands"
+        f"solver error: parts of {result.part_length:g} s repeated with finer steps, from the recorded states and "
+        "under the recorded motor commands"
     ]
     if result.closed_loop:
-        lines.append("closed loop: the whole flight again with finer steps, with sensors and autopilot")
+        lines.append("closed loop: entire flight repeated with finer steps, with sensors and autopilot")
     return lines
 
 
 def _verdict(result: FlightAccuracy) -> str:
-    what = "accuracy of the solver" if result.part else "accuracy"
+    subject = "accuracy of the solver" if result.part_length else "accuracy"
     verdict, worst = "met" if result.met else "missed", result.worst
-    return f"{what} {verdict}: asked {result.asked:g}, got {worst.error:.1e} ({worst.name}, {worst.time:.3f} s)"
+    return (
+        f"{subject} {verdict}: error {worst.error:.1e}, required {result.accuracy:g} ({worst.name}, {worst.time:.3f} s)"
+    )
 
 
 def _closed_loop(result: FlightAccuracy) -> list[str]:
-    """Return why the closed loop differs by more than the accuracy."""
+    """Return the reason for a difference of the closed loop beyond the accuracy."""
     if result.closed_loop is None:
         return []
     loop = result.closed_loop
-    worst, apart = worst_of(loop.quantities), loop.apart
+    worst, shifted = worst_of(loop.quantities), loop.difference
     lines = [
-        f"closed loop: {worst.error:.1e} ({worst.name}, {worst.time:.3f} s), made by sensors and autopilot: starts "
-        f"{loop.start_apart:g} apart differ by {apart.error:.1e} ({apart.name}, {apart.time:.3f} s) with the same steps"
+        f"closed loop: {worst.error:.1e} ({worst.name}, {worst.time:.3f} s), amplified by sensors and autopilot: "
+        f"an initial difference of {loop.start_difference:g} grows to {shifted.error:.1e} "
+        f"({shifted.name}, {shifted.time:.3f} s) with equal steps"
     ]
     if loop.signal:
         name, difference, time = loop.signal
         lines.append(
-            f"first signal that differs by more than {result.asked:g}: {name}, by {difference:.1e} at {time:.3f} s, "
+            f"first signal that differs by more than {result.accuracy:g}: {name}, by {difference:.1e} at {time:.3f} s, "
             f"where the true state differs by {loop.true_difference:.1e}"
         )
     return lines
 
 
 def _remedy(result: FlightAccuracy) -> list[str]:
-    """Return what to do about a missed accuracy."""
+    """Return the remedy for a missed accuracy."""
     if result.met:
         return []
     if not result.step_selected:
         cause = f"solver.step: set to {result.step:g} s, which does not depend on the accuracy"
-        return [f"{cause}; remove it, and a step is selected"]
-    cause = "solver.step: selected for a less violent flight"
-    count = math.ceil((result.worst.error / result.asked) ** (1.0 / integrators.get(result.integrator).ORDER))
+        return [f"{cause}; remove it to select a step"]
+    cause = "solver.step: selected for a gentler flight"
+    count = math.ceil((result.worst.error / result.accuracy) ** (1.0 / integrators.get(result.integrator).ORDER))
     return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:g}"]
 
 
@@ -101,4 +104,4 @@ def _is_fleet(result: FlightAccuracy) -> bool:
 
 def write_json(path: Path, result: FlightAccuracy) -> None:
     """Write the errors."""
-    json_file.write_json(path, {**result._asdict(), "got": result.worst.error, "worst": result.worst})
+    json_file.write_json(path, {**result._asdict(), "error": result.worst.error, "worst": result.worst})

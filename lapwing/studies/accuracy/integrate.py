@@ -1,4 +1,4 @@
-"""The ways to solve a system of `dynamics`: every integrator that applies to it."""
+"""Solver methods for a system of `dynamics`: every compatible integrator."""
 
 from collections.abc import Callable
 from types import ModuleType
@@ -14,14 +14,14 @@ from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.problem import SolverMethod, SolverRun
 from lapwing.studies.accuracy.round_off import end_in_extended_precision
 
-ADAPTIVE = "rkmk54"  # the method that `integrate_adaptive` runs
-SAMPLES = 8  # parts of a run after which its invariants are looked at; every count of steps is a multiple
+ADAPTIVE = "rkmk54"  # method of `integrate_adaptive`
+SAMPLES = 8  # samples of a run for its invariants; every number of steps is a multiple
 HALVINGS = 18
 TOLERANCES = tuple(10.0**-k for k in range(1, 14))
 
 
 def count_evaluations(method: ModuleType, p: Any, x: Any, h: float, times: np.ndarray, rows: np.ndarray) -> float:
-    """Return the mean evaluations in a step of h, counted at each of these times and states (uncompiled)."""
+    """Return the mean number of evaluations in a step of h, over these times and states (uncompiled)."""
     calls = 0
 
     def count_and_evaluate(p: Any, t: float, state: Any) -> Any:
@@ -34,10 +34,10 @@ def count_evaluations(method: ModuleType, p: Any, x: Any, h: float, times: np.nd
     return calls / len(times)
 
 
-# kernels of this file, so that their cache names no class but those of systems that every user of the study can import
+# kernels of this file, so that their cache refers only to classes that every user of the study can import
 @kernel
 def sample_states(method: Any, p: Any, x: Any, h: float, every: int, out: np.ndarray) -> int:
-    """Integrate from time 0 in steps of h; store each `every`-th state in a row of `out`. Return the finite rows."""
+    """Integrate from time 0 in steps of h; store each `every`-th state in `out`. Return the number of finite rows."""
     return record(method, p, 0.0, x, h, every, out)
 
 
@@ -47,8 +47,8 @@ def adapt_step(p: Any, x: Any, times: np.ndarray, tolerance: float, out: np.ndar
     return integrate_adaptive(p, x, times, tolerance, out)
 
 
-def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
-    """Return a solver method per integrator, the adaptive one by tolerances.
+def solver_methods(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
+    """Return a solver method per integrator, with tolerances as settings of the adaptive one.
 
     Args:
         p: parameters of the system (its class is in `RATES`).
@@ -57,11 +57,11 @@ def ways(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
         coarsest: steps of the coarsest run; a multiple of SAMPLES.
     """
     fixed = fixed_step_methods(p, x, duration, coarsest)
-    return [_adaptive(p, x, duration) if way.name == ADAPTIVE else way for way in fixed]
+    return [_adaptive(p, x, duration) if method.name == ADAPTIVE else method for method in fixed]
 
 
 def fixed_step_methods(p: Any, x: Any, duration: float, coarsest: int) -> list[SolverMethod]:
-    """Return a solver method per integrator, all by steps."""
+    """Return a solver method per integrator, with steps as settings."""
     return [_fixed_step_method(name, p, x, duration, coarsest) for name in integrators.compatible_methods(p, x)]
 
 
@@ -81,8 +81,8 @@ def _fixed_step_method(name: str, p: Any, x: Any, duration: float, coarsest: int
         if rows < len(out):
             return None
         times = np.linspace(0.0, duration, SAMPLES + 1)
-        each = getattr(method, "EVALUATIONS", None) or count_evaluations(method, p, x, h, times[:-1], out[:-1])
-        evaluations = round(steps(h) * each)
+        per_step = getattr(method, "EVALUATIONS", None) or count_evaluations(method, p, x, h, times[:-1], out[:-1])
+        evaluations = round(steps(h) * per_step)
         return SolverRun(times, coordinates(x, out), defect(x, out[-1]), evaluations)
 
     settings = [duration / (coarsest * 2**k) for k in range(HALVINGS)]

@@ -1,9 +1,9 @@
-"""Error of the solver alone: a flight is flown again in parts with finer steps, under its recorded commands.
+"""Error of the solver alone: a flight is repeated in parts with finer steps, under its recorded commands.
 
-A multirotor does not hold its attitude without an autopilot, so that the error of a whole flight under recorded
-commands grows with a high power of time, while a closed loop forgets it within seconds. Therefore a part lasts
-`PART` seconds, begins at a recorded state, and overlaps half of the next: each moment is measured where its part is
-at least half as old. The commands are data, so that no decision of an autopilot and no digit of a sensor matters.
+A multirotor is unstable without an autopilot, so the error of an entire flight under recorded commands grows with a
+high power of time, while a closed loop damps it within seconds. Therefore a part lasts `PART_LENGTH` seconds, begins at
+a recorded state, and overlaps half of the next one. Errors are measured in the second half of each part. The commands
+are data, so neither decisions of an autopilot nor the resolution of sensors have an influence.
 """
 
 from collections.abc import Callable
@@ -20,18 +20,18 @@ from lapwing.messages.topics import Topic
 from lapwing.services.process_table import CLOCK_OWNER, create
 from lapwing.studies.flight_data import FlightData
 
-PART = 2.0  # [s] as in the selection of a solver (`solver_selection`)
+PART_LENGTH = 2.0  # [s] as in the selection of a solver (`solver_selection`)
 
 
 class Parts(NamedTuple):
     """Flights of all vehicles in every second part of a run, with finer steps."""
 
     flights: list[FlightData]
-    spans: list[tuple[float, float]]  # [s] moments to measure: later halves of the parts, end exclusive
+    spans: list[tuple[float, float]]  # [s] intervals to measure: second halves of the parts, end exclusive
 
 
 class _Plant(NamedTuple):
-    """Plant of a run alone, which reads recorded inputs."""
+    """Plant of a run, with recorded inputs."""
 
     graph: BlockDiagram
     service: Service
@@ -48,20 +48,20 @@ def inputs_of_plant(flight: BlockDiagram) -> list[str]:
 def fly_parts(
     flight: BlockDiagram, finer: RunConfig, topics: tuple[Topic, ...], observe: Callable[[int], None]
 ) -> tuple[Parts, Parts]:
-    """Fly a run again in parts, from its own states and under its own commands.
+    """Repeat a run in parts, from its recorded states and under its recorded commands.
 
     Args:
-        flown: block diagram at the end of the run, with the full history of all ports.
+        flight: block diagram at the end of the run, with the full history of all ports.
         finer: its configuration with another solver.
-        topics: of the plant, to return of each vehicle.
+        topics: topics of the plant to return for each vehicle.
         observe: called with each tick at which a part begins.
 
     Returns:
-        Two series of parts, whose spans together are the whole run.
+        Two series of parts, whose spans together cover the run.
     """
     recorded, *replicas = (_plant(flight, setup) for setup in (flight.setup, finer, finer))
     interval = flight.setup.interval
-    half = max(1, round(0.5 * PART / interval))
+    half = max(1, round(0.5 * PART_LENGTH / interval))
     spans: tuple[list[tuple[float, float]], ...] = ([], [])
     for number, start in enumerate(range(0, flight.tick, half)):
         stop = min(start + half, flight.tick)
@@ -77,11 +77,11 @@ def fly_parts(
 
 
 def _plant(flight: BlockDiagram, setup: RunConfig) -> _Plant:
-    """Return the plant of `setup` at tick 0, with the inputs that it had in a finished run."""
+    """Return the plant of `setup` at tick 0, with its inputs of a finished run."""
     service = create(setup, CLOCK_OWNER)
     inputs = inputs_of_plant(flight)
-    whole = {port.name for part in service.parts for port in part.outputs} | set(inputs)
-    graph = BlockDiagram(setup, [service], 1, whole)
+    recorded_ports = {port.name for part in service.parts for port in part.outputs} | set(inputs)
+    graph = BlockDiagram(setup, [service], 1, recorded_ports)
     for name in inputs:
         history = flight.history(name, flight.ports[name].period)
         graph.put_rows(name, np.arange(len(history)) * flight.ports[name].period, history)
@@ -91,12 +91,12 @@ def _plant(flight: BlockDiagram, setup: RunConfig) -> _Plant:
 def _restart(plant: _Plant, recorded: _Plant, tick: int) -> None:
     """Set the state of a plant before `tick` to that of another one with the same blocks.
 
-    Vehicles of a fleet act on each other by outputs of the tick before, which are part of the state.
+    It includes outputs of previous ticks, through which vehicles of a fleet act on each other.
     """
     for own, other in zip(plant.service.parts, recorded.service.parts, strict=True):
         if isinstance(own, Block):
             write(own.state, read(other.state))
     outputs = {port.name for part in plant.service.parts for port in part.outputs}
-    for late in {i for part in plant.service.parts for i in getattr(part, "inputs", ()) if i.port in outputs}:
-        for stamp in range(max(0, tick - late.delay), tick):
-            plant.graph.put_row(late.port, stamp, recorded.graph.row(late.port, stamp))
+    for delayed in {i for part in plant.service.parts for i in getattr(part, "inputs", ()) if i.port in outputs}:
+        for stamp in range(max(0, tick - delayed.delay), tick):
+            plant.graph.put_row(delayed.port, stamp, recorded.graph.row(delayed.port, stamp))

@@ -1,4 +1,4 @@
-"""The multirotor of a scene as a problem: its plant with all its effects in the air, under prescribed voltages."""
+"""Multirotor of a scene as a problem: its plant with all effects in the air, under prescribed voltages."""
 
 from collections.abc import Callable
 from typing import Any
@@ -25,34 +25,34 @@ from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.double_double import DoubleDouble
 from lapwing.studies.accuracy.integrate import SAMPLES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
-from lapwing.studies.accuracy.round_off import coordinates_in_extended_numbers, extend, in_extended_precision
+from lapwing.studies.accuracy.round_off import coordinates_in_extended_precision, extend, in_extended_precision
 
-DURATION = 2.0  # [s], about
+DURATION = 2.0  # [s] approximately
 HEIGHT = 20.0  # [m] clear of the ground
-FINEST = 64  # steps in an exchange interval, of the reference; the runs that are compared have half as many at most
-EXTENDED = (multirotor, multirotor_slung)  # forms whose steps can be made in extended precision
-JUMP, JUMPS_APART = 0.02, 0.4  # [s] of a motor at its limit, from one manoeuvre to the next
-TICK = 1000  # of the first exchange, so that random effects have begun
+FINEST = 64  # steps of the reference per communication step; other runs have at most half as many
+EXTENDED = (multirotor, multirotor_slung)  # forms with steps in extended precision
+JUMP, JUMP_INTERVAL = 0.02, 0.4  # [s] duration at a motor's limit; interval of the manoeuvres
+TICK = 1000  # first tick, after the start of random effects
 
 
 Voltages = Callable[[MultirotorParameters, float], tuple[float, ...]]  # [V] of each motor at a time [s]
 
 
-def waves(p: MultirotorParameters, t: float) -> tuple[float, ...]:
-    """Return voltages [V] of a gentle flight: they vary by 2 % about hover. See `jumps` for arguments."""
+def gentle_voltages(p: MultirotorParameters, t: float) -> tuple[float, ...]:
+    """Return voltages [V] of a gentle flight, which vary by 2 % about hover. See `jumping_voltages` for arguments."""
     volts = hover_speed(p) / p.layout.speed_per_volt
     return tuple(volts * (1.0 + 0.02 * math.sin(3.0 * t + 2.4 * i)) for i in range(len(p.layout.x_body)))
 
 
-def jumps(p: MultirotorParameters, t: float) -> tuple[float, ...]:
-    """Return voltages [V] that jump over the whole range, as those of an autopilot whose setpoint jumps.
+def jumping_voltages(p: MultirotorParameters, t: float) -> tuple[float, ...]:
+    """Return voltages [V] that jump over the entire range, as those of an autopilot after a setpoint jump.
 
     Args:
-        p: the multirotor.
+        p: parameters of the multirotor.
         t: time [s] since the start.
     """
     layout = p.layout
-    number, part = divmod(t, JUMPS_APART)
+    number, part = divmod(t, JUMP_INTERVAL)
     axis = (layout.y_body, layout.x_body, layout.reaction_sign)[int(number) % 3]
     volts = hover_speed(p) / layout.speed_per_volt
     if part >= 4.0 * JUMP:
@@ -78,7 +78,7 @@ def flight(
     every: int,
     out: np.ndarray,
 ) -> None:
-    """Fly exchanges of n steps of h [s] under the rows of `voltages`; a row of `out` for each `every` of them."""
+    """Fly ticks of n steps of h [s] under the rows of `voltages`; store the motion in `out` every `every` ticks."""
     tick = 0
     for row in range(out.shape[0]):
         if row > 0:
@@ -95,13 +95,13 @@ def physics(scene: Scene, level: bool = False) -> tuple[MultirotorParameters, Mu
     """Return (parameters, initial state) of a scene with a multirotor of one or more bodies, airborne.
 
     Args:
-        scene: such a scene.
+        scene: scene of a multirotor.
         level: start level without rotation; otherwise tilted and rotating.
     """
     form, p = model(scene).describe(scene)
     attitude, omega_body = (NO_ROTATION, ZERO) if level else (exp((0.1, -0.15, 0.3)), (0.4, -0.6, 0.3))
     state = form.initial_state(p, (0.0, 0.0, HEIGHT), attitude, hover_speed(p), (3.0, 1.0, -0.5), omega_body)
-    if form is multirotor_slung:  # stretched by the load: the cable stays taut, and no step is split
+    if form is multirotor_slung:  # stretched by the load, so the cable stays taut and no step is split
         sling, (x, y, z) = p.layout.bodies, state.motion.load_position
         load = (x, y, z - sling.load_mass * gravity(scene) / sling.stiffness)
         state = state._replace(motion=state.motion._replace(load_position=load))
@@ -119,55 +119,56 @@ def longest_step(scene: Scene) -> float:
     return result(scene) if result else math.inf
 
 
-def problem(scene: Scene, manoeuvre: Voltages = waves) -> Problem:
-    """Return the plant of such a scene, under the voltages of a manoeuvre, as a problem with its solver methods."""
+def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
+    """Return the multirotor of a scene under the voltages of a manoeuvre as a problem."""
     exchange = scene[Communication]
-    (p, state), longest = physics(scene, manoeuvre is jumps), longest_step(scene)
+    (p, state), longest = physics(scene, manoeuvre is jumping_voltages), longest_step(scene)
     form = model(scene).describe(scene)[0]
-    motion = multirotor.initial_state(p).motion  # of this shape, whatever the form of the state
+    motion = multirotor.initial_state(p).motion  # equal shape for every form of the state
     every = max(1, round(DURATION * exchange.rate / SAMPLES))
     duration = SAMPLES * every * exchange.interval
-    start = 0 if manoeuvre is jumps else TICK
+    start = 0 if manoeuvre is jumping_voltages else TICK
     voltages = np.array([manoeuvre(p, (start + i) * exchange.interval) for i in range(SAMPLES * every)])
     key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
 
-    def flight_of(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+    def prepare_flight(method: Any, steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         out = np.empty((rows, len(flatten(motion))))
         token, h = method.Method(), exchange.interval / steps
         return lambda: (flight(token, p, key, state, voltages, h, steps, every, out), out)[1]
 
-    def way(name: str) -> SolverMethod:
+    def solver_method(name: str) -> SolverMethod:
         method = integrators.get(name)
 
         def read(step: float, out: np.ndarray) -> SolverRun | None:
             if not np.isfinite(out).all():
                 return None
-            each_step = getattr(method, "EVALUATIONS", None)
-            evaluations = each_step and SAMPLES * every * round(exchange.interval / step) * each_step
+            per_step = getattr(method, "EVALUATIONS", None)
+            evaluations = per_step and SAMPLES * every * round(exchange.interval / step) * per_step
             times = np.linspace(0.0, duration, SAMPLES + 1)
             return SolverRun(times, coordinates(motion, out), defect(motion, out[-1]), evaluations)
 
-        def fly_in_extended_numbers(step: float) -> np.ndarray:
+        def final_state_in_extended_precision(step: float) -> np.ndarray:
             count = round(exchange.interval / step)
             fly, h = extend(advance), DoubleDouble(exchange.interval / count)
             x, numbers = in_extended_precision(state), in_extended_precision(p)
             for tick, voltage in enumerate(map(tuple, voltages.tolist()), TICK):
                 x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)
-            return coordinates_in_extended_numbers(motion, extend(motion_of)(numbers.layout, x.motion))
+            return coordinates_in_extended_precision(motion, extend(motion_of)(numbers.layout, x.motion))
 
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return SolverMethod(
-            name, method.ORDER, "s", settings, lambda h: flight_of(method, round(exchange.interval / h)), read,
-            flight_of(method, 1, rows=1), fly_in_extended_numbers if form in EXTENDED else None,
+            name, method.ORDER, "s", settings, lambda h: prepare_flight(method, round(exchange.interval / h)), read,
+            prepare_flight(method, 1, rows=1), final_state_in_extended_precision if form in EXTENDED else None,
         )  # fmt: skip
 
     return Problem(
-        f"{scene.name}: its multirotor in the air under {'jumping' if manoeuvre is jumps else 'prescribed'} voltages",
+        f"{scene.name}: its multirotor in the air under "
+        f"{'jumping' if manoeuvre is jumping_voltages else 'prescribed'} voltages",
         "s",
         duration,
-        [way(name) for name in integrators.compatible_methods(p, state.motion)],
-        lambda: coordinates(motion, flight_of(rkmk54, FINEST)())[-1],
-        f"rkmk54 with {FINEST} steps in an exchange interval",
+        [solver_method(name) for name in integrators.compatible_methods(p, state.motion)],
+        lambda: coordinates(motion, prepare_flight(rkmk54, FINEST)())[-1],
+        f"rkmk54 with {FINEST} steps per communication step",
         {},
     )
 

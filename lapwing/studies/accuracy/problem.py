@@ -9,18 +9,18 @@ import numpy as np
 class SolverRun(NamedTuple):
     """Result of one run of a method."""
 
-    times: np.ndarray  # of the samples, shape (k,), the first the start, the last the end
+    times: np.ndarray  # times of the samples including start and end, shape (k,)
     samples: np.ndarray  # coordinates (lapwing/studies/accuracy/coordinates.py) at these times, shape (k, n)
-    defect: float  # how far the end is off its manifold
-    evaluations: int | None  # of the right-hand side; None where they are not known
+    defect: float  # distance of the final state from its manifold
+    evaluations: int | None  # evaluations of the right-hand side; None if unknown
 
 
 class SolverMethod(NamedTuple):
-    """One method, for one problem.
+    """One method for one problem.
 
-    A setting is its step or its tolerance. `prepare(setting)` returns the timed function, which does all the work and
-    nothing else; `read(setting, result of that call)` its Outcome, or None where the run failed; `idle()` is the same
-    call without a single step, whose time is taken off.
+    A setting is its step or its tolerance. `prepare(setting)` returns the timed function, which does only the
+    integration. `read(setting, result)` returns its `SolverRun`, or None if the run failed. `idle()` is the same call
+    without a step, whose time is subtracted.
     """
 
     name: str
@@ -30,16 +30,16 @@ class SolverMethod(NamedTuple):
     prepare: Callable[[float], Callable[[], Any]]
     read: Callable[[float, Any], SolverRun | None]
     idle: Callable[[], Any]
-    extended: Callable[[float], np.ndarray] | None = None  # coordinates at the end by the steps in extended precision
+    extended: Callable[[float], np.ndarray] | None = None  # final coordinates in extended precision
 
 
 class Problem(NamedTuple):
-    """A system from a start to an end."""
+    """An initial value problem with its reference solution and the methods to compare."""
 
     title: str
-    unit: str  # of time
+    unit: str  # unit of time
     duration: float
-    ways: Sequence[SolverMethod]
-    reference: Callable[[], np.ndarray]  # coordinates at the end, shape (n,)
-    source: str  # what the reference is
+    methods: Sequence[SolverMethod]
+    reference: Callable[[], np.ndarray]  # final coordinates, shape (n,)
+    source: str  # description of the reference
     invariants: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]  # (times, samples) -> values, shape (k, ...)

@@ -1,4 +1,4 @@
-"""Round-off error: the same steps in double and in extended precision.
+"""Round-off error: comparison of equal steps in double and in extended precision.
 
 Both runs execute the source of the same kernels with the same step and the same coefficients, so that their difference
 is the rounding of doubles alone. Extended numbers are double-doubles, with 32 digits. Random numbers are doubles in
@@ -29,21 +29,21 @@ _MATH = SimpleNamespace(**FUNCTIONS, pi=math.pi, tau=math.tau, inf=math.inf)
 class RoundOff(NamedTuple):
     """Round-off error at the end of a run."""
 
-    way: str
+    method: str
     steps: int
     error: float  # largest difference of coordinates, relative to 1 + size
 
 
 def measure(problem: Problem) -> RoundOff | None:
     """Return the round-off error of a problem, None if its methods have no extended numbers."""
-    way = next((way for way in problem.ways if way.name == METHOD), None)
-    if way is None or way.extended is None:
+    method = next((method for method in problem.methods if method.name == METHOD), None)
+    if method is None or method.extended is None:
         return None
-    settings = [h for h in way.settings if round(problem.duration / h) >= STEPS]
-    outcome = way.read(settings[0], way.prepare(settings[0])()) if settings else None
+    settings = [h for h in method.settings if round(problem.duration / h) >= STEPS]
+    outcome = method.read(settings[0], method.prepare(settings[0])()) if settings else None
     if outcome is None or not np.isfinite(outcome.samples).all():
         return None
-    exact = way.extended(settings[0])
+    exact = method.extended(settings[0])
     return RoundOff(METHOD, round(problem.duration / settings[0]), error(outcome.samples[-1], exact))
 
 
@@ -64,10 +64,10 @@ def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, step
     state, p = in_extended_precision(x), in_extended_precision(p)
     for n in range(steps):
         state = step(rate, p, DoubleDouble(n * h), state, DoubleDouble(h))
-    return coordinates_in_extended_numbers(x, state)
+    return coordinates_in_extended_precision(x, state)
 
 
-def coordinates_in_extended_numbers(x: Any, state: Any) -> np.ndarray:
+def coordinates_in_extended_precision(x: Any, state: Any) -> np.ndarray:
     """Return the coordinates of a state in extended numbers, shape (n,).
 
     Args:
@@ -89,7 +89,7 @@ def in_extended_precision(tree: Any) -> Any:
 
 
 def extend(function: Any) -> Callable[..., Any]:
-    """Return the Python function of a kernel, in which all that it calls computes with extended numbers."""
+    """Return the Python function of a kernel that computes, with all its callees, in extended numbers."""
     return _extend(function, {})
 
 
@@ -132,7 +132,7 @@ class _Module:
 
 
 def _generator(function: Any) -> Callable[..., Any] | None:
-    """Return the generator of a function that compiled code alone has, None for a function written in Python."""
+    """Return the generator of a function that exists only in compiled code; None for a Python function."""
     if not isinstance(function, FunctionType):
         return None
     code = function.__code__

@@ -1,4 +1,4 @@
-"""Scenes as problems: the plant that a scene flies, and the exchange interval that its steps divide."""
+"""Scenes as problems: the plant of a scene, with steps that divide the communication step."""
 
 from typing import Any
 
@@ -16,26 +16,26 @@ from lapwing.studies.accuracy.coordinates import coordinates
 from lapwing.studies.accuracy.integrate import SAMPLES, fixed_step_methods, sample_states
 from lapwing.studies.accuracy.problem import Problem
 
-FINEST = 64  # steps in an exchange interval, of the reference
+FINEST = 64  # steps of the reference per communication step
 
 
 def problem(scene: Scene) -> Problem:
     """Return the problem on which integrators are compared for a scene.
 
     Raises:
-        ValueError: its model is none that this study knows how to integrate.
+        ValueError: the study does not support the scene's model.
     """
     return manoeuvres(scene)[0]
 
 
 def manoeuvres(scene: Scene) -> list[Problem]:
-    """Return the problems that a solver of the scene is selected by: the one to compare integrators on is the first.
+    """Return the problems for the selection of a solver; the first one is that of `problem`.
 
     Raises:
         ValueError: see `problem`.
     """
     if hasattr(plant.model(scene), "describe"):
-        return [plant.problem(scene), plant.problem(scene, plant.jumps)]
+        return [plant.problem(scene), plant.problem(scene, plant.jumping_voltages)]
     return [_fixed_step_problem(scene, *physics(scene))]
 
 
@@ -70,13 +70,13 @@ def _fixed_step_problem(scene: Scene, p: Any, x: Any) -> Problem:
         ticks * interval,
         fixed_step_methods(p, x, ticks * interval, ticks),
         reference,
-        f"rkmk54 with {FINEST} steps in an exchange interval",
+        f"rkmk54 with {FINEST} steps per communication step",
         {},
     )
 
 
 def with_lift(p: Any) -> Any:
-    """Return the parameters; those of a shared load with thrusts that balance the weight, and some rotation."""
+    """Return the parameters, for a shared load with thrusts that balance the weight and small moments."""
     if not isinstance(p, CooperativeLoadParameters):
         return p
     n = len(p.quad_mass)

@@ -1,7 +1,7 @@
-"""Sensitivity of a closed loop: what its sensors and its autopilot make of a difference, however small.
+"""Sensitivity of a closed loop: amplification of small differences by sensors and autopilot.
 
-A digit of a sensor, a threshold or a change of mode turns any difference into one of a digit or a tick. Two flights
-with the same solver whose starts differ by a small share of the accuracy show it without any error of a solver.
+Sensor resolution, thresholds and mode changes turn any difference into one of a digit or a tick. Two flights with the
+same solver and initial states that differ by a small share of the accuracy show it independent of solver errors.
 """
 
 from collections.abc import Iterator
@@ -16,12 +16,12 @@ from lapwing.kernels.row_packing import columns
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 from lapwing.services.process_table import CLOCK_OWNER
 
-SHARE = 1e-4  # of the accuracy, that the starts differ by
-LEAST = 1e-12  # [1] of that difference, above round-off
+SHARE = 1e-4  # share of the accuracy: difference of the initial states
+MIN_DIFFERENCE = 1e-12  # relative difference above round-off
 
 
 class Signal(NamedTuple):
-    """A number that a service outputs, at the moment at which it first differs between two flights."""
+    """Output of a service, at the time of its first difference between two flights."""
 
     name: str
     difference: float  # relative to 1 + size
@@ -29,35 +29,37 @@ class Signal(NamedTuple):
 
 
 def start_difference(accuracy: float) -> float:
-    """Return the difference between two starts, relative to 1 + size, for an accuracy."""
-    return max(SHARE * accuracy, LEAST)
+    """Return the difference of two initial states, relative to 1 + size, for an accuracy."""
+    return max(SHARE * accuracy, MIN_DIFFERENCE)
 
 
-def with_start_shifted(setup: RunConfig, apart: float) -> RunConfig:
-    """Return a run configuration in which each number x of the vehicles' initial motions is apart (1 + |x|) larger."""
+def with_start_shifted(setup: RunConfig, difference: float) -> RunConfig:
+    """Return a run configuration with each number x of the initial motions increased by difference (1 + |x|)."""
     plant = setup.services[CLOCK_OWNER]
     if isinstance(plant.parameters, PerVehicle):
         vehicles, configs = plant.parameters
-        plant = plant._replace(parameters=PerVehicle(vehicles, tuple(_shift_start(each, apart) for each in configs)))
+        plant = plant._replace(
+            parameters=PerVehicle(vehicles, tuple(_shift_start(each, difference) for each in configs))
+        )
     else:
-        plant = _shift_start(plant, apart)
+        plant = _shift_start(plant, difference)
     return setup._replace(services={**setup.services, CLOCK_OWNER: plant})
 
 
-def _shift_start(service: ServiceConfig, apart: float) -> ServiceConfig:
+def _shift_start(service: ServiceConfig, difference: float) -> ServiceConfig:
     start = service.parameters.start
     if isinstance(start, MultirotorPlantState):
-        shifted = start._replace(vehicle=start.vehicle._replace(motion=_shift(start.vehicle.motion, apart)))
+        shifted = start._replace(vehicle=start.vehicle._replace(motion=_shift(start.vehicle.motion, difference)))
     else:
-        shifted = _shift(start, apart)
+        shifted = _shift(start, difference)
     return service._replace(parameters=service.parameters._replace(start=shifted))
 
 
-def _shift(tree: Any, apart: float) -> Any:
+def _shift(tree: Any, difference: float) -> Any:
     if isinstance(tree, tuple):
-        items = [_shift(item, apart) for item in tree]
+        items = [_shift(item, difference) for item in tree]
         return type(tree)(*items) if hasattr(tree, "_fields") else tuple(items)
-    return tree + apart * (1.0 + abs(tree)) if isinstance(tree, float) else tree
+    return tree + difference * (1.0 + abs(tree)) if isinstance(tree, float) else tree
 
 
 def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | None:
@@ -66,7 +68,7 @@ def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | Non
     Args:
         a: finished run with the full history of all ports.
         b: a similar run.
-        limit: relative to 1 + size.
+        limit: limit of the difference, relative to 1 + size.
     """
     first: Signal | None = None
     for service in a.services:
@@ -75,7 +77,7 @@ def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | Non
                 continue
             pair = [columns(port.like, graph.history(port.name, port.period)) for graph in (a, b)]
             for name, one, other in _pair_columns(port.name, *pair):
-                signal = _first(name, one, other, limit, port.period * a.setup.interval)
+                signal = _first_difference(name, one, other, limit, port.period * a.setup.interval)
                 if signal and (first is None or signal.time < first.time):
                     first = signal
     return first
@@ -92,7 +94,7 @@ def _pair_columns(name: str, a: Any, b: Any) -> Iterator[tuple[str, np.ndarray, 
         yield name, a[:n].reshape(n, -1), b[:n].reshape(n, -1)
 
 
-def _first(name: str, a: np.ndarray, b: np.ndarray, limit: float, period: float) -> Signal | None:
+def _first_difference(name: str, a: np.ndarray, b: np.ndarray, limit: float, period: float) -> Signal | None:
     same = (a == b) | (np.isnan(a) & np.isnan(b))
     with np.errstate(invalid="ignore"):
         difference = np.where(same, 0.0, np.abs(a - b) / (1.0 + np.abs(b)))

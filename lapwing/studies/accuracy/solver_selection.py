@@ -1,4 +1,4 @@
-"""`[solver] accuracy`: the cheapest integrator and step for a scene, measured once and remembered."""
+"""`[solver] accuracy`: cheapest integrator and step for a scene, from cached measurements."""
 
 import hashlib
 import json
@@ -19,21 +19,19 @@ from lapwing.studies.accuracy import scenes
 from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
 from lapwing.studies.complete_file import complete_file
 
-CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # cheapest on some system at some error
-IMPACT_SHARE = 3e-3  # of the accuracy: an impact turns an error of position into one of velocity 300 times as large
-JUMP_SHARE = (
-    0.125  # of the accuracy while voltages jump: in flights where they do the largest error is 7 times as large
-)
+CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each the cheapest for some system and error
+IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
+JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
 
 
-def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
-    """Return the overrides that meet the scene's accuracy at the least cost; none if it sets a step.
+def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
+    """Return the overrides that meet the scene's accuracy at the lowest cost; [] if the scene sets a step.
 
-    The vehicles of a fleet get one solver, which meets the accuracy of each in flight alone.
+    All vehicles of a fleet get the same solver, which meets the accuracy of each vehicle in free flight.
 
     Args:
         scene: any scene.
-        say: told of a measurement before it begins.
+        notify: called with a message before a measurement.
 
     Raises:
         SceneError: no integrator meets the accuracy on this plant.
@@ -43,64 +41,66 @@ def overrides(scene: Scene, say: Callable[[str], None]) -> list[str]:
         return []
     distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.vehicles or (scene,)}.values()
     try:
-        chosen = cheapest(_of_all([_expected_of(vehicle, accuracy, say) for vehicle in distinct]), accuracy)
+        selected = cheapest(
+            _combine_vehicles([_expected_points(vehicle, accuracy, notify) for vehicle in distinct]), accuracy
+        )
     except ConfigError as error:
         message = f"{accuracy:g}: {error.message}"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
-    # the step that `Solver.check` takes for a divisor of the interval
-    return [f'solver.integrator="{chosen.way}"', f"solver.step={chosen.setting!r}"]
+    # exact step that `Solver.check` accepts as a divisor of the communication step
+    return [f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"]
 
 
-def _of_all(vehicles: list[list[Point]]) -> list[Point]:
-    """Return the points that all vehicles have, each with the largest error and the time of all."""
-    by_key = [{(p.way, p.setting): p for p in points} for points in vehicles]
+def _combine_vehicles(vehicles: list[list[Point]]) -> list[Point]:
+    """Return the points common to all vehicles, with the largest error and the total time."""
+    by_key = [{(p.method, p.setting): p for p in points} for points in vehicles]
     common = [[points[key] for points in by_key] for key in by_key[0] if all(key in points for points in by_key)]
     return [same[0]._replace(error=max(p.error for p in same), time=sum(p.time for p in same)) for same in common]
 
 
-def _expected_of(scene: Scene, accuracy: float, say: Callable[[str], None]) -> list[Point]:
-    """Return the points of one vehicle with the largest errors to expect of a flight."""
+def _expected_points(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> list[Point]:
+    """Return the points of one vehicle with the largest errors expected in flight."""
     solver = scene[Solver]
     names = (solver.integrator,) if "integrator" in solver.model_fields_set else CANDIDATES
     gentle, *jumping = (
-        [p for p in points if p.way in names or len(names) > 1] for points in _points(scene, names, say)
+        [p for p in points if p.method in names or len(names) > 1] for points in _points(scene, names, notify)
     )
     return _expected_errors(gentle, _share(scene, gentle, accuracy) / accuracy, jumping)
 
 
 def _expected_errors(gentle: list[Point], share: float, jumping: list[list[Point]]) -> list[Point]:
-    """Return the points of gentle flight with the largest error to expect of a flight."""
-    errors = {(p.way, p.setting): p.error / share for p in gentle}
+    """Return the points of gentle flight with the largest errors expected in flight."""
+    errors = {(p.method, p.setting): p.error / share for p in gentle}
     for points in jumping:
-        known = {(p.way, p.setting): p.error / JUMP_SHARE for p in points}
-        errors = {key: max(error, known.get(key, math.inf)) for key, error in errors.items()}
-    return [p._replace(error=errors[p.way, p.setting]) for p in gentle]
+        cached = {(p.method, p.setting): p.error / JUMP_SHARE for p in points}
+        errors = {key: max(error, cached.get(key, math.inf)) for key, error in errors.items()}
+    return [p._replace(error=errors[p.method, p.setting]) for p in gentle]
 
 
 def _share(scene: Scene, points: list[Point], accuracy: float) -> float:
-    """Return the error allowed in gentle flight: all of it, or the share for impacts if a point reaches that."""
+    """Return the error allowed in gentle flight: the accuracy, or its share for impacts if a point reaches that."""
     strict = IMPACT_SHARE * accuracy
     impacts = "ground_contact" in scene.tables("effects") and any(p.error <= strict for p in points)
     return strict if impacts else accuracy
 
 
-def _points(scene: Scene, names: tuple[str, ...], say: Callable[[str], None]) -> list[list[Point]]:
-    """Return the points of the scene's plant in each manoeuvre, from the user's cache if they are there.
+def _points(scene: Scene, names: tuple[str, ...], notify: Callable[[str], None]) -> list[list[Point]]:
+    """Return the points of the scene's plant in each manoeuvre, from the cache if available.
 
-    Compiling an integrator takes 3 s and more, so only those `names` are measured; all if none fits the plant.
+    Compilation of an integrator takes at least 3 s, so only `names` are measured; all if none fits the plant.
     """
-    path = _file(scene, names)
-    if path and (known := _read(path)):
-        return known
+    path = _cache_file(scene, names)
+    if path and (cached := _read(path)):
+        return cached
     problems = []
     for problem in scenes.manoeuvres(scene):
-        ways = [way for way in problem.ways if way.name in names] or problem.ways
-        problems.append(problem._replace(ways=ways))
-    measured = ", ".join(way.name for way in problems[0].ways)
-    say(f"measuring {measured} on this plant for solver.accuracy (first time only)")
+        methods = [method for method in problem.methods if method.name in names] or problem.methods
+        problems.append(problem._replace(methods=methods))
+    measured = ", ".join(method.name for method in problems[0].methods)
+    notify(f"measuring {measured} on this plant for solver.accuracy (first time only)")
     points = [measure(problem) for problem in problems]
     if path is not None:
-        with suppress(OSError):  # where nothing can be kept, they are measured again
+        with suppress(OSError):  # without a cache they are measured again
             path.parent.mkdir(parents=True, exist_ok=True)
             with complete_file(path) as file:
                 file.write_text(json.dumps([[p._asdict() for p in each] for each in points]), encoding="utf-8")
@@ -108,15 +108,15 @@ def _points(scene: Scene, names: tuple[str, ...], say: Callable[[str], None]) ->
 
 
 def _read(path: Path) -> list[list[Point]]:
-    """Return cached measurements; none if the file is missing or damaged."""
+    """Return cached measurements; [] if the file is missing or damaged."""
     with suppress(OSError, ValueError, TypeError):
         points = [[Point(**entry) for entry in each] for each in json.loads(path.read_text(encoding="utf-8"))]
         return points if all(points) else []
     return []
 
 
-def _file(scene: Scene, names: tuple[str, ...]) -> Path | None:
-    """Return the cache file, named by sources, integrators and plant without its step. Return None without a cache."""
+def _cache_file(scene: Scene, names: tuple[str, ...]) -> Path | None:
+    """Return the cache file, named by a digest of sources, integrators and plant; None without a cache."""
     folder = cache_folder()
     if folder is None:
         return None

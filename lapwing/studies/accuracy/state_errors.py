@@ -1,4 +1,4 @@
-"""Differences of two flights in the whole state, part by part, relative to 1 + size."""
+"""Differences of two flights in each quantity of the state, relative to 1 + size."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from lapwing.studies.accuracy.coordinates import matrices
 from lapwing.studies.flight_data import FlightData
 
 TOPICS = (TRUTH, BATTERY)
-BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState; its current jumps where a motor is switched off
+BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState, without the current, which jumps if a motor is switched off
 STATE_FIELDS = (
     ("position", "position"),
     ("attitude", "orientation"),
@@ -22,12 +22,12 @@ Errors = tuple[str, np.ndarray, np.ndarray]  # name of a quantity, times [s], er
 
 
 class Quantity(NamedTuple):
-    """Largest error of one part of a vehicle's state, of its numbers relative to 1 + their size."""
+    """Largest error of one quantity of a vehicle's state, relative to 1 + size."""
 
     vehicle: str
     name: str
     error: float
-    time: float  # [s] of the moment
+    time: float  # [s]
 
 
 def worst_of(quantities: Iterable[Quantity]) -> Quantity:
@@ -45,12 +45,12 @@ def differences_of_all(
 def differences(
     flight: FlightData, exact: FlightData, spans: list[tuple[float, float]] | None = None
 ) -> list[Quantity]:
-    """Return the largest error of each part of the state, at the ticks that both flights have.
+    """Return the largest error of each quantity of the state, at the ticks common to both flights.
 
     Args:
         flight: any flight.
         exact: the flight to compare with.
-        spans: [s] only the moments between these times, end exclusive, in order; None: all.
+        spans: intervals [s] to compare, in order, end exclusive; None: all.
     """
     result = []
     for name, times, errors in _errors(flight, exact):
@@ -63,7 +63,7 @@ def differences(
 
 
 def _errors(flight: FlightData, exact: FlightData) -> Iterator[Errors]:
-    """Yield the error of each part of the state, at the ticks that both flights have."""
+    """Yield the errors of each quantity of the state, at the ticks common to both flights."""
     for name, field in STATE_FIELDS:
         a, b = (np.asarray(getattr(each.truth, field)) for each in (flight, exact))
         if field == "orientation":
@@ -76,7 +76,7 @@ def _errors(flight: FlightData, exact: FlightData) -> Iterator[Errors]:
 
 
 def _error(name: str, times: np.ndarray, a: np.ndarray, b: np.ndarray) -> Iterator[Errors]:
-    """Yield the error of one part of the state, unless the vehicle does not have it."""
+    """Yield the errors of one quantity of the state; nothing if the vehicle does not have it."""
     n = min(len(a), len(b))
     a, b = a[:n].reshape(n, -1), b[:n].reshape(n, -1)
     if a.size and np.isfinite(b).all():

@@ -1,4 +1,4 @@
-"""From the name on the command line to a problem."""
+"""Targets of `lapwing accuracy`: problems and scenes by name."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,16 +12,16 @@ from lapwing.studies.accuracy.systems import problems
 
 
 def find(target: str) -> Problem:
-    """Return the problem of a name.
+    """Return a problem by its name.
 
     Raises:
-        ValueError: it does not exist; the message lists the choices.
+        ValueError: the problem is unknown; the message lists the choices.
     """
     return discovery.choose(problems(), target, "problem")
 
 
 def scene_of(target: str, overrides: Iterable[str]) -> Scene | None:
-    """Return the scene of a target, by its path or, unless a problem has it, by its name; None for a problem.
+    """Return the scene of a target, by its path or, if no problem has the name, by its name; None for a problem.
 
     Raises:
         ValueError: the scene is invalid, or there are overrides without a scene.
@@ -30,5 +30,5 @@ def scene_of(target: str, overrides: Iterable[str]) -> Scene | None:
     if target.endswith(".toml") or shipped:
         return load(Path(target), overrides)
     if overrides := list(overrides):
-        raise ValueError(f"--set {overrides[0]}: {target} is no scene, and has no keys to override")
+        raise ValueError(f"--set {overrides[0]}: {target} is not a scene; use --set with a scene")
     return None

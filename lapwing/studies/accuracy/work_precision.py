@@ -1,4 +1,4 @@
-"""Running every way of a problem from coarse to fine: error, wall time, evaluations, drift."""
+"""Measurement of all methods of a problem from coarse to fine: error, wall time, evaluations, drift."""
 
 import math
 import statistics
@@ -12,46 +12,50 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.studies.accuracy.coordinates import error
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 
-FINE_ENOUGH = 1e-11  # errors below are round-off, of the run or of the reference
-LONGEST = 0.1  # [s] of wall time of one run; what takes longer is not repeated, and not refined by default
-TIMED = 0.02  # [s] spent on timing a run
-REPEATS = (3, 500)  # fewest and most
+FINE_ENOUGH = 1e-11  # smaller errors are round-off of the run or of the reference
+LONGEST = 0.1  # [s] wall time of one run, above which it is neither repeated nor refined
+TIMED = 0.02  # [s] total time of the repetitions
+REPEATS = (3, 500)  # limits of the number of repetitions
 
 
 class Point(NamedTuple):
-    """One way at one setting."""
+    """Result of one method at one setting."""
 
-    way: str
+    method: str
     order: int
     unit: str
     setting: float
-    error: float  # largest difference to the reference at the end, relative to 1 + size
-    time: float  # [s] of wall time, median
+    error: float  # largest final difference from the reference, relative to 1 + size
+    time: float  # [s] median wall time
     evaluations: int | None
-    drift: dict[str, float]  # of each invariant, relative to its size; "manifold": how far the end is off it
+    drift: dict[str, float]  # of each invariant, relative to its size; "manifold": distance of the final state
 
 
 def measure(problem: Problem, longest: float = LONGEST) -> list[Point]:
     """Return all points of a problem, method by method, each from coarse to fine until a run takes `longest` [s]."""
     exact = problem.reference()
     points = []
-    for way in problem.ways:
-        way.idle()  # compiles or loads
-        points += _refine(problem, way, exact, longest)
+    for method in problem.methods:
+        method.idle()  # compiles or loads the kernels
+        points += _refine(problem, method, exact, longest)
     return points
 
 
-def _refine(problem: Problem, way: SolverMethod, exact: np.ndarray, longest: float) -> list[Point]:
+def _refine(problem: Problem, method: SolverMethod, exact: np.ndarray, longest: float) -> list[Point]:
     points: list[Point] = []
-    idle = clock(way.idle)[0]
-    for setting in way.settings:
-        seconds, result = clock(way.prepare(setting))
-        outcome = way.read(setting, result)
+    idle = clock(method.idle)[0]
+    for setting in method.settings:
+        seconds, result = clock(method.prepare(setting))
+        outcome = method.read(setting, result)
         if outcome is not None and np.isfinite(outcome.samples).all():
-            off = error(outcome.samples[-1], exact)
-            net = max(seconds - idle, 1e-7)
+            end_error = error(outcome.samples[-1], exact)
+            seconds_net = max(seconds - idle, 1e-7)
             drifts = drift(problem, outcome)
-            points.append(Point(way.name, way.order, way.unit, setting, off, net, outcome.evaluations, drifts))
+            points.append(
+                Point(
+                    method.name, method.order, method.unit, setting, end_error, seconds_net, outcome.evaluations, drifts
+                )
+            )
         if seconds > longest or _refinement_is_useless([p.error for p in points]):
             break
     return points
@@ -66,7 +70,7 @@ def _refinement_is_useless(errors: list[float]) -> bool:
 
 
 def drift(problem: Problem, outcome: SolverRun) -> dict[str, float]:
-    """Return the largest change of each invariant over the samples, relative to its size at the start."""
+    """Return the largest change of each invariant over the samples, relative to its initial size."""
     result = {"manifold": outcome.defect}
     for name, invariant in problem.invariants.items():
         values = invariant(outcome.times, outcome.samples)
@@ -91,24 +95,24 @@ def cheapest(points: list[Point], target: float) -> Point:
     """Return the fastest point whose error is at most `target`.
 
     Raises:
-        ConfigError: there is none.
+        ConfigError: no point meets the target.
     """
-    met = [p for p in points if p.error <= target]
-    if not met:
+    candidates = [p for p in points if p.error <= target]
+    if not candidates:
         best = min(points, key=lambda p: p.error, default=None)
-        reached = f"; the smallest reached is {best.error:.2g}, by {best.way}" if best else ""
+        reached = f"; the smallest error is {best.error:.2g}, by {best.method}" if best else ""
         raise ConfigError(f"--target {target:g}", f"no method meets this error{reached}")
-    return min(met, key=lambda p: p.time)
+    return min(candidates, key=lambda p: p.time)
 
 
 def pareto_points(points: list[Point], levels: list[float]) -> list[Point]:
     """Return the fastest point of each method at each of these errors."""
     selected: list[Point] = []
-    for way in dict.fromkeys(p.way for p in points):
-        own = [p for p in points if p.way == way]
+    for method in dict.fromkeys(p.method for p in points):
+        own = [p for p in points if p.method == method]
         for level in levels:
-            met = [p for p in own if p.error <= level]
-            if met and (result := min(met, key=lambda p: p.time)) not in selected:
+            candidates = [p for p in own if p.error <= level]
+            if candidates and (result := min(candidates, key=lambda p: p.time)) not in selected:
                 selected.append(result)
     return selected
 
@@ -117,7 +121,7 @@ def check_target(target: float | None) -> None:
     """Check that a target is a valid error.
 
     Raises:
-        ValueError: it is zero, negative or no number.
+        ValueError: the target is not a positive finite number.
     """
     if target is not None and not (target > 0.0 and math.isfinite(target)):
         raise ValueError(f"--target {target:g}: expected an error above 0, for example 1e-6")

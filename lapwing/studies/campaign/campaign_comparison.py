@@ -1,4 +1,4 @@
-"""Two campaigns beside each other, run by run: runs of one number and seed differ in nothing but what was changed."""
+"""Paired comparison of two campaigns: runs with equal number and seed differ only by the changes of the plan."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -13,33 +13,40 @@ from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, interval, paired_difference
 from lapwing.studies.metrics import METRICS
 
-COMPARED = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a campaign's manifest
+PLAN_ENTRIES = (
+    "scene",
+    "overrides",
+    "vary",
+    "sweep",
+    "design",
+    "versions",
+)  # entries of a manifest that define the flights
 
 
 class Difference(NamedTuple):
-    """A figure in both campaigns, and by how much the second has more of it."""
+    """Means of a metric in both campaigns, and their difference."""
 
     figure: str
     one: float  # mean
     other: float
-    difference: Interval  # of the means, over pairs of runs
+    difference: Interval  # second minus first, over pairs of runs
 
     @property
-    def sure(self) -> bool:
+    def is_significant(self) -> bool:
         """True if the interval excludes 0."""
         return self.difference.low > 0.0 or self.difference.high < 0.0
 
 
 class Comparison(NamedTuple):
-    """Two campaigns, paired."""
+    """Result of a paired comparison of two campaigns."""
 
     names: tuple[str, str]
-    differing: list[str]  # entries of their plans, and keys that pairs have drawn otherwise
+    differing: list[str]  # different entries of the plans, and keys with different drawn values
     pairs: int
-    left_out: int  # runs that only one has, or that one refuses
+    unpaired: int  # runs that only one campaign has or accepts
     failures: tuple[Interval, Interval]
-    only_one: int  # pairs of which only the first fails
-    only_other: int
+    only_first: int  # pairs in which only the run of the first fails
+    only_second: int  # pairs in which only the run of the second fails
     differences: list[Difference]  # "success" first
 
 
@@ -47,31 +54,40 @@ def compare(one: Path, other: Path) -> Comparison:
     """Compare two campaigns over their common runs.
 
     Raises:
-        ValueError: one folder is no campaign, or they have no runs in common.
+        ValueError: a folder is not a campaign, or the campaigns have no common runs.
     """
     a, b = Results(read(one)), Results(read(other))
-    known = {pair: k for k, pair in enumerate(_pairs(a))}
-    pairs = [(known[pair], k) for k, pair in enumerate(_pairs(b)) if pair in known]
+    positions = {pair: k for k, pair in enumerate(_pairs(a))}
+    pairs = [(positions[pair], k) for k, pair in enumerate(_pairs(b)) if pair in positions]
     if not pairs:
-        raise ValueError(f"{one} and {other}: have no run of the same seed; expected two campaigns of one --seed")
-    at, of = np.array(pairs).T
-    good, better = a["success"][at].astype(float), b["success"][of].astype(float)
-    differences = [Difference("success", float(good.mean()), float(better.mean()), paired_difference(good, better))]
+        raise ValueError(f"{one} and {other}: no run has the same seed; expected two campaigns with equal --seed")
+    rows_a, rows_b = np.array(pairs).T
+    success_a, success_b = a["success"][rows_a].astype(float), b["success"][rows_b].astype(float)
+    differences = [
+        Difference("success", float(success_a.mean()), float(success_b.mean()), paired_difference(success_a, success_b))
+    ]
     for name in METRICS:
         if a.folder.kinds[name] is float:
-            x, y = a[name][at], b[name][of]
-            there = np.isfinite(x) & np.isfinite(y)
-            if there.any():
-                means = float(x[there].mean()), float(y[there].mean())
-                differences.append(Difference(name, *means, paired_difference(x[there], y[there])))
+            x, y = a[name][rows_a], b[name][rows_b]
+            is_finite = np.isfinite(x) & np.isfinite(y)
+            if is_finite.any():
+                means = float(x[is_finite].mean()), float(y[is_finite].mean())
+                differences.append(Difference(name, *means, paired_difference(x[is_finite], y[is_finite])))
     count = len(pairs)
-    failures = interval(int(count - good.sum()), count), interval(int(count - better.sum()), count)
-    worse, mended = int(((good == 1) & (better == 0)).sum()), int(((good == 0) & (better == 1)).sum())
+    failures = interval(int(count - success_a.sum()), count), interval(int(count - success_b.sum()), count)
+    only_first, only_second = (
+        int(((success_a == 1) & (success_b == 0)).sum()),
+        int(((success_a == 0) & (success_b == 1)).sum()),
+    )
     total = len(set(_pairs(a)) | set(_pairs(b)))
     keys = [key for key in a.folder.plan.keys if key in b.folder.plan.keys]
-    drawn = [f"{key} (drawn otherwise)" for key in keys if not np.array_equal(a[key][at], b[key][of])]
-    differing = [name for name in COMPARED if a.folder.about[name] != b.folder.about[name]] + drawn
-    return Comparison((str(one), str(other)), differing, count, total - count, failures, mended, worse, differences)
+    different_values = [
+        f"{key} (different values)" for key in keys if not np.array_equal(a[key][rows_a], b[key][rows_b])
+    ]
+    differing = [name for name in PLAN_ENTRIES if a.folder.about[name] != b.folder.about[name]] + different_values
+    return Comparison(
+        (str(one), str(other)), differing, count, total - count, failures, only_second, only_first, differences
+    )
 
 
 def _pairs(results: Results) -> list[tuple[int, int]]:
@@ -80,21 +96,21 @@ def _pairs(results: Results) -> list[tuple[int, int]]:
 
 def show(console: Console, comparison: Comparison) -> None:
     """Print the comparison."""
-    left_out = f", {comparison.left_out} left out that only one has flown" if comparison.left_out else ""
-    console.print(f"{comparison.pairs} pairs of runs{left_out}")
-    console.print(f"the campaigns differ in: {', '.join(comparison.differing) or 'nothing'}")
+    unpaired = f", {comparison.unpaired} runs without a pair left out" if comparison.unpaired else ""
+    console.print(f"{comparison.pairs} pairs of runs{unpaired}")
+    console.print(f"different: {', '.join(comparison.differing) or 'nothing'}")
     for name, p in zip(comparison.names, comparison.failures, strict=True):
         console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}")
-    console.print(f"  failed in the first only: {comparison.only_one}, in the second only: {comparison.only_other}")
-    title = "Means, and the change from the first to the second with its 95 % interval"
+    console.print(f"  failed in the first only: {comparison.only_first}, in the second only: {comparison.only_second}")
+    title = "Means, and change from the first to the second with its 95 % interval"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    table.add_column("figure", no_wrap=True)
+    table.add_column("metric", no_wrap=True)
     for head in ("first", "second", "change", "from", "to"):
         table.add_column(head, justify="right", no_wrap=True)
     for d in comparison.differences:
         label, scale = ("success [%]", 100.0) if d.figure == "success" else label_and_factor(d.figure)
         means = (f"{scale * mean:.4g}" for mean in (d.one, d.other))
         changes = (f"{scale * change:+.3g}" for change in d.difference)
-        table.add_row(f"{label}{' *' if d.sure else ''}", *means, *changes)
+        table.add_row(f"{label}{' *' if d.is_significant else ''}", *means, *changes)
     console.print(table)
-    console.print("*: the interval does not hold 0")
+    console.print("*: the interval excludes 0")

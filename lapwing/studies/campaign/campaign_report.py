@@ -1,4 +1,4 @@
-"""The report of a campaign: a page for a browser, or its plots on paper."""
+"""Report of a campaign as a web page, PDF or image."""
 
 import shlex
 from collections.abc import Callable
@@ -13,34 +13,34 @@ from lapwing.studies.report.plot import NotRecordedError, Plot
 from lapwing.studies.report.sections import Section
 from lapwing.studies.tracking import AXES, unit_and_factor
 
-WORST = 10  # runs that are listed
+WORST = 10  # listed runs
 PLOTS: dict[str, Callable[[Results], Plot]] = {
     "Errors": campaign_plots.errors,
     "Probability of success": campaign_plots.success,
-    "Touch-down": campaign_plots.touchdown,
-    "Which parameter matters": campaign_plots.matters,
-    "Other figures": campaign_plots.others,
+    "Touchdown": campaign_plots.touchdown,
+    "Sensitivities": campaign_plots.sensitivity,
+    "Other metrics": campaign_plots.others,
     "All parameters": campaign_plots.parallel,
 }
-LISTED = ("max_distance", "touchdown.speed", "max_tilt")  # of the worst runs
+LISTED = ("max_distance", "touchdown.speed", "max_tilt")  # metrics of the worst runs
 
 
 def write(path: Path, results: Results) -> None:
-    """Write the report in the format of the name's ending: .html, .pdf or .png.
+    """Write the report in the format of the suffix: .html, .pdf or .png.
 
     Raises:
-        ValueError: it cannot be written.
+        ValueError: the file cannot be written.
     """
     sections = [_section(title, draw, results) for title, draw in PLOTS.items()]
     try:
         if path.suffix == ".html":
             path.write_text(_page(results, sections), encoding="utf-8")
         else:
-            drawn = [Titled(section.title, section.plot) for section in sections if section.plot]
+            titled_plots = [Titled(section.title, section.plot) for section in sections if section.plot]
             if path.suffix == ".pdf":
-                write_pdf(path, _cover(results), drawn)
+                write_pdf(path, _cover(results), titled_plots)
             else:
-                write_png(path, [titled.plot for titled in drawn])
+                write_png(path, [titled.plot for titled in titled_plots])
     except OSError as fault:
         raise ValueError(f"{path}: cannot write the report: {fault.strerror or fault}") from None
 
@@ -87,39 +87,39 @@ def _cover(results: Results) -> Cover:
 
 
 def _title(results: Results) -> str:
-    return f"{results.scene}: {len(results) + len(results.refused['run'])} runs"
+    return f"{results.scene}: {len(results) + len(results.rejected['run'])} runs"
 
 
 def _page(results: Results, sections: list[Section]) -> str:
     plan = results.folder.plan
-    heads = [campaign_plots.label_and_factor(name) for name in LISTED]
+    labels = [campaign_plots.label_and_factor(name) for name in LISTED]
     worst = [
         {
             "run": int(row["run"]),
             "outcome_text": row["outcome_text"] or row["outcome"],
             "parameters": ", ".join(f"{key} {_short(row[key])}" for key in plan.keys),
-            "figures": [f"{scale * row[name]:.3g}" for name, (_, scale) in zip(LISTED, heads, strict=True)],
+            "figures": [f"{scale * row[name]:.3g}" for name, (_, scale) in zip(LISTED, labels, strict=True)],
             "command": shlex.join(
                 ["lapwing", "run", plan.path, "--run", str(row["run"]), "--campaign", str(results.folder.path)]
             ),
         }
         for row in results.worst(WORST)
     ]
-    refused = zip(results.refused["run"].tolist(), results.refused["outcome_text"].tolist(), strict=True)
+    refused = zip(results.rejected["run"].tolist(), results.rejected["outcome_text"].tolist(), strict=True)
     return render(
         "campaign.html",
         title=_title(results),
         outcome_text=results.outcome_text,
         failure=results.failure,
         facts=_facts(results),
-        heads=[label for label, _ in heads],
+        labels=[label for label, _ in labels],
         worst=worst,
         vehicles=console_output.vehicle_cells(results),
         vehicle_heads=console_output.VEHICLE_COLUMNS,
         vehicle_title=console_output.VEHICLES,
         nearest=console_output.nearest_of(results) if results.vehicles else "",
         refused=list(refused)[:WORST],
-        refusals=len(results.refused["run"]),
+        refusals=len(results.rejected["run"]),
         sections=sections,
     )
 

@@ -1,7 +1,7 @@
-"""The workers of a Dask cluster, however it was made: by `dask worker`, by dask-jobqueue, by dask-kubernetes.
+"""Execution of a campaign on the workers of a Dask cluster: `dask worker`, dask-jobqueue, dask-kubernetes.
 
-Dask hands a task of a worker that is lost to another one, and hands tasks to workers that join late. Each worker checks
-before its first task that it flies what the campaign was begun with (`runs.fly_runs`).
+Dask reassigns the tasks of a lost worker, and assigns tasks to workers that join late. Before its first task each
+worker checks that it reproduces the reference of the campaign (`runs.fly_runs`).
 """
 
 import logging
@@ -10,11 +10,11 @@ from typing import Any
 
 from lapwing.cosim.run_errors import RunFailed
 
-PATIENCE = 10.0  # [s] for the scheduler to answer
+SCHEDULER_TIMEOUT = 10.0  # [s]
 
 
 def dask(
-    address: str, say: Callable[[str], None] = lambda line: None
+    address: str, notify: Callable[[str], None] = lambda line: None
 ) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
     """Return a function that runs calls on the workers of a Dask scheduler, tcp://host:8786.
 
@@ -27,29 +27,29 @@ def dask(
         from distributed.scheduler import KilledWorker
     except ImportError:
         raise ValueError("--cluster: Dask is not installed; pip install lapwing[cluster]") from None
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # it tells of a lost scheduler by a traceback
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # it logs a traceback if the scheduler is lost
     try:
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as fault:
-        raise ValueError(f"--cluster {address}: no Dask scheduler answers there: {fault}") from None
+        raise ValueError(f"--cluster {address}: no Dask scheduler answers: {fault}") from None
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
         with client:
             if not client.nthreads():
-                say(f"{address}: no worker has joined the scheduler yet; the campaign waits for one")
-            futures = {client.submit(call, *task, pure=False): place for place, task in enumerate(tasks)}
+                notify(f"{address}: no worker has joined the scheduler; waiting for one")
+            futures = {client.submit(call, *task, pure=False): index for index, task in enumerate(tasks)}
             try:
                 for future in as_completed(list(futures), loop=client.loop):
                     yield futures[future], future.result()
-                    future.release()  # its rows need stay nowhere
+                    future.release()  # frees its rows in the cluster
             except KilledWorker:
-                message = "a task has lost one worker after the other, perhaps for want of memory"
-                raise RunFailed(f"{message}; the same command goes on where it stopped") from None
+                message = "a task has repeatedly lost its worker, possibly out of memory"
+                raise RunFailed(f"{message}; repeat the command to continue") from None
             except (FutureCancelledError, OSError, TimeoutError):
                 message = f"the scheduler at {address} is lost"
-                raise RunFailed(f"{message}; the same command goes on where it stopped") from None
+                raise RunFailed(f"{message}; repeat the command to continue") from None
             finally:
-                if left := [future for future in futures if not future.done()]:
-                    client.cancel(left)
+                if unfinished := [future for future in futures if not future.done()]:
+                    client.cancel(unfinished)
 
     return run

@@ -1,4 +1,4 @@
-"""A campaign in the terminal, and as JSON."""
+"""Results of a campaign as tables and as JSON."""
 
 import math
 from collections.abc import Sequence
@@ -15,32 +15,32 @@ from lapwing.studies.consistency import JOINT, SOURCES, bounds
 from lapwing.studies.tracking import AXES, unit_and_factor
 
 VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
-VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touch-down [m/s]", "success")
-VEHICLES = "The vehicles: worst run of each, and in how many runs it did not fail"
-LISTED = 10  # failures, refusals
+VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touchdown [m/s]", "success")
+VEHICLES = "Worst run and success rate of each vehicle"
+LISTED = 10  # failures and rejected runs
 
 
 def show(console: Console, results: Results) -> None:
-    """Print the campaign for people."""
+    """Print the tables and the failure probability."""
     if len(results) == 0:
         console.print(f"{results.scene}: the scene rejected every run")
-        _list(console, "rejected", results.refused["run"], results.refused["outcome_text"])
+        _list(console, "rejected", results.rejected["run"], results.rejected["outcome_text"])
         return
-    _table(console, "Root-mean-square error of the reference against the truth", "rmse", results)
+    _table(console, "Root-mean-square error between reference and ground truth", "rmse", results)
     if results.on_estimate:
-        _table(console, "The same against the vehicle's own estimate", "rmse_estimate", results)
+        _table(console, "Root-mean-square error between reference and estimate", "rmse_estimate", results)
         shares = ", ".join(f"{axis} {results[f'within_3sigma.{axis}'].mean():.2%}" for axis in "xyz")
-        console.print(f"Truth within 3 sigma of the estimate: {shares} of the time")
+        console.print(f"Ground truth within 3 sigma of the estimate: {shares} of the time")
         least = {axis: results.spread(f"within_3sigma.{axis}") for axis in "xyz"}
         text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
-        console.print(f"Least of a flight: {text}")
+        console.print(f"Lowest share of a flight: {text}")
         for line in consistency_lines(results):
             console.print(line)
     if results.vehicles:
         _vehicles(console, results)
     if len(results) > 1 and not results.figures:
-        console.print("Every run is the same flight: nothing in this scene is random, and nothing varies")
-    runs = len(results) + len(results.refused["run"])
+        console.print("All runs are equal: the scene has no random numbers, and no key varies")
+    runs = len(results) + len(results.rejected["run"])
     console.print(f"{results.scene}: {runs} runs: {results.outcome_text}")
     p, failed = results.failure, ~results["success"].astype(bool)
     share = f"{p.value:.2%} of the flights, 95 % interval {p.low:.2%} to {p.high:.2%}"
@@ -49,17 +49,17 @@ def show(console: Console, results: Results) -> None:
     console.print(f"Failures: {share} (success: {criteria})", style=style, markup=False)
     if (farthest := results.spread("target_distance")) and failed.any():
         text = f"median {farthest.median:.1f} m, worst {farthest.worst:.1f} m (run {farthest.run})"
-        console.print(f"Distance from the mission's target at the end: {text}")
+        console.print(f"Final distance from the mission's target: {text}")
     _list(console, "run", results["run"][failed], results["outcome_text"][failed])
-    _list(console, "rejected: run", results.refused["run"], results.refused["outcome_text"])
+    _list(console, "rejected: run", results.rejected["run"], results.rejected["outcome_text"])
 
 
 def consistency_lines(results: Results) -> list[str]:
     """Return the joint NEES and the NIS over all runs with their 95 % bounds; [] without a covariance."""
-    known = results["nees"][np.isfinite(results["nees"])]
-    if not len(known):
+    finite = results["nees"][np.isfinite(results["nees"])]
+    if not len(finite):
         return []
-    low, high = bounds(JOINT, len(known))
+    low, high = bounds(JOINT, len(finite))
     share = np.nanmean(results["within_95.nees"])
     samples = int(np.nansum(results["nis_samples"]))
     innovations = []
@@ -68,7 +68,7 @@ def consistency_lines(results: Results) -> list[str]:
             least, most = (bound / dimension for bound in bounds(dimension, samples))
             innovations.append(f"{source} {np.nanmean(results[f'nis.{source}']):.3f} ({least:.3f} to {most:.3f})")
     return [
-        f"Joint NEES of attitude, velocity, position: {known.mean():.2f}, expected {JOINT}, 95 % bounds {low:.2f} to "
+        f"Joint NEES of attitude, velocity, position: {finite.mean():.2f}, expected {JOINT}, 95 % bounds {low:.2f} to "
         f"{high:.2f}; within its 95 % quantile {share:.1%} of the time",
         f"NIS by dimension, expected 1 (95 % bounds): {', '.join(innovations)}",
     ]
@@ -82,7 +82,7 @@ def _vehicles(console: Console, results: Results) -> None:
     for vehicle, cells in vehicle_cells(results).items():
         table.add_row(vehicle, *cells)
     console.print(table)
-    console.print(f"Nearest of any two vehicles: {nearest_of(results)}")
+    console.print(f"Smallest separation of two vehicles: {nearest_of(results)}")
 
 
 def vehicle_cells(results: Results) -> dict[str, list[str]]:
@@ -97,18 +97,18 @@ def _cells(results: Results, vehicle: str) -> list[str]:
 
 
 def nearest_of(results: Results) -> str:
-    """Return the least separation of two vehicles of a fleet as text."""
+    """Return the smallest separation of two vehicles of a fleet as text."""
     least = results.spread(NEAREST)
     if least is None:
         return "unknown"
-    return f"{least.worst:.2f} m apart (run {least.run}), in half of the runs below {least.median:.2f} m"
+    return f"{least.worst:.2f} m (run {least.run}), median {least.median:.2f} m"
 
 
-def _list(console: Console, what: str, runs: Sequence[int], texts: Sequence[str]) -> None:
+def _list(console: Console, label: str, runs: Sequence[int], texts: Sequence[str]) -> None:
     for run, text in list(zip(runs, texts, strict=True))[:LISTED]:
-        console.print(f"  {what} {run}: {text}")
+        console.print(f"  {label} {run}: {text}")
     if len(runs) > LISTED:
-        console.print(f"  and {len(runs) - LISTED} more: the table has all of them")
+        console.print(f"  and {len(runs) - LISTED} more; see the table of runs")
 
 
 def _table(console: Console, title: str, kind: str, results: Results) -> None:
@@ -118,7 +118,7 @@ def _table(console: Console, title: str, kind: str, results: Results) -> None:
         table.add_column(column, justify="right", no_wrap=True)
     if results.published:
         table.add_column(results.source, justify="right")
-        table.add_column("worst / that", justify="right")
+        table.add_column("worst / published", justify="right")
     for axis in AXES:
         s, (unit, scale) = results.spread(f"{kind}.{axis}"), unit_and_factor(axis)
         if s is None:
@@ -127,7 +127,7 @@ def _table(console: Console, title: str, kind: str, results: Results) -> None:
         if published := results.published.get(f"rmse.{axis}"):
             row += [digits(scale * published), f"{s.worst / published:.3f}"]
         table.add_row(*row)
-    if table.row_count:  # a flight plan is no reference
+    if table.row_count:  # empty without a reference, as for a flight plan
         console.print(table)
 
 
@@ -138,16 +138,16 @@ def digits(value: float) -> str:
 
 
 def write_json(path: Path, results: Results, digest: str) -> None:
-    """Write the results of the campaign; the table has the single runs."""
+    """Write the results of the campaign without its single runs."""
     spreads = {name: results.spread(name) for name in results.figures}
     data = {
         "scene": results.scene,
-        "runs": len(results) + len(results.refused["run"]),
+        "runs": len(results) + len(results.rejected["run"]),
         "outcome_text": results.outcome_text,
         "failure": results.failure,
         "figures": {name: s for name, s in spreads.items() if s},
         "failed": results["run"][~results["success"].astype(bool)],
-        "refused": results.refused["run"],
+        "rejected": results.rejected["run"],
         "digest": digest,
     }
     json_file.write_json(path, data)

@@ -1,4 +1,4 @@
-"""Distributions of varied scene keys, given by their quantile functions."""
+"""Distributions of varied scene keys, defined by their quantile functions."""
 
 import re
 import sys
@@ -14,7 +14,7 @@ from lapwing.cosim.scene.overrides import value_of
 
 
 class Distribution(NamedTuple):
-    """A distribution of the values of a key; `str` gives the text that `parse` reads."""
+    """Distribution of the values of a key; `str` returns the text that `parse` reads."""
 
     name: str
     arguments: tuple[Any, ...]
@@ -24,7 +24,7 @@ class Distribution(NamedTuple):
 
     @property
     def values(self) -> tuple[Any, ...]:
-        """Its values where there are finitely many, each as likely; () otherwise."""
+        """Values of a discrete distribution, equally likely; () for a continuous one."""
         return _VALUES[self.name](*self.arguments) if self.name in _VALUES else ()
 
     def at(self, u: float) -> Any:
@@ -40,7 +40,7 @@ def normal(mean: float, deviation: float) -> Distribution:
     Raises:
         ValueError: the deviation is below 0.
     """
-    return _validate("normal", mean, deviation, sound=deviation >= 0.0, expected="a deviation of at least 0")
+    return _validate("normal", mean, deviation, valid=deviation >= 0.0, expected="a deviation of at least 0")
 
 
 def uniform(low: float, high: float) -> Distribution:
@@ -49,7 +49,7 @@ def uniform(low: float, high: float) -> Distribution:
     Raises:
         ValueError: high is below low.
     """
-    return _validate("uniform", low, high, sound=high >= low, expected="low <= high")
+    return _validate("uniform", low, high, valid=high >= low, expected="low <= high")
 
 
 def loguniform(low: float, high: float) -> Distribution:
@@ -58,25 +58,25 @@ def loguniform(low: float, high: float) -> Distribution:
     Raises:
         ValueError: high is below low, or low is not above 0.
     """
-    return _validate("loguniform", low, high, sound=high >= low > 0.0, expected="0 < low <= high")
+    return _validate("loguniform", low, high, valid=high >= low > 0.0, expected="0 < low <= high")
 
 
 def linspace(low: float, high: float, count: int) -> Distribution:
     """Return a distribution over `count` equidistant values from low to high, equally likely.
 
     Raises:
-        ValueError: the count is no integer from 1 to 1 000 000.
+        ValueError: the count is not an integer from 1 to 1 000 000.
     """
-    sound = isinstance(count, int) and 0 < count <= MOST
-    expected = f"a whole number of values, up to {MOST}, as third argument"
-    return _validate("linspace", low, high, count, sound=sound, expected=expected)
+    valid = isinstance(count, int) and 0 < count <= MAX_VALUES
+    expected = f"a whole number of values, up to {MAX_VALUES}, as third argument"
+    return _validate("linspace", low, high, count, valid=valid, expected=expected)
 
 
 def choice(*values: Any) -> Distribution:
     """Return a distribution over these values, equally likely.
 
     Raises:
-        ValueError: there are none.
+        ValueError: no value is given.
     """
     if not values:
         raise ValueError("choice: expected at least one value")
@@ -93,7 +93,7 @@ _VALUES: dict[str, Callable[..., tuple]] = {
     "choice": lambda *values: values,
     "linspace": lambda low, high, count: tuple(np.linspace(low, high, count).tolist()),
 }
-MOST = 1_000_000  # values of a linspace
+MAX_VALUES = 1_000_000  # values of a linspace
 _FORM = re.compile(r"(\w+)\s*\((.*)\)", re.DOTALL)
 _SPLIT = re.compile(r"""((?:"[^"]*"|'[^']*'|\[[^\]]*\]|\{[^}]*\}|[^,])+)(?:,|$)""")
 
@@ -123,8 +123,8 @@ def _arguments(text: str) -> list[Any]:
         return [value_of(part.strip()) for part in _SPLIT.findall(text)]
 
 
-def _validate(name: str, *numbers: float, sound: bool, expected: str) -> Distribution:
-    if not sound or not all(abs(number) <= sys.float_info.max for number in numbers):
+def _validate(name: str, *numbers: float, valid: bool, expected: str) -> Distribution:
+    if not valid or not all(abs(number) <= sys.float_info.max for number in numbers):
         raise ValueError(f"{name}: expected {expected}, got {', '.join(map(str, numbers))}")
     return Distribution(name, numbers)
 

@@ -1,4 +1,4 @@
-"""A run of a fleet in a campaign's table: the worst of its vehicles in the columns of a run, and each by its name."""
+"""Columns of a fleet in a campaign's table: the worst vehicle, and each vehicle by name."""
 
 import math
 from collections.abc import Mapping
@@ -11,23 +11,23 @@ from lapwing.studies.outcome import KINDS
 from lapwing.studies.separation import nearest
 
 NEAREST = "nearest"  # [m] least distance between two vehicles
-PLACES = ("touchdown.x", "touchdown.y")  # which of several has no meaning
+POSITIONS = ("touchdown.x", "touchdown.y")  # undefined for several vehicles
 Row = dict[str, Any]
 
 
 def columns(vehicles: tuple[str, ...]) -> dict[str, type]:
     """Return the name and type of a fleet's additional columns, such as `left.rmse.x`."""
-    each = {f"{name}.success": bool for name in vehicles}
+    success_columns = {f"{name}.success": bool for name in vehicles}
     figures = {
         f"{v}.{name}": str if name == "outcome" else float
         for v in vehicles
         for name in METRICS
         if name != "outcome_text"
     }
-    return {NEAREST: float, **each, **figures} if vehicles else {}
+    return {NEAREST: float, **success_columns, **figures} if vehicles else {}
 
 
-def joint_row(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
+def joint_row(flights: Mapping[str, FlightData], by_vehicle: Mapping[str, Row], required: Mapping[str, Success]) -> Row:
     """Return the columns of a run without its drawn parameters.
 
     Args:
@@ -35,16 +35,16 @@ def joint_row(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], req
         of_each: metrics by vehicle name.
         required: `[success]` by vehicle name.
     """
-    result: Row = {name: _worst(name, [row[name] for row in of_each.values()]) for name in METRICS}
-    unmet = {name: required[name].unmet(row) for name, row in of_each.items()}
+    result: Row = {name: _worst(name, [row[name] for row in by_vehicle.values()]) for name in METRICS}
+    unmet = {name: required[name].unmet(row) for name, row in by_vehicle.items()}
     texts = [
-        f"{name}: {of_each[name]['outcome_text']}; not {', not '.join(missed)}"
-        for name, missed in unmet.items()
-        if missed
+        f"{name}: {by_vehicle[name]['outcome_text']}; not {', not '.join(criteria)}"
+        for name, criteria in unmet.items()
+        if criteria
     ]
     result |= {"success": not texts, "outcome_text": "; ".join(texts)}
     result[NEAREST] = nearest({name: flight.truth for name, flight in flights.items()}).distance
-    for name, row in of_each.items():
+    for name, row in by_vehicle.items():
         result |= {f"{name}.{key}": value for key, value in row.items() if key != "outcome_text"}
         result[f"{name}.success"] = not unmet[name]
     return result
@@ -53,11 +53,11 @@ def joint_row(flights: Mapping[str, FlightData], of_each: Mapping[str, Row], req
 def _worst(name: str, values: list[Any]) -> Any:
     if name == "outcome":
         return max(values, key=KINDS.index)
-    if name == "outcome_text" or name in PLACES:
+    if name == "outcome_text" or name in POSITIONS:
         return "" if name == "outcome_text" else math.nan
-    known = [value for value in values if not math.isnan(value)]
-    if not known:
+    finite = [value for value in values if not math.isnan(value)]
+    if not finite:
         return math.nan
     if name == "energy":
-        return math.fsum(known)
-    return min(known) if name.startswith("within_") else max(known)
+        return math.fsum(finite)
+    return min(finite) if name.startswith("within_") else max(finite)

@@ -1,10 +1,10 @@
-"""The folder of a campaign: what is flown (`campaign.json`), the shards that are done, and at the end the table.
+"""Folder of a campaign: manifest, complete shards, and finally the table of runs.
 
-campaign.json      the plan, the scene's texts, versions; a campaign is its hash
-shards/00007.csv   the rows of one shard, written whole or not at all
-last_shard         where the table ends that `--ci-half-width` has ended; shards after it stay for a command without
-runs.parquet       all rows in their order (runs.csv without pyarrow)
-report.html
+campaign.json      plan, source texts of the scene, versions; its hash identifies the campaign
+shards/00007.csv   rows of one shard, written completely or not at all
+last_shard         last shard of a table ended by `--ci-half-width`; later shards are kept for a command without it
+runs.parquet       all rows in order (runs.csv without pyarrow)
+report.html        report
 """
 
 import contextlib
@@ -28,16 +28,16 @@ from lapwing.studies.campaign.runs import Reference, Row, columns, scene_of, sou
 from lapwing.studies.complete_file import complete_file
 
 MANIFEST = "campaign.json"
-LAST = "last_shard"
-SHARDS = 32  # of a small campaign
-MOST = 250  # runs in a shard
+LAST_SHARD = "last_shard"
+SHARDS = 32  # number of shards of a small campaign
+MAX_SHARD_SIZE = 250  # runs in a shard
 
 
 class Folder:
     """A campaign on disk."""
 
     def __init__(self, path: Path, plan: Plan, about: dict[str, Any]):
-        """Use `begin` or `read`; `about` is the manifest."""
+        """Create the object; use `begin` or `read` instead. `about` is the manifest."""
         self.path, self.plan, self.about = path, plan, about
 
     @cached_property
@@ -47,16 +47,20 @@ class Folder:
 
     @cached_property
     def shards(self) -> list[range]:
-        """The runs of each shard, which their count alone decides."""
-        size = min(math.ceil(self.plan.runs / SHARDS), MOST)
+        """Runs of each shard, determined by the number of runs alone."""
+        size = min(math.ceil(self.plan.runs / SHARDS), MAX_SHARD_SIZE)
         return [range(start, min(start + size, self.plan.runs)) for start in range(0, self.plan.runs, size)]
 
     def missing(self) -> list[int]:
-        """Return the shards that have not been flown."""
+        """Return the numbers of the shards without results."""
         return [k for k in range(len(self.shards)) if not self._shard(k).exists()]
 
     def write(self, shard: int, rows: list[Row]) -> None:
-        """Keep the rows of a shard: whole, or not at all. RunFailed where they cannot be written."""
+        """Write the rows of a shard, completely or not at all.
+
+        Raises:
+            RunFailed: the file cannot be written.
+        """
         with _campaign_file(self._shard(shard)) as file:
             run_table.write_csv(file, self.kinds, [rows])
 
@@ -65,7 +69,7 @@ class Folder:
         return run_table.read_csv(self._shard(shard), self.kinds)
 
     def pages(self) -> Iterator[list[Row]]:
-        """Yield the rows of the runs in order, shard by shard, up to the first missing one or the table's end."""
+        """Yield the rows of each shard in order, up to the first missing shard or the end of the table."""
         last = self._last()
         for shard in range(len(self.shards)):
             if not self._shard(shard).exists() or (last is not None and shard > last):
@@ -77,32 +81,34 @@ class Folder:
         return run_table.arrays(self.kinds, self.pages())
 
     def end_after(self, shard: int | None) -> None:
-        """End the table with this shard; None: with the last. Later shards are kept but left out.
+        """End the table with a shard; None: with the last one. Later shards are kept but omitted.
 
         Raises:
             RunFailed: the folder cannot be written.
         """
         if shard is None:
-            (self.path / LAST).unlink(missing_ok=True)
+            (self.path / LAST_SHARD).unlink(missing_ok=True)
             return
-        with _campaign_file(self.path / LAST) as file:
+        with _campaign_file(self.path / LAST_SHARD) as file:
             file.write_text(f"{shard}\n", encoding="utf-8")
 
     def _last(self) -> int | None:
         try:
-            return int((self.path / LAST).read_text(encoding="utf-8"))
+            return int((self.path / LAST_SHARD).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
 
     def finish(self, csv: bool = False) -> str:
-        """Write the table, with `csv` as CSV too; its digest, which no number, kind or order of workers changes.
+        """Write the table as Parquet, or as CSV without pyarrow, and return its digest.
+
+        The digest does not depend on number, kind or order of the workers. `csv` also writes CSV.
 
         Raises:
-            RunFailed: it cannot be written.
+            RunFailed: a file cannot be written.
         """
         digest = hashlib.blake2b(digest_size=16)
         for page in self.pages():
-            for line in run_table.bits(self.kinds, page):
+            for line in run_table.digest_lines(self.kinds, page):
                 digest.update(line)
         if run_table.has_parquet():
             about = {name: v if isinstance(v, str) else json.dumps(v) for name, v in self.about.items()}
@@ -143,21 +149,21 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
     """Create or continue the folder of a campaign.
 
     Raises:
-        ValueError: it contains another campaign or something else, or cannot be written.
+        ValueError: the folder holds another campaign or other files, or cannot be written.
     """
     if not (path / MANIFEST).exists():
-        _make(path, about)
-    there = read(path).about  # perhaps that of another machine, which has begun meanwhile
-    differing = [name for name in about if name != "path" and there.get(name) != about[name]]
+        _create(path, about)
+    existing = read(path).about  # another machine may have started the campaign
+    differing = [name for name in about if name != "path" and existing.get(name) != about[name]]
     if differing:
         raise ValueError(f"{path}: holds another campaign ({', '.join(differing)} differ); expected a new folder")
     return Folder(path, plan, about)
 
 
-def _make(path: Path, about: dict[str, Any]) -> None:
-    """Make the folder of a campaign."""
+def _create(path: Path, about: dict[str, Any]) -> None:
+    """Create the folder of a campaign."""
     if path.exists() and (not path.is_dir() or any(not _may_be_new(file) for file in path.iterdir())):
-        raise ValueError(f"{path}: holds something else; expected a new folder, or one of a campaign")
+        raise ValueError(f"{path}: holds other files; expected a new folder, or one of a campaign")
     try:
         (path / "shards").mkdir(parents=True, exist_ok=True)
         with complete_file(path / MANIFEST) as file:
@@ -175,7 +181,7 @@ def read(path: Path) -> Folder:
     """Return the folder of an existing campaign.
 
     Raises:
-        ValueError: it is no campaign.
+        ValueError: the folder is not that of a campaign.
     """
     try:
         about = json.loads((path / MANIFEST).read_text(encoding="utf-8"))
@@ -183,7 +189,7 @@ def read(path: Path) -> Folder:
         values = {name: about[name] for name in Plan._fields}
         plan = Plan(**values | {"vary": vary, "overrides": tuple(about["overrides"]), "sweep": tuple(about["sweep"])})
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        raise ValueError(f"{path}: no campaign there; expected the folder of one, with {MANIFEST}") from None
+        raise ValueError(f"{path}: not a campaign; expected a folder with {MANIFEST}") from None
     return Folder(path, plan, about)
 
 
@@ -195,4 +201,4 @@ def _campaign_file(path: Path) -> Iterator[Path]:
             yield file
     except OSError as fault:
         reason = (fault.strerror or str(fault)).lower()
-        raise RunFailed(f"{path}: cannot be written: {reason}; the same command goes on where it stopped") from None
+        raise RunFailed(f"{path}: cannot be written: {reason}; repeat the command to continue") from None

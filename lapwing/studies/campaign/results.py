@@ -1,4 +1,4 @@
-"""The results of a campaign: its table in memory, and what is asked of it."""
+"""Results of a campaign: its table in memory with derived statistics."""
 
 from collections.abc import Mapping
 from functools import cached_property
@@ -8,34 +8,34 @@ import numpy as np
 
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.folder import Folder
-from lapwing.studies.campaign.runs import REFUSED
+from lapwing.studies.campaign.runs import REJECTED
 from lapwing.studies.campaign.statistics import Interval, Spread, interval, spread
 from lapwing.studies.metrics import METRICS
 from lapwing.studies.outcome import KINDS
 from lapwing.studies.tracking import AXES
 
-LEAST_IS_WORST = (
+MIN_IS_WORST = (
     NEAREST,
     *(f"within_3sigma.{axis}" for axis in "xyz"),
     "within_95.nees",
-)  # of all other figures the greatest is the worst
+)  # the worst value of all other metrics is the largest
 
 
 class Results:
-    """The runs of a campaign as columns, shape (n,) each.
+    """Runs of a campaign as columns, shape (n,) each.
 
     Attributes:
-        folder: of the campaign.
-        columns: by name, those of refused runs left out.
-        refused: of the refused runs.
-        units: of the parameters' keys, as far as they are known.
+        folder: folder of the campaign.
+        columns: columns of the completed runs by name.
+        rejected: columns of the rejected runs by name.
+        units: units of the varied keys, if known.
     """
 
     def __init__(self, folder: Folder, units: Mapping[str, str] | None = None):
-        self.folder, self.units, everything = folder, units or {}, folder.arrays()
-        is_flown = everything["outcome"] != REFUSED
-        self.columns = {name: values[is_flown] for name, values in everything.items()}
-        self.refused = {name: values[~is_flown] for name, values in everything.items()}
+        self.folder, self.units, columns = folder, units or {}, folder.arrays()
+        is_flown = columns["outcome"] != REJECTED
+        self.columns = {name: values[is_flown] for name, values in columns.items()}
+        self.rejected = {name: values[~is_flown] for name, values in columns.items()}
 
     def __len__(self) -> int:
         """Return the number of completed runs."""
@@ -47,17 +47,17 @@ class Results:
 
     @property
     def scene(self) -> str:
-        """Its name."""
+        """Name of the scene."""
         return str(self.folder.about["scene"])
 
     @property
     def vehicles(self) -> list[str]:
-        """The names of the vehicles of a fleet, whose columns are named `left.rmse.x`; [] of a scene of one."""
+        """Vehicle names of a fleet, the prefixes of columns such as `left.rmse.x`; [] for a single vehicle."""
         return list(self.folder.about["vehicles"])
 
     @property
     def published(self) -> dict[str, float]:
-        """Published figures by the names of ours: "rmse.x"."""
+        """Published values by the name of the metric, e.g. "rmse.x"."""
         return {f"rmse.{axis}": value for axis, value in self.folder.about["published"].get("rmse", {}).items()}
 
     @property
@@ -73,12 +73,14 @@ class Results:
     @cached_property
     def outcome_text(self) -> str:
         """Number of runs of each outcome: "97 landed, 3 crashed, 1 rejected"."""
-        kinds = [(kind, int((self["outcome"] == kind).sum())) for kind in KINDS] + [(REFUSED, len(self.refused["run"]))]
+        kinds = [(kind, int((self["outcome"] == kind).sum())) for kind in KINDS] + [
+            (REJECTED, len(self.rejected["run"]))
+        ]
         return ", ".join(f"{n} {kind}" for kind, n in kinds if n)
 
     @cached_property
     def figures(self) -> list[str]:
-        """The figures that are numbers and differ between runs."""
+        """Numeric metrics that differ between runs."""
         numbers = [name for name in METRICS if self.folder.kinds[name] is float]
         return [name for name in numbers if len(np.unique(self[name][np.isfinite(self[name])])) > 1]
 
@@ -89,7 +91,7 @@ class Results:
 
     def spread(self, name: str) -> Spread | None:
         """Return the distribution of a metric."""
-        return spread(self[name], self["run"], least=name in LEAST_IS_WORST)
+        return spread(self[name], self["run"], least=name in MIN_IS_WORST)
 
     def of_vehicles(self, name: str) -> dict[str, np.ndarray]:
         """Return a metric by vehicle name of a fleet; {} for a single vehicle."""
@@ -102,6 +104,6 @@ class Results:
 
     def worst(self, count: int) -> list[dict[str, Any]]:
         """Return the worst runs: failures first, then the largest tracking errors."""
-        away = np.nan_to_num(self["max_distance"], nan=np.inf)
-        order = np.lexsort((self["run"], -away, self["success"].astype(bool)))[:count]
+        distance = np.nan_to_num(self["max_distance"], nan=np.inf)
+        order = np.lexsort((self["run"], -distance, self["success"].astype(bool)))[:count]
         return [{name: values[k] for name, values in self.columns.items()} for k in order]

@@ -1,4 +1,4 @@
-"""The table of a campaign on disk: a line for each run, as CSV, or as Parquet where pyarrow is installed."""
+"""Table of a campaign on disk with a row for each run, as CSV or, with pyarrow, as Parquet."""
 
 import csv
 import json
@@ -19,12 +19,12 @@ def has_parquet() -> bool:
 
 
 def write_csv(path: Path, kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> None:
-    """Write rows as CSV: numbers as Python's repr, exact; nothing where there is no number.
+    """Write rows as CSV: numbers exactly, as their repr; NaN as an empty cell.
 
     Args:
-        path: of the file.
+        path: path of the file.
         kinds: type of each column: int, float, bool or str.
-        pages: rows, some at a time.
+        pages: rows in groups.
     """
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
@@ -37,7 +37,7 @@ def read_csv(path: Path, kinds: Mapping[str, type]) -> list[dict[str, Any]]:
     """Return the rows of a file of `write_csv`.
 
     Raises:
-        ValueError: it is no such file, or has other columns.
+        ValueError: the file is not such a table, or has other columns.
     """
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -48,23 +48,23 @@ def read_csv(path: Path, kinds: Mapping[str, type]) -> list[dict[str, Any]]:
             {name: _value(cell, kind) for (name, kind), cell in zip(kinds.items(), line, strict=True)} for line in lines
         ]
     except (OSError, ValueError, csv.Error) as fault:
-        message = f"is no table of this campaign: {fault}; without this file its runs are flown again"
+        message = f"not a table of this campaign: {fault}; delete the file to repeat its runs"
         raise ValueError(f"{path}: {message}") from None
 
 
 def write_parquet(
     path: Path, kinds: Mapping[str, type], pages: Iterable[Iterable[Row]], metadata: Mapping[str, str]
 ) -> None:
-    """Write rows as Parquet, a row group for each page, with metadata in its schema; needs pyarrow."""
+    """Write rows as Parquet with a row group for each page and metadata in the schema; requires pyarrow."""
     import pyarrow
     from pyarrow import parquet
 
-    of = {int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_(), str: pyarrow.string()}
-    schema = pyarrow.schema([(name, of[kind]) for name, kind in kinds.items()], metadata=dict(metadata))
+    types = {int: pyarrow.int64(), float: pyarrow.float64(), bool: pyarrow.bool_(), str: pyarrow.string()}
+    schema = pyarrow.schema([(name, types[kind]) for name, kind in kinds.items()], metadata=dict(metadata))
     with parquet.ParquetWriter(path, schema) as writer:
         for page in pages:
-            plain = [{name: _plain(row.get(name), kind) for name, kind in kinds.items()} for row in page]
-            writer.write_table(pyarrow.Table.from_pylist(plain, schema=schema))
+            rows = [{name: _plain(row.get(name), kind) for name, kind in kinds.items()} for row in page]
+            writer.write_table(pyarrow.Table.from_pylist(rows, schema=schema))
 
 
 def arrays(kinds: Mapping[str, type], pages: Iterable[Iterable[Row]]) -> dict[str, np.ndarray]:
@@ -86,10 +86,10 @@ def _plain(value: Any, kind: type) -> Any:
 
 
 def _text(value: Any, kind: type) -> str:
-    plain = _plain(value, kind)
-    if isinstance(plain, bool):
-        return "true" if plain else "false"
-    return "" if isinstance(plain, float) and math.isnan(plain) else str(plain)
+    result = _plain(value, kind)
+    if isinstance(result, bool):
+        return "true" if result else "false"
+    return "" if isinstance(result, float) and math.isnan(result) else str(result)
 
 
 def _value(cell: str, kind: type) -> Any:
@@ -98,7 +98,7 @@ def _value(cell: str, kind: type) -> Any:
     return math.nan if kind is float and not cell else kind(cell)
 
 
-def bits(kinds: Mapping[str, type], rows: Iterable[Row]) -> Iterator[bytes]:
+def digest_lines(kinds: Mapping[str, type], rows: Iterable[Row]) -> Iterator[bytes]:
     """Yield the rows as bytes for a digest."""
     for row in rows:
         yield "\x1f".join(_text(row.get(name), kind) for name, kind in kinds.items()).encode() + b"\n"

@@ -1,4 +1,4 @@
-"""Flies runs of a campaign: from their numbers to the rows of its table. What every worker calls, wherever it is."""
+"""Flights of the runs of a campaign, called by all workers: from the run's number to its row of the table."""
 
 import contextlib
 import hashlib
@@ -27,31 +27,31 @@ from lapwing.studies.campaign.plan import Plan
 from lapwing.studies.metrics import METRICS, check_success, joint_end_state, metrics
 from lapwing.studies.simulate import fly_each
 
-REFUSED = "rejected"  # outcome of a run whose values the scene refuses
-TRIED = 16  # first runs, of which the scene has to take one at least, or else of as many all over the campaign
-_FOLDER = re.compile(r"(?<![^\s'\"(])/(?:[^\s/]+/)+")  # of an absolute path
-_OURS = ("lapwing",)
-_NUMBERS_OF = ("llvmlite", "numba", "numpy", "scipy")
+REJECTED = "rejected"  # outcome of a run with values that the scene rejects
+TRIAL_RUNS = 16  # number of first runs, and of runs spread over the campaign, one of which must be valid
+_ABSOLUTE_FOLDER = re.compile(r"(?<![^\s'\"(])/(?:[^\s/]+/)+")  # folder of an absolute path
+_PACKAGES = ("lapwing",)
+_LIBRARIES = ("llvmlite", "numba", "numpy", "scipy")
 
 Row = dict[str, Any]  # values by column
 
 
 class Reference(NamedTuple):
-    """Versions and end state that every worker has to reproduce."""
+    """Versions and end state that every worker must reproduce."""
 
     versions: dict[str, str]
     run: int
-    end_state: str  # of that run
+    end_state: str  # of this run
 
 
 @cache
 def versions() -> dict[str, str]:
-    """Return the versions on which the numbers of a flight depend."""
+    """Return the versions that affect the results of a flight."""
     folder, digest = Path(lapwing.services.__file__).parents[1], hashlib.blake2b(digest_size=8)
-    for path in sorted(path for name in _OURS for path in (folder / name).rglob("*.py")):
+    for path in sorted(path for name in _PACKAGES for path in (folder / name).rglob("*.py")):
         digest.update(path.relative_to(folder).as_posix().encode() + path.read_bytes())
     result = {"lapwing": package_version(), "sources": digest.hexdigest(), "python": platform.python_version()}
-    return result | {name: version(name) for name in _NUMBERS_OF}
+    return result | {name: version(name) for name in _LIBRARIES}
 
 
 def vehicles(plan: Plan) -> tuple[str, ...]:
@@ -76,19 +76,19 @@ def first_setup(plan: Plan) -> tuple[int, RunConfig]:
     Raises:
         SceneError: the scene is invalid, or rejects the first `TRIED` runs and as many others.
     """
-    refusal = None
-    others = np.linspace(0, plan.runs - 1, TRIED, dtype=int).tolist()  # of a grid the first runs are much alike
-    for run in dict.fromkeys([*range(min(plan.runs, TRIED)), *others]):
+    first_error = None
+    spread_runs = np.linspace(0, plan.runs - 1, TRIAL_RUNS, dtype=int).tolist()  # the first runs of a grid are similar
+    for run in dict.fromkeys([*range(min(plan.runs, TRIAL_RUNS)), *spread_runs]):
         try:
             return run, setup_of(plan, run)
         except SceneError as error:
-            refusal = refusal or error
-    assert refusal is not None
-    raise refusal
+            first_error = first_error or error
+    assert first_error is not None
+    raise first_error
 
 
 def reference(run: int, setup: RunConfig) -> Reference:
-    """Fly a run and return its reference, without an end state for a foreign firmware, whose flights differ."""
+    """Fly a run and return the reference; without an end state for a foreign firmware, whose flights differ."""
     if foreign_firmware(setup):
         return Reference(versions(), run, "")
     return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
@@ -98,7 +98,7 @@ def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Ro
     """Return the rows of the runs from `start` (inclusive) to `stop` (exclusive).
 
     Raises:
-        ValueError: this worker has another version or other numbers.
+        ValueError: this worker has other versions or different results.
     """
     _check(plan, reference)
     rows: dict[str, np.ndarray] = {}
@@ -117,7 +117,7 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     try:
         setup = setup_of(plan, run)
     except SceneError as error:
-        return {**row, **_of_refused(vehicles(plan)), "outcome_text": _refusal(error)}
+        return {**row, **_rejected_row(vehicles(plan)), "outcome_text": _rejection_text(error)}
     flights = fly_each(setup, TOPICS, rows)
     row["end_state"] = joint_end_state(flights)
     scene = scene_of(plan)
@@ -133,19 +133,19 @@ def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> R
     return {**row, **result, "success": not unmet, "outcome_text": text}
 
 
-def _refusal(error: SceneError) -> str:
+def _rejection_text(error: SceneError) -> str:
     """Return the error text without folders, so that the table is equal for all workers."""
     source = error.source
     if source.path is not None:
         source = source._replace(path=Path(source.path.name))
-    return _FOLDER.sub("", str(SceneError(error.key, error.message, error.expected, source)))
+    return _ABSOLUTE_FOLDER.sub("", str(SceneError(error.key, error.message, error.expected, source)))
 
 
-def _of_refused(names: tuple[str, ...]) -> Row:
+def _rejected_row(names: tuple[str, ...]) -> Row:
     result: Row = dict.fromkeys(METRICS, math.nan)
     for name, kind in fleet_columns.columns(names).items():
-        result[name] = {bool: False, str: REFUSED, float: math.nan}[kind]
-    return {**result, "outcome": REFUSED, "end_state": ""}
+        result[name] = {bool: False, str: REJECTED, float: math.nan}[kind]
+    return {**result, "outcome": REJECTED, "end_state": ""}
 
 
 def setup_of(plan: Plan, run: int) -> RunConfig:
@@ -184,10 +184,12 @@ def sources(plan: Plan) -> dict[str, str]:
     for key, distribution in plan.vary:
         for value in distribution.values:
             if isinstance(value, str):
-                with contextlib.suppress(SceneError):  # such a run is refused
-                    named = load(scene_of(plan), {key: value}).sources
+                with contextlib.suppress(SceneError):  # such a run is rejected
+                    sources_of_value = load(scene_of(plan), {key: value}).sources
                     result |= {
-                        f"{key}={value}: {n}": t.decode() for n, t in named.items() if result.get(n) != t.decode()
+                        f"{key}={value}: {n}": t.decode()
+                        for n, t in sources_of_value.items()
+                        if result.get(n) != t.decode()
                     }
     return dict(sorted(result.items()))
 
@@ -205,22 +207,24 @@ def _resolve(scene: str, overrides: tuple[str, ...]) -> RunConfig:
     return campaign_setup(_scene(scene, overrides))
 
 
-_agreed: set[str] = set()  # end states of references that this process has flown
+_verified_end_states: set[str] = set()  # end states that this process has reproduced
 
 
 def _check(plan: Plan, reference: Reference) -> None:
-    """Check that the first run gives the same result as at the start of the campaign."""
-    where = f"worker on {platform.node()}"
+    """Check that this worker reproduces the reference of the campaign."""
+    worker = f"worker on {platform.node()}"
     try:
         scene_of(plan)
     except SceneError as error:
-        raise ValueError(f"{where}: {error}") from None
+        raise ValueError(f"{worker}: {error}") from None
     for name, expected in reference.versions.items():
         if (result := versions().get(name)) != expected:
-            raise ValueError(f"{where}: has {name} {result}; the campaign was begun with {expected}")
+            raise ValueError(f"{worker}: has {name} {result}; expected {expected} as at the start of the campaign")
     if foreign_firmware(setup_of(plan, reference.run)):
-        return  # no two of its flights need be equal
-    if reference.end_state not in _agreed:
+        return  # its flights are not repeatable
+    if reference.end_state not in _verified_end_states:
         if (result := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
-            raise ValueError(f"{where}: run {reference.run} goes another way there than where the campaign was begun")
-        _agreed.add(reference.end_state)
+            raise ValueError(
+                f"{worker}: the end state of run {reference.run} differs from that at the start of the campaign"
+            )
+        _verified_end_states.add(reference.end_state)

@@ -1,16 +1,16 @@
-"""Flies a campaign, shard by shard, and counts."""
+"""Execution of a campaign shard by shard, with counts of the outcomes."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from lapwing.studies.campaign.folder import Folder
-from lapwing.studies.campaign.runs import REFUSED, Reference, Row, fly_runs
+from lapwing.studies.campaign.runs import REJECTED, Reference, Row, fly_runs
 from lapwing.studies.campaign.statistics import Interval, interval
 from lapwing.studies.outcome import KINDS
 
 Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]
-"""(call, tasks) -> (place of a task, call(*task)), as soon as they are there."""
+"""(call, tasks) -> (index of the task, call(*task)) in order of completion."""
 
 
 class Count(NamedTuple):
@@ -18,16 +18,16 @@ class Count(NamedTuple):
 
     runs: int = 0
     successes: int = 0
-    kinds: tuple[tuple[str, int], ...] = ()  # how many ended how
+    kinds: tuple[tuple[str, int], ...] = ()  # number of runs by outcome
 
     @property
     def accepted(self) -> int:
-        """Runs that the scene took."""
-        return self.runs - dict(self.kinds).get(REFUSED, 0)
+        """Number of runs that the scene accepted."""
+        return self.runs - dict(self.kinds).get(REJECTED, 0)
 
     @property
     def failures(self) -> int:
-        """Runs that were flown without success."""
+        """Number of accepted runs without success."""
         return self.accepted - self.successes
 
     @property
@@ -36,7 +36,7 @@ class Count(NamedTuple):
         return interval(self.failures, self.accepted)
 
     def __add__(self, other: "Count") -> "Count":  # type: ignore[override]
-        kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REFUSED)}
+        kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REJECTED)}
         counts = tuple((kind, n) for kind, n in kinds.items() if n)
         return Count(self.runs + other.runs, self.successes + other.successes, counts)
 
@@ -56,67 +56,67 @@ def campaign(
     reference: Reference,
     workers: Workers,
     progress: Callable[[Count], None] = lambda count: None,
-    until: float | None = None,
-    part: Iterable[int] | None = None,
+    half_width: float | None = None,
+    shards: Iterable[int] | None = None,
 ) -> Count:
-    """Fly what is missing.
+    """Fly the missing runs.
 
     Args:
-        folder: of the campaign.
-        reference: what each worker has to agree on.
-        workers: who flies.
-        progress: is told what the runs so far came to, those of before among them.
-        until: end as soon as the probability of a failure is known to this on either side; which run is the last does
-            not depend on the workers.
-        part: the shards to fly, None for all.
+        folder: folder of the campaign.
+        reference: result that each worker must reproduce.
+        workers: executor of the tasks.
+        progress: called with the counts so far, including earlier runs.
+        half_width: end at this half-width of the failure probability's confidence interval; None: fly all runs. The
+            last run does not depend on the workers.
+        shards: numbers of the shards to fly; None: all.
 
     Returns:
-        What all runs of the table came to.
+        Counts of all runs of the table.
 
     Raises:
-        RunFailed: what was flown cannot be written, or a worker is lost.
+        RunFailed: results cannot be written, or a worker is lost.
     """
     folder.end_after(None)
-    absent = set(folder.missing())
-    missing = sorted(absent if part is None else absent.intersection(part))
-    done = {k: count(folder.rows(k)) for k in range(len(folder.shards)) if k not in absent}
-    total, ending = sum(done.values(), Count()), Ending(until)
-    if not ending.reached(done):
+    missing_shards = set(folder.missing())
+    missing = sorted(missing_shards if shards is None else missing_shards.intersection(shards))
+    counts = {k: count(folder.rows(k)) for k in range(len(folder.shards)) if k not in missing_shards}
+    total, rule = sum(counts.values(), Count()), StoppingRule(half_width)
+    if not rule.reached(counts):
         progress(total)
-        plan = folder.plan.anywhere()
+        plan = folder.plan.with_absolute_path()
         tasks = [(plan, reference, folder.shards[k].start, folder.shards[k].stop) for k in missing]
         results = workers(fly_runs, tasks)
-        for place, rows in results:
-            folder.write(missing[place], rows)
-            done[missing[place]] = count(rows)
-            total += done[missing[place]]
+        for index, rows in results:
+            folder.write(missing[index], rows)
+            counts[missing[index]] = count(rows)
+            total += counts[missing[index]]
             progress(total)
-            if ending.reached(done):
+            if rule.reached(counts):
                 break
         results.close()  # type: ignore[attr-defined]
-    if ending.reached(done):
-        folder.end_after(ending.shard)
-        return ending.total
+    if rule.reached(counts):
+        folder.end_after(rule.shard)
+        return rule.total
     return total
 
 
-class Ending:
-    """Stopping rule: the first shard up to which the failure probability is known well enough.
+class StoppingRule:
+    """Stopping rule: the first shard at which the confidence interval is narrow enough.
 
     Attributes:
-        shard: this one, or the next to be looked at; each is looked at once.
-        total: what the runs up to it came to.
+        shard: this shard, or the next one to check.
+        total: counts of the runs up to this shard.
     """
 
-    def __init__(self, until: float | None):
-        """Create a stopping rule; `until`: half-width of the failure probability's confidence interval, or None."""
+    def __init__(self, half_width: float | None):
+        """Create a rule for a half-width of the failure probability's confidence interval; None: never stop."""
         self.shard, self.total = 0, Count()
-        self._until, self._reached = until, False
+        self._half_width, self._reached = half_width, False
 
-    def reached(self, done: Mapping[int, Count]) -> bool:
-        """Return True if these shards suffice."""
-        while self._until is not None and not self._reached and self.shard in done:
-            self.total += done[self.shard]
-            self._reached = self.total.accepted > 0 and self.total.failure.half_width <= self._until
+    def reached(self, counts: Mapping[int, Count]) -> bool:
+        """Return True if the counts of these shards suffice."""
+        while self._half_width is not None and not self._reached and self.shard in counts:
+            self.total += counts[self.shard]
+            self._reached = self.total.accepted > 0 and self.total.failure.half_width <= self._half_width
             self.shard += not self._reached
         return self._reached

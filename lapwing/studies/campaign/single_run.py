@@ -1,11 +1,11 @@
-"""A run of a campaign, to be flown again by itself."""
+"""Single run of a campaign, to repeat it."""
 
 from pathlib import Path
 
 from lapwing.cosim.scene import Scene
 from lapwing.services.scene_resolver import load
 from lapwing.studies.campaign.folder import read
-from lapwing.studies.campaign.runs import REFUSED, name_option_in_errors, scene_of, sources
+from lapwing.studies.campaign.runs import REJECTED, name_option_in_errors, scene_of, sources
 
 
 def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
@@ -17,25 +17,25 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
         folder: folder of the campaign.
 
     Raises:
-        ValueError: there is no such run, or the scene differs from the campaign's.
+        ValueError: the run does not exist, or the scene differs from the campaign's.
     """
     campaign = read(folder)
     if not 0 <= run < campaign.plan.runs:
         raise ValueError(f"--run {run}: expected a run of {folder}, 0 to {campaign.plan.runs - 1}")
     plan = campaign.plan._replace(path=str(scene))
-    there, here = campaign.about["sources"], sources(plan)
-    for name in sorted({*there, *here}):
-        if there.get(name) != here.get(name):
-            raise ValueError(f"{scene}: {name} is not what {folder} has flown; expected the scene as it was then")
+    recorded, current = campaign.about["sources"], sources(plan)
+    for name in sorted({*recorded, *current}):
+        if recorded.get(name) != current.get(name):
+            raise ValueError(f"{scene}: {name} differs from the campaign {folder}; expected the original scene")
     with name_option_in_errors(plan):
         return load(scene_of(plan), plan.overrides_of(run))
 
 
 def end_state_of(run: int, folder: Path) -> str:
-    """Return the final state of a run in its campaign; "" if it has not been flown."""
+    """Return the end state of a run in its campaign; "" without one."""
     campaign = read(folder)
     shard = next(k for k, runs in enumerate(campaign.shards) if run in runs)
     if shard in campaign.missing():
         return ""
     row = next(row for row in campaign.rows(shard) if row["run"] == run)
-    return "" if row["outcome"] == REFUSED else row["end_state"]
+    return "" if row["outcome"] == REJECTED else row["end_state"]

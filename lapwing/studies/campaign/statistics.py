@@ -1,4 +1,4 @@
-"""Statistics of campaigns: intervals, spreads, and which parameter matters."""
+"""Statistics of campaigns: intervals, distributions, sensitivities."""
 
 from importlib.util import find_spec
 from typing import NamedTuple
@@ -6,11 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy import stats
 
-SURE = 0.95  # of every interval
+CONFIDENCE = 0.95  # confidence level of every interval
 
 
 class Interval(NamedTuple):
-    """An estimate with its interval of 95 %."""
+    """An estimate with its 95 % interval."""
 
     value: float
     low: float
@@ -26,26 +26,29 @@ class Spread(NamedTuple):
     """Distribution of a metric over the runs."""
 
     median: float
-    low: float  # 5 % of the runs are below
-    high: float  # 5 % are above
+    low: float  # 5 % quantile
+    high: float  # 95 % quantile
     worst: float
-    run: int  # of the worst
+    run: int  # run of the worst value
 
 
 def interval(k: int, n: int) -> Interval:
     """Return the Clopper-Pearson interval of a probability from k events in n trials; it is conservative."""
     if n == 0:
         return Interval(float("nan"), 0.0, 1.0)
-    result = stats.binomtest(k, n).proportion_ci(SURE, method="exact")
+    result = stats.binomtest(k, n).proportion_ci(CONFIDENCE, method="exact")
     return Interval(k / n, float(result.low), float(result.high))
 
 
 def spread(values: np.ndarray, runs: np.ndarray, least: bool = False) -> Spread | None:
-    """Return the distribution of a metric without NaN; the worst is the greatest, or the `least`. None if empty."""
-    there = np.isfinite(values)
-    if not there.any():
+    """Return the distribution of the finite values of a metric; None if empty.
+
+    The worst value is the largest, with `least` the smallest.
+    """
+    is_finite = np.isfinite(values)
+    if not is_finite.any():
         return None
-    numbers, runs = values[there], runs[there]
+    numbers, runs = values[is_finite], runs[is_finite]
     low, median, high = np.quantile(numbers, [0.05, 0.5, 0.95])
     worst = int(numbers.argmin() if least else numbers.argmax())
     return Spread(float(median), float(low), float(high), float(numbers[worst]), int(runs[worst]))
@@ -57,8 +60,8 @@ def paired_difference(a: np.ndarray, b: np.ndarray) -> Interval:
     if len(difference) < 2:
         return Interval(float("nan"), float("nan"), float("nan"))
     mean, error = float(difference.mean()), float(stats.sem(difference))
-    reach = float(stats.t.ppf(0.5 + 0.5 * SURE, len(difference) - 1)) * error
-    return Interval(mean, mean - reach, mean + reach)
+    half_width = float(stats.t.ppf(0.5 + 0.5 * CONFIDENCE, len(difference) - 1)) * error
+    return Interval(mean, mean - half_width, mean + half_width)
 
 
 def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
@@ -66,9 +69,9 @@ def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
     if len(x) < 4 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return Interval(float("nan"), float("nan"), float("nan"))
     rho = float(stats.spearmanr(x, y).statistic)
-    reach = float(stats.norm.ppf(0.5 + 0.5 * SURE)) * np.sqrt((1.0 + 0.5 * rho * rho) / (len(x) - 3.0))
+    half_width = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE)) * np.sqrt((1.0 + 0.5 * rho * rho) / (len(x) - 3.0))
     z = np.arctanh(np.clip(rho, -1.0 + 1e-12, 1.0 - 1e-12))
-    return Interval(rho, float(np.tanh(z - reach)), float(np.tanh(z + reach)))
+    return Interval(rho, float(np.tanh(z - half_width)), float(np.tanh(z + half_width)))
 
 
 def has_sobol() -> bool:
@@ -88,8 +91,8 @@ def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
     varying = np.flatnonzero(high > low)
     bounds = np.column_stack([low, high])[varying].tolist()
     problem = {"num_vars": len(varying), "names": [names[k] for k in varying], "bounds": bounds}
-    with np.errstate(invalid="ignore", divide="ignore"):  # a resample in which every run came to the same
-        result = rbd_fast.analyze(problem, x[:, varying], y, seed=1, conf_level=SURE)
+    with np.errstate(invalid="ignore", divide="ignore"):  # a resample with equal results of all runs
+        result = rbd_fast.analyze(problem, x[:, varying], y, seed=1, conf_level=CONFIDENCE)
     indices = [Interval(np.nan, np.nan, np.nan)] * len(names)
     for k, s, c in zip(varying, result["S1"], result["S1_conf"], strict=True):
         indices[k] = Interval(float(s), float(s - c), float(s + c))
@@ -97,7 +100,7 @@ def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
 
 
 def ellipse(points: np.ndarray, share: float, n: int = 90) -> np.ndarray:
-    """Return the ellipse (n, 2) of this share of a normal distribution with mean and covariance of points (k, 2)."""
+    """Return the ellipse (n, 2) with this share of a normal distribution fitted to points (k, 2)."""
     values, axes = np.linalg.eigh(np.cov(points.T))
     radius = np.sqrt(stats.chi2.ppf(share, 2) * np.clip(values, 0.0, None))
     angle = np.linspace(0.0, 2.0 * np.pi, n)

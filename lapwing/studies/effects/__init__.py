@@ -1,1 +1,1 @@
-"""`lapwing effects`: what each effect of a scene costs and changes, and which of them the scene could do without."""
+"""`lapwing effects`: cost and influence of each effect of a scene, and the smallest sufficient set."""

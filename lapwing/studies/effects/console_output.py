@@ -1,4 +1,4 @@
-"""The study as a table, as JSON and as a plot."""
+"""Results of the effects study as tables, as JSON and as a plot."""
 
 import math
 from pathlib import Path
@@ -14,39 +14,40 @@ from lapwing.studies.effects.procedure import Row, Study
 from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
 
-LEAST = 1e-6  # [m] shorter bars are drawn as long as this
+MIN_BAR = 1e-6  # [m] length of the shortest bars
 
 
 def show(console: Console, study: Study) -> None:
-    """Print the study for people."""
-    head = f"{study.scene}: a plant step takes {study.airborne:.0f} ns hovering, {study.standing:.0f} ns standing"
+    """Print the study."""
+    head = f"{study.scene}: plant step: {study.airborne:.0f} ns hovering, {study.standing:.0f} ns on the ground"
     console.print(head)
-    _table(console, "Effects of the scene, and what leaving one out changes", study, active=True)
-    _table(console, "Effects that the scene leaves out, and what adding one changes", study, active=False)
+    _table(console, "Effects of the scene, and the change without each", study, active=True)
+    _table(console, "Effects not in the scene, and the change with each", study, active=False)
     saved = 1.0 - study.smallest_airborne / study.airborne, 1.0 - study.smallest_standing / study.standing
     console.print(
-        f"Smallest set within {study.within:g} m: {', '.join(study.smallest) or 'none'} ({study.apart:.2g} m off; "
-        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} standing)",
+        f"Smallest set within {study.within:g} m: {', '.join(study.smallest) or 'none'} "
+        f"(distance {study.distance:.2g} m; "
+        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground)",
     )
-    console.print('Costs after "<" are below what this measurement resolves.')
+    console.print('Costs after "<" are below the resolution of the measurement.')
     names = ", ".join(row.name for row in study.missing)
-    console.print(f"Left out, and worth more than {study.within:g} m: {names or 'none'}")
+    console.print(f"Not in the scene, influence above {study.within:g} m: {names or 'none'}")
 
 
 def _table(console: Console, title: str, study: Study, active: bool) -> None:
     console.print(title)
     table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
     table.add_column("effect", no_wrap=True)
-    for column in ("hovering\n[ns]", "share", "standing\n[ns]", "path [m]", "end [m]", "energy"):
+    for column in ("hovering\n[ns]", "share", "on ground\n[ns]", "path [m]", "end [m]", "energy"):
         table.add_column(column, justify="right", no_wrap=True)
-    for row in _of(study, active):
+    for row in _sorted_rows(study, active):
         if row.influence is None:
             continue
-        share = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
+        ratio = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
         airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
-        table.add_row(row.name, airborne, share, standing, *_changes(row.influence))
+        table.add_row(row.name, airborne, ratio, standing, *_changes(row.influence))
     console.print(table)
-    for row in _of(study, active):
+    for row in _sorted_rows(study, active):
         if row.remark:
             console.print(f"  not flown: {row.remark}", soft_wrap=True)
 
@@ -58,37 +59,39 @@ def _cost(difference: float, noise: float) -> str:
 def _changes(i: Influence) -> tuple[str, str, str]:
     if i.failure:
         return "ends early", "", ""
-    return f"{i.trajectory:.2g}", f"{i.final:.2g}", percent(i.energy)
+    return f"{i.trajectory:.2g}", f"{i.final:.2g}", format_percent(i.energy)
 
 
-def percent(share: float) -> str:
+def format_percent(ratio: float) -> str:
     """Return a relative change in per cent with two significant digits, without an exponent up to 1000 %."""
-    value = 100.0 * share
+    value = 100.0 * ratio
     if not value:
         return "0 %"
     return f"{value:+.0f} %" if 9.95 <= abs(value) < 1e4 else f"{value:+.2g} %"
 
 
-def _of(study: Study, active: bool) -> list[Row]:
+def _sorted_rows(study: Study, active: bool) -> list[Row]:
     rows = [row for row in study.rows if row.active == active]
     return sorted(rows, key=lambda r: -r.influence.trajectory if r.influence else math.inf)
 
 
 def write_json(path: Path, study: Study) -> None:
-    """Write the study; values that are infinite or unknown are null."""
+    """Write the study; infinite and unknown values are null."""
     json_file.write_json(path, {**study._asdict(), "missing": [row.name for row in study.missing]})
 
 
 def plot(path: Path, study: Study) -> None:
     """Plot the influence of every effect over the tolerance, and its cost."""
-    rows = [r for r in (*_of(study, False)[::-1], *_of(study, True)[::-1]) if r.influence]
+    rows = [r for r in (*_sorted_rows(study, False)[::-1], *_sorted_rows(study, True)[::-1]) if r.influence]
     names = [row.name if row.active else f"({row.name})" for row in rows]
     with plot_style():
         figure = Figure(figsize=(WIDTH, 1.1 + 0.27 * len(rows)), dpi=DPI, layout="constrained")
         influence, cost = figure.subplots(1, 2, sharey=True)
-        ends = [row.influence.trajectory for row in rows if row.influence]
-        most = max([e for e in ends if math.isfinite(e)] + [10.0 * study.within])
-        lengths = [min(max(e, LEAST), 3.0 * most) if e > 0.0 else 0.0 for e in ends]  # no bar: no change
+        distances = [row.influence.trajectory for row in rows if row.influence]
+        longest = max([e for e in distances if math.isfinite(e)] + [10.0 * study.within])
+        lengths = [
+            min(max(e, MIN_BAR), 3.0 * longest) if e > 0.0 else 0.0 for e in distances
+        ]  # no bar without a change
         colours = [FLOWN if row.active else "#9CC3DD" for row in rows]
         influence.barh(names, lengths, color=colours)
         influence.axvline(study.within, color=BOUND, linewidth=1.2, label=f"tolerance {study.within:g} m")
@@ -100,5 +103,5 @@ def plot(path: Path, study: Study) -> None:
         for axis in (influence, cost):
             axis.grid(visible=False, axis="y")
             axis.margins(y=0.01)
-        figure.suptitle(f"{study.scene}: effects of the scene, and (in brackets) those it leaves out", fontsize=10)
+        figure.suptitle(f"{study.scene}: effects of the scene, and others (in brackets)", fontsize=10)
         figure.savefig(path)

@@ -16,14 +16,14 @@ from lapwing.services.common.vehicle_schema import active, airframe, rotor_const
 from lapwing.services.plant.schema import Solver, method
 from lapwing.studies.effects.variants import Tables, variant
 
-STEPS = 2000  # in one timed call
-ROUNDS = 60  # calls of each variant, taking turns so that they share the machine's moods
+STEPS = 2000  # steps in one timed call
+ROUNDS = 60  # calls of each variant, interleaved so that disturbances affect all variants
 HEIGHT = 10.0  # [m]
 STANDARD_GRAVITY = 9.81  # [m/s^2]
 
 
 class Cost(NamedTuple):
-    """Time that a plant step takes [ns], and by how much two halves of the measurement differ."""
+    """Time of a plant step [ns], and difference of two halves of the measurement."""
 
     airborne: float  # hovering at 10 m
     standing: float  # on the ground with the motors off
@@ -46,7 +46,7 @@ def costs(scene: Scene, variants: list[Tables]) -> list[Cost]:
         for i, pair in enumerate(calls):
             for j, call in enumerate(pair):
                 row[i, j] = call()
-    # interruptions only add: the least is nearest to what the work itself takes
+    # interruptions only add time, so the minimum is the best estimate
     odd, even = (times[begin::2].min(axis=0) / STEPS * 1e9 for begin in (1, 2))
     return [Cost(*np.minimum(a, b), *np.abs(a - b)) for a, b in zip(odd, even, strict=True)]
 
@@ -69,8 +69,8 @@ def _call(scene: Scene, p: Any, height: float, speed: float, voltage: float) -> 
 
     def call() -> float:
         state = Cell(start)
-        began = time.perf_counter()
+        started = time.perf_counter()
         exchanges(integrator, parameters, state, key, command, step, steps, STEPS // steps)
-        return time.perf_counter() - began
+        return time.perf_counter() - started
 
     return call

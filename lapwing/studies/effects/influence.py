@@ -8,12 +8,12 @@ from lapwing.studies.flight_data import FlightData
 
 
 class Influence(NamedTuple):
-    """The difference that one effect makes; infinite where the flight without it comes to no end."""
+    """Change of a flight by one effect; infinite if the changed flight fails."""
 
-    trajectory: float  # largest distance between the two at one time [m]
-    final: float  # distance between the ends [m]
+    trajectory: float  # [m] largest distance at equal times
+    final: float  # [m] distance of the final positions
     energy: float  # relative change of the electrical energy
-    failure: str = ""
+    failure: str = ""  # error of the changed flight
 
 
 def influence(reference: FlightData, other: FlightData) -> Influence:
@@ -22,9 +22,9 @@ def influence(reference: FlightData, other: FlightData) -> Influence:
         return Influence(np.inf, np.inf, np.inf, other.failure)
     count = max(len(reference.truth), len(other.truth))
     a, b = (_extend(flight.truth.position, count) for flight in (reference, other))
-    apart = np.linalg.norm(a - b, axis=1)
+    distance = np.linalg.norm(a - b, axis=1)
     change = (other.energy - reference.energy) / reference.energy if reference.energy else 0.0
-    return Influence(float(apart.max()), float(apart[-1]), float(change))
+    return Influence(float(distance.max()), float(distance[-1]), float(change))
 
 
 def _extend(position: np.ndarray, count: int) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Variants of a scene with other effects, flown on all cores."""
+"""Variants of a scene with other effects, and their flights on all cores."""
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,7 +15,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 from lapwing.studies.workers import workers
 
-Tables = Mapping[str, Any]  # the table of each effect that a variant has
+Tables = Mapping[str, Any]  # tables of a variant's effects by name
 
 
 def variant(scene: Scene, tables: Tables) -> Scene:
@@ -23,8 +23,8 @@ def variant(scene: Scene, tables: Tables) -> Scene:
     return scene.replaced(Effects.model_validate(dict(tables)))
 
 
-def refusal(scene: Scene, tables: Tables) -> str:
-    """Return the reason why a scene cannot have these effects; "" if it can."""
+def check_effects(scene: Scene, tables: Tables) -> str:
+    """Return the error if a scene cannot have these effects; "" if it can."""
     try:
         effects.from_scene(tables, airframe(scene), environment(scene))
     except ValueError as error:
@@ -32,24 +32,24 @@ def refusal(scene: Scene, tables: Tables) -> str:
     return ""
 
 
-def truth_of(scene: Scene) -> FlightData:
-    """Fly the scene to its end. Return the true state alone."""
+def fly_for_truth(scene: Scene) -> FlightData:
+    """Fly the scene to its end. Return a flight with the ground truth alone."""
     return fly(scene, (TRUTH,))
 
 
 class VariantPool:
-    """Flies variants of one scene side by side; each set of effects is compiled once and kept on disk."""
+    """Pool of processes that fly variants of one scene; each set of effects is compiled once and cached on disk."""
 
     def __init__(self, scene: Scene, pool: ProcessPoolExecutor):
         self._scene, self._pool = scene, pool
 
     def fly(self, variants: Iterable[Tables]) -> Iterator[FlightData]:
         """Yield the flight of each variant, in order."""
-        return self._pool.map(truth_of, [variant(self._scene, tables) for tables in variants])
+        return self._pool.map(fly_for_truth, [variant(self._scene, tables) for tables in variants])
 
 
 @contextmanager
-def hangar(scene: Scene) -> Iterator[VariantPool]:
-    """Yield a pool whose processes end with the block, at once on an error, and with this process."""
+def variant_pool(scene: Scene) -> Iterator[VariantPool]:
+    """Yield a pool whose processes end with the block, immediately after an error, and with this process."""
     with workers(os.cpu_count() or 1) as pool:
         yield VariantPool(scene, pool)

@@ -11,7 +11,7 @@ class Curve(NamedTuple):
 
     name: str
     x: np.ndarray  # (n,)
-    y: np.ndarray  # (n,) NaN where there is nothing finite
+    y: np.ndarray  # (n,) NaN where not finite
 
 
 class Plot(NamedTuple):
@@ -26,30 +26,30 @@ class Plot(NamedTuple):
 
 
 class Row(NamedTuple):
-    """One figure of a case: what must stay below a bound, by our method and by a baseline one on the same case."""
+    """One result of a case: error of Lapwing's method and of a baseline method, and the bound of both."""
 
     name: str
     method: str
-    invariant: str  # what is measured, with its unit
+    invariant: str  # measured quantity, with its unit
     bound: float
-    why: str  # it is this bound
+    why: str  # reason for the bound
     measured: float
     baseline: str  # the baseline method
     baseline_measured: float
 
     @property
     def passes(self) -> bool:
-        """True if our method keeps the bound; NaN does not."""
+        """True if Lapwing's method meets the bound; NaN does not."""
         return bool(self.measured <= self.bound)
 
     @property
     def baseline_passes(self) -> bool:
-        """True if the baseline method keeps it: then the row proves nothing."""
+        """True if the baseline method meets the bound: then the row proves nothing."""
         return bool(self.baseline_measured <= self.bound)
 
     @property
     def is_conclusive(self) -> bool:
-        """Ours keeps the bound, and the baseline method does not."""
+        """True if Lapwing's method meets the bound and the baseline method does not."""
         return self.passes and not self.baseline_passes
 
 
@@ -61,14 +61,14 @@ class CaseResult(NamedTuple):
 
 
 class Sweep(NamedTuple):
-    """Error of each method over the difficulty, which grows from left to right."""
+    """Error of each method over the difficulty."""
 
-    difficulty: str  # with its unit
-    error: str
+    difficulty: str  # label of the x axis, with its unit
+    error: str  # label of the y axis
     bound: float
-    curves: Sequence[Curve]  # a method each
+    curves: Sequence[Curve]  # one per method
     log_x: bool = True
-    falling: bool = False  # the case gets harder towards small values
+    falling: bool = False  # True if small values are harder
 
     def breaks(self) -> dict[str, float | None]:
         """Return the first difficulty at which each method exceeds the bound; None if it never does."""

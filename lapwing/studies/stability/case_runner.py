@@ -1,4 +1,4 @@
-"""Runs cases in worker processes, as many at once as there are processors."""
+"""Execution of cases in worker processes, one per processor."""
 
 import os
 import time
@@ -14,13 +14,13 @@ from lapwing.studies.workers import workers
 
 
 class Result(NamedTuple):
-    """A case and what it came to."""
+    """Result of a case with its difficulty and run time."""
 
     case: str
     hard: str
     figures: CaseResult
     sweep: Sweep | None
-    seconds: float  # of wall time
+    seconds: float  # [s] wall time
 
     @property
     def is_conclusive(self) -> bool:
@@ -32,14 +32,14 @@ def select(case: str | None, long: bool, sweep: bool) -> list[str]:
     """Return the names of the cases to run: one, or all; slow ones only with `long`.
 
     Raises:
-        ValueError: there is no such case, or it has no sweep.
+        ValueError: the case is unknown, or has no sweep.
     """
     if case is None:
-        every = [name for name in cases.names() if long or not getattr(cases.get(name), "LONG", False)]
-        return [name for name in every if not sweep or hasattr(cases.get(name), "sweep")]
+        selected = [name for name in cases.names() if long or not getattr(cases.get(name), "LONG", False)]
+        return [name for name in selected if not sweep or hasattr(cases.get(name), "sweep")]
     if sweep and not hasattr(cases.get(case), "sweep"):
-        able = ", ".join(name for name in cases.names() if hasattr(cases.get(name), "sweep"))
-        raise ValueError(f"--sweep: the difficulty of {case} is not walked; expected one of {able}")
+        with_sweep = ", ".join(name for name in cases.names() if hasattr(cases.get(name), "sweep"))
+        raise ValueError(f"--sweep: {case} has no sweep; expected one of {with_sweep}")
     return [cases.get(case).__name__.rpartition(".")[2]]
 
 
@@ -53,25 +53,25 @@ def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) 
     """
     number = min(len(names), os.cpu_count() or 1)
     if number == 1:
-        return [_report(one(name, sweep), progress) for name in names]
+        return [_report(run_case(name, sweep), progress) for name in names]
     with workers(number) as pool:
-        jobs = {pool.submit(one, name, sweep): name for name in names}
+        jobs = {pool.submit(run_case, name, sweep): name for name in names}
         done = {jobs[job]: _report(job.result(), progress) for job in as_completed(jobs)}
     return [done[name] for name in names]
 
 
-def one(name: str, sweep: bool) -> Result:
+def run_case(name: str, sweep: bool) -> Result:
     """Return the result of one case; an error makes it fail and is part of the result."""
     module, started = cases.get(name), time.perf_counter()
     try:
-        with np.errstate(all="ignore"):  # methods that break run over; that is what is measured
+        with np.errstate(all="ignore"):  # methods that diverge overflow, which the case measures
             result = module.run()
     except (ArithmeticError, LookupError, RuntimeError, ValueError) as error:
-        why = f"ended in an error: {error}"
-        result = CaseResult([Row(name, "", why, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
+        reason = f"ended in an error: {error}"
+        result = CaseResult([Row(name, "", reason, 0.0, "", np.nan, "", np.nan)], Plot("", "", []))
     with np.errstate(all="ignore"):
-        walked = module.sweep() if sweep else None
-    return Result(name, module.HARD, result, walked, time.perf_counter() - started)
+        sweep_result = module.sweep() if sweep else None
+    return Result(name, module.HARD, result, sweep_result, time.perf_counter() - started)
 
 
 def _report(result: Result, progress: Callable[[str], None]) -> Result:

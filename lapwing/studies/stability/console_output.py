@@ -1,4 +1,4 @@
-"""The results as a table and as JSON."""
+"""Results of `lapwing stability` as a table and as JSON."""
 
 import math
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ def verdict(passes: bool) -> str:
 
 
 def distance(bound: float, measured: float) -> str:
-    """Return the distance of a figure from its bound as a factor."""
+    """Return the ratio of bound to measured value; "" if undefined, "exact" for 0."""
     if bound == 0.0 or not math.isfinite(measured):
         return ""
     if measured == 0.0:
@@ -31,7 +31,7 @@ def distance(bound: float, measured: float) -> str:
     return f"{bound / measured:.3g} x" if measured > 0.1 * bound else f"{bound / measured:.1g} x"
 
 
-COLUMNS = {  # name: share of the width, None where it is as wide as its figures
+COLUMNS = {  # name: share of the width; None: width of FIGURES
     "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "away": None, "verdict": None,
     "baseline method": 5, "its result": None,
 }  # fmt: skip
@@ -39,7 +39,7 @@ FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}
 
 
 def table(console: Console, results: Sequence[Result]) -> None:
-    """Print each case: a line on its difficulty, and its rows."""
+    """Print the difficulty and the rows of each case."""
     for k, result in enumerate(results):
         console.print(f"\n[bold]{result.case}[/bold]: {escape(result.hard)}", highlight=False)
         shown = Table(box=None, pad_edge=False, header_style="dim", show_header=k == 0, expand=True)
@@ -70,13 +70,13 @@ def sweeps(console: Console, results: Sequence[Result]) -> None:
             f"\n[bold]{result.case}[/bold]: {escape(result.sweep.error)} beyond {figure(result.sweep.bound)}",
             highlight=False,
         )
-        for name, at in result.sweep.breaks().items():
-            where = "nowhere in the sweep" if at is None else f"at {escape(result.sweep.difficulty)} = {at:.3g}"
+        for name, limit in result.sweep.breaks().items():
+            where = "nowhere in the sweep" if limit is None else f"at {escape(result.sweep.difficulty)} = {limit:.3g}"
             console.print(f"  {escape(name)}: {where}", highlight=False)
 
 
 def write_json(path: Path, results: Sequence[Result]) -> None:
-    """Write {"cases": [...]} with an entry for each row; values that are not finite are null."""
+    """Write {"cases": [...]} with an entry for each row; non-finite values are null."""
     cases = [
         {
             "name": f"{result.case}.{row.name}",

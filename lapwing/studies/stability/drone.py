@@ -1,4 +1,4 @@
-"""The delivery drone of five bodies as cases throw it into the air."""
+"""Delivery drone of five bodies in free rotation, for several cases."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Flights of shipped scenes with something changed."""
+"""Flights of shipped scenes with overrides."""
 
 from collections.abc import Iterable
 from typing import Any

@@ -4,26 +4,24 @@ import sys
 import time
 from collections.abc import Callable
 
-HOUR, AHEAD = 3600, 1  # [s] by which the wall clock is wrong, and by which a clock that only goes forward leaps
-OFTEN, RARELY = (
-    0.05,
-    0.5,
-)  # [s] between two jumps of either; the latter leaves a start 40 s of the two minutes it may take
+HOUR, AHEAD = 3600, 1  # [s] error of the wall clock; jump of a monotonic clock
+WALL_INTERVAL = 0.05  # [s] between two jumps of the wall clock
+MONOTONIC_INTERVAL = 0.5  # [s] between two jumps of a monotonic clock; leaves a start 40 s of its limit of two minutes
 VICTIM = "autopilot"
 
 
 def wall(seconds: float) -> int:
     """Return the error of the wall clock [s] at a time [s]: alternately an hour late and an hour early."""
-    return HOUR if int(seconds / OFTEN) % 2 else -HOUR
+    return HOUR if int(seconds / WALL_INTERVAL) % 2 else -HOUR
 
 
 def forward(seconds: float) -> int:
     """Return the jump of a monotonic clock at that time [s]."""
-    return AHEAD * int(seconds / RARELY)
+    return AHEAD * int(seconds / MONOTONIC_INTERVAL)
 
 
 def add_jumps(clock: Callable[[], float], scale: int, jump: Callable[[float], int]) -> Callable[[], float]:
-    """Return the clock with these jumps; it counts `scale` per second."""
+    """Return the clock with these jumps [s]; `scale` is its number of units per second."""
 
     def read() -> float:
         now = clock()
@@ -33,10 +31,10 @@ def add_jumps(clock: Callable[[], float], scale: int, jump: Callable[[float], in
 
 
 def install() -> None:
-    """Let the clocks of this process jump."""
+    """Replace the clocks of this process by jumping ones."""
     for name, jump in (("time", wall), ("monotonic", forward), ("perf_counter", forward)):
-        for of, scale in ((name, 1), (f"{name}_ns", 10**9)):
-            setattr(time, of, add_jumps(getattr(time, of), scale, jump))
+        for function, scale in ((name, 1), (f"{name}_ns", 10**9)):
+            setattr(time, function, add_jumps(getattr(time, function), scale, jump))
 
 
 if __name__ == "sitecustomize" and sys.orig_argv[-1] == VICTIM:

@@ -1,4 +1,4 @@
-"""Runs of any integrator on any system, sampled: what many cases are made of."""
+"""Sampled runs of any integrator on any system, and their errors."""
 
 from typing import Any
 
@@ -13,11 +13,11 @@ from lapwing.studies.accuracy.integrate import sample_states
 def rows(method: str, p: Any, x: Any, duration: float, steps: int, samples: int) -> np.ndarray:
     """Return the states at `samples` equal parts of a run from time 0, shape (samples + 1, n).
 
-    `steps` is a multiple of `samples`. Rows are NaN from the first non-finite one.
+    `duration` is in [s]; `steps` is a multiple of `samples`. Rows are NaN from the first non-finite one.
     """
     out = np.empty((samples + 1, len(flatten(x))))
-    rows = sample_states(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
-    out[rows:] = np.nan
+    count = sample_states(integrators.get(method).Method(), p, x, duration / steps, steps // samples, out)
+    out[count:] = np.nan
     return out
 
 
@@ -32,6 +32,6 @@ def worst(values: np.ndarray) -> float:
 
 
 def drift(values: np.ndarray) -> np.ndarray:
-    """Change of an invariant from its start, relative to its size there, shape (k,)."""
+    """Return the largest change of an invariant from its initial value, relative to that value, shape (k,)."""
     values = values.reshape(len(values), -1)
     return np.abs(values - values[0]).max(axis=1) / np.abs(values[0]).max()

@@ -1,4 +1,4 @@
-"""`lapwing stability`: run, print, and write what was asked for."""
+"""`lapwing stability`: run the cases, print the results, and write them to the requested files."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from lapwing.studies.stability import console_output, stability_page
 from lapwing.studies.stability.case_runner import measure, select
 
-WIDTH = 180  # letters of a table that goes to no terminal
+WIDTH = 180  # characters of a table without a terminal
 
 
 def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Path | None) -> bool:
@@ -18,16 +18,16 @@ def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Pa
     Args:
         case: name of a case; None: all.
         long: include the slow cases.
-        sweep: increase the difficulty until each method fails.
-        json: file for the numbers.
-        report: file for the page.
+        sweep: also increase the difficulty until each method fails.
+        json: output file for the results; None: no file.
+        report: output file for the page; None: no file.
 
     Raises:
-        ValueError: there is no such case, or it has no sweep.
+        ValueError: the case is unknown or has no sweep, or a file cannot be written.
     """
     console = Console(width=None if sys.stdout.isatty() else WIDTH)
     names = select(case, long, sweep)
-    columns = (TextColumn("running the cases (the first time they are compiled)"), BarColumn(), MofNCompleteColumn())
+    columns = (TextColumn("running the cases (the first run compiles them)"), BarColumn(), MofNCompleteColumn())
     with Progress(*columns, TimeElapsedColumn(), console=console, transient=True) as progress:
         task = progress.add_task("", total=len(names))
         results = measure(names, sweep, lambda name: progress.advance(task))
@@ -37,7 +37,7 @@ def run(case: str | None, long: bool, sweep: bool, json: Path | None, report: Pa
         console_output.write_json(json, results)
     if report:
         stability_page.write(report, results)
-    short = [result.case for result in results if not result.is_conclusive]
-    if short:
-        console.print(f"\nfalls short: {', '.join(short)}", highlight=False)
-    return not short
+    failing = [result.case for result in results if not result.is_conclusive]
+    if failing:
+        console.print(f"\nfailing cases: {', '.join(failing)}", highlight=False)
+    return not failing

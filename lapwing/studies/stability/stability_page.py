@@ -18,7 +18,7 @@ def write(path: Path, results: Sequence[Result]) -> None:
     """Write the page.
 
     Raises:
-        ValueError: it cannot be written.
+        ValueError: the file cannot be written.
     """
     text = render(
         "stability.html",
@@ -44,8 +44,8 @@ def _sections(results: Sequence[Result]) -> Iterator[Section]:
 
 def _breaks(sweep: Sweep) -> str:
     texts = [
-        f"{name}: {'nowhere in the sweep' if at is None else f'at {sweep.difficulty} = {figure(at)}'}"
-        for name, at in sweep.breaks().items()
+        f"{name}: {'nowhere in the sweep' if limit is None else f'at {sweep.difficulty} = {figure(limit)}'}"
+        for name, limit in sweep.breaks().items()
     ]
     return "; ".join(texts) + "."
 

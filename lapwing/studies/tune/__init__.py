@@ -1,1 +1,1 @@
-"""`lapwing tune`: the plant linearised about hover, and a gain set designed for it."""
+"""`lapwing tune`: design of a gain set for the plant linearised about hover."""

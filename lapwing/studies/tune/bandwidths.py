@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 
 class Bandwidths(NamedTuple):
-    """Bandwidth of each loop: derivative gain over the effect, nearly its crossover [rad/s]."""
+    """Bandwidth of each loop [rad/s]: derivative gain times the plant's gain, approximately the crossover."""
 
     altitude: float = 13.0
     yaw: float = 17.4

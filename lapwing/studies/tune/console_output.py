@@ -24,12 +24,12 @@ UNITS = {
 
 
 class Rows:
-    """Table as text: title, heads and rows; the first column names the row."""
+    """Table of texts with title, column heads and rows; the first cell of a row is its name."""
 
     def __init__(self, title: str, *heads: str):
         self.title, self.heads = title, heads
         self.rows: list[tuple[str, ...]] = []
-        self.failed: set[int] = set()  # numbers of rows that report a failure
+        self.failed: set[int] = set()  # indices of rows with a failure
 
     def add(self, *cells: str, failed: bool = False) -> None:
         """Add a row."""
@@ -39,7 +39,7 @@ class Rows:
 
 
 def tables(tuning: Tuning) -> Iterator[Rows]:
-    """Yield every table of the study, the result first."""
+    """Yield all tables of the study, the result first."""
     yield _margins(tuning)
     if tuning.refinement:
         yield _errors(tuning)
@@ -72,16 +72,16 @@ def _margins(tuning: Tuning) -> Rows:
     heads = ("loop", "gains", "crossover, rad/s", "phase margin, °", "gain margin, dB", "reduction, dB")
     rows = Rows("Margins of the loops before and after", *heads)
     for name in tuning.after.margins:
-        for judged in (tuning.before, tuning.after):
-            failed = judged is tuning.after and name in judged.shortfalls
-            rows.add(name, judged.name, *cells(judged.margins[name]), failed=failed)
+        for review in (tuning.before, tuning.after):
+            failed = review is tuning.after and name in review.shortfalls
+            rows.add(name, review.name, *cells(review.margins[name]), failed=failed)
     return rows
 
 
 def _errors(tuning: Tuning) -> Rows:
     p = tuning.refinement
     assert p is not None
-    title = f"RMSE of {len(p.after)} flights of the scene: as designed and refined ({p.candidates} gain sets flown)"
+    title = f"RMSE of {len(p.after)} flights of the scene, designed and refined ({p.candidates} gain sets flown)"
     rows = Rows(title, "axis", "designed", "refined")
     for axis in AXES:
         unit, scale = unit_and_factor(axis)
@@ -91,7 +91,7 @@ def _errors(tuning: Tuning) -> Rows:
 
 def _corners(tuning: Tuning) -> Rows:
     rows = Rows(
-        "Flights with a vehicle that differs from the controller's model",
+        "Flights of vehicles that differ from the controller's model",
         "vehicle",
         "max. position error, m",
         "outcome",

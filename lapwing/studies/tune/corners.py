@@ -1,4 +1,4 @@
-"""Closed-loop flights with mass, inertia and thrust that differ by 20 % from the controller's model."""
+"""Closed-loop flights with deviations of 20 % in mass, inertia and thrust from the controller's model."""
 
 from collections.abc import Mapping
 from itertools import product
@@ -23,7 +23,7 @@ DEVIATION = 0.2  # of the nominal value
 
 
 class Corner(NamedTuple):
-    """Factors on the true vehicle relative to the autopilot's model."""
+    """Factors of the true vehicle relative to the autopilot's model."""
 
     mass: float
     inertia: float
@@ -48,9 +48,9 @@ def failure(flight: Mapping[str, Any]) -> str:
 
 def with_gains(setup: RunConfig, gains: GainSet) -> RunConfig:
     """Return the run with another gain set, which also replaces gains changed by the scene's parameters."""
-    own, changed = setup.services["autopilot"].parameters, {p.name: p for p in gain_parameters(gains)}
-    parameters = tuple(changed.get(p.name, p) for p in own.parameters)
-    return _with(setup, "autopilot", own._replace(gains=gains.plain(), parameters=parameters))
+    present, changed = setup.services["autopilot"].parameters, {p.name: p for p in gain_parameters(gains)}
+    parameters = tuple(changed.get(p.name, p) for p in present.parameters)
+    return _with(setup, "autopilot", present._replace(gains=gains.plain(), parameters=parameters))
 
 
 def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
@@ -65,8 +65,8 @@ def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
     )
     frame = frame.model_copy(update={"mass": mass})
     active = effects.from_scene(scene[Effects].tables, frame, environment(scene))
-    acting = tuple(_stronger(e, corner.thrust) for e in active)
-    p = multirotor.parameters(frame, acting)
+    modified = tuple(_stronger(e, corner.thrust) for e in active)
+    p = multirotor.parameters(frame, modified)
     plant = setup.services["plant"].parameters
     start = plant.start._replace(vehicle=static_equilibrium(multirotor, p, start_pose(scene), gravity(scene)))
     return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
@@ -78,7 +78,7 @@ def _with(setup: RunConfig, name: str, parameters: Any) -> RunConfig:
 
 
 def _stronger(effect: Any, factor: float) -> Any:
-    """Return an effect with its rotor thrust times `factor`; effects without rotors unchanged."""
+    """Return an effect with its thrust constant times `factor`; unchanged if it has none."""
     if "thrust_constant" not in getattr(effect, "_fields", ()):
         return effect
     return effect._replace(thrust_constant=factor * effect.thrust_constant)

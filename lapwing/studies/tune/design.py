@@ -1,4 +1,4 @@
-"""A gain set for given bandwidths, slowed down loop by loop until every margin holds."""
+"""Design of a gain set: bandwidths are reduced loop by loop until all margins are reached."""
 
 import math
 from collections.abc import Callable
@@ -11,9 +11,9 @@ from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops,
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.linearise import Hover
 
-PHASE, GAIN = 45.0, 6.0  # [deg], [dB] the least margins
-CORNERS = (0.8 / 1.2, 1.2 / 0.8)  # thrust over mass or inertia, each 20 % wrong in the worse direction
-DELAY = 1  # [ticks] that of the parallel coupling, the later of the two
+PHASE_MARGIN, GAIN_MARGIN = 45.0, 6.0  # [deg], [dB] required margins
+CORNERS = (0.8 / 1.2, 1.2 / 0.8)  # thrust over mass or inertia, each with an error of 20 % in the worse direction
+DELAY = 1  # [ticks] of the Jacobi coupling, the larger of both
 BACK_OFF = 0.95
 ATTEMPTS = 60
 
@@ -31,7 +31,7 @@ def assumed_airframe(airframe: Airframe, model: Hover) -> Airframe:
 
 
 def gain_set(model: Hover, bandwidths: Bandwidths) -> GainSet:
-    """Return the gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are fixed shares of w."""
+    """Return the gains of each loop from its bandwidth w: D = w / effect; P / D and I / P are proportional to w."""
 
     def loop(effect: float, w: float, p: float, i: float) -> tuple[float, float, float]:
         d = w / effect
@@ -65,18 +65,18 @@ def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
         if not stable(response):
             result[name] = "unstable"
         elif not 0.0 < m.crossover < math.inf:
-            result[name] = f"its gain is {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
-        elif math.degrees(m.phase) < PHASE:
-            result[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE:g}"
-        elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN:
-            result[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN:g}"
+            result[name] = f"gain {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
+        elif math.degrees(m.phase) < PHASE_MARGIN:
+            result[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE_MARGIN:g}"
+        elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN_MARGIN:
+            result[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN_MARGIN:g}"
         elif not all(stable(k * response) for k in scaled):
-            result[name] = "unstable with mass, inertia or thrust 20 % wrong"
+            result[name] = "unstable with errors of 20 % in mass, inertia or thrust"
     return result
 
 
 def design(
-    model: Hover, airframe: Airframe, tick: float, initial: Bandwidths, say: Callable[[str], None]
+    model: Hover, airframe: Airframe, tick: float, initial: Bandwidths, warn: Callable[[str], None]
 ) -> Bandwidths:
     """Return the fastest bandwidths at or below `initial` whose gain set has the required margins.
 
@@ -85,35 +85,37 @@ def design(
         airframe: nominal vehicle parameters of the controller.
         tick: period of the controller [s].
         initial: initial bandwidths.
-        say: called with each loop that had to be slowed down, and the reason.
+        warn: called with a message for each reduced bandwidth.
 
     Raises:
         ValueError: no bandwidth down to a twentieth of `initial` has the margins.
     """
-    plant, now = assumed_airframe(airframe, model), initial
-    first: dict[str, str] = {}
+    plant, current = assumed_airframe(airframe, model), initial
+    first_faults: dict[str, str] = {}
     for _ in range(ATTEMPTS):
-        wrong = shortfalls(open_loops(build(gain_set(model, now).plain(), airframe), plant, tick, DELAY))
-        if not wrong:
-            for loop, was in initial._asdict().items():
-                if (value := getattr(now, loop)) < was:
-                    say(f"{loop}: backed off from {was:.3g} to {value:.3g} rad/s ({first[loop]})")
-            return now
+        faults = shortfalls(open_loops(build(gain_set(model, current).plain(), airframe), plant, tick, DELAY))
+        if not faults:
+            for loop, previous in initial._asdict().items():
+                if (value := getattr(current, loop)) < previous:
+                    warn(f"{loop}: reduced from {previous:.3g} to {value:.3g} rad/s ({first_faults[loop]})")
+            return current
         slower = {}
-        for name, why in wrong.items():
-            loop = _owner(name, wrong)
-            first.setdefault(loop, f"{name}: {why}")
-            slower[loop] = BACK_OFF * getattr(now, loop)
-        now = now._replace(**slower)
-    name, why = next(iter(wrong.items()))
-    raise ValueError(f"no gains with {PHASE:g} deg and {GAIN:g} dB found: {name}: {why}; ask for lower bandwidths")
+        for name, why in faults.items():
+            loop = _owner(name, faults)
+            first_faults.setdefault(loop, f"{name}: {why}")
+            slower[loop] = BACK_OFF * getattr(current, loop)
+        current = current._replace(**slower)
+    name, why = next(iter(faults.items()))
+    raise ValueError(
+        f"no gains with {PHASE_MARGIN:g} deg and {GAIN_MARGIN:g} dB found: {name}: {why}; use lower bandwidths"
+    )
 
 
-def _owner(name: str, wrong: dict[str, str]) -> str:
+def _owner(name: str, faults: dict[str, str]) -> str:
     """Return the bandwidth responsible for a loop: the inner one of a cascade first."""
     if name in ("altitude", "yaw"):
         return name
-    return "attitude" if {"roll", "pitch"} & wrong.keys() else "position"
+    return "attitude" if {"roll", "pitch"} & faults.keys() else "position"
 
 
 def _decibel(factor: float) -> float:

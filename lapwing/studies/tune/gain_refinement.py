@@ -1,4 +1,4 @@
-"""Bandwidths polished on the non-linear closed loop: the least error of the scene's flight that keeps the margins."""
+"""Refinement of bandwidths in simulated flights: smallest tracking error with the required margins."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -18,29 +18,29 @@ from lapwing.studies.tune.corners import metrics_of, with_gains
 from lapwing.studies.tune.design import DELAY, assumed_airframe, gain_set, shortfalls
 from lapwing.studies.tune.linearise import Hover
 
-Figures = dict[str, Any]  # by name, of `lapwing.studies.metrics`
+Figures = dict[str, Any]  # metrics by name, see `lapwing.studies.metrics`
 
-CANDIDATES = 60  # at most
-FIRST_STEP = 0.1  # of the logarithm of every bandwidth
-FINE = 2e-3  # of the same, and of the error, at which the search ends
-SEEDS = 3  # flights of each candidate, so that nothing is tuned to one draw of the noise
-MOVED_BY = {
+CANDIDATES = 60  # largest number of gain sets
+FIRST_STEP = 0.1  # initial step of the logarithm of every bandwidth
+SEARCH_TOLERANCE = 2e-3  # step and relative error at the end of the search
+SEEDS = 3  # flights of each candidate, to average over the noise
+JUDGING_AXES = {
     "altitude": ("z",),
     "yaw": ("yaw",),
     "attitude": ("x", "y"),
     "position": ("x", "y"),
-}  # what judges a bandwidth
-AT_ALL = 1e-6  # [m], [rad]: an axis that errs less, since nothing moves it, is not judged
+}  # axes whose errors judge a bandwidth
+MIN_RMSE = 1e-6  # [m], [rad] axes with smaller errors are not excited and not judged
 
 
 class Refinement(NamedTuple):
-    """Result of the search."""
+    """Result of the refinement."""
 
     gains: GainSet
     bandwidths: Bandwidths
-    before: list[Figures]  # of the scene's flight with some seeds, with the gains that it began with
-    after: list[Figures]
-    candidates: int  # that kept their margins and were flown
+    before: list[Figures]  # metrics of the flights with the initial gains, one per seed
+    after: list[Figures]  # metrics with the refined gains
+    candidates: int  # number of gain sets with the margins, which were flown
 
 
 def refine(
@@ -57,7 +57,7 @@ def refine(
     margin is worse than any that flies. Deterministic: equal scenes return equal gains.
     """
     plant, setup = assumed_airframe(airframe, model), campaign_setup(scene)
-    tried: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
+    valid: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
 
     def fly(gains: GainSet) -> list[Figures]:
         progress()
@@ -65,37 +65,37 @@ def refine(
         return [metrics_of(reseed(run, setup.seed + k)) for k in range(SEEDS)]
 
     before = fly(gain_set(model, start))
-    judged = [axis for axis in AXES if rmse(before, axis) > AT_ALL]
+    judged_axes = [axis for axis in AXES if rmse(before, axis) > MIN_RMSE]
 
-    free = [name for name, axes in MOVED_BY.items() if set(axes) & set(judged)]
+    free_bandwidths = [name for name, axes in JUDGING_AXES.items() if set(axes) & set(judged_axes)]
 
     def cost(logarithms: np.ndarray) -> float:
-        bandwidths = start._replace(**{n: float(b) for n, b in zip(free, np.exp(logarithms), strict=True)})
+        bandwidths = start._replace(**{n: float(b) for n, b in zip(free_bandwidths, np.exp(logarithms), strict=True)})
         gains = gain_set(model, bandwidths)
-        lacking = shortfalls(open_loops(build(gains.plain(), airframe), plant, tick, DELAY))
-        if lacking:
-            return 10.0 + len(lacking)
+        missing = shortfalls(open_loops(build(gains.plain(), airframe), plant, tick, DELAY))
+        if missing:
+            return 10.0 + len(missing)
         result = fly(gains)
         if any(f["outcome"] != "landed" for f in result):
             return 10.0
-        ratio = float(np.mean([rmse(result, axis) / rmse(before, axis) for axis in judged]))
-        tried[ratio] = bandwidths, gains, result
+        ratio = float(np.mean([rmse(result, axis) / rmse(before, axis) for axis in judged_axes]))
+        valid[ratio] = bandwidths, gains, result
         return ratio
 
-    if not free:
+    if not free_bandwidths:
         return Refinement(gain_set(model, start), start, before, before, 0)
-    at = np.log([getattr(start, name) for name in free])
+    at = np.log([getattr(start, name) for name in free_bandwidths])
     simplex = np.vstack([at, at + FIRST_STEP * np.eye(len(at))])
-    options = {"maxfev": CANDIDATES, "xatol": FINE, "fatol": FINE, "initial_simplex": simplex}
+    options = {"maxfev": CANDIDATES, "xatol": SEARCH_TOLERANCE, "fatol": SEARCH_TOLERANCE, "initial_simplex": simplex}
     minimize(cost, at, method="Nelder-Mead", options=options)
-    if not tried:
-        what = next(
+    if not valid:
+        reason = next(
             (f["outcome_text"] for f in before if f["outcome"] != "landed"),
-            "none of those near it holds its margins and lands",
+            "no gain set nearby has the margins and lands",
         )
-        raise ValueError(f"no gain set lands this flight; as designed: {what}; ask for other bandwidths")
-    bandwidths, gains, after = tried[min(tried)]
-    return Refinement(gains, bandwidths, before, after, len(tried))
+        raise ValueError(f"no gain set lands this flight; as designed: {reason}; use other bandwidths")
+    bandwidths, gains, after = valid[min(valid)]
+    return Refinement(gains, bandwidths, before, after, len(valid))
 
 
 def rmse(flights: list[Figures], axis: str) -> float:

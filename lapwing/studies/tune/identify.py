@@ -1,8 +1,8 @@
-"""The plant about hover from a recorded flight: gains and lag that explain what was flown (theory.md, section 4.8).
+"""Identification of the plant about hover from a flight: gains and lag (theory.md, section 4.8).
 
-The input is what the controller asked of the rotors, not the setpoint: so it does not matter which controller flew, nor
-whether the excitation was a chirp, steps or a square wave. Both sides go through the same low-pass filter, which turns
-the rates of the gyroscopes into angular accelerations without differentiating noise.
+The input is the controller's demand on the rotors, not the setpoint, so any controller and any excitation (chirp,
+steps, square wave) can be used. Both sides pass the same low-pass filter, which yields angular accelerations from
+gyroscope rates without amplification of noise.
 """
 
 from typing import NamedTuple
@@ -15,11 +15,11 @@ from lapwing.services.autopilot.control import Parameters
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune.linearise import Hover
 
-CUT = 60.0  # [rad/s] of the filter, above the loops' bandwidths
-CLEAR = 0.5  # [m] over the start below which the ground may have a say
-LAGS = (2e-3, 0.5)  # [s] between which the rotors' lag is sought
-QUIET = 2e-3  # share of the hovering thrust below which a demand counts as not moved
-LEAST_FIT = 50.0  # [%]
+FILTER_BANDWIDTH = 60.0  # [rad/s] above the loops' bandwidths
+MIN_HEIGHT = 0.5  # [m] over the start, above the influence of the ground
+LAGS = (2e-3, 0.5)  # [s] search interval of the rotors' lag
+MIN_EXCITATION = 2e-3  # share of the hovering thrust, smallest deviation of an excited demand
+MIN_FIT = 50.0  # [%]
 LOOPS = ("altitude", "roll", "pitch", "yaw")
 
 
@@ -31,35 +31,36 @@ class Identification(NamedTuple):
 
 
 class _Signals(NamedTuple):
-    demand: np.ndarray  # (n, 4) [N] asked of every rotor, as LOOPS
+    demand: np.ndarray  # (n, 4) [N] virtual controls per rotor, in the order of LOOPS
     response: np.ndarray  # (n, 4) filtered acceleration along z [m/s^2] and angular accelerations [rad/s^2]
-    used: np.ndarray  # (n,) bool: in the air
+    used: np.ndarray  # (n,) bool, in the air
 
 
 def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identification:
     """Fit acceleration = gain * lag(demand) + constant to a log.
 
     Args:
-        flight: the flight; actuators, setpoints and the IMU (or the truth, where none was carried) are taken from it.
-        p: a controller of the vehicle, for the rotors' shares and the hovering thrust.
+        flight: flight with actuators, setpoints and IMU, or ground truth without an IMU.
+        p: parameters of a controller of the vehicle, for the rotors' shares.
         guess: linear model, for values that the log does not determine.
 
     Raises:
-        ValueError: the log has no such topics, too little of it is in the air, or a loop was not moved or does not fit.
+        ValueError: topics are missing, the vehicle is in the air for less than 2 s, or a loop is not excited or does
+            not fit.
     """
     log = flight.origin.source
-    lacking = [name for name in ("actuators", "setpoint") if not flight.has(name)]
-    if lacking:
-        raise ValueError(f"{log}: no topic {', '.join(lacking)}; expected the log of a flight")
+    missing = [name for name in ("actuators", "setpoint") if not flight.has(name)]
+    if missing:
+        raise ValueError(f"{log}: no topic {', '.join(missing)}; expected the log of a flight")
     tick = float(np.median(np.diff(flight.times("actuators"))))
     signals = _signals(flight, p, tick)
     if signals.used.sum() * tick < 2.0:
-        raise ValueError(f"{log}: {signals.used.sum() * tick:.1f} s above {CLEAR:g} m; expected 2 s or more")
+        raise ValueError(f"{log}: {signals.used.sum() * tick:.1f} s above {MIN_HEIGHT:g} m; expected 2 s or more")
     hovering = float(signals.demand[signals.used, 0].mean())
     for k, name in enumerate(LOOPS):
-        moved = float(signals.demand[signals.used, k].std())
-        if moved < QUIET * hovering:
-            raise ValueError(f"{log}: {name} was not moved ({moved:.2g} N); fly the scene excitation and use its log")
+        deviation = float(signals.demand[signals.used, k].std())
+        if deviation < MIN_EXCITATION * hovering:
+            raise ValueError(f"{log}: {name} is not excited ({deviation:.2g} N); use a log of the scene excitation")
     result = minimize_scalar(
         lambda log_lag: sum(_fit(signals, k, float(np.exp(log_lag)), tick)[1] for k in range(4)),
         bounds=np.log(LAGS),
@@ -68,14 +69,14 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identification:
     lag = float(np.exp(result.x))
     gains, fit = {}, {}
     for k, name in enumerate(LOOPS):
-        (gains[name], *lead), left = _fit(signals, k, lag, tick)
+        (gains[name], *lead), residual = _fit(signals, k, lag, tick)
         if lead:
             gains["spin_up_zero"] = lead[0] / gains[name]
-        fit[name] = float(100.0 * (1.0 - np.sqrt(left)))
-        if fit[name] < LEAST_FIT:
+        fit[name] = float(100.0 * (1.0 - np.sqrt(residual)))
+        if fit[name] < MIN_FIT:
             raise ValueError(
-                f"{log}: {name} fits to {fit[name]:.0f} % only, {LEAST_FIT:g} % are needed; "
-                "fly the scene excitation in less wind and use its log"
+                f"{log}: {name} fits to {fit[name]:.0f} %, below {MIN_FIT:g} %; "
+                "use a log of the scene excitation with less wind"
             )
     return Identification(guess._replace(lag=lag, **gains), fit)
 
@@ -83,8 +84,8 @@ def identify(flight: FlightData, p: Parameters, guess: Hover) -> Identification:
 def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
     """Return virtual controls and filtered responses tick by tick."""
     thrust = flight.actuators.thrust
-    sensed = flight.has("imu") and len(flight.topic("imu")) >= len(thrust)
-    if sensed:
+    has_imu = flight.has("imu") and len(flight.topic("imu")) >= len(thrust)
+    if has_imu:
         rates = flight.topic("imu").angular_velocity
         vertical = flight.topic("imu").linear_acceleration[:, 2]
     else:
@@ -94,27 +95,31 @@ def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
     armed = flight.actuators.armed
     n = min(len(thrust), len(rates), len(height))
     delay = 1 if flight.metadata.get("coupling", "gauss_seidel") == "gauss_seidel" else 2
-    demands = np.linalg.pinv(np.array(p.shares[0])).T  # what thrusts come to
+    demands = np.linalg.pinv(np.array(p.shares[0])).T  # from thrusts to virtual controls
     demand = np.vstack([np.zeros((delay, 4)), thrust[: n - delay] @ demands])
-    smooth, differ = _filters(tick)
-    response = np.column_stack([lfilter(*smooth, vertical[:n]), lfilter(*differ, rates[:n], axis=0)])
-    flying = armed[:n] & (height[:n] > height[0] + CLEAR)
-    settled = np.convolve(~flying, np.ones(round(10.0 / CUT / tick)))[:n] == 0  # the filters have forgotten the ground
+    low_pass, derivative = _filters(tick)
+    response = np.column_stack([lfilter(*low_pass, vertical[:n]), lfilter(*derivative, rates[:n], axis=0)])
+    flying = armed[:n] & (height[:n] > height[0] + MIN_HEIGHT)
+    settled = (
+        np.convolve(~flying, np.ones(round(10.0 / FILTER_BANDWIDTH / tick)))[:n] == 0
+    )  # the filters have settled after the take-off
     return _Signals(demand, response, settled)
 
 
 def _filters(tick: float) -> tuple[tuple, tuple]:
-    """Return the digital 1 / (s/CUT + 1)^2 and s / (s/CUT + 1)^2."""
-    below = [1.0 / CUT**2, 2.0 / CUT, 1.0]
-    return bilinear([1.0], below, 1.0 / tick), bilinear([1.0, 0.0], below, 1.0 / tick)
+    """Return the digital filters 1 / (s/w + 1)^2 and s / (s/w + 1)^2 with w = `FILTER_BANDWIDTH`."""
+    denominator = [1.0 / FILTER_BANDWIDTH**2, 2.0 / FILTER_BANDWIDTH, 1.0]
+    return bilinear([1.0], denominator, 1.0 / tick), bilinear([1.0, 0.0], denominator, 1.0 / tick)
 
 
 def _fit(signals: _Signals, k: int, lag: float, tick: float) -> tuple[list[float], float]:
-    """Return a loop's gains of thrust, for yaw also of its rate, for a lag [s], and the unexplained variance share."""
-    keep, used = np.exp(-tick / lag), signals.used
-    thrust = lfilter([1.0 - keep], [1.0, -keep], signals.demand[:, k])
-    regressors = [lfilter(*way, thrust)[used] for way in _filters(tick)[: 2 if LOOPS[k] == "yaw" else 1]]
+    """Return (gains of a loop for thrust, for yaw also its rate; unexplained share of the variance) at a lag [s]."""
+    decay, used = np.exp(-tick / lag), signals.used
+    thrust = lfilter([1.0 - decay], [1.0, -decay], signals.demand[:, k])
+    regressors = [
+        lfilter(*coefficients, thrust)[used] for coefficients in _filters(tick)[: 2 if LOOPS[k] == "yaw" else 1]
+    ]
     response = signals.response[used, k]
     result, *_ = np.linalg.lstsq(np.column_stack([*regressors, np.ones(used.sum())]), response)
-    left = response - np.column_stack(regressors) @ result[:-1] - result[-1]
-    return [float(g) for g in result[:-1]], float(left.var() / response.var())
+    residual = response - np.column_stack(regressors) @ result[:-1] - result[-1]
+    return [float(g) for g in result[:-1]], float(residual.var() / response.var())

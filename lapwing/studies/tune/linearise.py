@@ -1,4 +1,4 @@
-"""The plant about hover, by central differences of the compiled model."""
+"""Linearisation of the plant about hover by central differences of the compiled model."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -15,16 +15,16 @@ from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.vehicle_schema import Effects, airframe
 
-HEIGHT = 50.0  # [m] clear of the ground and of its effect
-INTERVAL = 0.004  # [s] only scales the tick number, which is 0
+HEIGHT = 50.0  # [m] above the ground effect
+INTERVAL = 0.004  # [s] without influence, since the tick is 0
 STEP = 1e-3  # relative to the rotor speed and to a radian; the model is smooth and nearly quadratic
 
 
 class Hover(NamedTuple):
-    """The linear model about hover in still air."""
+    """Linear model about hover in still air."""
 
-    rotor_speed: float  # [rad/s] at which the weight is carried
-    voltage: float  # [V] that holds it
+    rotor_speed: float  # [rad/s] at hover
+    voltage: float  # [V] at hover
     lag: float  # [s] of the rotors' speed behind the voltage
     thrust_slope: float  # [N s/rad] of one rotor without interference, over its speed
     altitude: float  # [m/s^2 / N] acceleration upwards over the force demand of every rotor
@@ -32,11 +32,11 @@ class Hover(NamedTuple):
     pitch: float  # [rad/s^2 / N]
     yaw: float  # [rad/s^2 / N] of steady rotor speeds
     spin_up_zero: float  # [s] that of changing speeds over it: (1 + spin_up_zero s) is the rotors' spin-up reaction
-    tilt: float  # [m/s^2 / rad] acceleration ahead over the pitch
+    tilt: float  # [m/s^2 / rad] forward acceleration over the pitch
 
 
 def hover(scene: Scene) -> Hover:
-    """Linearise the scene's plant about hover, its winds left out.
+    """Return the scene's plant, without winds, linearised about hover.
 
     Raises:
         ValueError: the vehicle cannot hover.
@@ -85,13 +85,13 @@ def hover(scene: Scene) -> Hover:
 
     roll, pitch, turn = map(angular_acceleration_per_thrust, range(3))
     lag = -1.0 / slope(one, lambda o: o.rotor_acceleration[0])
-    # Voltages that differ at equal speeds: what the body feels is the reaction to speeding the rotors up, alone.
+    # With different voltages at equal speeds only the spin-up reaction of the rotors acts on the body.
     yawing, most = turns[2], int(np.argmax(np.abs(turns[2])))
     more, less = (at_hover(rotors, volts + sign * STEP * voltage * yawing) for sign in (1.0, -1.0))
     per_acceleration = (more.angular_acceleration_body[2] - less.angular_acceleration_body[2]) / float(
         (more.rotor_acceleration[most] - less.rotor_acceleration[most]) / yawing[most]
     )
-    yaw = turn + per_acceleration / (lag * thrust)  # a speed perturbed at constant voltage falls back by 1 / lag
+    yaw = turn + per_acceleration / (lag * thrust)  # at constant voltage a speed perturbation decays with 1 / lag
     return Hover(
         float(speed),
         float(voltage),

@@ -36,10 +36,10 @@ class Tuning(NamedTuple):
     """Result of a tuning."""
 
     scene: str
-    tick: float  # [s] the controller's period
-    compiled_model: Hover  # from the model
-    identification: Identification | None  # from a log
-    nominal: Airframe  # airframe that the design assumes
+    tick: float  # [s] period of the controller
+    compiled_model: Hover  # linearised compiled model
+    identification: Identification | None  # None without a log
+    nominal: Airframe  # airframe assumed by the design
     before: GainReview
     after: GainReview
     gains: GainSet
@@ -48,12 +48,12 @@ class Tuning(NamedTuple):
 
     @property
     def model(self) -> Hover:
-        """Linear model of the design."""
+        """Linear model used for the design."""
         return self.identification.model if self.identification else self.compiled_model
 
     @property
     def failures(self) -> list[str]:
-        """Loops of the new gains without their margins, and flights of perturbed vehicles that failed."""
+        """Loops of the new gains without the required margins, and failed flights of perturbed vehicles."""
         loops = [f"{name}: {why}" for name, why in self.after.shortfalls.items()]
         return loops + [f"{corner}: {corners.failure(flight)}" for corner, flight in self.corners.items()
                         if corners.failure(flight)]  # fmt: skip
@@ -62,7 +62,7 @@ class Tuning(NamedTuple):
 def tune(
     scene: Scene,
     initial: Bandwidths,
-    say: Callable[[str], None],
+    warn: Callable[[str], None],
     log: Path | None = None,
     progress: Callable[[], None] = lambda: None,
 ) -> Tuning:
@@ -71,9 +71,9 @@ def tune(
     Args:
         scene: scene with the vehicle, trajectory and wind.
         initial: initial bandwidths.
-        say: called with each warning.
+        warn: called with each warning.
         log: log to identify the plant from; None to linearise the compiled model.
-        progress: called after every gain set that was flown.
+        progress: called after the flights of every gain set.
 
     Raises:
         ValueError: the scene has no autopilot, its vehicle cannot hover, the log does not excite all loops, or no gains
@@ -85,25 +85,27 @@ def tune(
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
     airframe, tick, config = known_airframe(scene), scene[Communication].interval, scene[Autopilot]
-    own = build(scene[GainSet].plain(), airframe)
+    present = build(scene[GainSet].plain(), airframe)
     compiled_model = hover(scene)
-    identification = identify(FlightData.read(log), own, compiled_model) if log else None
+    identification = identify(FlightData.read(log), present, compiled_model) if log else None
     model = identification.model if identification else compiled_model
     plant = assumed_airframe(airframe, model)
-    before = _review(config.gains, own, plant, tick)
+    before = _review(config.gains, present, plant, tick)
     for name, why in before.shortfalls.items():
-        say(f"warning: present gains {config.gains} of the scene: {name}: {why}")
-    reached = design(model, airframe, tick, initial, say)
-    gains, refinement, at_corners = gain_set(model, reached), None, {}
+        warn(f"warning: present gains {config.gains} of the scene: {name}: {why}")
+    bandwidths = design(model, airframe, tick, initial, warn)
+    gains, refinement, corner_flights = gain_set(model, bandwidths), None, {}
     if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not config.accept_commands:
-        refinement = gain_refinement.refine(scene, model, airframe, tick, reached, progress)
+        refinement = gain_refinement.refine(scene, model, airframe, tick, bandwidths, progress)
         gains = refinement.gains
         setup = corners.with_gains(campaign_setup(scene), gains)
-        at_corners = {c: corners.metrics_of(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
+        corner_flights = {c: corners.metrics_of(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
     else:
-        say("gains not refined in flight: the scene has no [trajectory] that its autopilot follows")
+        warn("gains are not refined: the autopilot of the scene follows no [trajectory]")
     after = _review("new", build(gains.plain(), airframe), plant, tick)
-    return Tuning(scene.name, tick, compiled_model, identification, plant, before, after, gains, refinement, at_corners)
+    return Tuning(
+        scene.name, tick, compiled_model, identification, plant, before, after, gains, refinement, corner_flights
+    )
 
 
 def _review(name: str, parameters: Parameters, plant: Airframe, tick: float) -> GainReview:
@@ -114,7 +116,7 @@ def _review(name: str, parameters: Parameters, plant: Airframe, tick: float) -> 
 
 
 def write(path: Path, gains: GainSet) -> None:
-    """Write a gain set to a TOML file that a scene can name."""
+    """Write a gain set to a TOML file for `autopilot.gains`."""
     lines = ["# Force demand [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D"]
     for key, value in gains.model_dump().items():
         if isinstance(value, tuple):

@@ -1,4 +1,4 @@
-"""The study on a problem of one number with known errors and times, and the command around it."""
+"""Accuracy study of a scalar problem with known errors and times, and its command."""
 
 import json
 
@@ -14,7 +14,7 @@ from lapwing.studies.terminal import console
 
 
 def decay():
-    """x' = -x to t = 1 by Euler's method in Python; and a way that always fails."""
+    """Return x' = -x up to t = 1 under Euler's method, and a method that always fails."""
 
     def euler(h):
         x = 1.0
@@ -26,17 +26,17 @@ def decay():
         return SolverRun(np.array([0.0, 1.0]), np.array([[1.0], [x]]), 0.0, round(1.0 / h))
 
     steps = [0.1 / 2**k for k in range(5)]
-    ways = [
+    methods = [
         SolverMethod("euler", 1, "s", steps, lambda h: lambda: euler(h), read, lambda: None),
         SolverMethod("broken", 1, "s", steps, lambda h: lambda: None, lambda h, x: None, lambda: None),
     ]
     value = {"value": lambda t, y: y[:, 0]}
-    return Problem("decay", "s", 1.0, ways, lambda: np.array([np.exp(-1.0)]), "closed form", value)
+    return Problem("decay", "s", 1.0, methods, lambda: np.array([np.exp(-1.0)]), "closed form", value)
 
 
-def test_measured_errors_are_those_of_method():
+def test_measured_errors_equal_closed_form():
     points = measure(decay())
-    assert [p.way for p in points] == ["euler"] * 5
+    assert [p.method for p in points] == ["euler"] * 5
     for p in points:
         exact = np.exp(-1.0)
         assert p.error == pytest.approx(abs((1 - p.setting) ** (1 / p.setting) - exact) / (1 + exact), rel=1e-9)
@@ -58,8 +58,10 @@ def points():
 def test_cheapest_that_meets_target_is_named():
     assert cheapest(points(), 1e-3).setting == 0.1
     assert cheapest(points(), 2e-4).setting == 0.05
-    assert cheapest(points(), 1e-6).way == "two"
-    with pytest.raises(ValueError, match=r"--target 1e-09: no method meets this error; the smallest .* 5e-07, by two"):
+    assert cheapest(points(), 1e-6).method == "two"
+    with pytest.raises(
+        ValueError, match=r"--target 1e-09: no method meets this error; the smallest error is 5e-07, by two"
+    ):
         cheapest(points(), 1e-9)
     assert [p.setting for p in pareto_points(points(), [1e-2, 1e-4])] == [0.1, 0.05, 1e-3, 1e-6]
 
@@ -86,9 +88,9 @@ def test_problem_name_precedes_scene_name():
 def test_json_and_picture(tmp_path):
     console_output.write_json(tmp_path / "a.json", "decay", decay(), points(), points()[1], [])
     data = json.loads((tmp_path / "a.json").read_text())
-    assert data["cheapest"]["way"] == "one"
+    assert data["cheapest"]["method"] == "one"
     assert data["points"][2] == {
-        "way": "two", "order": 5, "unit": "tol", "setting": 1e-6, "error": 5e-7, "time": 3e-5, "evaluations": 90,
+        "method": "two", "order": 5, "unit": "tol", "setting": 1e-6, "error": 5e-7, "time": 3e-5, "evaluations": 90,
         "drift": {"manifold": 0.0},
     }  # fmt: skip
     draw(tmp_path / "a.png", "decay", points())
@@ -96,10 +98,10 @@ def test_json_and_picture(tmp_path):
 
 
 @pytest.mark.long
-def test_command_prints_choice(capsys, tmp_path, monkeypatch):
+def test_command_prints_cheapest_method(capsys, tmp_path, monkeypatch):
     problem = find("os4_experiment_1")
-    few = [way for way in problem.ways if way.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled
-    monkeypatch.setattr(accuracy_command, "find", lambda target: problem._replace(ways=few))
+    few = [method for method in problem.methods if method.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled
+    monkeypatch.setattr(accuracy_command, "find", lambda target: problem._replace(methods=few))
     result = accuracy_command.study(accuracy_command.console(), "os4_experiment_1", [], 1e-3)
     accuracy_command.show(accuracy_command.console(), result)
     accuracy_command.write_json(tmp_path / "a.json", result)
@@ -108,10 +110,10 @@ def test_command_prints_choice(capsys, tmp_path, monkeypatch):
     assert "cheapest: " in printed
     result = json.loads((tmp_path / "a.json").read_text())
     assert result["cheapest"]["error"] <= 1e-3
-    assert {"rkmk54", "lie_euler", "erk4m"} == {p["way"] for p in result["points"]}
+    assert {"rkmk54", "lie_euler", "erk4m"} == {p["method"] for p in result["points"]}
 
 
-def test_table_fits_80_columns_and_cuts_no_digit(capsys):
+def test_table_fits_80_columns(capsys):
     drift = dict.fromkeys(("manifold", "energy", "vertical momentum"), 1.23e-123)
     wide = Point("implicit_lie_midpoint", 2, "s", 5.7220458984375e-05, 3.2e-13, 0.15, 12_345_678, drift)
     console_output.show(console(80), decay(), [wide], wide)

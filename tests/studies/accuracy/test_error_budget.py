@@ -1,4 +1,4 @@
-"""Three errors apart, on flights whose answer is known."""
+"""Error budget on flights with known differences."""
 
 from pathlib import Path
 
@@ -33,7 +33,7 @@ def test_difference_at_common_ticks():
     assert difference(fine, opposite) == (0.0, 0.0, 0.0)
 
 
-def test_flight_in_memory_is_plants_own():
+def test_flight_in_memory_moves_plant():
     flights = fly(load(ROOT / "lapwing/scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
     assert len(flights.truth) == 101
     assert flights.setup.interval == 0.004
@@ -43,20 +43,20 @@ def test_flight_in_memory_is_plants_own():
 
 
 @pytest.mark.long
-def test_errors_decrease_with_their_causes():
+def test_errors_decrease_with_step_rate_and_delay():
     scene = load(ROOT / "lapwing/scenes/cooperative_load.toml", ["run.duration=1.0", "solver.integrator=rkmk2"])
     parts = errors(scene)
     by = {source: [p for p in parts if p.source == source] for source in SOURCES}
     steps = [p.position for p in by["plant step"]]
     assert steps[0] / steps[1] == pytest.approx(4.0, rel=0.2)  # second order
-    exchange = [p.position for p in by["exchange interval"]]
+    exchange = [p.position for p in by["communication step"]]
     assert exchange[0] > exchange[1] > exchange[2] > 0.0
     delay = [p.position for p in by["coupling delay"]]
-    assert delay[0] / delay[1] == pytest.approx(2.0, rel=0.3)  # one interval of delay, first order
+    assert delay[0] / delay[1] == pytest.approx(2.0, rel=0.3)  # delay of one communication step, first order
 
 
-def test_accuracy_is_kept_from_take_off_to_rest():
-    """Steps of 4 ms and the contact at the accuracy, against steps of an eighth and a contact 1000 times finer."""
+def test_accuracy_holds_from_take_off_to_rest():
+    """Steps of 4 ms and contact at the accuracy, against an eighth of the step and 1/1000 of the accuracy."""
     coarse, fine = (
         fly(load("hover", [f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]))
         for step, accuracy in ((0.004, 1e-5), (0.0005, 1e-8))

@@ -1,4 +1,4 @@
-"""Landings against the event-located reference: error got is at most error asked, in the whole state, at every tick."""
+"""Landings against the event-located reference: errors of the state are below the accuracy at all times."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ def test_sliding_touch_down_meets_accuracy():
 
 @pytest.mark.parametrize("seed", [0, 6, 11])
 def test_random_landing_meets_accuracy(seed):
-    """`python -m benchmarks.landings` has 200 of them; 11 is on bumps."""
+    """See `python -m benchmarks.landings` for 200 landings; 11 is on bumps."""
     case = cases.draw(seed)
     exact, events = cases.exact(case)
     assert events > 20
@@ -41,7 +41,7 @@ def test_strike_of_propeller_comes_before_feet():
 
 @pytest.mark.parametrize(("kind", "seed"), [("steps", 0), ("steps", 3), ("toppling", 0), ("strikes", 0)])
 def test_landing_at_step_toppling_or_strike_meets_accuracy(kind, seed):
-    """Into a wall, over an edge and down, over one foot onto the hull, on a propeller: faces and points that change."""
+    """Cases: into a wall, over an edge, over one foot onto the hull, on a propeller."""
     case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)
     assert events > 50
@@ -57,15 +57,15 @@ def test_reference_is_independent_of_its_tolerance():
 
 def test_accuracy_problem_improves_with_its_setting():
     problem = problems()["landing_level"]
-    way = problem.ways[0]
-    ends = [way.read(a, way.prepare(a)()).samples[-1] for a in (1e-3, 1e-8)]
+    method = problem.methods[0]
+    ends = [method.read(a, method.prepare(a)()).samples[-1] for a in (1e-3, 1e-8)]
     coarse, fine = (error(end, problem.reference()) for end in ends)
     assert fine < 1e-8 < 1e-3
     assert fine < coarse < 1e-3
 
 
 def test_batch_of_sliding_landings_meets_accuracy():
-    """The touch-down of which three in four were millimetres off, whatever accuracy was asked."""
+    """A touchdown with errors of millimetres in former versions at any accuracy."""
     ends = []
     for accuracy in (1e-4, 1e-6, 1e-10):
         solver = {"solver.accuracy": accuracy, "solver.integrator": "rk4_renormalised", "solver.step": 0.001}
@@ -78,18 +78,18 @@ def test_batch_of_sliding_landings_meets_accuracy():
 
 
 def test_step_in_air_meets_share_of_accuracy():
-    """Bounces throw the vehicle up: at 1 ms the decay of its rotors alone was 6e-9 off, whatever accuracy was asked."""
+    """After bounces at 1 ms the decay of the rotors alone had an error of 6e-9 at any accuracy."""
     p, _ = cases.plant(cases.FASTEST)
     for accuracy in (1e-4, 1e-9):
         z = p.layout.lag_rate * cases.INTERVAL / cases.airborne_steps(accuracy, "rk4_renormalised")
-        step = 1.0 - z + z**2 / 2.0 - z**3 / 6.0 + z**4 / 24.0  # of classical Runge-Kutta on the decay
+        step = 1.0 - z + z**2 / 2.0 - z**3 / 6.0 + z**4 / 24.0  # RK4 step of the decay
         times = cases.times()
         exact = 300.0 * np.exp(-p.layout.lag_rate * times)
-        taken = 300.0 * step ** (p.layout.lag_rate * times / z)
-        assert (np.abs(taken - exact) / (1.0 + exact)).max() < 1.5 * 3e-3 * accuracy
+        numeric = 300.0 * step ** (p.layout.lag_rate * times / z)
+        assert (np.abs(numeric - exact) / (1.0 + exact)).max() < 1.5 * 3e-3 * accuracy
 
 
-def test_landings_are_flown_in_pieces(tmp_path):
+def test_landings_are_added_to_file(tmp_path):
     path = tmp_path / "landings.json"
     assert measure.read(path) == {}
     landings = [measure.LandingErrors(k, 7, (1e-4,) * 7, (0.1,) * 7, (0.2,) * 7, 1e-10) for k in (12, 3)]

@@ -1,4 +1,4 @@
-"""Error of the solver alone: parts of a flight again, under its own commands."""
+"""Error of the solver alone: repeated parts of a flight under its recorded commands."""
 
 from types import SimpleNamespace
 
@@ -22,39 +22,39 @@ def setup_of(step, *overrides, scene="delivery_mission"):
 
 
 @pytest.fixture(scope="module")
-def flown():
+def run():
     return fly_with_ports(setup_of(0.001), TOPICS)
 
 
-def errors(flown, finer):
-    flights, graph = flown
+def errors(run, finer):
+    flights, graph = run
     parts = fly_parts(graph, finer, TOPICS, lambda tick: None)
     return [q for part in parts for q in differences(flights[0], part.flights[0], part.spans)]
 
 
-def test_parts_with_same_solver_repeat_flight(flown):
-    assert {quantity.error for quantity in errors(flown, flown[1].setup)} == {0.0}
+def test_parts_with_same_solver_repeat_flight(run):
+    assert {quantity.error for quantity in errors(run, run[1].setup)} == {0.0}
 
 
-def test_spans_cover_each_tick_once(flown):
-    flights, graph = flown
+def test_spans_cover_each_tick_once(run):
+    flights, graph = run
     one, other = fly_parts(graph, graph.setup, TOPICS, lambda tick: None)
     times = flights[0].truth.times
     counts = [sum(a <= t < b for a, b in [*one.spans, *other.spans]) for t in times.tolist()]
     assert counts == [1] * len(times)
 
 
-def test_error_falls_with_fourth_power_of_step(flown):
+def test_error_falls_with_fourth_power_of_step(run):
     """RK4 against steps of 1/16 ms: its error at 1 ms is 16 times the one at 0.5 ms."""
     finer = setup_of(0.0000625)
-    coarse = {q.name: q.error for q in errors(flown, finer)}
+    coarse = {q.name: q.error for q in errors(run, finer)}
     half = {q.name: q.error for q in errors(fly_with_ports(setup_of(0.0005), TOPICS), finer)}
     assert coarse["position"] / half["position"] == pytest.approx(16.0, rel=0.3)
     assert coarse["position"] < 1e-7
 
 
-def test_plant_reads_commands_of_autopilot(flown):
-    assert inputs_of_plant(flown[1]) == ["actuators", "status"]
+def test_plant_reads_commands_of_autopilot(run):
+    assert inputs_of_plant(run[1]) == ["actuators", "status"]
 
 
 @pytest.mark.parametrize("scene", ["delivery_mission", "fleet"])
@@ -75,7 +75,7 @@ def test_shifted_start_differs_in_every_number(scene):
 
 
 def test_restart_includes_outputs_read_a_tick_later(monkeypatch):
-    """Vehicles of a fleet pull at each other with their states of the tick before, as in `carried_load`."""
+    """Vehicles of a fleet act on each other by their states of the previous tick, as in `carried_load`."""
     port = Port("load", 0.0)
 
     def plant(value):

@@ -1,4 +1,4 @@
-"""Scenes with a multirotor of five bodies as problems: the steps that they accept, and the order of the method."""
+"""Scenes with a multirotor of five bodies as problems: accepted steps, and order of the method."""
 
 from pathlib import Path
 
@@ -19,11 +19,11 @@ def test_five_bodies_use_steps_accepted_by_scene(monkeypatch):
     monkeypatch.setattr(plant.integrators, "compatible_methods", lambda p, x: ["rk4_renormalised"])
     scene = load(HOVER, ["vehicle.model=multibody", "solver.accuracy=1e-4"])
     problem = scenes.problem(scene)
-    (way,) = problem.ways
-    assert way.settings == pytest.approx([1e-3, 5e-4, 2.5e-4, 1.25e-4])
-    assert way.settings[0] <= longest_step(scene) < 2.0 * way.settings[0]
+    (method,) = problem.methods
+    assert method.settings == pytest.approx([1e-3, 5e-4, 2.5e-4, 1.25e-4])
+    assert method.settings[0] <= longest_step(scene) < 2.0 * method.settings[0]
     exact = problem.reference()
-    errors = [error(way.read(h, way.prepare(h)()).samples[-1], exact) for h in way.settings]
+    errors = [error(method.read(h, method.prepare(h)()).samples[-1], exact) for h in method.settings]
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.7), errors
-    for h in way.settings:
+    for h in method.settings:
         load(HOVER, ["vehicle.model=multibody", f"solver.step={h!r}"])

@@ -1,4 +1,4 @@
-"""The round-off error that the study reports, against arithmetic of 50 digits."""
+"""Round-off error of the study against arithmetic with 50 digits."""
 
 from typing import NamedTuple
 
@@ -41,7 +41,7 @@ def in_digits(x: DoubleDouble) -> mpmath.mpf:
 
 
 def end_in_digits(steps: int, h: float) -> list[mpmath.mpf]:
-    """Return the end of the steps of RK4, whose rounding error is below 1e-45."""
+    """Return the final state of RK4 with a round-off error below 1e-45."""
     with mpmath.workdps(50):
         A = mpmath.matrix([[0, 1], [-mpmath.mpf(P.stiffness), -mpmath.mpf(P.damping)]]) * mpmath.mpf(h)
         one_step = mpmath.eye(2) + A + A**2 / 2 + A**3 / 6 + A**4 / 24  # RK4 of a linear system
@@ -58,11 +58,11 @@ def test_end_of_linear_system_has_digits_of_extended_precision() -> None:
 
 
 def test_round_off_of_linear_system_is_that_of_digits() -> None:
-    ways = fixed_step_methods(P, START, DURATION, 8)
-    result = round_off.measure(Problem("oscillator", "s", DURATION, ways, lambda: np.zeros(2), "", {}))
-    (way,) = (way for way in ways if way.name == round_off.METHOD)
+    methods = fixed_step_methods(P, START, DURATION, 8)
+    result = round_off.measure(Problem("oscillator", "s", DURATION, methods, lambda: np.zeros(2), "", {}))
+    (method,) = (method for method in methods if method.name == round_off.METHOD)
     h = DURATION / result.steps
-    double = way.read(h, way.prepare(h)()).samples[-1]
+    double = method.read(h, method.prepare(h)()).samples[-1]
     with mpmath.workdps(50):
         digits = end_in_digits(result.steps, h)
         expected = max(abs(mpmath.mpf(float(a)) - b) / (1 + abs(b)) for a, b in zip(double, digits, strict=True))

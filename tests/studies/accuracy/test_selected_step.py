@@ -1,4 +1,4 @@
-"""The selected step in flights whose motors jump over their whole range, through the command."""
+"""Selected step in flights with motors that jump over their entire range, through the command."""
 
 import json
 import subprocess
@@ -17,4 +17,4 @@ def test_selected_step_meets_accuracy_when_motors_saturate(scene, tmp_path):
     assert run.returncode == 0, run.stdout + run.stderr
     measured = json.loads(result.read_text())
     assert measured["step_selected"]
-    assert measured["got"] <= 1e-4
+    assert measured["error"] <= 1e-4

@@ -1,4 +1,4 @@
-"""An accuracy instead of a step: what is chosen meets it, is remembered, and is what all services fly."""
+"""Selection of integrator and step for an accuracy, and its cache."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ POINTS = [
 
 
 def scene(tmp_path, solver):
-    """OS4 without its own solver."""
+    """Return the path of an OS4 scene with another [solver] table."""
     text = (ROOT / "lapwing/scenes/os4_experiment_2.toml").read_text()
     head, _, rest = text.partition("[solver]")
     path = tmp_path / "os4.toml"
@@ -31,8 +31,8 @@ def scene(tmp_path, solver):
 
 
 @pytest.fixture
-def measured(monkeypatch, tmp_path):
-    """Counts measurements, whose points are given; the cache is empty."""
+def measured_titles(monkeypatch, tmp_path):
+    """Replace measurements by POINTS with an empty cache. Return the titles of the measured problems."""
     calls = []
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path / "cache")
     monkeypatch.setattr(solver_selection, "measure", lambda problem: calls.append(problem.title) or list(POINTS))
@@ -43,8 +43,8 @@ def measured(monkeypatch, tmp_path):
     ("overrides", "step"),
     [(["solver.accuracy=1e-3"], 0.004), (["solver.accuracy=1e-3", "solver.integrator=rkmk2"], 0.002)],
 )
-def test_scene_that_lands_gets_share_for_impacts(overrides, step, measured, monkeypatch):
-    """An impact amplifies errors of the flight before it; an integrator that cannot reach the share meets the rest."""
+def test_scene_that_lands_gets_share_for_impacts(overrides, step, measured_titles, monkeypatch):
+    """An impact amplifies previous errors; an integrator that cannot reach the share meets the accuracy."""
     points = [Point("rkmk2", 2, "s", 0.002, 9e-4, 1e-5, 1, {}), Point("rk4", 4, "s", 0.004, 2e-6, 1.5e-5, 1, {})]
     exact = [p._replace(error=1e-9) for p in points]
     monkeypatch.setattr(solver_selection, "measure", lambda problem: exact if "jumping" in problem.title else points)
@@ -53,7 +53,7 @@ def test_scene_that_lands_gets_share_for_impacts(overrides, step, measured, monk
 
 
 @pytest.mark.parametrize(("accuracy", "step"), [(1e-3, 0.004), (5e-4, 0.002), (1e-4, 0.002)])
-def test_voltages_that_jump_count_with_their_share(accuracy, step, measured, monkeypatch):
+def test_voltages_that_jump_count_with_their_share(accuracy, step, measured_titles, monkeypatch):
     gentle = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]
     jumping = [p._replace(error=error) for p, error in zip(gentle, (8e-5, 5e-6, 3e-7), strict=True)]
     monkeypatch.setattr(solver_selection, "measure", lambda problem: jumping if "jumping" in problem.title else gentle)
@@ -61,8 +61,8 @@ def test_voltages_that_jump_count_with_their_share(accuracy, step, measured, mon
     assert solver_selection.overrides(scene, lambda text: None)[1] == f"solver.step={step!r}"
 
 
-def test_fleet_gets_one_solver_that_each_vehicle_meets(measured, monkeypatch):
-    """Each airframe is measured once, with all vehicles of a kind as one."""
+def test_fleet_gets_one_solver_that_each_vehicle_meets(measured_titles, monkeypatch):
+    """Each airframe is measured once."""
     points = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]
     errors = iter([(1e-5, 5e-6, 3e-7), (4e-4, 2e-4, 1e-6)])
     by_problem = {}
@@ -79,19 +79,19 @@ def test_fleet_gets_one_solver_that_each_vehicle_meets(measured, monkeypatch):
     result = solver_selection.overrides(scene, lambda text: None)
     assert len(by_problem) == 2
     assert result == ['solver.integrator="rk4"', "solver.step=0.001"]
-    decided = load(scene, result)
-    assert [method(vehicle)[2] for vehicle in decided.vehicles] == [0.001] * 3
+    resolved = load(scene, result)
+    assert [method(vehicle)[2] for vehicle in resolved.vehicles] == [0.001] * 3
 
 
-def test_fleet_with_step_of_one_vehicle_selects_none(measured):
+def test_fleet_with_step_of_one_vehicle_selects_none(measured_titles):
     overrides = ["solver.accuracy=1e-4", "vehicle.1.solver.step=0.002"]
     scene = load(ROOT / "lapwing/scenes/formation.toml", overrides)
     assert solver_selection.overrides(scene, lambda text: None) == []
-    assert not measured
+    assert not measured_titles
 
 
 @pytest.mark.parametrize(
-    ("solver", "chosen"),
+    ("solver", "overrides"),
     [
         ("accuracy = 1e-4", ['solver.integrator="rkmk4"', "solver.step=0.004"]),
         ("accuracy = 1e-3", ['solver.integrator="rkmk2"', "solver.step=0.004"]),
@@ -100,13 +100,13 @@ def test_fleet_with_step_of_one_vehicle_selects_none(measured):
         ("step = 0.001", []),
     ],
 )
-def test_cheapest_that_meets_accuracy_is_set(solver, chosen, measured, tmp_path):
+def test_cheapest_that_meets_accuracy_is_set(solver, overrides, measured_titles, tmp_path):
     path = scene(tmp_path, solver)
     result = solver_selection.overrides(load(path), lambda text: None)
-    assert result == chosen
-    decided = load(path, result)
-    assert not decided[Solver].undecided
-    method(decided)
+    assert result == overrides
+    resolved = load(path, result)
+    assert not resolved[Solver].undecided
+    method(resolved)
 
 
 @pytest.mark.parametrize(
@@ -117,38 +117,38 @@ def test_cheapest_that_meets_accuracy_is_set(solver, chosen, measured, tmp_path)
         ('accuracy = 1e-4\nintegrator = "cf4"', ["cf4"]),
     ],
 )
-def test_only_candidates_are_compiled(solver, names, measured, monkeypatch, tmp_path):
-    """Each integrator takes seconds to compile; the others win nowhere."""
+def test_only_candidates_are_compiled(solver, names, measured_titles, monkeypatch, tmp_path):
+    """Each integrator takes seconds to compile, and the others are nowhere the cheapest."""
     problems = []
     points = [Point(name, 4, "s", 0.004, 1e-9, 1e-5, 1, {}) for name in names]
     monkeypatch.setattr(solver_selection, "measure", lambda problem: problems.append(problem) or points)
     solver_selection.overrides(load(scene(tmp_path, solver)), lambda text: None)
-    assert sorted(way.name for way in problems[0].ways) == names
+    assert sorted(method.name for method in problems[0].methods) == names
 
 
-def test_selection_is_measured_once_per_physics(measured, tmp_path):
+def test_selection_is_measured_once_per_physics(measured_titles, tmp_path):
     path, output = scene(tmp_path, "accuracy = 1e-4"), []
     first = solver_selection.overrides(load(path), output.append)
     assert solver_selection.overrides(load(path), output.append) == first
     solver_selection.overrides(load(path, ["solver.accuracy=1e-3"]), output.append)
-    assert len(measured) == len(output) == 1
+    assert len(measured_titles) == len(output) == 1
     solver_selection.overrides(load(path, ["os4.mass=0.7"]), output.append)
-    assert len(measured) == 2
+    assert len(measured_titles) == 2
 
 
-def test_damaged_or_read_only_cache_is_ignored(measured, monkeypatch, tmp_path):
+def test_damaged_or_read_only_cache_is_ignored(measured_titles, monkeypatch, tmp_path):
     path = scene(tmp_path, "accuracy = 1e-4")
     first = solver_selection.overrides(load(path), lambda text: None)
-    (kept,) = (tmp_path / "cache" / "accuracy").glob("*.json")
+    (cache_file,) = (tmp_path / "cache" / "accuracy").glob("*.json")
     for damage in (b"\xff", b"[{}]", b"[1", b"7", b"[]"):
-        kept.write_bytes(damage)
+        cache_file.write_bytes(damage)
         assert solver_selection.overrides(load(path), lambda text: None) == first
-    assert len(measured) == 6
+    assert len(measured_titles) == 6
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: Path("/dev/null/none"))
     assert solver_selection.overrides(load(path), lambda text: None) == first
 
 
-def test_unreachable_accuracy_and_default_are_reported(measured, tmp_path):
+def test_unreachable_accuracy_and_default_are_reported(measured_titles, tmp_path):
     path = scene(tmp_path, "accuracy = 1e-12")
     with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: 1e-12: no method meets .* 1e-07, by rkmk4"):
         solver_selection.overrides(load(path), lambda text: None)
@@ -159,16 +159,18 @@ def test_unreachable_accuracy_and_default_are_reported(measured, tmp_path):
 
 
 @pytest.mark.long
-def test_measured_in_earnest_on_scene(monkeypatch, tmp_path):
+def test_selection_by_real_measurement(monkeypatch, tmp_path):
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path)
-    few = ["lie_euler", "erk4m", "rkmk4"]  # each is compiled
-    monkeypatch.setattr(integrate.integrators, "compatible_methods", lambda p, x: few)
+    names = ["lie_euler", "erk4m", "rkmk4"]  # each is compiled
+    monkeypatch.setattr(integrate.integrators, "compatible_methods", lambda p, x: names)
     path = scene(tmp_path, "accuracy = 1e-6")
     result = solver_selection.overrides(load(path), lambda text: None)
     (points,) = json.loads(next((tmp_path / "accuracy").glob("*.json")).read_text())
-    (chosen,) = [p for p in points if result == [f'solver.integrator="{p["way"]}"', f"solver.step={p['setting']!r}"]]
-    assert chosen["error"] <= 1e-6
-    assert chosen["time"] == min(p["time"] for p in points if p["error"] <= 1e-6)
+    (overrides,) = [
+        p for p in points if result == [f'solver.integrator="{p["method"]}"', f"solver.step={p['setting']!r}"]
+    ]
+    assert overrides["error"] <= 1e-6
+    assert overrides["time"] == min(p["time"] for p in points if p["error"] <= 1e-6)
 
 
 def test_model_that_cannot_be_measured_is_named(monkeypatch):

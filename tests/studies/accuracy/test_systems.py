@@ -1,4 +1,4 @@
-"""Every system of the study: its independent reference and our integrators agree, and its invariants are kept."""
+"""Systems of the study: agreement of reference and integrators, and conservation of the invariants."""
 
 import numpy as np
 import pytest
@@ -12,21 +12,21 @@ from lapwing.studies.accuracy.work_precision import drift
 pytestmark = pytest.mark.long
 
 
-@pytest.mark.parametrize("name", [n for n, p in problems().items() if any(w.name == "rkmk54" for w in p.ways)])
-def test_reference_is_met(name):
+@pytest.mark.parametrize("name", [n for n, p in problems().items() if any(m.name == "rkmk54" for m in p.methods)])
+def test_integrator_agrees_with_reference(name):
     problem = problems()[name]
-    way = next(w for w in problem.ways if w.name == "rkmk54")
-    coarse, fine = (way.read(t, way.prepare(t)()) for t in (1e-5, 1e-12))
+    method = next(m for m in problem.methods if m.name == "rkmk54")
+    coarse, fine = (method.read(t, method.prepare(t)()) for t in (1e-5, 1e-12))
     exact = problem.reference()
     assert error(fine.samples[-1], exact) < 3e-9
     assert error(coarse.samples[-1], exact) > 3 * error(fine.samples[-1], exact)
     assert max(drift(problem, fine).values()) < 1e-9
 
 
-def test_invariant_of_wrong_motion_drifts():
+def test_wrong_motion_has_drift():
     problem = problems()["free_rigid_body"]
-    way = next(w for w in problem.ways if w.name == "rkmk54")
-    outcome = way.read(1e-8, way.prepare(1e-8)())
+    method = next(m for m in problem.methods if m.name == "rkmk54")
+    outcome = method.read(1e-8, method.prepare(1e-8)())
     outcome.samples[-1, 9:12] *= 1.01
     result = drift(problem, outcome)
     assert result["energy"] == pytest.approx(0.0201, rel=1e-3)

@@ -1,4 +1,4 @@
-"""The plots of a campaign's report, of tables that are made up."""
+"""Plots of a campaign's report, of synthetic tables."""
 
 from itertools import combinations
 from types import SimpleNamespace
@@ -8,7 +8,7 @@ import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from lapwing.studies.campaign import campaign_plots
-from lapwing.studies.campaign.campaign_plots import errors, matters, parallel
+from lapwing.studies.campaign.campaign_plots import errors, parallel, sensitivity
 from lapwing.studies.campaign.distributions import uniform
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.results import Results
@@ -21,29 +21,29 @@ MANY = tuple("abcdefghijkl")
 
 
 def table(runs, sweep=None, keys=KEYS, **values):
-    """The results of a campaign over some parameters; figures that are not given are NaN."""
-    made = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(keys, uniform(0, 1)), sweep=sweep)
-    drawn = {key: np.array([made.values(run)[key] for run in range(runs)], float) for key in keys}
+    """Return the results of a campaign over `keys`; metrics without a function are NaN."""
+    new_plan = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(keys, uniform(0, 1)), sweep=sweep)
+    drawn = {key: np.array([new_plan.values(run)[key] for run in range(runs)], float) for key in keys}
     kinds = {"run": int, "seed": int, **dict.fromkeys(keys, float), "success": bool}
     kinds |= {name: str if name in ("outcome", "outcome_text") else float for name in METRICS}
     result = {name: np.full(runs, np.nan) for name in kinds}
     result |= {"run": np.arange(runs), "success": np.ones(runs, bool), "outcome": np.full(runs, "landed", object)}
     about = {"vehicles": [], "published": {}, "success": [], "scene": "hover"}
-    arrays = result | drawn | {name: of(drawn) for name, of in values.items()}
-    return Results(SimpleNamespace(arrays=lambda: arrays, plan=made, about=about, kinds=kinds))
+    arrays = result | drawn | {name: function(drawn) for name, function in values.items()}
+    return Results(SimpleNamespace(arrays=lambda: arrays, plan=new_plan, about=about, kinds=kinds))
 
 
 def bars(plot, panel, aim):
-    """Length of the bars of a panel of `matters`, by parameter."""
+    """Return the length of the bars in a panel of `sensitivity` by parameter."""
     (result,) = [p for p in plot.panels if p.title == aim and p.x_label.startswith(panel)]
     return {bar.lane: bar.end - bar.start for bar in result.marks}
 
 
-def test_missing_values_of_runs_keep_other_columns():
+def test_missing_values_do_not_affect_other_metrics():
     def speed(drawn):
-        return np.where(drawn["b"] < 0.5, drawn["a"], np.nan)  # half of the runs never touch down
+        return np.where(drawn["b"] < 0.5, drawn["a"], np.nan)  # half of the runs have no touchdown
 
-    plot = matters(table(400, **{"touchdown.speed": speed, "energy": lambda drawn: drawn["b"]}))
+    plot = sensitivity(table(400, **{"touchdown.speed": speed, "energy": lambda drawn: drawn["b"]}))
     assert {panel.title for panel in plot.panels} == {"touchdown.speed", "energy"}
     assert bars(plot, "rank", "touchdown.speed")["a"] == pytest.approx(1.0)
     assert abs(bars(plot, "rank", "touchdown.speed")["b"]) < 0.2
@@ -56,7 +56,7 @@ def test_constant_parameter_has_no_index():
         drawn["b"][:] = np.where(drawn["b"] < 0.5, 0.25, drawn["b"])
         return np.where(drawn["b"] == 0.25, drawn["a"], np.nan)
 
-    result = bars(matters(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
+    result = bars(sensitivity(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
     assert set(result) == {"a"}
     assert result["a"] == pytest.approx(1.0, abs=0.1)
 
@@ -64,35 +64,35 @@ def test_constant_parameter_has_no_index():
 def test_sobol_indices_are_omitted_for_correlated_parameters(tmp_path):
     lines = [f"{k / 100},{k / 50}" for k in range(100)]
     (tmp_path / "s.csv").write_text("\n".join(["a,b", *lines]))
-    plot = matters(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
+    plot = sensitivity(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
     assert [panel.x_label for panel in plot.panels] == ["rank correlation"]
-    assert "which those of a sweep are not" in plot.caption
+    assert "unlike those of a sweep" in plot.caption
 
 
-def test_omitted_grid_runs_are_no_values():
-    lots = table(3000, energy=lambda drawn: drawn["b"])
-    lots.columns["b"][:] = np.arange(3000) % 10  # of which every tenth run has the same
-    (good,) = parallel(lots).panels[0].marks
-    lines = good.y.reshape(-1, 4)[:, :3]
+def test_omitted_grid_runs_do_not_remove_values():
+    results = table(3000, energy=lambda drawn: drawn["b"])
+    results.columns["b"][:] = np.arange(3000) % 10  # every tenth run has the same value
+    (line,) = parallel(results).panels[0].marks
+    lines = line.y.reshape(-1, 4)[:, :3]
     assert lines.shape == (300, 3)
     assert len(np.unique(lines[:, 1])) == 10
 
 
-def test_sobol_indices_look_at_so_many_runs_at_most(monkeypatch):
+def test_sobol_indices_use_limited_number_of_runs(monkeypatch):
     requested = []
     monkeypatch.setattr(campaign_plots, "has_sobol", lambda: True)
     monkeypatch.setattr(
         campaign_plots, "sobol", lambda x, y, names: requested.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names)
     )
-    monkeypatch.setattr(campaign_plots, "MOST", 100)
-    lots = table(2000, energy=lambda drawn: drawn["b"])
-    lots.columns["b"][:] = np.arange(2000) % 10
-    matters(lots)
+    monkeypatch.setattr(campaign_plots, "SOBOL_MAX_RUNS", 100)
+    results = table(2000, energy=lambda drawn: drawn["b"])
+    results.columns["b"][:] = np.arange(2000) % 10
+    sensitivity(results)
     assert requested[0].shape == (100, 2)
     assert len(np.unique(requested[0][:, 1])) == 10
 
 
-def test_long_keys_stand_beside_each_other():
+def test_long_keys_are_broken_into_lines():
     assert campaign_plots._break_key("effects.random_wind_force.mean.0") == "effects.\nrandom_wind_force.\nmean.0"
     assert campaign_plots._break_key("vehicle.mass") == "vehicle.mass"
     assert campaign_plots._break_key("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
@@ -107,13 +107,15 @@ def test_errors_are_shares_of_requirements():
     assert roll.marks[1].x == pytest.approx(np.degrees([0.1, 0.1]))
 
 
-def test_influential_parameters_are_drawn_others_listed():
+def test_weak_parameters_are_listed_instead_of_plotted():
     result = table(200, keys=MANY, energy=lambda drawn: drawn["l"] + 0.5 * drawn["k"])
-    assert len(bars(matters(result), "rank", "energy")) == len(MANY)
+    assert len(bars(sensitivity(result), "rank", "energy")) == len(MANY)
     for draw in (campaign_plots.success, parallel):
         plot = draw(result)
-        reported = plot.caption.partition("Left out, as they go least with it: ")[2].rstrip(".").split(", ")
-        assert len(reported) == len(MANY) - campaign_plots.KEYS
+        reported = (
+            plot.caption.partition("Omitted, because their correlations are weakest: ")[2].rstrip(".").split(", ")
+        )
+        assert len(reported) == len(MANY) - campaign_plots.MAX_KEYS
         assert not {"k", "l"} & set(reported)
     assert [panel.x_label for panel in campaign_plots.success(result).panels] == [
         key for key in MANY if key not in reported

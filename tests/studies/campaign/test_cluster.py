@@ -1,4 +1,4 @@
-"""A campaign on a Dask cluster of several processes, one of which is killed and another joins late: the same table."""
+"""Campaign on a Dask cluster: killed and late workers, lost scheduler."""
 
 import os
 import signal
@@ -22,10 +22,10 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed: 
 
 
 def test_killed_and_late_workers_do_not_change_results(tmp_path):
-    made = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
-    first = reference(*first_setup(made))
-    alone, folder = (begin(tmp_path / name, made, manifest(made, first)) for name in ("alone", "cluster"))
-    campaign(alone, first, workers.here)
+    new_plan = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
+    first = reference(*first_setup(new_plan))
+    local, folder = (begin(tmp_path / name, new_plan, manifest(new_plan, first)) for name in ("alone", "cluster"))
+    campaign(local, first, workers.here)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,
@@ -33,16 +33,16 @@ def test_killed_and_late_workers_do_not_change_results(tmp_path):
         victim, *_ = client.run(os.getpid).values()
         calls = []
 
-        def strike(count):
+        def kill_worker(count):
             calls.append(count.runs)
             if len(calls) == 2:  # after the first shard
                 cluster.scale(3)
                 os.kill(victim, signal.SIGKILL)
 
-        count = campaign(folder, first, dask(cluster.scheduler_address), strike)
+        count = campaign(folder, first, dask(cluster.scheduler_address), kill_worker)
     assert count.runs == 40
     assert len(calls) == 1 + len(folder.shards)
-    assert folder.finish() == alone.finish()
+    assert folder.finish() == local.finish()
 
 
 def test_lost_scheduler_is_one_line_and_keeps_runs(tmp_path, capfd):
@@ -52,16 +52,18 @@ def test_lost_scheduler_is_one_line_and_keeps_runs(tmp_path, capfd):
     common = ["--no-dashboard"]
     scheduler = ["dask_scheduler", "--host", address, *common]
     worker = ["dask_worker", address, "--nthreads", "1", "--local-directory", str(tmp_path), *common]
-    made = plan("delivery_mission", ("run.duration=3.5",), runs=400, seed=7)
-    first = reference(*first_setup(made))
-    folder = begin(tmp_path / "folder", made, manifest(made, first))
-    with (tmp_path / "said").open("w") as output:
+    new_plan = plan("delivery_mission", ("run.duration=3.5",), runs=400, seed=7)
+    first = reference(*first_setup(new_plan))
+    folder = begin(tmp_path / "folder", new_plan, manifest(new_plan, first))
+    with (tmp_path / "output").open("w") as output:
         helpers = [
-            subprocess.Popen([sys.executable, "-m", f"distributed.cli.{name}", *words], stdout=output, stderr=output)
-            for name, *words in (scheduler, worker)
+            subprocess.Popen(
+                [sys.executable, "-m", f"distributed.cli.{name}", *arguments], stdout=output, stderr=output
+            )
+            for name, *arguments in (scheduler, worker)
         ]
         try:
-            with pytest.raises(RunFailed, match=f"the scheduler at {address} is lost; the same command goes on"):
+            with pytest.raises(RunFailed, match=f"the scheduler at {address} is lost; repeat the command to continue"):
                 campaign(folder, first, dask(address), lambda count: helpers[0].kill() if count.runs else None)
         finally:
             for helper in helpers:
@@ -71,7 +73,7 @@ def test_lost_scheduler_is_one_line_and_keeps_runs(tmp_path, capfd):
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_missing_worker_is_reported(monkeypatch):
-    monkeypatch.setattr("lapwing.studies.campaign.cluster.PATIENCE", 0.5)
-    with pytest.raises(ValueError, match=r"--cluster tcp://127.0.0.1:9: no Dask scheduler answers there"):
+def test_missing_scheduler_is_reported(monkeypatch):
+    monkeypatch.setattr("lapwing.studies.campaign.cluster.SCHEDULER_TIMEOUT", 0.5)
+    with pytest.raises(ValueError, match=r"--cluster tcp://127.0.0.1:9: no Dask scheduler answers"):
         dask("tcp://127.0.0.1:9")

@@ -1,4 +1,4 @@
-"""Campaigns of fleets: the worst of the vehicles in the columns of a run, and each by its name."""
+"""Campaigns of fleets: columns of the worst vehicle and of each vehicle."""
 
 import json
 
@@ -20,7 +20,7 @@ from lapwing.studies.simulate import fly_each
 from tests.cosim.memory_log import fly
 
 SHORT = ("run.duration=2.0", 'vehicle.2.success.require=["max_tilt < 0.001"]')
-VARIED = [
+VARY = [
     "--vary",
     "vehicle.0.airframe.mass.total=uniform(9.5,10.5)",
     "--vary",
@@ -28,7 +28,7 @@ VARIED = [
 ]
 
 
-def lapwing(*arguments):
+def run_lapwing(*arguments):
     result = CliRunner().invoke(app, [str(a) for a in arguments])
     assert "Traceback" not in result.output
     return result.exit_code, result.output
@@ -38,7 +38,7 @@ def lapwing(*arguments):
 def folder(tmp_path_factory):
     path = tmp_path_factory.mktemp("campaign") / "fleet"
     sets = [part for text in SHORT for part in ("--set", text)]
-    code, output = lapwing("campaign", "fleet", *sets, *VARIED, "--runs", 3, "--workers", 1, "--out", path)
+    code, output = run_lapwing("campaign", "fleet", *sets, *VARY, "--runs", 3, "--workers", 1, "--out", path)
     assert code == 0, output
     return path, output
 
@@ -67,8 +67,8 @@ def test_row_has_worst_of_vehicles_and_each_of_them(folder):
     assert result["left.success"].all()
     assert not result["scout.success"].any()
     assert all(text.startswith("scout: Completed") for text in result["outcome_text"])
-    assert 4.0 < result["nearest"].min() < 4.3  # they stand 4.24 m apart
-    assert "Nearest of any two vehicles" in output
+    assert 4.0 < result["nearest"].min() < 4.3  # initial separation 4.24 m
+    assert "Smallest separation of two vehicles" in output
 
 
 def test_report_shows_every_vehicle(folder):
@@ -88,12 +88,12 @@ def test_varied_key_reaches_named_vehicle(folder):
     result = Results(read(folder[0]))
     masses = result["vehicle.0.airframe.mass.total"]
     assert len(set(masses)) == 3
-    # who climbs with more mass takes more energy
+    # a climb with more mass needs more energy
     assert (np.argsort(masses) == np.argsort(result["left.energy"])).all()
     assert json.loads((folder[0] / "campaign.json").read_text())["vehicles"] == result.vehicles
 
 
-def test_run_is_its_figures_and_same_each_time():
+def test_repeated_run_has_equal_row():
     values = plan("fleet", SHORT, runs=2)
     rows = {}
     first = [row_of(values, run, rows) for run in (0, 1, 0)]
@@ -103,9 +103,9 @@ def test_run_is_its_figures_and_same_each_time():
     assert metrics(flights[1])["rmse.z"] == first[0]["right.rmse.z"]
 
 
-def test_run_is_flown_again_to_bit(folder, tmp_path):
-    code, output = lapwing(
+def test_repeated_run_is_bit_for_bit_identical(folder, tmp_path):
+    code, output = run_lapwing(
         "run", "fleet", "--run", 1, "--campaign", folder[0], "--mode", "single-process", "--log", tmp_path / "a.mcap"
     )
     assert "final state bit-for-bit identical" in output
-    assert code == 4  # as it had failed
+    assert code == 4  # the run fails

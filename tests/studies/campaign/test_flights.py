@@ -1,4 +1,4 @@
-"""A flight of a campaign is that of the single executor, column by column."""
+"""Flights of a campaign equal those of the single-process executor."""
 
 import pytest
 import synthetic_flights
@@ -18,7 +18,7 @@ from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 
-BREAKS = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]'
+BLOCKED_PROPELLER = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]'
 
 
 @pytest.mark.parametrize(
@@ -28,7 +28,7 @@ BREAKS = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]'
         ("delivery_mission", ["run.duration=20.0"]),
         ("delivery_mission", ["run.duration=10.0", "communication.coupling=jacobi"]),
         ("hover", ["effects.battery.initial_charge=0.071"]),
-        ("hover", ["run.duration=2.0", "vehicle.model=multibody", BREAKS]),
+        ("hover", ["run.duration=2.0", "vehicle.model=multibody", BLOCKED_PROPELLER]),
     ],
     ids=["hover", "mission", "parallel", "battery", "five bodies and an event"],
 )
@@ -49,7 +49,7 @@ def test_campaign_equals_single_process(scene, overrides, tmp_path):
     )  # the commander acts
 
 
-def test_runs_in_memory_of_others_are_same():
+def test_reused_memory_does_not_change_rows():
     values, rows = plan("hover", ("run.duration=4",), runs=3, vary={"vehicle.mass": parse("uniform(9, 11)")}), {}
     reused = [row_of(values, run, rows) for run in (0, 1, 2, 0)]
     alone = [row_of(values, run) for run in (0, 1, 2, 0)]

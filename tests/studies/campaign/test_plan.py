@@ -1,4 +1,4 @@
-"""Drawn values of the runs of a campaign."""
+"""Plan of a campaign: drawn values of its runs, and invalid arguments."""
 
 import re
 
@@ -9,11 +9,11 @@ from scipy import stats
 from lapwing.cosim.scene import SceneError
 from lapwing.studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
 from lapwing.studies.campaign.plan import plan
-from lapwing.studies.campaign.runs import _refusal, first_setup
+from lapwing.studies.campaign.runs import _rejection_text, first_setup
 
 
-def drawn(made, key):
-    return [made.values(run)[key] for run in range(made.runs)]
+def draw_values(new_plan, key):
+    return [new_plan.values(run)[key] for run in range(new_plan.runs)]
 
 
 @pytest.mark.parametrize(
@@ -41,7 +41,7 @@ def test_quantiles_are_those_of_scipy(distribution, reference):
         ("linspace(0, 1, 3)", (0.0, 0.5, 1.0)),
     ],
 )
-def test_values_that_are_finitely_many(text, values):
+def test_discrete_distribution_has_equal_probabilities(text, values):
     result = parse(text)
     assert result.values == values
     assert [result.at(u) for u in (np.arange(len(values)) + 0.5) / len(values)] == list(values)
@@ -49,7 +49,7 @@ def test_values_that_are_finitely_many(text, values):
 
 
 @pytest.mark.parametrize(
-    ("text", "output"),
+    ("text", "message"),
     [
         ("normal(1)", "normal: got '1'"),
         ("normal(a, b)", "normal: got 'a, b'"),
@@ -65,50 +65,52 @@ def test_values_that_are_finitely_many(text, values):
         ("3.0", "expected a distribution"),
     ],
 )
-def test_no_distribution(text, output):
-    with pytest.raises(ValueError, match=re.escape(output)):
+def test_invalid_distribution_is_rejected(text, message):
+    with pytest.raises(ValueError, match=re.escape(message)):
         parse(text)
 
 
 def test_draws_depend_on_seed_run_and_key_alone():
     one = plan("hover", runs=50, seed=3, vary={"a": normal(0, 1), "b": uniform(0, 1)})
     more = plan("hover", runs=80, seed=3, vary={"c": uniform(0, 1), "b": uniform(0, 1)})
-    assert drawn(one, "b") == drawn(more, "b")[:50]
+    assert draw_values(one, "b") == draw_values(more, "b")[:50]
     assert [one.seed_of(k) for k in range(50)] == [more.seed_of(k) for k in range(50)]
-    assert drawn(one, "b") != drawn(plan("hover", runs=50, seed=4, vary={"b": uniform(0, 1)}), "b")
+    assert draw_values(one, "b") != draw_values(plan("hover", runs=50, seed=4, vary={"b": uniform(0, 1)}), "b")
     assert [one._replace(seed=1).seed_of(k) for k in range(3)] == [1, 2, 3]
     assert len({plan("hover", seed=s).seed_of(k) for s in (1, 2, 3) for k in range(100)}) == 300
     assert one._replace(seed=2**31 - 1).seed_of(2**32 - 1) < 2**63
 
 
-def test_draws_are_distributed_as_they_ought_to_be():
-    made = plan("hover", runs=2000, vary={"a": normal(1.0, 2.0), "b": uniform(0, 1)})
-    a, b = drawn(made, "a"), drawn(made, "b")
+def test_drawn_values_follow_distribution():
+    new_plan = plan("hover", runs=2000, vary={"a": normal(1.0, 2.0), "b": uniform(0, 1)})
+    a, b = draw_values(new_plan, "a"), draw_values(new_plan, "b")
     assert stats.kstest(a, stats.norm(1.0, 2.0).cdf).pvalue > 0.01
     assert stats.kstest(b, stats.uniform.cdf).pvalue > 0.01
     assert abs(np.corrcoef(a, b)[0, 1]) < 0.06
 
 
 @pytest.mark.parametrize("design", ["lhs", "sobol"])
-def test_designs_draw_every_part_of_range(design):
-    made = plan("hover", runs=16, vary={"a": uniform(0, 16), "b": uniform(0, 16)}, design=design)
+def test_design_draws_each_interval_once(design):
+    new_plan = plan("hover", runs=16, vary={"a": uniform(0, 16), "b": uniform(0, 16)}, design=design)
     for key in "ab":
-        assert sorted(map(int, drawn(made, key))) == list(range(16))  # one in each sixteenth
-    assert drawn(made, "a") != drawn(made, "b")
-    assert made.values(7) == plan("hover", runs=16, vary=dict(made.vary), design=design).values(7)
+        assert sorted(map(int, draw_values(new_plan, key))) == list(range(16))  # one in each of 16 intervals
+    assert draw_values(new_plan, "a") != draw_values(new_plan, "b")
+    assert new_plan.values(7) == plan("hover", runs=16, vary=dict(new_plan.vary), design=design).values(7)
 
 
 def test_grid_has_all_combinations():
-    made = plan("hover", vary={"a": choice(1, 2), "b": linspace(0, 1, 3), "c": uniform(0, 1)}, design="grid")
-    assert made.runs == 6
-    assert sorted(zip(drawn(made, "a"), drawn(made, "b"), strict=True)) == [(a, b) for a in (1, 2) for b in (0, 0.5, 1)]
-    assert len(set(drawn(made, "c"))) == 6
+    new_plan = plan("hover", vary={"a": choice(1, 2), "b": linspace(0, 1, 3), "c": uniform(0, 1)}, design="grid")
+    assert new_plan.runs == 6
+    assert sorted(zip(draw_values(new_plan, "a"), draw_values(new_plan, "b"), strict=True)) == [
+        (a, b) for a in (1, 2) for b in (0, 0.5, 1)
+    ]
+    assert len(set(draw_values(new_plan, "c"))) == 6
 
 
 def test_sweep_keeps_rows_together(tmp_path):
     (tmp_path / "s.csv").write_text('vehicle.mass, "sensors.gps.preset"\n9.5, rtk\n10.5, standard\n')
-    made = plan("hover", runs=3, sweep=tmp_path / "s.csv")
-    assert [made.values(k) for k in range(3)] == [
+    new_plan = plan("hover", runs=3, sweep=tmp_path / "s.csv")
+    assert [new_plan.values(k) for k in range(3)] == [
         {"vehicle.mass": 9.5, "sensors.gps.preset": "rtk"},
         {"vehicle.mass": 10.5, "sensors.gps.preset": "standard"},
         {"vehicle.mass": 9.5, "sensors.gps.preset": "rtk"},
@@ -117,39 +119,41 @@ def test_sweep_keeps_rows_together(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("text", "output"),
+    ("text", "message"),
     [
-        ("", "expected a line of keys"),
-        ("a,b\n", "expected a line of keys, each once, and a line of values for each run"),
+        ("", "expected a header of distinct keys"),
+        ("a,b\n", "expected a header of distinct keys, and a line of values for each run"),
         ("a,b\n1\n", "line 2: expected 2 values, got 1"),
         ("a\n1 2\n", "1 2 is not a TOML value"),
     ],
 )
-def test_no_sweep(tmp_path, text, output):
+def test_invalid_sweep_is_rejected(tmp_path, text, message):
     (tmp_path / "s.csv").write_text(text)
-    with pytest.raises(ValueError, match=output):
+    with pytest.raises(ValueError, match=message):
         plan("hover", sweep=tmp_path / "s.csv")
 
 
-def test_sweep_may_begin_with_mark_that_spreadsheets_put_there(tmp_path):
+def test_sweep_accepts_byte_order_mark(tmp_path):
     (tmp_path / "s.csv").write_text("\ufeffa,b\n1,2\n", encoding="utf-8")
     assert plan("hover", sweep=tmp_path / "s.csv").sweep == ({"a": 1, "b": 2},)
 
 
-def test_grid_is_flown_though_its_first_runs_are_all_refused():
+def test_grid_is_accepted_when_first_runs_are_rejected():
     vary = {"effects.random_wind_force.sigma": choice(-1, 1), "vehicle.mass": linspace(10, 11, 20)}
-    made = plan("delivery_mission", vary=vary, design="grid")
-    assert made.runs == 40
-    assert first_setup(made)[0] >= 20
+    new_plan = plan("delivery_mission", vary=vary, design="grid")
+    assert new_plan.runs == 40
+    assert first_setup(new_plan)[0] >= 20
 
 
-def test_rejection_text_is_independent_of_file_place():
-    reported = [_refusal(SceneError("autopilot.gains", f"no file {folder}/nix.toml")) for folder in ("/a/b", "/c")]
+def test_rejection_text_is_independent_of_folder():
+    reported = [
+        _rejection_text(SceneError("autopilot.gains", f"no file {folder}/nix.toml")) for folder in ("/a/b", "/c")
+    ]
     assert reported == ["autopilot.gains: no file nix.toml"] * 2
 
 
 @pytest.mark.parametrize(
-    ("arguments", "output"),
+    ("arguments", "message"),
     [
         ({"runs": 40_000_000_000}, "--runs 40000000000: expected a number from 1 to 10000000"),
         ({"runs": 0}, "--runs 0: expected a number from 1 to 10000000"),
@@ -160,10 +164,10 @@ def test_rejection_text_is_independent_of_file_place():
         ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: No such file"),
     ],
 )
-def test_no_plan(arguments, output):
+def test_invalid_plan_is_rejected(arguments, message):
     from pathlib import Path
 
     if "sweep" in arguments:
         arguments = {"sweep": Path(arguments["sweep"])}
-    with pytest.raises(ValueError, match=output):
+    with pytest.raises(ValueError, match=message):
         plan("hover", **arguments)

@@ -1,4 +1,4 @@
-"""Intervals and sensitivities against closed forms and published numbers."""
+"""Intervals and sensitivities against closed forms and published values."""
 
 import numpy as np
 import pytest
@@ -14,28 +14,28 @@ from lapwing.studies.campaign.statistics import (
 )
 
 
-def test_clopper_and_pearson():
+def test_interval_is_clopper_pearson():
     assert interval(0, 100)[1:] == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 100)))
     assert interval(10, 10)[1:] == pytest.approx((0.025 ** (1 / 10), 1.0))
     assert interval(81, 263)[1:] == pytest.approx((0.2527, 0.3676), abs=1e-4)  # Newcombe 1998, table I
     assert interval(0, 0)[1:] == (0.0, 1.0)
 
 
-def test_spread_names_worst():
+def test_spread_has_worst_run():
     values, runs = np.append(np.arange(101.0), np.nan), np.arange(102) + 100
     assert spread(values, runs) == (50.0, 5.0, 95.0, 100.0, 200)
     assert spread(values, runs, least=True).run == 100
     assert spread(np.array([np.nan]), runs[:1]) is None
 
 
-def test_difference_of_pairs_is_sharper_than_of_means():
+def test_paired_difference_removes_common_noise():
     noise = np.random.default_rng(1).normal(0.0, 10.0, 400)
     result = paired_difference(noise, noise + np.tile([0.9, 1.1], 200))
     assert result.value == pytest.approx(1.0)
     assert result.high - result.low == pytest.approx(2.0 * 1.966 * 0.1 / 20.0, rel=0.01)
 
 
-def test_rank_correlation_of_monotone_and_of_no_relation():
+def test_rank_correlation_of_monotone_and_independent_columns():
     x = np.random.default_rng(2).uniform(size=500)
     assert rank_correlation(x, np.exp(5.0 * x)).value == pytest.approx(1.0)
     none = rank_correlation(x, np.random.default_rng(3).uniform(size=500))
@@ -51,7 +51,7 @@ def test_sobol_indices_of_ishigamis_function():
     assert [s.value for s in result] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.04)  # Saltelli et al. 2008
 
 
-def test_ellipse_holds_its_share():
+def test_ellipse_contains_share_of_points():
     points = np.random.default_rng(5).multivariate_normal([1.0, 2.0], [[4.0, 1.5], [1.5, 1.0]], 20000)
     outline = ellipse(points, 0.95) - points.mean(axis=0)
     inverse = np.linalg.inv(np.cov(points.T))

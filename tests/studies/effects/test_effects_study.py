@@ -1,4 +1,4 @@
-"""The study of effects: differences in closed form, the smallest set on flights made up, and a real one."""
+"""Effects study: differences in closed form, the smallest set for synthetic flights, and a real flight."""
 
 import contextlib
 import json
@@ -16,7 +16,7 @@ from lapwing.studies.effects.cost import Cost
 from lapwing.studies.effects.influence import Influence, influence
 from lapwing.studies.effects.procedure import Row, Study, _smallest
 from lapwing.studies.effects.procedure import study as run_study
-from lapwing.studies.effects.variants import refusal, variant
+from lapwing.studies.effects.variants import check_effects, variant
 from lapwing.studies.simulate import fly
 from lapwing.studies.terminal import console
 
@@ -35,60 +35,65 @@ def test_landed_vehicle_stays_landed():
     assert influence(moved([0, 1, 2, 5]), moved([0, 1])).trajectory == 4.0
 
 
-def test_flight_without_end_is_infinitely_far():
+def test_failed_flight_has_infinite_influence():
     result = influence(moved([0, 1]), moved([0], failure="not finite at t = 1 s"))
     assert result.trajectory == math.inf
     assert result.failure == "not finite at t = 1 s"
 
 
-class Crew:
-    """Flights that are off by the sum of what the missing effects are worth."""
+class FakePool:
+    """Pool whose flights differ by the sum of the influences of the missing effects."""
 
-    def __init__(self, worth):
-        self.worth = worth
+    def __init__(self, influences):
+        self.worth = influences
 
     def fly(self, variants):
         return iter([moved([0, sum(w for n, w in self.worth.items() if n not in tables)]) for tables in variants])
 
 
-def test_smallest_set_leaves_out_all_that_may_go_together():
-    worth = {"a": 0.001, "b": 0.004, "c": 0.008, "d": 5.0}
+def test_smallest_set_omits_effects_that_are_small_together():
+    influences = {"a": 0.001, "b": 0.004, "c": 0.008, "d": 5.0}
     output = []
-    kept, apart = _smallest(
-        Crew(worth), {name: {} for name in worth}, moved([0, 0]), ["a", "b", "c"], 0.01, output.append
+    remaining, distance = _smallest(
+        FakePool(influences), {name: {} for name in influences}, moved([0, 0]), ["a", "b", "c"], 0.01, output.append
     )
-    assert list(kept) == ["c", "d"]
-    assert apart == pytest.approx(0.005)
+    assert list(remaining) == ["c", "d"]
+    assert distance == pytest.approx(0.005)
     assert output == ["without a, b, c together", "without a, b together"]
-    assert _smallest(Crew(worth), {name: {} for name in worth}, moved([0, 0]), [], 0.01, output.append)[1] == 0.0
+    assert (
+        _smallest(FakePool(influences), {name: {} for name in influences}, moved([0, 0]), [], 0.01, output.append)[1]
+        == 0.0
+    )
 
 
 @pytest.mark.long
 def test_density_changes_real_flight_little():
     scene = load(HOVER, ["run.duration=2.0"])
     tables = dict(scene[Effects].tables)
-    one, again, thinner = (fly(variant(scene, t)) for t in (tables, tables, tables | {"air_density": {}}))
-    assert (one.truth.position == again.truth.position).all()
-    assert 0.0 < influence(one, thinner).trajectory < 0.01
-    # [J] what hovering takes is about the ideal power over the efficiency; here for less than 2 s
-    assert 100.0 < one.energy < 4000.0
+    first, repeated, thinner = (fly(variant(scene, t)) for t in (tables, tables, tables | {"air_density": {}}))
+    assert (first.truth.position == repeated.truth.position).all()
+    assert 0.0 < influence(first, thinner).trajectory < 0.01
+    # [J] about the ideal hover power over the efficiency, for less than 2 s
+    assert 100.0 < first.energy < 4000.0
 
 
-def test_impossible_effects_name_reason():
+def test_invalid_effects_return_error():
     scene = load(HOVER)
-    assert refusal(scene, {"gravity": {}, "gravity_altitude": {}}).startswith("effects.gravity_altitude: excludes")
-    assert refusal(scene, {"wind_gust": {}}).startswith("effects.wind_gust.peak: ")
-    assert refusal(scene, scene[Effects].tables) == ""
+    assert check_effects(scene, {"gravity": {}, "gravity_altitude": {}}).startswith(
+        "effects.gravity_altitude: excludes"
+    )
+    assert check_effects(scene, {"wind_gust": {}}).startswith("effects.wind_gust.peak: ")
+    assert check_effects(scene, scene[Effects].tables) == ""
 
 
 def test_every_effect_of_catalogue_is_listed(monkeypatch):
-    """Flights and costs are replaced; what cannot be flown has its reason."""
+    """Flights and costs are synthetic; effects that cannot be flown have a remark."""
 
     class Same:
         def fly(self, variants):
             return (moved([0.0, 1.0]) for _ in variants)
 
-    monkeypatch.setattr(procedure, "hangar", lambda scene: contextlib.nullcontext(Same()))
+    monkeypatch.setattr(procedure, "variant_pool", lambda scene: contextlib.nullcontext(Same()))
     monkeypatch.setattr(procedure, "costs", lambda scene, variants: [Cost(1.0, 1.0, 0.1, 0.1)] * len(variants))
     result = run_study(load(HOVER), 0.01, lambda *_: None)
     rows = {row.name: row for row in result.rows}
@@ -96,8 +101,8 @@ def test_every_effect_of_catalogue_is_listed(monkeypatch):
     for name in ("multirotor_ground_effect", "vortex_ring", "dc_motor", "battery_thevenin"):
         assert rows[name].influence is not None
     assert rows["ceiling_effect"].remark.startswith("effects.ceiling_effect.height: missing")
-    assert rows["collision"].remark == "effects.collision: needs other vehicles"
-    assert rows["downwash"].remark == "effects.downwash: needs other vehicles"
+    assert rows["collision"].remark == "effects.collision: requires other vehicles"
+    assert rows["downwash"].remark == "effects.downwash: requires other vehicles"
 
 
 def study():
@@ -116,12 +121,12 @@ def test_table_json_and_plot(tmp_path, capsys):
     console_output.show(console(80), result)
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
-    assert "…" not in text  # no digit is cut
+    assert "…" not in text  # no number is cut
     assert "path [m]" in text
     assert "ends early" in text
-    assert "< 1.5" in text  # cost of gravity, below what the measurement resolves
+    assert "< 1.5" in text  # cost of gravity, below the resolution of the measurement
     assert "not flown: gust.peak: field required" in text
-    assert "Left out, and worth more than 0.01 m: wind" in text
+    assert "Not in the scene, influence above 0.01 m: wind" in text
     console_output.write_json(tmp_path / "study.json", result)
     data = json.loads((tmp_path / "study.json").read_text())
     assert data["missing"] == ["wind"]
@@ -130,6 +135,6 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_system_without_effects_is_refused():
-    with pytest.raises(ValueError, match=r"os4_motors.toml: the model os4 knows no effects"):
+def test_system_without_effects_is_rejected():
+    with pytest.raises(ValueError, match=r"os4_motors.toml: the model os4 has no effects"):
         run_study(load(HOVER.parent / "os4_motors.toml"), 0.01, print)

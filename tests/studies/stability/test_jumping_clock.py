@@ -1,4 +1,4 @@
-"""Clocks that jump in the process that is meant, and in no other."""
+"""Jumping clocks: they affect the selected process alone."""
 
 import os
 import shutil
@@ -9,14 +9,14 @@ import time
 import pytest
 
 from lapwing.studies.stability import jumping_clock
-from lapwing.studies.stability.cases.late_sensors import by_own_clock
+from lapwing.studies.stability.cases.late_sensors import wall_clock_errors
 
 
 @pytest.mark.parametrize(("name", "off"), [(jumping_clock.VICTIM, 3600.0), ("plant", 0.0)])
 def test_clock_of_one_process_jumps(tmp_path, name, off):
     shutil.copy(jumping_clock.__file__, tmp_path / "sitecustomize.py")
-    words = [sys.executable, "-c", "import time; print(time.time())", name]
-    output = subprocess.run(words, env={**os.environ, "PYTHONPATH": str(tmp_path)}, capture_output=True, check=True)
+    arguments = [sys.executable, "-c", "import time; print(time.time())", name]
+    output = subprocess.run(arguments, env={**os.environ, "PYTHONPATH": str(tmp_path)}, capture_output=True, check=True)
     assert abs(float(output.stdout) - time.time()) == pytest.approx(off, abs=600.0)
 
 
@@ -25,5 +25,5 @@ def test_monotonic_clock_never_decreases():
     assert [clock() for _ in range(5)] == pytest.approx([0.0, 0.4, 1.5, 1.6, 4.6])
 
 
-def test_controller_with_wall_clock_fails_at_jumps():
-    assert by_own_clock(1000, 0.004) == 80  # 4 s, a jump every 0.05 s
+def test_wall_clock_baseline_errs_at_every_jump():
+    assert wall_clock_errors(1000, 0.004) == 80  # 4 s, a jump every 0.05 s

@@ -1,4 +1,4 @@
-"""Scenes drawn at random: those that validate fly, and fly alike twice."""
+"""Random scenes: valid scenes fly, and repeated flights are bit-for-bit identical."""
 
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st

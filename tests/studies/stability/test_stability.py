@@ -1,4 +1,4 @@
-"""The study of hard cases: cheap ones whole, and what is printed, written and returned."""
+"""Stability study: complete runs of cheap cases, printed and written results, exit codes."""
 
 import json
 import math
@@ -10,7 +10,7 @@ import pytest
 from lapwing.cli.study_commands import stability
 from lapwing.studies.stability import cases, console_output
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.case_runner import one, select
+from lapwing.studies.stability.case_runner import run_case, select
 
 pytestmark = pytest.mark.long
 
@@ -28,7 +28,7 @@ CHEAP = (
 
 @pytest.mark.parametrize("name", CHEAP)
 def test_case_passes_and_baseline_fails(name, monkeypatch):
-    result = one(name, False)
+    result = run_case(name, False)
     assert result.figures.rows
     for row in result.figures.rows:
         assert row.passes, (row.name, row.measured, row.bound)
@@ -47,22 +47,22 @@ def row(measured, baseline, bound=1.0):
 
 
 @pytest.fixture
-def made_up(monkeypatch):
-    """A case that gives what it is told to."""
+def fake_case(monkeypatch):
+    """Return a function that installs a case with the given rows."""
 
     def make(*rows):
         plot = Plot("x", "y", [Curve("a", np.arange(3.0), np.array([1.0, np.nan, 2.0]))], 1.5)
-        module = SimpleNamespace(HARD="hard", run=lambda: CaseResult(rows, plot), __name__="made_up")
+        module = SimpleNamespace(HARD="hard", run=lambda: CaseResult(rows, plot), __name__="fake")
         monkeypatch.setattr(cases, "get", lambda name: module)
-        monkeypatch.setattr(cases, "names", lambda: ["made_up"])
+        monkeypatch.setattr(cases, "names", lambda: ["fake"])
 
     return make
 
 
-def test_json_and_page(made_up, tmp_path, capsys):
-    made_up(row(0.5, 2.0), row(0.0, math.nan, 0.0))
-    stability("made_up", json=tmp_path / "s.json", report=tmp_path / "s.html")
-    values = {"name": "made_up.row", "bound": 1.0, "measured": 0.5, "verdict": "pass"}
+def test_json_and_page(fake_case, tmp_path, capsys):
+    fake_case(row(0.5, 2.0), row(0.0, math.nan, 0.0))
+    stability("fake", json=tmp_path / "s.json", report=tmp_path / "s.html")
+    values = {"name": "fake.row", "bound": 1.0, "measured": 0.5, "verdict": "pass"}
     assert json.loads((tmp_path / "s.json").read_text()) == {
         "cases": [
             {**values, "baseline_measured": 2.0, "baseline_verdict": "fail"},
@@ -72,25 +72,25 @@ def test_json_and_page(made_up, tmp_path, capsys):
     page = (tmp_path / "s.html").read_text()
     assert page.count('<figure class="plot">') == 1
     assert 'src="http' not in page
-    assert "made_up" in capsys.readouterr().out
+    assert "fake" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
-    "rows", [[row(2.0, 3.0)], [row(math.nan, 3.0)], [row(0.1, 0.2)]], ids=["over", "nan", "no teeth"]
+    "rows", [[row(2.0, 3.0)], [row(math.nan, 3.0)], [row(0.1, 0.2)]], ids=["over", "nan", "baseline passes"]
 )
-def test_exit_code_1_where_case_falls_short(made_up, rows):
-    made_up(*rows)
+def test_exit_code_1_when_case_fails(fake_case, rows):
+    fake_case(*rows)
     with pytest.raises(SystemExit) as ended:
-        stability("made_up")
+        stability("fake")
     assert ended.value.code == 1
 
 
-def test_case_that_ends_in_error_falls_short(monkeypatch):
+def test_case_that_ends_in_error_fails(monkeypatch):
     def broken():
         raise ValueError("out of reach")
 
     monkeypatch.setattr(cases, "get", lambda name: SimpleNamespace(HARD="hard", run=broken))
-    result = one("broken", False)
+    result = run_case("broken", False)
     assert not result.is_conclusive
     assert "out of reach" in result.figures.rows[0].invariant
 
@@ -99,7 +99,7 @@ def test_case_that_ends_in_error_falls_short(monkeypatch):
     ("arguments", "message"),
     [
         ({"case": "loping"}, "unknown case 'loping'; did you mean looping?"),
-        ({"case": "exact_time", "sweep": True}, "the difficulty of exact_time is not walked"),
+        ({"case": "exact_time", "sweep": True}, "exact_time has no sweep"),
         ({"report": "page.txt"}, "expected a name that ends in .html"),
     ],
 )
@@ -118,11 +118,11 @@ def test_slow_cases_need_option():
     assert "lie_limits" not in select(None, False, True)
 
 
-def test_where_method_breaks():
+def test_first_difficulty_beyond_bound():
     x = np.array([1.0, 2.0, 3.0, 4.0])
-    curves = [Curve("soon", x, np.array([0.1, 5.0, 0.1, 9.0])), Curve("never", x, x * 0.0)]
-    assert Sweep("d", "e", 1.0, curves).breaks() == {"soon": 2.0, "never": None}
-    assert Sweep("d", "e", 1.0, curves, falling=True).breaks() == {"soon": 4.0, "never": None}
+    curves = [Curve("breaks", x, np.array([0.1, 5.0, 0.1, 9.0])), Curve("never", x, x * 0.0)]
+    assert Sweep("d", "e", 1.0, curves).breaks() == {"breaks": 2.0, "never": None}
+    assert Sweep("d", "e", 1.0, curves, falling=True).breaks() == {"breaks": 4.0, "never": None}
     assert Sweep("d", "e", 1.0, [Curve("nan", x, x * np.nan)]).breaks() == {"nan": 1.0}
 
 

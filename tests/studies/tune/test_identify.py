@@ -1,4 +1,4 @@
-"""The plant found again from flights whose plant is known, whatever excited it."""
+"""Identification of a known plant from flights with several excitations."""
 
 import re
 from pathlib import Path
@@ -19,12 +19,12 @@ UP = '[[trajectory.phase]]\nname = "up"\nz = { kind = "minimum_jerk", to = 3.0, 
 CLOSE = {"altitude": 0.05, "roll": 0.05, "pitch": 0.05, "yaw": 0.05, "spin_up_zero": 0.15, "lag": 0.1}
 
 
-def found(scene):
+def identify_scene(scene):
     return identify(fly(scene), build(load("tuned").plain(), known_airframe(scene)), hover(scene))
 
 
-def excited(kind, overrides=()):
-    """The excitation scene with another path: steps or a square wave (what a relay makes) of every axis."""
+def excitation_scene(kind, overrides=()):
+    """Return the scene `excitation` with steps or a square wave, as of a relay, on every axis."""
     text = (SCENES / "excitation.toml").read_text()
     head = text[: text.index("[[trajectory.phase]]")]
     phases = [UP]
@@ -39,12 +39,12 @@ def excited(kind, overrides=()):
 
 
 @pytest.mark.parametrize("kind", ["chirp", "step", "relay"])
-def test_gains_and_lag_are_found_again(kind):
-    scene = load_scene(SCENES / "excitation.toml") if kind == "chirp" else excited(kind)
-    true, it = hover(scene), found(scene)
+def test_identified_gains_and_lag_equal_linear_model(kind):
+    scene = load_scene(SCENES / "excitation.toml") if kind == "chirp" else excitation_scene(kind)
+    true, result = hover(scene), identify_scene(scene)
     for name, within in CLOSE.items():
-        assert getattr(it.model, name) == pytest.approx(getattr(true, name), rel=within), name
-    assert min(it.fit.values()) > 75.0
+        assert getattr(result.model, name) == pytest.approx(getattr(true, name), rel=within), name
+    assert min(result.fit.values()) > 75.0
 
 
 def test_heavier_vehicle_is_identified(tmp_path):
@@ -53,12 +53,12 @@ def test_heavier_vehicle_is_identified(tmp_path):
     heavy_file.write_text(re.sub(r"^total = .*$", "total = 12.0", airframe, count=1, flags=re.MULTILINE))
     light = load_scene(SCENES / "excitation.toml")
     heavy = load_scene(SCENES / "excitation.toml", [f"vehicle.airframe={heavy_file}"])
-    it = identify(fly(heavy), build(load("tuned").plain(), known_airframe(light)), hover(light))
-    assert it.model.altitude == pytest.approx(hover(heavy).altitude, rel=0.03)
-    assert it.model.altitude == pytest.approx(4.0 / 12.0, rel=0.03)
+    result = identify(fly(heavy), build(load("tuned").plain(), known_airframe(light)), hover(light))
+    assert result.model.altitude == pytest.approx(hover(heavy).altitude, rel=0.03)
+    assert result.model.altitude == pytest.approx(4.0 / 12.0, rel=0.03)
 
 
 def test_log_without_excitation_is_rejected():
     scene = load_scene(SCENES / "hover.toml")
-    with pytest.raises(ValueError, match=r"hover: roll was not moved .* fly the scene excitation"):
-        found(scene)
+    with pytest.raises(ValueError, match=r"hover: roll is not excited .* use a log of the scene excitation"):
+        identify_scene(scene)

@@ -23,62 +23,62 @@ HOVER = SCENES / "hover.toml"
 
 
 @pytest.fixture(scope="module")
-def found():
+def tuning():
     return tune(load_scene(HOVER), Bandwidths(), lambda _: None)
 
 
-def test_written_gains_can_be_read_and_flown(found, tmp_path):
+def test_gain_file_can_be_read_and_flown(tuning, tmp_path):
     path = tmp_path / "new.toml"
-    write(path, found.gains)
-    assert load(str(path)) == found.gains
+    write(path, tuning.gains)
+    assert load(str(path)) == tuning.gains
     flight = fly(load_scene(HOVER, [f"autopilot.gains={path}"]))
     assert flight.failure == ""
     height = flight.truth.position[:, 2]
     assert height.max() - height[0] == pytest.approx(1.0, abs=0.05)
 
 
-def test_refinement_keeps_margins_and_reduces_errors(found):
-    assert found.after.shortfalls == {}
-    assert rmse(found.refinement.after, "z") < 0.9 * rmse(found.refinement.before, "z")
-    moved, requested = found.refinement.bandwidths, Bandwidths()
-    assert moved.altitude != requested.altitude
-    assert moved.position == requested.position  # nothing of this flight goes along x or y
+def test_refinement_keeps_margins_and_reduces_errors(tuning):
+    assert tuning.after.shortfalls == {}
+    assert rmse(tuning.refinement.after, "z") < 0.9 * rmse(tuning.refinement.before, "z")
+    refined, requested = tuning.refinement.bandwidths, Bandwidths()
+    assert refined.altitude != requested.altitude
+    assert refined.position == requested.position  # the flight does not move along x or y
 
 
-def test_tuning_is_deterministic(found):
-    assert tune(load_scene(HOVER), Bandwidths(), lambda _: None).gains == found.gains
+def test_tuning_is_deterministic(tuning):
+    assert tune(load_scene(HOVER), Bandwidths(), lambda _: None).gains == tuning.gains
 
 
-def test_perturbed_vehicles_land(found):
-    assert len(found.corners) == 8
-    assert not [f["outcome_text"] for f in found.corners.values() if f["outcome"] != "landed"]
-    assert max(f["max_distance"] for f in found.corners.values()) < 0.3
-    assert len({f["max_distance"] for f in found.corners.values()}) == 8  # the corners are different vehicles
+def test_perturbed_vehicles_land(tuning):
+    assert len(tuning.corners) == 8
+    assert not [f["outcome_text"] for f in tuning.corners.values() if f["outcome"] != "landed"]
+    assert max(f["max_distance"] for f in tuning.corners.values()) < 0.3
+    assert len({f["max_distance"] for f in tuning.corners.values()}) == 8  # the corners are different vehicles
 
 
-def test_page_and_tables(found, tmp_path):
+def test_page_and_tables(tuning, tmp_path):
     path = tmp_path / "tune.html"
-    tuning_report.write(path, found)
+    tuning_report.write(path, tuning)
     page = page_text(path)
     assert page.count('<figure class="plot">') == 2
     assert "Open loops" in page
-    assert "rise time" in page  # what the numbers in the panels are
+    assert "rise time" in page  # legend of the numbers in the panels
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
     console = Console(record=True, width=120)
-    console_output.show(console, found)
+    console_output.show(console, tuning)
     rows = [line.split("│")[1:-1] for line in console.export_text().splitlines() if "x_plant_input" in line]
-    assert [row[1].strip() for row in rows] == [found.before.name, "new"]
-    for row, judged in zip(rows, (found.before, found.after), strict=True):
-        m = judged.margins["x_plant_input"]
+    assert [row[1].strip() for row in rows] == [tuning.before.name, "new"]
+    for row, review in zip(rows, (tuning.before, tuning.after), strict=True):
+        m = review.margins["x_plant_input"]
         expected = (m.crossover, np.degrees(m.phase), 20.0 * np.log10(m.gain), 20.0 * np.log10(m.reduction))
         assert [float(text) for text in row[2:]] == pytest.approx(expected, abs=0.051)  # a number in each cell
 
 
-def test_failing_gains_are_named_and_need_force(found, tmp_path, monkeypatch):
-    corner = next(iter(found.corners))
-    crash = found.corners[corner] | {"outcome": "crashed", "outcome_text": "Crashed at 3.00 s: turned over"}
-    failing = found._replace(corners=found.corners | {corner: crash})
-    assert (found.failures, failing.failures) == ([], [f"{corner}: Crashed at 3.00 s: turned over"])
+def test_failing_gains_are_reported_and_require_force(tuning, tmp_path, monkeypatch):
+    corner = next(iter(tuning.corners))
+    crash = tuning.corners[corner] | {"outcome": "crashed", "outcome_text": "Crashed at 3.00 s: turned over"}
+    failing = tuning._replace(corners=tuning.corners | {corner: crash})
+    assert (tuning.failures, failing.failures) == ([], [f"{corner}: Crashed at 3.00 s: turned over"])
     monkeypatch.setattr("lapwing.studies.tune.procedure.tune", lambda *_: failing)
     out = tmp_path / "new.toml"
     result = CliRunner().invoke(app, ["tune", str(HOVER), "--out", str(out)])
@@ -106,9 +106,9 @@ def test_check_warns_of_unstable_gains(tmp_path):
     assert unstable_loops(load_scene(HOVER)) == []
     result = CliRunner().invoke(app, ["check", str(HOVER), "--set", f"autopilot.gains={path}"])
     assert result.exit_code == 0
-    warned = [line for line in result.output.splitlines() if "warning" in line]
-    assert len(warned) == 1
-    assert "altitude: unstable, gain margin -17.5 dB: its gain is too high" in warned[0]
+    warnings = [line for line in result.output.splitlines() if "warning" in line]
+    assert len(warnings) == 1
+    assert "altitude: unstable, gain margin -17.5 dB: its gain is too high" in warnings[0]
 
 
 def test_shipped_scenes_have_stable_gains():

@@ -1,4 +1,4 @@
-"""python-control against the frequency responses and margins of our own."""
+"""Frequency responses and margins of python-control against Lapwing's."""
 
 import math
 from pathlib import Path
@@ -24,18 +24,18 @@ def airframe(request):
 
 
 @pytest.mark.parametrize("name", ["tuned", "paper"])
-def test_same_responses_margins_and_stability(name, airframe):
+def test_responses_margins_and_stability_are_equal(name, airframe):
     p = build(load(name).plain(), airframe)
-    own = open_loops(p, airframe, TICK, DELAY)
+    responses = open_loops(p, airframe, TICK, DELAY)
     for loop, system in systems(p, airframe, TICK, DELAY).items():
-        seen = FREQUENCIES < 200.0
-        response = system(1j * FREQUENCIES[seen])
-        assert np.allclose(response, own[loop][seen], rtol=1e-4), loop
+        in_range = FREQUENCIES < 200.0
+        response = system(1j * FREQUENCIES[in_range])
+        assert np.allclose(response, responses[loop][in_range], rtol=1e-4), loop
         up, phase, _, _ = control.margin(system)
-        m = margins(own[loop])
+        m = margins(responses[loop])
         assert math.radians(phase) == pytest.approx(m.phase, abs=5e-3), loop
         assert any(up == pytest.approx(g, rel=5e-3) for g in (m.gain, m.reduction)), loop
-        assert stable(own[loop]) == (close_loop(system).poles().real.max() < 0.0), loop
+        assert stable(responses[loop]) == (close_loop(system).poles().real.max() < 0.0), loop
 
 
 def test_step_of_first_order_loop_is_closed_form():

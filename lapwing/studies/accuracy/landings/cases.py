@@ -1,4 +1,4 @@
-"""Landings drawn at random, flown by the plant, and their errors against the reference."""
+"""Random landings, their flights by the plant, and their errors against the reference."""
 
 import math
 import time
@@ -26,14 +26,14 @@ from lapwing.studies.accuracy.landings.reference import LandingBody, LandingGrou
 from lapwing.studies.accuracy.solver_selection import IMPACT_SHARE
 
 AIRFRAME = Path(lapwing.scenes.__file__).parent / "vehicles/delivery_drone.toml"
-DURATION, INTERVAL = 0.6, 0.004  # [s] flown, and between the moments that are compared
+DURATION, INTERVAL = 0.6, 0.004  # [s] of a flight, and between the compared times
 ACCURACIES = tuple(10.0**-k for k in range(3, 10))
 GRAVITY = 9.80665
-CLEAR = 2e-3  # [m] the lowest point is above the ground at first
+CLEARANCE = 2e-3  # [m] initial height of the lowest point above the ground
 WAVE = 2.0 * math.pi / 0.7  # [1/m] of bumps
-MOST_STEPS = 64  # in an interval
+MAX_STEPS = 64  # in an interval
 NO_STEP = (math.inf, 0.0)
-HIGH = 50.0  # [m] above the ground, where no foot touches within the duration
+AIRBORNE_HEIGHT = 50.0  # [m] above the ground, without contact within the duration
 
 
 class Landing(NamedTuple):
@@ -46,29 +46,29 @@ class Landing(NamedTuple):
     tilt: tuple[float, float, float]  # [rad] rotation vector from upright over the slope
     heading: float  # [rad]
     spin: tuple[float, float, float]  # [rad/s] in the body
-    rotor_speed: float  # [rad/s], slowing down
+    rotor_speed: float  # [rad/s] initial, decaying
     start: float = 0.0  # [m] x of the centre of mass
-    step: tuple[float, float] = NO_STEP  # x of its wall and rise [m]
-    tips: bool = False  # True: the hull's points are the outermost ones of the propellers, not the rotor hubs
+    step: tuple[float, float] = NO_STEP  # [m] x of the wall; rise
+    tips: bool = False  # True: points of the hull at the propeller tips instead of the hubs
 
 
 def draw(seed: int) -> Landing:
-    """Draw a landing: speed 0-3 m/s, slip 0-2 m/s, tilt 0-30 degrees, slope 0-20 degrees, spin to 1 rad/s an axis.
+    """Return a random landing: speed 0-3 m/s, slip 0-2 m/s, tilt to 30 degrees, slope to 20 degrees, spin to 1 rad/s.
 
-    Every fourth is on bumps of 1 cm.
+    Every fourth landing is on bumps of 1 cm.
     """
     rng = np.random.default_rng([33, seed])
-    steep, along = math.tan(math.radians(rng.uniform(0.0, 20.0))), rng.uniform(0.0, 2.0 * math.pi)
-    slip, to = rng.uniform(0.0, 2.0), rng.uniform(0.0, 2.0 * math.pi)
-    tilt, about = math.radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * math.pi)
+    slope, slope_direction = math.tan(math.radians(rng.uniform(0.0, 20.0))), rng.uniform(0.0, 2.0 * math.pi)
+    slip, slip_direction = rng.uniform(0.0, 2.0), rng.uniform(0.0, 2.0 * math.pi)
+    tilt, tilt_direction = math.radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * math.pi)
     speed, heading = float(rng.uniform(0.0, 3.0)), float(rng.uniform(0.0, 2.0 * math.pi))
     roll, pitch, yaw = map(float, rng.uniform(-1.0, 1.0, 3))
     return Landing(
-        (steep * math.cos(along), steep * math.sin(along)),
+        (slope * math.cos(slope_direction), slope * math.sin(slope_direction)),
         0.01 if seed % 4 == 3 else 0.0,
         speed,
-        (slip * math.cos(to), slip * math.sin(to)),
-        (tilt * math.cos(about), tilt * math.sin(about), 0.0),
+        (slip * math.cos(slip_direction), slip * math.sin(slip_direction)),
+        (tilt * math.cos(tilt_direction), tilt * math.sin(tilt_direction), 0.0),
         heading,
         (roll, pitch, yaw),
         float(rng.uniform(0.0, 300.0)),
@@ -76,23 +76,23 @@ def draw(seed: int) -> Landing:
 
 
 def draw_step(seed: int) -> Landing:
-    """Draw a landing at a step of 5 to 20 cm, into its wall (even seeds) or over its edge and down (odd seeds)."""
-    rng, down = np.random.default_rng([34, seed]), seed % 2 == 1
-    case, at = draw(seed), 0.6
-    slip = (float(rng.uniform(0.5, 2.0)) * (-1.0 if down else 1.0), float(rng.uniform(-0.3, 0.3)))
-    start = at + float(rng.uniform(0.05, 0.3)) * (1.0 if down else -1.5)
+    """Return a random landing at a step of 5 to 20 cm, into its wall (even seeds) or over its edge (odd seeds)."""
+    rng, downwards = np.random.default_rng([34, seed]), seed % 2 == 1
+    case, wall = draw(seed), 0.6
+    slip = (float(rng.uniform(0.5, 2.0)) * (-1.0 if downwards else 1.0), float(rng.uniform(-0.3, 0.3)))
+    start = wall + float(rng.uniform(0.05, 0.3)) * (1.0 if downwards else -1.5)
     return case._replace(
-        slope=(0.0, 0.0), bump=0.0, slip=slip, start=start, step=(at, float(rng.uniform(0.05, 0.2))),
+        slope=(0.0, 0.0), bump=0.0, slip=slip, start=start, step=(wall, float(rng.uniform(0.05, 0.2))),
         speed=min(case.speed, 1.0), tilt=scale(0.4, case.tilt),
     )  # fmt: skip
 
 
 def draw_toppling(seed: int) -> Landing:
-    """Draw a landing on one foot or two that lean by 30 to 60 degrees, turning over onto the hull's points."""
+    """Return a random landing on one or two feet, tilted by 30 to 60 degrees, that turns over onto the hull."""
     rng = np.random.default_rng([35, seed])
-    tilt, about = math.radians(rng.uniform(30.0, 60.0)), float(rng.uniform(0.0, 2.0 * math.pi))
-    axis = (math.cos(about), math.sin(about), 0.0)
-    spin = float(rng.uniform(0.5, 3.0))  # [rad/s] further over
+    tilt, tilt_direction = math.radians(rng.uniform(30.0, 60.0)), float(rng.uniform(0.0, 2.0 * math.pi))
+    axis = (math.cos(tilt_direction), math.sin(tilt_direction), 0.0)
+    spin = float(rng.uniform(0.5, 3.0))  # [rad/s] in the direction of the tilt
     x, y, _ = (tilt * part for part in axis)
     return draw(seed)._replace(
         slope=(0.0, 0.0), bump=0.0, speed=float(rng.uniform(0.0, 0.5)), tilt=(x, y, 0.0),
@@ -102,11 +102,12 @@ def draw_toppling(seed: int) -> Landing:
 
 
 def draw_strike(seed: int) -> Landing:
-    """Draw a landing that leans by 40 to 75 degrees, so that a propeller's tip strikes the ground before the feet."""
+    """Return a random landing tilted by 40 to 75 degrees, in which a propeller tip strikes before the feet."""
     rng = np.random.default_rng([36, seed])
-    tilt, about = math.radians(rng.uniform(40.0, 75.0)), float(rng.uniform(0.0, 2.0 * math.pi))
+    tilt, tilt_direction = math.radians(rng.uniform(40.0, 75.0)), float(rng.uniform(0.0, 2.0 * math.pi))
     return draw(seed)._replace(
-        bump=0.0, speed=float(rng.uniform(0.5, 2.0)), tilt=(tilt * math.cos(about), tilt * math.sin(about), 0.0),
+        bump=0.0, speed=float(rng.uniform(0.5, 2.0)),
+        tilt=(tilt * math.cos(tilt_direction), tilt * math.sin(tilt_direction), 0.0),
         slip=(float(rng.uniform(-1.0, 1.0)), float(rng.uniform(-1.0, 1.0))), tips=True,
     )  # fmt: skip
 
@@ -114,7 +115,9 @@ def draw_strike(seed: int) -> Landing:
 DRAWS: dict[str, Callable[[int], Landing]] = {
     "random": draw, "steps": draw_step, "toppling": draw_toppling, "strikes": draw_strike,
 }  # fmt: skip
-FASTEST = Landing((0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0)  # after bounces
+FASTEST = Landing(
+    (0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0
+)  # fastest motion after bounces
 
 
 def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
@@ -130,10 +133,10 @@ def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
     matrix = of_state(Quaternion(*attitude)).reshape(3, 3)
     points = np.array(contact_of(p).feet) @ matrix.T
     edge, rise = case.step
-    under = (case.slope[0] * x + case.slope[1] * y + (rise if case.start + x > edge else 0.0) for x, y, _ in points)
-    clear = max(height - z for height, (_, _, z) in zip(under, points, strict=True)) + case.bump + CLEAR
+    ground = (case.slope[0] * x + case.slope[1] * y + (rise if case.start + x > edge else 0.0) for x, y, _ in points)
+    clearance = max(height - z for height, (_, _, z) in zip(ground, points, strict=True)) + case.bump + CLEARANCE
     state = multirotor.initial_state(
-        p, (case.start, 0.0, float(clear)), attitude, case.rotor_speed, (*case.slip, -case.speed), case.spin
+        p, (case.start, 0.0, float(clearance)), attitude, case.rotor_speed, (*case.slip, -case.speed), case.spin
     )
     return p, state
 
@@ -155,7 +158,7 @@ def contact_of(p: MultirotorParameters) -> GroundContact:
 
 
 def exact(case: Landing, tolerance: float = 3e-14) -> tuple[np.ndarray, int]:
-    """Return (states at the moments compared by the reference, shape (k, 22), number of its events)."""
+    """Return (states of the reference at `times`, shape (k, 22); number of its events)."""
     p, state = plant(case)
     e, layout = contact_of(p), p.layout
     rotor = next(x for x in p.effects if hasattr(x, "thrust_constant"))
@@ -174,22 +177,22 @@ def exact(case: Landing, tolerance: float = 3e-14) -> tuple[np.ndarray, int]:
 
 
 def times() -> np.ndarray:
-    """Return the moments [s] that are compared."""
+    """Return the compared times [s], shape (k,)."""
     return np.arange(round(DURATION / INTERVAL) + 1) * INTERVAL
 
 
 @cache
 def airborne_steps(accuracy: float, integrator: str) -> int:
-    """Return the steps in an interval whose error in the air is at most the share that `lapwing run` selects for.
+    """Return the number of steps per interval with an error in the air of at most the share used by `lapwing run`.
 
     Raises:
         ValueError: the integrator needs more than 64.
     """
     p, state = plant(FASTEST)
     x, y, z = state.motion.position_world
-    state = state._replace(motion=state.motion._replace(position_world=(x, y, z + HIGH)))
+    state = state._replace(motion=state.motion._replace(position_world=(x, y, z + AIRBORNE_HEIGHT)))
     n, coarse = 1, _rows(integrator, p, state, 1)
-    while n <= MOST_STEPS:
+    while n <= MAX_STEPS:
         fine = _rows(integrator, p, state, 2 * n)
         if errors(coarse, fine).max() <= IMPACT_SHARE * accuracy:
             return n
@@ -198,18 +201,18 @@ def airborne_steps(accuracy: float, integrator: str) -> int:
 
 
 def fly(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") -> tuple[np.ndarray, float]:
-    """Return (states of the plant at the same moments, wall time [s])."""
+    """Return (states of the plant at `times`, shape (k, 22); wall time [s])."""
     p, state = plant(case)
     n = airborne_steps(accuracy, integrator)  # compiles or loads, too
-    began = time.perf_counter()
+    started = time.perf_counter()
     rows = _rows(integrator, p._replace(tolerance=contact_tolerance(accuracy)), state, n)
-    return rows, time.perf_counter() - began
+    return rows, time.perf_counter() - started
 
 
 def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
-    """Return the largest difference of flights at the strictest accuracy whose starts differ by the last bit.
+    """Return the largest difference of flights at the strictest accuracy with initial states that differ by one bit.
 
-    A sample, not a bound: a landing multiplies a difference of its start by up to 3e5.
+    It is a sample, not a bound: a landing amplifies an initial difference by up to 3e5.
     """
     p, state = plant(case)
     p, n = p._replace(tolerance=contact_tolerance(ACCURACIES[-1])), airborne_steps(ACCURACIES[-1], integrator)
@@ -221,15 +224,15 @@ def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
 
 
 def _last_bits(v: Vec3) -> list[Vec3]:
-    """Return a vector, and it with one number each at its next double."""
-    moved = np.array([v] * 4)
+    """Return a vector, and three copies with one component replaced by the next double."""
+    rows = np.array([v] * 4)
     for k in range(3):
-        moved[k + 1, k] = np.nextafter(v[k], np.inf)
-    return [tuple(row) for row in moved.tolist()]
+        rows[k + 1, k] = np.nextafter(v[k], np.inf)
+    return [tuple(row) for row in rows.tolist()]
 
 
 def _rows(integrator: str, p: MultirotorParameters, state: MultirotorState, n: int) -> np.ndarray:
-    """Return the coordinates at the moments compared, from n steps in each interval."""
+    """Return the coordinates at `times`, from n steps per interval."""
     method, off = integrators.get(integrator).Method(), (0.0,) * len(p.layout.x_body)
     motions = [state.motion]
     for tick in range(len(times()) - 1):
@@ -239,5 +242,5 @@ def _rows(integrator: str, p: MultirotorParameters, state: MultirotorState, n: i
 
 
 def errors(states: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return the largest error at each moment, of all numbers of the state relative to 1 + their size."""
+    """Return the largest error of the state at each time, relative to 1 + size, shape (k,)."""
     return (np.abs(states - reference) / (1.0 + np.abs(reference))).max(axis=1)

@@ -1,4 +1,4 @@
-"""Asked against got over many random landings."""
+"""Errors of random landings relative to their accuracy."""
 
 import json
 import os
@@ -16,36 +16,36 @@ from lapwing.studies.workers import workers
 
 
 class LandingErrors(NamedTuple):
-    """One landing."""
+    """Errors of one landing at several accuracies."""
 
     seed: int
     events: int  # located by the reference
-    got: tuple[float, ...]  # largest error over all moments, for each of `cases.ACCURACIES`
-    worst: tuple[float, ...]  # [s] the moment of each
-    seconds: tuple[float, ...]  # wall time of each
-    round_off: float  # difference that the last bit of the start makes
+    error: tuple[float, ...]  # largest error over time, for each of `cases.ACCURACIES`
+    worst_time: tuple[float, ...]  # [s] time of each error
+    seconds: tuple[float, ...]  # [s] wall time of each flight
+    round_off: float  # difference by the last bit of the initial state
 
 
 def fly_and_compare(kind: str, seed: int) -> LandingErrors:
-    """Fly a landing at every accuracy and compare its whole state, at every moment, with the reference."""
+    """Fly a landing at every accuracy and compare the entire state with the reference at all times."""
     case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)
-    got, worst, times = [], [], []
+    error, worst_time, times = [], [], []
     for accuracy in cases.ACCURACIES:
         states, seconds = cases.fly(case, accuracy)
         errors = cases.errors(states, exact)
-        got.append(float(errors.max()))
-        worst.append(float(cases.times()[errors.argmax()]))
+        error.append(float(errors.max()))
+        worst_time.append(float(cases.times()[errors.argmax()]))
         times.append(seconds)
-    return LandingErrors(seed, events, tuple(got), tuple(worst), tuple(times), cases.round_off(case))
+    return LandingErrors(seed, events, tuple(error), tuple(worst_time), tuple(times), cases.round_off(case))
 
 
 def measure(seeds: Iterable[int], processes: int | None = None, kind: str = "random") -> Iterator[LandingErrors]:
     """Yield measured landings of a kind in `cases.DRAWS` in the order of their seeds; by default on all processors."""
-    waiting = list(seeds)
-    if waiting:
-        with workers(max(1, min(len(waiting), processes or os.cpu_count() or 1))) as pool:
-            yield from pool.map(partial(fly_and_compare, kind), waiting)
+    remaining = list(seeds)
+    if remaining:
+        with workers(max(1, min(len(remaining), processes or os.cpu_count() or 1))) as pool:
+            yield from pool.map(partial(fly_and_compare, kind), remaining)
 
 
 def read(path: Path) -> dict[int, LandingErrors]:
@@ -62,5 +62,5 @@ def write(path: Path, landings: Iterable[LandingErrors]) -> None:
 
 
 def ratios(landings: Iterable[LandingErrors]) -> np.ndarray:
-    """Return error got over error asked, shape (landings, accuracies)."""
-    return np.array([landing.got for landing in landings]) / np.array(cases.ACCURACIES)
+    """Return errors over accuracies, shape (landings, accuracies)."""
+    return np.array([landing.error for landing in landings]) / np.array(cases.ACCURACIES)

@@ -1,9 +1,9 @@
 """Event-located reference of a landing: smooth pieces by SciPy's DOP853, transitions of each foot by root finding.
 
-Written apart from `lapwing.dynamics`: attitudes are matrices, and the law of a foot is spelled out by cases, which
-change only at located events: touch-down and lift-off, full onset of the normal force, the end of its pull, sticking
-and sliding, the slip at which the dynamic coefficient is reached (theory.md, section 2.8), and on ground with a step
-the nearest face: its top, its wall, or the ground before it (section 2.9).
+Independent of `lapwing.dynamics`: attitudes are matrices, and the law of a foot is written by cases, which change only
+at located events: touchdown and lift-off, full onset of the normal force, change of its sign, sticking and sliding, the
+slip at which the dynamic coefficient is reached (theory.md, section 2.8), and on ground with a step the nearest face:
+its top, its wall, or the ground before it (section 2.9).
 """
 
 import math
@@ -15,24 +15,24 @@ from scipy.optimize import brentq
 
 from lapwing.kernels import kernel
 
-TOLERANCE = 1e-12  # relative to 1 + size, of a step
-LONGEST = 1e-3  # [s] of a step, so that no foot touches and leaves within one
-GRAZING = 2e-3  # [m] of the ground or a wall, within which a step is searched for a touch
+TOLERANCE = 1e-12  # of a step, relative to 1 + size
+LONGEST = 1e-3  # [s] limit of a step, so that no foot touches and leaves within one
+GRAZING = 2e-3  # [m] from the ground or a wall, within which a step is searched for contacts
 FULL, SLOW = 1, 4  # other rows of the cases: 0 in the ground, 2 pressing, 3 sliding
 BEYOND, TOP, FLOOR = 5, 6, 7  # of a step: behind its wall, nearer to its top than to its wall, nearest to the ground
 
 
 class LandingBody(NamedTuple):
-    """A rigid body with points that touch the ground, and rotors that slow down."""
+    """Rigid body with contact points, and rotors with decaying speeds."""
 
     mass: float  # [kg]
     inertia: np.ndarray  # [kg m^2] principal, shape (3,)
     points: np.ndarray  # [m] in the body, shape (n, 3)
     rotors: np.ndarray  # [m] in the body, shape (m, 3)
     signs: np.ndarray  # of the torque on the body, shape (m,)
-    thrust: float  # [N s^2] over the square of a rotor's speed
-    torque: float  # [N m s^2] over the same
-    lag: float  # [1/s] of the rotors
+    thrust: float  # [N s^2] over the squared rotor speed
+    torque: float  # [N m s^2] over the squared rotor speed
+    lag: float  # [1/s] decay rate of the rotors
     gravity: float  # [m/s^2]
 
 
@@ -57,22 +57,22 @@ class LandingGround(NamedTuple):
 @kernel
 def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> Any:
     """Return (arm, normal, slip, depth [m], approach [m/s], slip [m/s], shear, shear [N]) of a point, world."""
-    arm, spun = np.zeros(3), np.zeros(3)
+    arm, rotation_velocity = np.zeros(3), np.zeros(3)
     b = body.points[i]
     o = y[15:18]
-    turned = (o[1] * b[2] - o[2] * b[1], o[2] * b[0] - o[0] * b[2], o[0] * b[1] - o[1] * b[0])
+    rotation = (o[1] * b[2] - o[2] * b[1], o[2] * b[0] - o[0] * b[2], o[0] * b[1] - o[1] * b[0])
     for row in range(3):
         for k in range(3):
             arm[row] += y[3 + 3 * row + k] * b[k]
-            spun[row] += y[3 + 3 * row + k] * turned[k]
+            rotation_velocity[row] += y[3 + 3 * row + k] * rotation[k]
     u, v = ground.wave * (y[0] + arm[0]), ground.wave * (y[1] + arm[1])
     height = ground.slope[0] * (y[0] + arm[0]) + ground.slope[1] * (y[1] + arm[1])
     height += ground.bump * math.sin(u) * math.sin(v)
-    steep = ground.bump * ground.wave
+    gradient = ground.bump * ground.wave
     normal = np.array(
         [
-            -ground.slope[0] - steep * math.cos(u) * math.sin(v),
-            -ground.slope[1] - steep * math.sin(u) * math.cos(v),
+            -ground.slope[0] - gradient * math.cos(u) * math.sin(v),
+            -ground.slope[1] - gradient * math.sin(u) * math.cos(v),
             1.0,
         ]
     )
@@ -82,7 +82,7 @@ def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> A
         normal, depth = np.array([0.0, 0.0, 1.0]), ground.rise - y[2] - arm[2]
     elif cases[BEYOND, i] and not cases[FLOOR, i]:
         normal, depth = np.array([-1.0, 0.0, 0.0]), y[0] + arm[0] - ground.edge
-    velocity = y[12:15] + spun
+    velocity = y[12:15] + rotation_velocity
     rising = (velocity * normal).sum()
     slip = velocity - rising * normal
     deflection = y[len(y) - 3 * (len(body.points) - i) :][:3]
@@ -99,9 +99,9 @@ def _limit(ground: Any, cases: np.ndarray, i: int, depth: float, approach: float
         return 0.0, 0.0
     xi, slow = depth / ground.width, speed / ground.slow
     onset = 1.0 if cases[FULL, i] else xi * xi * (3.0 - 2.0 * xi)
-    press = onset * (ground.stiffness * depth + ground.damping * approach)
-    fall = slow * slow * (3.0 - 2.0 * slow) if cases[SLOW, i] else 1.0
-    return press, (ground.static + (ground.dynamic - ground.static) * fall) * press
+    normal_force = onset * (ground.stiffness * depth + ground.damping * approach)
+    decay = slow * slow * (3.0 - 2.0 * slow) if cases[SLOW, i] else 1.0
+    return normal_force, (ground.static + (ground.dynamic - ground.static) * decay) * normal_force
 
 
 @kernel
@@ -110,7 +110,7 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
     n, m = len(body.points), len(body.rotors)
     result = np.zeros_like(y)
     R, o = y[3:12].copy().reshape(3, 3), y[15:18]
-    force, world = np.array([0.0, 0.0, -body.mass * body.gravity]), np.zeros(3)
+    force, torque_world = np.array([0.0, 0.0, -body.mass * body.gravity]), np.zeros(3)
     torque = np.zeros(3)
     for k in range(m):
         square = y[18 + k] * y[18 + k]
@@ -124,12 +124,12 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
         stretch = -ground.shear_stiffness / ground.shear_damping * y[at : at + 3]
         if cases[0, i] and cases[2, i]:
             arm, normal, depth, approach, speed, shear, size = _foot(body, ground, cases, y, i)
-            press, limit = _limit(ground, cases, i, depth, approach, speed)
-            held = shear * (limit / max(size, 1e-300)) if cases[3, i] else shear
-            stretch = stretch + held / ground.shear_damping
-            push = press * normal - held
+            normal_force, limit = _limit(ground, cases, i, depth, approach, speed)
+            current = shear * (limit / max(size, 1e-300)) if cases[3, i] else shear
+            stretch = stretch + current / ground.shear_damping
+            push = normal_force * normal - current
             force += push
-            world += np.array(
+            torque_world += np.array(
                 [
                     arm[1] * push[2] - arm[2] * push[1],
                     arm[2] * push[0] - arm[0] * push[2],
@@ -138,7 +138,7 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
             )
         result[at : at + 3] = stretch
     for k in range(3):
-        torque[k] += (R[:, k] * world).sum()
+        torque[k] += (R[:, k] * torque_world).sum()
     h = body.inertia * o
     result[:3] = y[12:15]
     for row in range(3):
@@ -154,7 +154,7 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
 
 @kernel
 def margins(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return what is positive where a case holds, shape (8, n); it changes its sign at an event."""
+    """Return functions that are positive if a case holds, shape (8, n); their signs change at events."""
     result = np.empty((8, len(body.points)))
     for i in range(len(body.points)):
         arm, _, depth, approach, speed, _, size = _foot(body, ground, cases, y, i)
@@ -170,7 +170,7 @@ def margins(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndar
 def cases_at(body: LandingBody, ground: LandingGround, y: np.ndarray) -> np.ndarray:
     """Return the cases of a state."""
     cases = np.zeros((8, len(body.points)), dtype=bool)
-    for _ in range(3):  # the depth depends on the face, the limit of the friction on the others
+    for _ in range(3):  # the depth depends on the face, the friction limit on other cases
         cases = margins(body, ground, cases, y) > 0.0
     return cases
 
@@ -178,7 +178,7 @@ def cases_at(body: LandingBody, ground: LandingGround, y: np.ndarray) -> np.ndar
 def landing(
     body: LandingBody, ground: LandingGround, start: np.ndarray, times: np.ndarray, tolerance: float = TOLERANCE
 ) -> tuple[np.ndarray, int]:
-    """Return (states at `times`, the first of which is that of `start`; number of events).
+    """Return (states at `times`, of which the first is `start`; number of events).
 
     Raises:
         ValueError: the integration fails.
@@ -189,32 +189,34 @@ def landing(
     cases = cases_at(body, ground, y)
     step = None
     while row < len(times):
-        held = cases
+        current = cases
         solver = DOP853(
-            lambda _, x, held=held: rate(body, ground, held, x), t, y, float(times[-1]),
+            lambda _, x, current=current: rate(body, ground, current, x), t, y, float(times[-1]),
             rtol=tolerance, atol=tolerance, max_step=LONGEST, first_step=step and min(step, float(times[-1]) - t),
         )  # fmt: skip
         crossed = None
         while crossed is None and row < len(times):
             if message := solver.step():
                 raise ValueError(f"reference: {message}")
-            crossed = _first_crossing(body, ground, held, solver)
-            until = crossed[0] if crossed else solver.t
-            while row < len(times) and times[row] <= until:
-                out[row] = _at(body, ground, held, solver, float(times[row]), tolerance)
+            crossed = _first_crossing(body, ground, current, solver)
+            limit = crossed[0] if crossed else solver.t
+            while row < len(times) and times[row] <= limit:
+                out[row] = _at(body, ground, current, solver, float(times[row]), tolerance)
                 row += 1
         if crossed:
             step = max(1e-9, 0.2 * (solver.t - solver.t_old))
-            (t, flipped), y = crossed, _at(body, ground, held, solver, crossed[0], tolerance)
-            cases = held ^ flipped
-            turned = flipped[BEYOND:].any(axis=0)  # another face: what counts there begins anew
+            (t, changed), y = crossed, _at(body, ground, current, solver, crossed[0], tolerance)
+            cases = current ^ changed
+            rotation = changed[BEYOND:].any(axis=0)  # at another face the cases are determined again
             for _ in range(2):
-                cases[:BEYOND, turned] = (margins(body, ground, cases, y) > 0.0)[:BEYOND, turned]
-            fresh = cases[0] & (flipped[0] | flipped[2])  # what did not count there before
+                cases[:BEYOND, rotation] = (margins(body, ground, cases, y) > 0.0)[:BEYOND, rotation]
+            new_contact = cases[0] & (changed[0] | changed[2])  # new contacts
             now = margins(body, ground, cases, y) > 0.0
-            now[3] |= fresh  # a point slides until it is pressed
-            now[2] |= flipped[0]
-            cases[1:BEYOND, fresh] = np.where(flipped[1:, fresh], cases[1:, fresh], now[1:, fresh])[: BEYOND - 1]
+            now[3] |= new_contact  # a point slides until it carries load
+            now[2] |= changed[0]
+            cases[1:BEYOND, new_contact] = np.where(
+                changed[1:, new_contact], cases[1:, new_contact], now[1:, new_contact]
+            )[: BEYOND - 1]
             events += 1
     return out, events
 
@@ -260,10 +262,10 @@ def _first_crossing(
             dense = dense or solver.dense_output()
             roots = [(_root(wrong, dense, before, point, k), k) for k in zip(*np.nonzero(values > 0.0), strict=True)]
             t = min(roots)[0]
-            flipped = np.zeros_like(cases)
+            changed = np.zeros_like(cases)
             for root, k in roots:
-                flipped[k] = root == t
-            return t, flipped
+                changed[k] = root == t
+            return t, changed
         before = point
     return None
 

@@ -1,6 +1,6 @@
-"""The systems of the accuracy study: one file each, found by scanning this folder.
+"""Systems of the accuracy study: one file for each, discovered in this folder.
 
-A file has `problems()`, which returns its problems by their names in `lapwing accuracy`.
+A file defines `problems()`, which returns its problems by their names in `lapwing accuracy`.
 """
 
 from functools import cache

@@ -1,4 +1,4 @@
-"""Two quadrotors and the load between them: swinging under steady thrusts, and falling with the rotors off."""
+"""Two quadrotors with a shared load: swinging under steady thrusts, and falling with the rotors off."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.lie.ts2 import Swing, normalise
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
 from lapwing.studies.accuracy.coordinates import of_state
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import TOLERANCE, attitude_rate, dop853
 
@@ -40,7 +40,7 @@ def _problem(title: str, p: CooperativeLoadParameters, invariants: dict) -> Prob
         f"two quadrotors with a load: {title}",
         "s",
         DURATION,
-        ways(p, START, DURATION, 16),
+        solver_methods(p, START, DURATION, 16),
         lambda: free_motion(p, START, DURATION),
         f"SciPy DOP853 at {TOLERANCE:g} on three particles held together by Lagrange multipliers",
         invariants,
@@ -48,10 +48,10 @@ def _problem(title: str, p: CooperativeLoadParameters, invariants: dict) -> Prob
 
 
 def free_motion(p: CooperativeLoadParameters, x: CooperativeLoadState, duration: float) -> np.ndarray:
-    """Return the final coordinates of free particles under constraint forces, without spheres in their equations."""
+    """Return the final coordinates of free particles under constraint forces, without coordinates on spheres."""
     y, n = of_state(x), len(x.link)
     length = np.array(p.link_length)[:, None]
-    # of the state's coordinates: load 0:6, attitudes, angular velocities, then q and omega of each link
+    # coordinates of the state: load 0:6, attitudes, angular velocities, then q and omega of each link
     at = 6 + 12 * n
     q, omega = y[at:].reshape(n, 6)[:, :3], y[at:].reshape(n, 6)[:, 3:]
     places = np.vstack([y[:3], y[:3] - length * q])

@@ -1,8 +1,8 @@
-"""The delivery drone tumbling with its propellers at a steady speed: one rigid body, and five in every description.
+"""Tumbling delivery drone with propellers at constant speed: one rigid body, and five in every description.
 
-The ways are models and stabilisations, all by RK4 at the same steps, as `vehicle.model` flies them. What is left of the
-error of a reduced model at small steps is what it leaves out: "mean" has the propellers' inertia averaged over a turn,
-the other the frame's alone, as the paper has it.
+The methods are models and stabilisations as in `vehicle.model`, all under RK4 with the same steps. At small steps the
+error of a reduced model is its model error: "mean" uses the propellers' inertia averaged over a turn, the other one
+only the inertia of the frame, as in the paper.
 """
 
 from collections.abc import Callable
@@ -34,45 +34,47 @@ from lapwing.studies.accuracy.reference import TOLERANCE, attitude_rate
 
 AIRFRAME = Path(__file__).parents[3] / "scenes/vehicles/delivery_drone.toml"
 DURATION, SAMPLES, COARSEST, HALVINGS = 2.0, 8, 64, 10
-SPEED = 100.0  # [rad/s] of the propellers: slow, so that their uneven inertia shows most
+SPEED = 100.0  # [rad/s] of the propellers, slow to show the influence of their unequal moments
 ATTITUDE, OMEGA = exp((0.2, -0.4, 0.1)), (1.0, -0.7, 0.4)
 METHOD = integrators.get("rk4_renormalised")
-STILL = (0.0, 0.0, 0.0)
+ZERO = (0.0, 0.0, 0.0)
 
 
 @kernel
-def _of_one(p: Any, x: Any) -> float:
+def _violation_of_one(p: Any, x: Any) -> float:
     q = x.attitude
     return abs(q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z - 1.0)
 
 
 @kernel
-def _of_five(p: Any, x: Any) -> float:
+def _violation_of_five(p: Any, x: Any) -> float:
     drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
     return five_body_stabilisation.constraint_violation(without_loads(drive, motion_of(p.layout, x)), x)[0]
 
 
 @kernel
-def _of_euler(p: Any, x: Any) -> float:
-    return _of_five(p, multirotor_euler.five(x))
+def _violation_of_euler(p: Any, x: Any) -> float:
+    return _violation_of_five(p, multirotor_euler.five(x))
 
 
 @generic()
-def gap(p: types.Type, x: types.Type) -> Any:
+def constraint_violation(p: types.Type, x: types.Type) -> Any:
     """Return the violation of the constraints [m, -]."""
-    return {Motion: _of_one, FiveBodies: _of_five, FiveEulerBodies: _of_euler}[x.instance_class]
+    return {Motion: _violation_of_one, FiveBodies: _violation_of_five, FiveEulerBodies: _violation_of_euler}[
+        x.instance_class
+    ]
 
 
 @kernel
 def flight(method: Any, p: Any, state: Any, volts: tuple[float, ...], h: float, n: int, out: np.ndarray) -> float:
-    """Fly intervals of n steps of h [s]; a row of `out` for each, and how far the end is off its constraints."""
+    """Fly intervals of n steps of h [s], stored in rows of `out`. Return the final violation of the constraints."""
     for row in range(out.shape[0]):
         if row > 0:
             state = advance(method, p, (0, 0), row - 1, state, volts, h, n)
         numbers = flatten(motion_of(p.layout, state.motion))
         for i in range(len(numbers)):
             out[row, i] = numbers[i]
-    return gap(p, state.motion)
+    return constraint_violation(p, state.motion)
 
 
 def problems() -> dict[str, Problem]:
@@ -81,40 +83,41 @@ def problems() -> dict[str, Problem]:
     gyro = effects.from_scene({"gyroscopic_torque": {}}, frame)
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     plain = multirotor.parameters(frame, gyro)
-    start = multirotor.initial_state(plain, STILL, ATTITUDE, SPEED)
+    start = multirotor.initial_state(plain, ZERO, ATTITUDE, SPEED)
     start = start._replace(motion=start.motion._replace(omega_body=OMEGA))
     mean = plain._replace(body=body_of(frame.mass.total, tuple(np.diag(inertia(frame, None)).tolist())))
-    ways = [_way("reduced, frame only", plain, start, volts), _way("reduced, mean", mean, start, volts)]
+    methods = [
+        _solver_method("reduced, frame only", plain, start, volts),
+        _solver_method("reduced, mean", mean, start, volts),
+    ]
     for name, form in (("SE(3)", multirotor_multibody), ("Euler", multirotor_euler)):
         for stabilisation in multirotor_multibody.STABILISATIONS:
             p = form.parameters(frame, (), "speed", stabilisation)
             x = initial_bodies(p, frame)
             state = MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
-            ways.append(_way(f"{name}, {stabilisation}", p, state, volts))
+            methods.append(_solver_method(f"{name}, {stabilisation}", p, state, volts))
     problem = Problem(
         "delivery drone of one and of five bodies, tumbling",
         "s",
         DURATION,
-        ways,
+        methods,
         lambda: reference(frame),
-        f"SciPy DOP853 at {TOLERANCE:g} on the kept angular momentum of five bodies, written apart",
+        f"SciPy DOP853 at {TOLERANCE:g} on the conserved angular momentum of five bodies, independent equations",
         {},
     )
     return {"delivery_drone": problem}
 
 
 def initial_bodies(p: Any, frame: Any) -> FiveBodies:
-    """Return the initial state of the five bodies, blades along x."""
+    """Return the initial state of the five bodies, with blades along x."""
     speeds = tuple(-sign * SPEED for sign in frame.rotors.reaction_sign)
-    machine = five_bodies_machine(p.layout.bodies.drone, STILL, speeds=speeds)
-    return five_body_stabilisation.assembled_state(
-        machine, BodyState(STILL, ATTITUDE, STILL, OMEGA), (0.0,) * 4, speeds
-    )
+    machine = five_bodies_machine(p.layout.bodies.drone, ZERO, speeds=speeds)
+    return five_body_stabilisation.assembled_state(machine, BodyState(ZERO, ATTITUDE, ZERO, OMEGA), (0.0,) * 4, speeds)
 
 
-def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
-    def flight_of(steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
-        motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
+def _solver_method(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
+    def prepare(steps: int, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+        motion = Motion(ZERO, NO_ROTATION, ZERO, ZERO, (0.0,) * 4)
         out = np.empty((rows, len(flatten(motion))))
         each = max(1, steps // SAMPLES)
         return lambda: (flight(METHOD.Method(), p, state, volts, DURATION / steps, each, out), out)
@@ -124,12 +127,12 @@ def _way(name: str, p: Any, state: Any, volts: tuple) -> SolverMethod:
         if not np.isfinite(out).all():
             return None
         times = np.linspace(0.0, DURATION, SAMPLES + 1)
-        motion = Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)
+        motion = Motion(ZERO, NO_ROTATION, ZERO, ZERO, (0.0,) * 4)
         return SolverRun(times, coordinates(motion, out)[:, :18], defect, round(DURATION / step) * METHOD.EVALUATIONS)
 
     settings = [DURATION / (COARSEST * 2**k) for k in range(HALVINGS)]
     return SolverMethod(
-        name, METHOD.ORDER, "s", settings, lambda h: flight_of(round(DURATION / h)), read, flight_of(1, rows=1)
+        name, METHOD.ORDER, "s", settings, lambda h: prepare(round(DURATION / h)), read, prepare(1, rows=1)
     )
 
 
@@ -165,5 +168,5 @@ def reference(frame: Any) -> np.ndarray:
         rtol=TOLERANCE, atol=0.1 * TOLERANCE,
     )  # fmt: skip
     end = result.y[:, -1]
-    # the hubs surround the centre of mass: it stays where it is
-    return np.concatenate([STILL, end, STILL, omega(DURATION, end)])
+    # symmetric hubs: the centre of mass does not move
+    return np.concatenate([ZERO, end, ZERO, omega(DURATION, end)])

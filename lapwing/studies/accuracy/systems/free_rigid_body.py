@@ -1,4 +1,4 @@
-"""The free rigid body, whose motion is known: Jacobi's elliptic functions, and a quadrature for the last angle."""
+"""Free rigid body in closed form: Jacobi's elliptic functions, and a quadrature for the last angle."""
 
 import numpy as np
 from scipy.integrate import quad_vec
@@ -7,7 +7,7 @@ from scipy.special import ellipj, ellipkinc
 from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
 from lapwing.studies.accuracy.coordinates import matrices
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import to_world
 
@@ -17,12 +17,12 @@ DURATION = 60.0  # [s]
 
 
 def problems() -> dict[str, Problem]:
-    """Return the problem of this file: a body of three different moments of inertia, tumbling."""
+    """Return the problem of this file: a tumbling body with three different moments of inertia."""
     problem = Problem(
         "free rigid body, three different moments of inertia",
         "s",
         DURATION,
-        ways(FreeBodyParameters(INERTIA), START, DURATION, 64),
+        solver_methods(FreeBodyParameters(INERTIA), START, DURATION, 64),
         lambda: closed_form(INERTIA, START, DURATION),
         "closed form: Jacobi elliptic functions, the last angle by quadrature",
         {"energy": energy, "momentum": momentum},
@@ -43,7 +43,7 @@ def momentum(t: np.ndarray, y: np.ndarray) -> np.ndarray:
 def closed_form(inertia: tuple[float, float, float], start: RigidBody, t: float) -> np.ndarray:
     """Return the coordinates at time t (theory.md, eqs. (7.2) to (7.5) and (7.5a)).
 
-    For rotation about the axis of the largest moment, omega_1 and omega_3 positive at the start.
+    It holds for rotation about the axis of the largest moment, with omega_1 and omega_3 positive at the start.
     """
     A, B, C = inertia
     o = np.array(start.omega_body)

@@ -1,4 +1,4 @@
-"""The gyrostat satellite in its four cases, and one more with rotors that spin evenly, as free rotors do."""
+"""Gyrostat satellite in four cases, with a variant for rotors at constant speed."""
 
 import numpy as np
 
@@ -6,11 +6,11 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.studies.accuracy.coordinates import of_state
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853, to_world
 
-DURATION = 60.0  # [min]: the numbers of Ge and Lin have minutes for seconds
+DURATION = 60.0  # [min], the unit of Ge and Lin's numbers
 START = RigidBody(NO_ROTATION, (0.1, 0.1, 0.1))  # [rad/min]
 NONE, ONE = (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)
 
@@ -53,7 +53,7 @@ def _problem(p: GyrostatParameters, title: str, invariants: dict) -> Problem:
         f"gyrostat satellite: {title}",
         "min",
         DURATION,
-        ways(p, START, DURATION, 32),
+        solver_methods(p, START, DURATION, 32),
         lambda: dop853(lambda t, y: right_hand_side(p, t, y), of_state(START), DURATION),
         DOP853,
         invariants,
@@ -61,7 +61,7 @@ def _problem(p: GyrostatParameters, title: str, invariants: dict) -> Problem:
 
 
 def right_hand_side(p: GyrostatParameters, t: float, y: np.ndarray) -> np.ndarray:
-    """Return Ge and Lin's scalar equations for (x, y, z), and R' = R hat(omega); y is R in row order and omega."""
+    """Return Ge and Lin's scalar equations for (x, y, z), and R' = R hat(omega); y is row-major R and omega."""
     a, b, c = p.inertia
     h1, h2, h3 = p.rotor_momentum
     u, v, w = y[9:]

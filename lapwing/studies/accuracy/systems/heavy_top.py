@@ -1,4 +1,4 @@
-"""The heavy top: a rigid body on a pivot, turned by its weight."""
+"""Heavy top: a rigid body on a pivot under its weight."""
 
 import math
 from typing import NamedTuple
@@ -11,20 +11,20 @@ from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.kernels import always_inline
 from lapwing.studies.accuracy.coordinates import of_state
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853, to_world
 
 MASS, GRAVITY = 1.0, 9.81  # [kg], [m/s^2]
 ARM = 0.2  # [m] from the pivot to the centre of mass, along body x
 CENTRAL_INERTIA = (0.01, 0.008, 0.009)  # [kg m^2] about the centre of mass
-INERTIA = (0.01, 0.048, 0.049)  # [kg m^2] about the pivot: MASS ARM^2 more across the arm
+INERTIA = (0.01, 0.048, 0.049)  # [kg m^2] about the pivot, MASS ARM^2 larger across the arm
 START = RigidBody(exp((0.0, math.radians(-30.0), 0.0)), (80.0, 0.5, 0.8))  # the arm 30 degrees above level
 DURATION = 5.0  # [s]
 
 
 class HeavyTopParameters(NamedTuple):
-    """A body whose weight pulls at one of its points."""
+    """Parameters of a rigid body on a pivot under its weight."""
 
     inertia: Vec3  # [kg m^2] about the pivot, principal moments
     arm_body: Vec3  # [m] from the pivot to the centre of mass
@@ -32,7 +32,7 @@ class HeavyTopParameters(NamedTuple):
 
     @property
     def torque_without_rate(self) -> bool:
-        """Return the torque of the weight at an attitude."""
+        """True: the torque does not depend on the angular velocity."""
         return True
 
 
@@ -54,7 +54,7 @@ def problems() -> dict[str, Problem]:
         "heavy top, spinning and nutating",
         "s",
         DURATION,
-        ways(p, START, DURATION, 128),
+        solver_methods(p, START, DURATION, 128),
         lambda: dop853(right_hand_side, of_state(START), DURATION),
         DOP853,
         {"energy": energy, "vertical momentum": vertical_momentum},
@@ -63,7 +63,7 @@ def problems() -> dict[str, Problem]:
 
 
 def right_hand_side(t: float, y: np.ndarray) -> np.ndarray:
-    """Return the momentum balance about the pivot in the world, for R in row order and omega in the body."""
+    """Return the momentum balance about the pivot in the world, for row-major R and omega in the body."""
     R, o = y[:9].reshape(3, 3), y[9:]
     torque_world = np.cross(ARM * R[:, 0], [0.0, 0.0, -MASS * GRAVITY])
     omega_rate = (R.T @ torque_world - np.cross(o, np.multiply(INERTIA, o))) / INERTIA

@@ -1,4 +1,4 @@
-"""The delivery drone touching down while it slides: level, ahead at 0.4 m/s, and leaning on a slope."""
+"""Sliding touchdowns of the delivery drone: level at 0.4 m/s forward, and tilted on a slope."""
 
 import math
 from collections.abc import Callable
@@ -17,8 +17,8 @@ from lapwing.studies.accuracy.landings.cases import Landing
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 
 METHODS = ("rk4_renormalised", "rkmk4", "rk8_renormalised")
-STEP = 1e-3  # [s], the longest
-EVENTS = "SciPy DOP853 at 1e-13, every transition of every foot a located event, equations written apart"
+STEP = 1e-3  # [s] longest step
+EVENTS = "SciPy DOP853 at 1e-13, located events of every foot, independent equations"
 TOUCH_DOWNS = {
     "landing_level": Landing((0.0, 0.0), 0.0, 0.1, (0.4, 0.0), (0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0), 0.0),
     "landing_slope": Landing(
@@ -32,7 +32,7 @@ TITLES = {
 
 
 def problems() -> dict[str, Problem]:
-    """Return the problems of this file: two touch-downs whose setting is `solver.accuracy`."""
+    """Return the problems of this file: two touchdowns with `solver.accuracy` as setting."""
     return {name: _problem(TITLES[name], case) for name, case in TOUCH_DOWNS.items()}
 
 
@@ -41,18 +41,18 @@ def _problem(title: str, case: Landing) -> Problem:
         title,
         "s",
         cases.DURATION,
-        [_way(name, case) for name in METHODS],
+        [_solver_method(name, case) for name in METHODS],
         lambda: cases.exact(case)[0][-1],
         EVENTS,
         {},
     )
 
 
-def _way(name: str, case: Landing) -> SolverMethod:
+def _solver_method(name: str, case: Landing) -> SolverMethod:
     method = integrators.get(name)
     ticks = round(cases.DURATION / cases.INTERVAL)
 
-    def flight_of(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
+    def prepare(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         p, start = cases.plant(case)
         p, off = p._replace(tolerance=contact_tolerance(accuracy)), (0.0,) * len(p.layout.x_body)
         steps = round(cases.INTERVAL / STEP)
@@ -73,4 +73,4 @@ def _way(name: str, case: Landing) -> SolverMethod:
         motion = cases.plant(case)[1].motion
         return SolverRun(times, coordinates(motion, rows), defect(motion, rows[-1]), None)
 
-    return SolverMethod(name, method.ORDER, "tol", cases.ACCURACIES, flight_of, read, flight_of(1.0, rows=1))
+    return SolverMethod(name, method.ORDER, "tol", cases.ACCURACIES, prepare, read, prepare(1.0, rows=1))

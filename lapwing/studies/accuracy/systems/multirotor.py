@@ -1,4 +1,4 @@
-"""The bare delivery drone, tumbling: gravity, thrust and the lag of its rotors, at steady uneven voltages."""
+"""Tumbling delivery drone with gravity, thrust and rotor lag, at constant unequal voltages."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, rate
 from lapwing.studies.accuracy.coordinates import of_state
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853
 
@@ -27,13 +27,13 @@ RATES[MultirotorDrive] = rate
 
 
 def problems() -> dict[str, Problem]:
-    """Return the problem of this file: the bare delivery drone, tumbling."""
+    """Return the problem of this file: the tumbling delivery drone without other effects."""
     drive = bare_drive()
     problem = Problem(
         "delivery drone, bare and tumbling",
         "s",
         DURATION,
-        ways(drive, START, DURATION, 16),
+        solver_methods(drive, START, DURATION, 16),
         lambda: dop853(lambda t, y: right_hand_side(drive, y), of_state(START), DURATION),
         DOP853,
         {},
@@ -49,7 +49,7 @@ def bare_drive() -> MultirotorDrive:
 
 
 def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
-    """Return Newton, Euler and a first-order lag for (position, R in row order, velocity, omega, rotor speeds)."""
+    """Return Newton, Euler and a first-order lag for (position, row-major R, velocity, omega, rotor speeds)."""
     layout, body = drive.parameters.layout, drive.parameters.body
     gravity, rotor = drive.parameters.effects
     R, o, speed = y[3:12].reshape(3, 3), y[15:18], y[18:22]

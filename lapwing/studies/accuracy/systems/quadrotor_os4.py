@@ -1,4 +1,4 @@
-"""The OS4 quadrotor: experiments 1 to 4, three seconds from rest at fixed rotor speeds."""
+"""OS4 quadrotor: experiments 1 to 4, three seconds from rest at constant rotor speeds."""
 
 import math
 
@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
 from lapwing.studies.accuracy.coordinates import of_state
-from lapwing.studies.accuracy.integrate import ways
+from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.reference import DOP853, attitude_rate, dop853
 
@@ -43,7 +43,7 @@ def _problem(number: int, rpm: tuple[int, ...]) -> Problem:
         f"OS4 quadrotor: experiment {number}",
         "s",
         DURATION,
-        ways(OS4, start, DURATION, 8),
+        solver_methods(OS4, start, DURATION, 8),
         lambda: dop853(lambda t, y: right_hand_side(OS4, y), of_state(start), DURATION),
         DOP853,
         {},
@@ -51,10 +51,10 @@ def _problem(number: int, rpm: tuple[int, ...]) -> Problem:
 
 
 def right_hand_side(p: Os4Parameters, y: np.ndarray) -> np.ndarray:
-    """Return Newton and Euler for (position, R in row order, velocity, omega, rotor speeds), summed rotor by rotor."""
+    """Return Newton and Euler for (position, row-major R, velocity, omega, rotor speeds), summed rotor by rotor."""
     R, v, o, speed = y[3:12].reshape(3, 3), y[12:15], y[15:18], y[18:22]
     place = p.arm * np.array([[1.0, 0, 0], [0, 1.0, 0], [-1.0, 0, 0], [0, -1.0, 0]])
-    clockwise = np.array([1.0, -1.0, 1.0, -1.0])  # from above; drag turns the body the other way
+    clockwise = np.array([1.0, -1.0, 1.0, -1.0])  # seen from above; drag turns the body in the opposite direction
     thrust = p.lift_constant * speed**2
     torque = np.cross(place, np.outer(thrust, (0.0, 0.0, 1.0))).sum(axis=0)
     torque[2] += (clockwise * p.drag_constant * speed**2).sum()

@@ -1,7 +1,7 @@
-"""The cases: one file each, found by scanning this folder.
+"""Cases of the stability study: one file for each, discovered in this folder.
 
-A file has `HARD` (the difficulty), `run()` (returns the result) and `LONG = True` if it takes minutes.
-A case whose difficulty can be walked has `sweep()` as well.
+A file defines `HARD` (the difficulty) and `run()`, which returns the result, and `LONG = True` if it takes minutes.
+A case whose difficulty can be varied also defines `sweep()`.
 """
 
 from types import ModuleType
@@ -18,6 +18,6 @@ def get(name: str) -> ModuleType:
     """Return the module of a case.
 
     Raises:
-        ValueError: there is none; the message lists the choices.
+        ValueError: the case is unknown; the message lists the choices.
     """
     return discovery.get(__name__, name, "case")

@@ -1,4 +1,4 @@
-"""Case 13: NaN, infinity, subnormal and absurd numbers, in parameters, states and commands."""
+"""Case 13: NaN, infinity, subnormal and extreme numbers in parameters, states and commands."""
 
 import math
 from typing import Any
@@ -21,8 +21,8 @@ from lapwing.studies.stability.flights import finite, fly
 
 HARD = "NaN, infinity, 1e300 and 1e-300 where numbers are expected: rejected with time, place and value, never used"
 
-NOT = (math.nan, math.inf, -math.inf)
-ABSURD = (*NOT, 1e300, -1e300, 1e-300, 5e-324, 0.0)
+NON_FINITE = (math.nan, math.inf, -math.inf)
+ABSURD = (*NON_FINITE, 1e300, -1e300, 1e-300, 5e-324, 0.0)
 KEYS = (
     "airframe.mass.total", "airframe.motor.resistance", "airframe.motor.speed_constant", "airframe.propeller.diameter",
     "airframe.propeller.pitch", "airframe.rotors.inertia", "solver.step", "effects.ground_contact.stiffness",
@@ -31,10 +31,10 @@ SHORT = ("run.duration=0.2",)
 TICKS = 20
 
 
-class Steady:
-    """Stands for the autopilot: its commands are put by the case."""
+class CommandSource:
+    """Placeholder of the autopilot: the case sets its outputs."""
 
-    name = "case.given"
+    name = "case.commands"
 
     def __init__(self, *outputs: Port):
         self.outputs = outputs
@@ -47,22 +47,22 @@ class Steady:
         return NEVER
 
 
-def of_parameters(value: float, key: str) -> str:
-    """Return the reaction to an absurd parameter: "refused", "reported", "flown" or "silent"."""
+def reaction_to_parameter(value: float, key: str) -> str:
+    """Return the reaction to an extreme parameter: "rejected", "reported", "completed" or "silent"."""
     try:
         flight = fly("hover", [f"{key}={value!r}", *SHORT])
     except ValueError:
-        return "refused"
+        return "rejected"
     except ArithmeticError:
-        return "silent"  # names neither place nor value: a traceback that a user cannot act on
+        return "silent"  # a traceback without place and value
     if flight.failure:
         return "reported" if "t = " in flight.failure or "tick" in flight.failure else "silent"
-    return "flown" if finite(flight) else "silent"
+    return "completed" if finite(flight) else "silent"
 
 
-def of_states() -> dict[str, int]:
-    """Replace every number of states and parameters of three systems by NaN; return the reactions."""
-    result = {"refused": 0, "silent": 0}
+def reactions_to_states() -> dict[str, int]:
+    """Return the number of reactions by kind to one non-finite number in a state or in parameters of three systems."""
+    result = {"rejected": 0, "silent": 0}
     systems: list[tuple[Any, Any]] = [
         (FreeBodyParameters((1.0, 1.6, 2.1)), RigidBody((1.0, 0.0, 0.0, 0.0), (0.1, 0.2, 0.3))),  # type: ignore[arg-type]
         (gyrostat.SPINNING, gyrostat.START),
@@ -72,22 +72,22 @@ def of_states() -> dict[str, int]:
         for like, check in ((x, lambda tree, p=p: (p, tree)), (p, lambda tree, x=x: (tree, x))):
             numbers = flatten(like)
             for k in range(len(numbers)):
-                for value in NOT:
+                for value in NON_FINITE:
                     tree = unflatten(like, (*numbers[:k], value, *numbers[k + 1 :]))
                     try:
                         check_start(*check(tree))
                     except ValueError as error:
-                        result["refused" if str(value) in str(error) else "silent"] += 1
+                        result["rejected" if str(value) in str(error) else "silent"] += 1
                     else:
                         result["silent"] += 1
     return result
 
 
-def of_commands(value: float) -> tuple[str, float]:
-    """Return (reaction of a plant to such a voltage at its 10th tick, largest number in its output before)."""
+def reaction_to_voltage(value: float) -> tuple[str, float]:
+    """Return (reaction of a plant to a voltage at tick 10, largest absolute value in its output before)."""
     setup = resolve(load("hover", SHORT))
     outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
-    graph = BlockDiagram(setup, [create(setup, "plant"), Service("case", [Steady(*outputs)], [])], 2 * TICKS)
+    graph = BlockDiagram(setup, [create(setup, "plant"), Service("case", [CommandSource(*outputs)], [])], 2 * TICKS)
     like = setup.port(ports.ACTUATORS).like
     last = 0
     try:
@@ -101,11 +101,11 @@ def of_commands(value: float) -> tuple[str, float]:
         largest = np.abs(graph.row(ports.TRUTH, last)).max()
         return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(largest)
     largest = np.abs(graph.row(ports.TRUTH, last)).max()
-    return ("flown" if math.isfinite(largest) else "silent"), float(largest)
+    return ("completed" if math.isfinite(largest) else "silent"), float(largest)
 
 
 def baseline_step(mass: float, volts: float) -> float:
-    """Return the height after a second of a falling point under thrust, stepped with any value: the baseline."""
+    """Return the height after 1 s of a point mass under thrust, stepped without checks (baseline)."""
     with np.errstate(all="ignore"):
         m, v, z = np.float64(mass), np.float64(0.0), np.float64(0.0)
         for _ in range(10):
@@ -114,67 +114,69 @@ def baseline_step(mass: float, volts: float) -> float:
         return float(z)
 
 
-def _count(results: list[str], what: str) -> float:
-    return float(sum(f == what for f in results))
+def _count(results: list[str], reaction: str) -> float:
+    return float(sum(f == reaction for f in results))
 
 
-def _no_numbers(values: list[float]) -> float:
+def _count_non_finite(values: list[float]) -> float:
     return float(sum(not math.isfinite(v) for v in values))
 
 
 def run() -> CaseResult:
-    """Count the values that were passed on without an error."""
-    parameters = [of_parameters(value, key) for key in KEYS for value in ABSURD]
-    states = of_states()
-    commands = [of_commands(value) for value in ABSURD]
-    baseline = "stepped with whatever comes"
-    by_mass = _no_numbers([baseline_step(v, 33.0) for v in ABSURD])
-    by_number, by_voltage = (_no_numbers([baseline_step(10.0, v) for v in values]) for values in (NOT, ABSURD))
-    why = "none: a number that is none must not go on its way"
+    """Count the values that raise no error."""
+    parameters = [reaction_to_parameter(value, key) for key in KEYS for value in ABSURD]
+    states = reactions_to_states()
+    commands = [reaction_to_voltage(value) for value in ABSURD]
+    baseline = "steps without checks"
+    baseline_mass = _count_non_finite([baseline_step(v, 33.0) for v in ABSURD])
+    baseline_states, baseline_voltage = (
+        _count_non_finite([baseline_step(10.0, v) for v in values]) for values in (NON_FINITE, ABSURD)
+    )
+    why = "none: a non-finite number must not propagate"
     rows = [
         Row(
             "parameters",
             "checked when the scene is read, and at every tick",
-            f"of {len(parameters)} scenes, passed in silence",
+            f"scenes without an error, of {len(parameters)}",
             0.0,
             why,
             _count(parameters, "silent"),
             baseline,
-            by_mass,
+            baseline_mass,
         ),
         Row(
             "states",
             "`check_start`",
-            f"of {sum(states.values())} numbers of states and parameters, passed in silence",
+            f"numbers of states and parameters without an error, of {sum(states.values())}",
             0.0,
             why,
             float(states["silent"]),
             baseline,
-            by_number,
+            baseline_states,
         ),
         Row(
             "commands",
-            "the state is looked at every tick",
-            f"of {len(ABSURD)} voltages in flight, passed in silence",
+            "the state is checked at every tick",
+            f"voltages in flight without an error, of {len(ABSURD)}",
             0.0,
             why,
             _count([c for c, _ in commands], "silent"),
             baseline,
-            by_voltage,
+            baseline_voltage,
         ),
         Row(
             "state_before",
-            "the rows of the tick before",
-            "of those, after which the state before is no longer finite",
+            "samples of the previous tick",
+            "of those, with a non-finite previous state",
             0.0,
             why,
-            _no_numbers([largest for _, largest in commands]),
-            "one state, overwritten",
-            by_voltage,
+            _count_non_finite([largest for _, largest in commands]),
+            "a single state, overwritten",
+            baseline_voltage,
         ),
     ]
-    kinds = ("refused", "reported", "flown", "silent")
+    kinds = ("rejected", "reported", "completed", "silent")
     x = np.arange(len(kinds), dtype=float)
     every = [("parameters", parameters), ("commands", [c for c, _ in commands])]
     curves = [Curve(name, x, np.array([_count(result, k) for k in kinds])) for name, result in every]
-    return CaseResult(rows, Plot("0 refused, 1 reported, 2 flown, 3 silent", "how many", curves, log_y=False))
+    return CaseResult(rows, Plot("0 rejected, 1 reported, 2 completed, 3 silent", "number", curves, log_y=False))

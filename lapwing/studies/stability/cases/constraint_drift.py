@@ -1,4 +1,4 @@
-"""Case 7: hinges over an hour of flight, with each stabilisation and with none."""
+"""Case 7: hinges over an hour of flight, with each stabilisation and without."""
 
 from typing import Any
 
@@ -18,46 +18,46 @@ from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState
 from lapwing.kernels.state_tree import flatten
-from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, STILL, flight
+from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, ZERO, flight
 from lapwing.studies.accuracy.systems.delivery_drone import initial_bodies as drone_bodies
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.drone import PAPER, delivery_drone, spinning_state
 
-HARD = "an hour of five bodies held together by 20 constraints: the index-1 equations hold only their second derivative"
+HARD = "an hour of five bodies with 20 constraints: the index-1 equations enforce only their second derivative"
 
 METHOD = integrators.get("rk4_renormalised")
 OMEGA, SPEEDS = (0.3, 0.2, 0.5), (20.0, -20.0, 20.0, -20.0)
-STEP, EACH = 6e-3, 10_000  # [s], steps between two looks: a minute
+STEP, STEPS_PER_SAMPLE = 6e-3, 10_000  # [s]; steps between two samples, a minute
 MINUTES = 60
-WAYS = {"projection": PROJECTION, "partitioning": PARTITION, "none": NONE}
+METHODS = {"projection": PROJECTION, "partitioning": PARTITION, "none": NONE}
 BOUND = 1e-10
-WHY = "round-off of coordinates of a metre, a thousand steps of it: what a stabilisation leaves must not grow with time"
+WHY = "a thousand round-off errors of a coordinate of 1 m: the defect after stabilisation must not grow with time"
 
 
-def defects(way: int) -> np.ndarray:
-    """Return the maximum defect on either level [m, -, m/s, rad/s] per minute, shape (MINUTES,); NaN if invalid."""
+def defects(method: int) -> np.ndarray:
+    """Return the largest position or velocity defect [m, -, m/s, rad/s] per minute, shape (MINUTES,)."""
     p: Any
     p, x = spinning_state(delivery_drone(**PAPER), OMEGA, SPEEDS)
     result = []
     for minute in range(MINUTES):
-        x = advance(METHOD.Method(), p, 60.0 * minute, x, STEP, EACH, way)
+        x = advance(METHOD.Method(), p, 60.0 * minute, x, STEP, STEPS_PER_SAMPLE, method)
         result.append(max(constraint_violation(p, x)))
     return np.array(result)
 
 
-def of_plant(stabilisation: str, seconds: float) -> float:
-    """Return the hinge errors of five tumbling bodies [m, rad] after so long under RK4 at 2 ms."""
+def plant_hinge_error(stabilisation: str, seconds: float) -> float:
+    """Return the hinge error of five tumbling bodies [m, rad] after a time [s] under RK4 at 2 ms."""
     frame = load_airframe(AIRFRAME)
     volts = (SPEED * frame.motor.rotor_constant,) * 4
     p = multirotor_multibody.parameters(frame, (), "speed", stabilisation)
-    out = np.empty((2, len(flatten(Motion(STILL, NO_ROTATION, STILL, STILL, (0.0,) * 4)))))
+    out = np.empty((2, len(flatten(Motion(ZERO, NO_ROTATION, ZERO, ZERO, (0.0,) * 4)))))
     state = MultirotorState(drone_bodies(p, frame), ())
     return float(flight(METHOD.Method(), p, state, volts, 2e-3, round(seconds / 2e-3), out))
 
 
 def run() -> CaseResult:
     """Measure the hinge defects after every minute of an hour."""
-    drift = {name: defects(way) for name, way in WAYS.items()}
+    drift = {name: defects(method) for name, method in METHODS.items()}
     rows = [
         Row(
             name,
@@ -74,13 +74,13 @@ def run() -> CaseResult:
     rows.append(
         Row(
             "baumgarte",
-            "Baumgarte's feedback at 50/s, RK4 at 2 ms",
-            "hinges apart [m, rad] after an hour",
-            2.0 * of_plant("baumgarte", 60.0),
-            "twice what it leaves after a minute: feedback keeps the method's own error, which must not grow",
-            of_plant("baumgarte", 3600.0),
+            "Baumgarte stabilisation at 50/s, RK4 at 2 ms",
+            "hinge error [m, rad] after an hour",
+            2.0 * plant_hinge_error("baumgarte", 60.0),
+            "twice the error after a minute: feedback leaves the method's error, which must not grow",
+            plant_hinge_error("baumgarte", 3600.0),
             "no stabilisation",
-            of_plant("none", 3600.0),
+            plant_hinge_error("none", 3600.0),
         )
     )
     t = np.arange(1, MINUTES + 1)

@@ -14,10 +14,10 @@ from lapwing.studies.accuracy.integrate import adapt_step
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import rows
 
-HARD = "loads of 0.1 g to 10 kg on links that are parallel, flat, or pass over the top: constraints, energy, momentum"
+HARD = "loads of 0.1 g to 10 kg on links that are parallel, horizontal, or pass over the top: constraints and energy"
 
 INERTIA = (0.0820, 0.0845, 0.1377)  # [kg m^2]
-OFF = LiftCommand((0.0, 0.0), (ZERO, ZERO))
+NO_LIFT = LiftCommand((0.0, 0.0), (ZERO, ZERO))
 LENGTH, QUAD, G = (0.6, 0.8), 0.755, 9.81
 DURATION, STEPS, SAMPLES = 10.0, 20_000, 200
 LINK = (20, 26)  # columns of the two directions, each before its angular velocity
@@ -29,18 +29,18 @@ CASES: dict[str, tuple[float, tuple[float, float], tuple[float, float]]] = {
     "flat_links": (0.4, (0.5 * math.pi - 1e-9, -0.5 * math.pi + 1e-9), (0.5, -0.5)),
     "over_the_top": (0.4, (0.0, math.pi), (8.0, -7.0)),
 }
-HELD, ENERGY, LIGHT = 1e-14, 1e-9, 1e-7
-HELD_WHY = "round-off: the constraint is part of the state space"
-ENERGY_WHY = "the method's own error at 4e-3 rad of the fastest link a step, fourth power, for 20 000 steps"
-LIGHT_WHY = "a tolerance of 1e-12 in each of 16 000 steps, times six"
+LINK_BOUND, ENERGY_BOUND, LIGHT_BOUND = 1e-14, 1e-9, 1e-7
+LINK_WHY = "round-off: the state space satisfies the constraint"
+ENERGY_WHY = "the method's error: fourth power of 4e-3 rad per step, the angle of the fastest link, times 20 000 steps"
+LIGHT_WHY = "six times the tolerance of 1e-12 in each of 16 000 steps"
 ADAPTIVE, TOLERANCE = "rkmk54", 1e-12
-SPRING = 1e5  # [N/m] of the baseline way
+SPRING = 1e5  # [N/m] of the baseline
 
 
-def start(name: str) -> tuple[Any, CooperativeLoadState]:
-    """Return (parameters, state at the start) of one of `CASES`: thrown without thrust."""
+def initial_state(name: str) -> tuple[Any, CooperativeLoadState]:
+    """Return (parameters, initial state) of one of `CASES`, in free flight without thrust."""
     load, angles, rates = CASES[name]
-    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), LENGTH, load, G, OFF)
+    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), LENGTH, load, G, NO_LIFT)
     swings = tuple(
         Swing((math.sin(a), 0.0, -math.cos(a)), (0.0, -rate, 0.0)) for a, rate in zip(angles, rates, strict=True)
     )
@@ -48,15 +48,15 @@ def start(name: str) -> tuple[Any, CooperativeLoadState]:
 
 
 def adaptive(p: Any, x: Any) -> np.ndarray:
-    """Return the states, shape (SAMPLES + 1, n), with shorter steps where a light load snaps through."""
+    """Return the states, shape (SAMPLES + 1, n), with shorter steps where a light load moves fast."""
     out = np.full((SAMPLES + 1, len(flatten(x))), np.nan)
     adapt_step(p, x, np.linspace(0.0, DURATION, SAMPLES + 1), TOLERANCE, out)
     return out
 
 
-def ours(name: str, method: str = "rkmk4", steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """Return (relative error of the links' lengths; relative drift of the energy), shape (k,) each."""
-    p, x = start(name)
+def link_and_energy_errors(name: str, method: str = "rkmk4", steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
+    """Return (relative error of the link lengths, relative drift of the energy), shape (k,) each."""
+    p, x = initial_state(name)
     y = adaptive(p, x) if method == ADAPTIVE else rows(method, p, x, DURATION, steps, SAMPLES)
     off = np.max([np.abs(np.linalg.norm(y[:, at : at + 3], axis=1) - 1.0) for at in LINK], axis=0)
     velocity = [y[:, 3:6]] + [
@@ -68,16 +68,22 @@ def ours(name: str, method: str = "rkmk4", steps: int = STEPS) -> tuple[np.ndarr
 
 
 def energy_drift(load: float, velocity: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """Return the energy of three masses, velocities (3, k, 3), heights (3, k), over the initial kinetic one, (k,)."""
+    """Return the energy drift relative to the initial kinetic energy, shape (k,).
+
+    Args:
+        load: mass of the load [kg].
+        velocity: of load and quadrotors [m/s], shape (3, k, 3).
+        height: of load and quadrotors [m], shape (3, k).
+    """
     mass = np.array([load, QUAD, QUAD])
     kinetic = 0.5 * np.einsum("b,bkc->k", mass, velocity**2)
     total = kinetic + G * mass @ height
     return np.abs(total - total[0]) / kinetic[0]
 
 
-def baseline(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
-    """Return the errors of `ours` for links as stiff springs, RK4 at the same step: the baseline."""
-    p, x = start(name)
+def baseline_errors(name: str, steps: int = STEPS) -> tuple[np.ndarray, np.ndarray]:
+    """Return the errors of `link_and_energy_errors` for links as stiff springs, under RK4 (baseline)."""
+    p, x = initial_state(name)
     q, omega = (np.array([getattr(s, field) for s in x.link]) for field in ("direction", "omega"))
     length, mass = np.array(LENGTH)[:, None], np.array([[p.load_mass], [QUAD], [QUAD]])
     r = np.vstack([x.load_position, x.load_position - length * q])
@@ -115,22 +121,43 @@ def run() -> CaseResult:
     for name in CASES:
         light = name == "light_load"
         method = f"{ADAPTIVE} on TS^2, tolerance {TOLERANCE:g}" if light else "rkmk4 on TS^2, 0.5 ms"
-        bound, why = (LIGHT, LIGHT_WHY) if light else (ENERGY, ENERGY_WHY)
+        bound, why = (LIGHT_BOUND, LIGHT_WHY) if light else (ENERGY_BOUND, ENERGY_WHY)
         (off, energy), (baseline_off, baseline_energy) = (
-            ours(name, ADAPTIVE if light else "rkmk4"),
-            baseline(name, STEPS // 10),
+            link_and_energy_errors(name, ADAPTIVE if light else "rkmk4"),
+            baseline_errors(name, STEPS // 10),
         )
-        links, change = "length of the links, relative", "change of the energy, over the kinetic energy at first"
+        links, change = (
+            "error of the link length, relative",
+            "change of the energy, relative to the initial kinetic energy",
+        )
         result += [
-            Row(f"{name}.links", method, links, HELD, HELD_WHY, float(off.max()), spring, lost(baseline_off)),
-            Row(f"{name}.energy", method, change, bound, why, float(energy.max()), spring, lost(baseline_energy)),
+            Row(
+                f"{name}.links",
+                method,
+                links,
+                LINK_BOUND,
+                LINK_WHY,
+                float(off.max()),
+                spring,
+                largest_finite(baseline_off),
+            ),
+            Row(
+                f"{name}.energy",
+                method,
+                change,
+                bound,
+                why,
+                float(energy.max()),
+                spring,
+                largest_finite(baseline_energy),
+            ),
         ]
         curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, baseline_energy)]
-    return CaseResult(result, Plot("time [s]", "change of the energy", curves, ENERGY))
+    return CaseResult(result, Plot("time [s]", "change of the energy", curves, ENERGY_BOUND))
 
 
-def lost(values: np.ndarray) -> float:
-    """Return the largest of the values that are finite."""
+def largest_finite(values: np.ndarray) -> float:
+    """Return the largest finite value."""
     return float(np.nanmax(np.where(np.isfinite(values), values, np.nan)))
 
 
@@ -138,11 +165,11 @@ def sweep() -> Sweep:
     """Decrease the load's mass at a step of 2 ms."""
     loads, steps = np.geomspace(1.0, 1e-9, 10), 5000
     curves: dict[str, list[float]] = {"rkmk4 on TS^2": [], "links as springs": []}
-    whole = CASES["light_load"]
+    original = CASES["light_load"]
     for load in loads:
-        CASES["light_load"] = (float(load), *whole[1:])
-        curves["rkmk4 on TS^2"].append(float(ours("light_load", steps=steps)[1].max()))
-        curves["links as springs"].append(lost(baseline("light_load", steps)[1]))
-    CASES["light_load"] = whole
+        CASES["light_load"] = (float(load), *original[1:])
+        curves["rkmk4 on TS^2"].append(float(link_and_energy_errors("light_load", steps=steps)[1].max()))
+        curves["links as springs"].append(largest_finite(baseline_errors("light_load", steps)[1]))
+    CASES["light_load"] = original
     result = [Curve(name, loads, np.array(values)) for name, values in curves.items()]
     return Sweep("mass of the load [kg]", "change of the energy", 1e-3, result, falling=True)

@@ -1,4 +1,4 @@
-"""Case 17, at length: a day of simulated flight."""
+"""Case 17, long variant: a day of simulated flight."""
 
 import time
 
@@ -10,7 +10,7 @@ from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
-HARD = "24 h of hover in one go: memory that grows, a flight that slows down"
+HARD = "24 h of hover in one run: memory must not grow, the flight must not slow down"
 LONG = True
 
 HOURS = 24
@@ -22,13 +22,16 @@ def resident() -> float:
         return int(file.read().split()[1]) * 4096 / 1e6
 
 
-def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
-    """Return (memory [MB] after, processor time [s] of) each hour; `whole`: keep the full history of the truth."""
+def growth(record_truth: bool, hours: int) -> tuple[list[float], list[float]]:
+    """Return (memory [MB] after each hour, processor time [s] of each hour).
+
+    `record_truth` keeps the full history of the ground truth.
+    """
     setup = resolve(load("hover", ["run.duration=86400.0", "trajectory.phase.1.duration=86390.0"]))
-    graph = BlockDiagram(setup, create_all(setup), 64, {ports.TRUTH} if whole else ())
+    graph = BlockDiagram(setup, create_all(setup), 64, {ports.TRUTH} if record_truth else ())
     memory, seconds = [], []
     for hour in range(1, hours + 1):
-        started = time.process_time()  # of this process alone: others may be busy
+        started = time.process_time()  # of this process alone
         graph.advance(min(hour * round(3600.0 / setup.interval), setup.last_tick + 1))
         seconds.append(time.process_time() - started)
         memory.append(resident())
@@ -36,7 +39,7 @@ def growth(whole: bool, hours: int) -> tuple[list[float], list[float]]:
 
 
 def append_time_ratio() -> float:
-    """Return the time of the last 1000 appended rows over that of the first, minus one: the baseline."""
+    """Return the time to append the last 1000 rows over that of the first 1000, minus one (baseline)."""
     history, seconds = np.zeros(0), []
     for _ in range(20):
         started = time.process_time()
@@ -47,28 +50,28 @@ def append_time_ratio() -> float:
 
 
 def run() -> CaseResult:
-    """Measure memory and speed, hour by hour."""
+    """Measure memory and processor time of each hour."""
     memory, seconds = growth(False, HOURS)
-    kept, _ = growth(True, 2)
+    full_history, _ = growth(True, 2)
     rows = [
         Row(
             "memory",
-            "a ring of rows",
+            "ring buffers of samples",
             "growth of the resident memory [MB] from the first hour to the last",
             10.0,
-            "what Python's allocator may take now and then",
+            "occasional growth of Python's heap",
             memory[-1] - memory[0],
-            "every row of the truth kept, of the second hour alone",
-            kept[-1] - kept[0],
+            "full history of the ground truth, second hour only",
+            full_history[-1] - full_history[0],
         ),
         Row(
             "speed",
-            "the same compiled loop",
-            "processor time of the last hours over that of the first, the fastest of three each, less one",
+            "compiled loop",
+            "processor time of the last hours over that of the first ones, fastest of three each, minus one",
             0.05,
-            "within 5 %, as the issue asks",
+            "variation of the processor time between hours",
             min(seconds[-3:]) / min(seconds[:3]) - 1.0,
-            "a history that is appended to, 20 000 rows",
+            "an array that grows by each sample, 20 000 rows",
             append_time_ratio(),
         ),
     ]

@@ -1,4 +1,4 @@
-"""Case 18, its edges: a step run into, an edge slid over, a take-off from a slope."""
+"""Case 18, edges: impact on a step, slide over an edge, take-off from a slope."""
 
 import math
 from typing import Any
@@ -15,15 +15,15 @@ from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.cases.landing import DRONE, METHOD, STEP, G
 from lapwing.studies.stability.cases.slopes import DYNAMIC, energy
 
-HARD = "an upright step run into, an edge slid over, a take-off from a slope: faces that begin and end at a corner"
+HARD = "an impact on an upright step, a slide over an edge, a take-off from a slope: ground faces that end at corners"
 
 SPEED, RISER, DROP = 2.0, 0.1, 0.4  # [m/s], [m], [m]
-ANGLE, LIGHT = math.radians(20.0), 0.5  # of the slope, and how much of the weight the rotors carry while it slides
+ANGLE, LIFT_SHARE = math.radians(20.0), 0.5  # slope; share of the weight carried by the rotors
 DENSITY = STANDARD_DENSITY
 
 
-def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
-    """Return (parameters, state at rest, voltages) of a drone whose thrust is this fraction of its weight."""
+def state_at_rest(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
+    """Return (parameters, state at rest, motor voltages [V]) of a drone with a thrust of `share` times its weight."""
     tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE, Environment(terrain=terrain)))
     state = static_equilibrium(multirotor, p, resting_pose(DRONE.contact.feet if DRONE.contact else (), terrain), G)
@@ -33,13 +33,20 @@ def on(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[float, ...]]:
 
 
 def run_on(p: Any, state: Any, voltage: tuple[float, ...], seconds: float, step: float = STEP) -> Any:
-    """Return the state after a time."""
+    """Return the state after a time [s]."""
     return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
 
 
 def energy_gain(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
-    """Return the maximum energy gain over the kinetic energy of a slide into a step at that distance."""
-    p, state, off = on(relief(steps=[(distance, rise)]))
+    """Return the largest energy gain of a slide into a step, relative to its kinetic energy.
+
+    Args:
+        distance: from the start to the step [m].
+        rise: height of the step [m], negative for an edge.
+        speed: initial speed [m/s].
+        step: integrator step [s].
+    """
+    p, state, off = state_at_rest(relief(steps=[(distance, rise)]))
     state = state._replace(motion=state.motion._replace(velocity_world=(speed, 0.0, 0.0)))
     first = energy(p, state.motion)
     highest = first
@@ -49,8 +56,8 @@ def energy_gain(distance: float, rise: float, speed: float = SPEED, step: float 
     return (highest - first) / (0.5 * p.body.mass * speed**2)
 
 
-def baseline_gained(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
-    """Return the `energy_gain` of a point mass on a height field, at most one step deep beyond the riser."""
+def baseline_energy_gain(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
+    """Return the `energy_gain` of a point mass on a height field (baseline)."""
     mass, x, z, v = DRONE.mass.total, 0.0, 0.0, 0.0
     highest = 0.0
     for _ in range(round(1.0 / step)):
@@ -64,42 +71,42 @@ def baseline_gained(distance: float, rise: float, speed: float = SPEED, step: fl
 
 
 def acceleration_under_lift(share: float) -> float:
-    """Return the downhill acceleration [m/s^2] of a drone whose rotors carry a share of its weight."""
-    p, state, voltage = on(relief(slope=(0.0, math.tan(ANGLE))), share)
+    """Return the downhill acceleration [m/s^2] of a drone with a thrust of `share` times its weight."""
+    p, state, voltage = state_at_rest(relief(slope=(0.0, math.tan(ANGLE))), share)
     down = np.array([0.0, -math.cos(ANGLE), -math.sin(ANGLE)])
-    pushed = tuple(float(v) for v in 0.2 * down)
-    state = state._replace(motion=state.motion._replace(velocity_world=pushed))
+    sliding = tuple(float(v) for v in 0.2 * down)
+    state = state._replace(motion=state.motion._replace(velocity_world=sliding))
     early = run_on(p, state, voltage, 0.3)
     late = run_on(p, early, voltage, 0.2)
     return float(np.subtract(late.motion.velocity_world, early.motion.velocity_world) @ down / 0.2)
 
 
-def exact(share: float) -> float:
+def newton_acceleration(share: float) -> float:
     """Return the acceleration [m/s^2] of `acceleration_under_lift` by Newton's law."""
     return G * (math.sin(ANGLE) - DYNAMIC * max(math.cos(ANGLE) - share, 0.0))
 
 
 def run() -> CaseResult:
     """Measure contact with a step, an edge and a slope."""
-    faces, field = "each face with its own normal, RK4 at 1 ms", "a height field, as deep as the step is high"
-    none = "none but round-off: the ground adds no energy"
-    newton = "acceleration down 20 degrees, half the weight lifted, relative to Newton's law"
-    slid = "what the feet's springs still swing after 0.3 s"
+    faces, field = "a normal for each face, RK4 at 1 ms", "a height field, penetration up to the height of the step"
+    none = "round-off: the ground adds no energy"
+    newton = "error of the acceleration on 20 degrees with thrust of half the weight, relative to Newton's law"
+    transient = "remaining oscillation of the feet's springs after 0.3 s"
     unloaded = G * (math.sin(ANGLE) - DYNAMIC * math.cos(ANGLE))
     rows = [
-        Row("step", faces, "energy gained at a step of 10 cm, over the kinetic", 1e-9, none,
-            energy_gain(0.4, RISER), field, baseline_gained(0.4, RISER)),
-        Row("edge", faces, "energy gained over an edge of 40 cm, over the kinetic", 1e-9, none,
+        Row("step", faces, "energy gain at a step of 10 cm, relative to the kinetic energy", 1e-9, none,
+            energy_gain(0.4, RISER), field, baseline_energy_gain(0.4, RISER)),
+        Row("edge", faces, "energy gain at an edge of 40 cm, relative to the kinetic energy", 1e-9, none,
             energy_gain(0.4, -DROP), "forward Euler on spring and damper, upright", baseline_fall()),
-        Row("take_off", "friction elements, RK4 at 1 ms", newton, 1e-3, slid,
-            abs(acceleration_under_lift(LIGHT) / exact(LIGHT) - 1.0),
-            "friction by the whole weight", abs(unloaded / exact(LIGHT) - 1.0)),
+        Row("take_off", "friction elements, RK4 at 1 ms", newton, 1e-3, transient,
+            abs(acceleration_under_lift(LIFT_SHARE) / newton_acceleration(LIFT_SHARE) - 1.0),
+            "friction of the full weight", abs(unloaded / newton_acceleration(LIFT_SHARE) - 1.0)),
     ]  # fmt: skip
     return CaseResult(rows, sweep().plot())
 
 
 def baseline_fall() -> float:
-    """Return the energy gain (over the kinetic energy of the slide) of a fall, forward Euler at the plant's step."""
+    """Return the energy gain of a fall under forward Euler, relative to the kinetic energy of the slide (baseline)."""
     mass, z, v = DRONE.mass.total, DROP, 0.0
     highest = 0.0
     for _ in range(2000):
@@ -112,9 +119,9 @@ def baseline_fall() -> float:
 def sweep() -> Sweep:
     """Increase the speed into a step."""
     speeds = np.array([1.0, 2.0, 4.0, 8.0])
-    ways = {"faces": energy_gain, "height field": baseline_gained}
+    gains = {"faces": energy_gain, "height field": baseline_energy_gain}
     curves = [
-        Curve(name, speeds, np.maximum([way(0.4, RISER, float(v)) for v in speeds], 1e-17))
-        for name, way in ways.items()
+        Curve(name, speeds, np.maximum([gain(0.4, RISER, float(v)) for v in speeds], 1e-17))
+        for name, gain in gains.items()
     ]
-    return Sweep("speed into a step of 10 cm [m/s]", "energy gained, over the kinetic", 1e-9, curves)
+    return Sweep("speed into a step of 10 cm [m/s]", "energy gain, relative to the kinetic energy", 1e-9, curves)

@@ -1,4 +1,4 @@
-"""Case 17, in short: what the clock says after a day."""
+"""Case 17, short variant: error of the clock after a day."""
 
 from fractions import Fraction
 
@@ -7,7 +7,7 @@ import numpy as np
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
-HARD = "24 h at 250 Hz, 21.6 million exchanges: a clock that adds up intervals is no longer on time"
+HARD = "24 h at 250 Hz, 21.6 million communication steps: a sum of intervals accumulates round-off"
 
 HOURS = 24
 
@@ -26,7 +26,7 @@ def run() -> CaseResult:
         "integer ticks of integer nanoseconds",
         "error of the time [s] after 24 h",
         1e-11,
-        "half a unit in the last place of 86 400 s, as a float; stamps are integers and exact",
+        "half a unit in the last place of 86 400 s as a float; time stamps are exact integers",
         float(ours.max()),
         "a sum of intervals",
         float(baseline.max()),

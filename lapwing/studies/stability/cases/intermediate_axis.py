@@ -11,15 +11,15 @@ from lapwing.studies.accuracy.reference import to_world
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
-HARD = "1000 s of tumbling about the intermediate axis (Dzhanibekov): every flip multiplies an error of the energy"
+HARD = "1000 s of tumbling about the intermediate axis (Dzhanibekov effect): every flip amplifies an energy error"
 
 INERTIA = (1.0, 1.6, 2.1)  # [kg m^2]
-EPSILON = 1e-2  # [rad/s] beside the intermediate axis: the distance to the separatrix
+EPSILON = 1e-2  # [rad/s] component off the intermediate axis: distance to the separatrix
 DURATION, STEPS, SAMPLES = 1000.0, 200_000, 500
-SMALL = 1e-11
+INVARIANT_BOUND = 1e-11
 
 
-def start(epsilon: float) -> RigidBody:
+def initial_state(epsilon: float) -> RigidBody:
     """Return a rotation about the intermediate axis with a small component about the largest one."""
     return RigidBody(exp((0.3, -0.5, 0.2)), (0.0, 1.0, epsilon))
 
@@ -27,28 +27,28 @@ def start(epsilon: float) -> RigidBody:
 def closed_form(epsilon: float, t: np.ndarray) -> np.ndarray:
     """Return omega_body at times t [s], shape (k, 3), with omega_2 maximum at t = 0 (eqs. (7.2) to (7.5))."""
     A, B, C = INERTIA
-    square, twice = B * B + (C * epsilon) ** 2, B + C * epsilon**2  # of the momentum, and twice the energy
-    # this side of the separatrix, twice the energy times B below the square: about the axis of the largest moment
+    square, twice = B * B + (C * epsilon) ** 2, B + C * epsilon**2  # of the momentum; twice the energy
+    # twice the energy times B is below the square: the side of the separatrix around the axis of the largest moment
     a1 = math.sqrt((twice * C - square) / (A * (C - A)))
     a2 = math.sqrt((twice * C - square) / (B * (C - B)))
     a3 = math.sqrt((square - twice * A) / (C * (C - A)))
     rate = math.sqrt((C - B) * (square - twice * A) / (A * B * C))
-    # twice C - square and square - twice A differ by what is small: 1 - m from the small number itself
-    rest = (C - A) * C * (C - B) * epsilon**2 / ((C - B) * (square - twice * A))
-    m = 1.0 - rest
+    # 1 - m is computed from the small number, because the difference of two nearly equal terms would cancel
+    complement = (C - A) * C * (C - B) * epsilon**2 / ((C - B) * (square - twice * A))
+    m = 1.0 - complement
     sn, cn, dn, _ = ellipj(rate * t + ellipk(m), m)
     return np.column_stack([a1 * cn, a2 * sn, a3 * dn])
 
 
 def figures(method: str, epsilon: float, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (maximum difference from the closed form so far, drift of energy, of momentum), (k,) each."""
+    """Return (largest error of the rates so far [rad/s], relative drift of energy, of momentum), shape (k,) each."""
     return figures_of_run(
-        run_fixed_steps(method, FreeBodyParameters(INERTIA), start(epsilon), DURATION, steps, SAMPLES), epsilon
+        run_fixed_steps(method, FreeBodyParameters(INERTIA), initial_state(epsilon), DURATION, steps, SAMPLES), epsilon
     )
 
 
 def figures_of_run(y: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the `figures` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
+    """Return the `figures` of a run; `y` has R_world_body and omega_body at every sample, shape (k, 12)."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     off = np.abs(y[:, 9:12] - closed_form(epsilon, t)).max(axis=1)
     energy = drift(0.5 * (y[:, 9:12] ** 2 * INERTIA).sum(axis=1))
@@ -65,10 +65,10 @@ def run() -> CaseResult:
         Row(
             "rates",
             method,
-            "body rates against Jacobi's functions [rad/s]",
+            "error of the body rates against Jacobi's functions [rad/s]",
             1e-7,
-            "round-off of the energy, 1e-14, times the sensitivity of the period beside the separatrix, 1 / epsilon^2, "
-            "times the thousand radians of the run",
+            "round-off of the energy, 1e-14, times the sensitivity of the period near the separatrix, 1 / epsilon^2, "
+            "times the 1000 rad of the run",
             float(off.max()),
             baseline,
             float(baseline_off.max()),
@@ -77,8 +77,8 @@ def run() -> CaseResult:
             "energy",
             method,
             "change of the kinetic energy, relative",
-            SMALL,
-            "round-off of 200 000 steps: 2e-16 times their number, were it always of one sign",
+            INVARIANT_BOUND,
+            "round-off of 2e-16 in each of 200 000 steps, all of one sign",
             float(energy.max()),
             baseline,
             float(baseline_energy.max()),
@@ -87,8 +87,8 @@ def run() -> CaseResult:
             "momentum",
             method,
             "change of the angular momentum in the world, relative",
-            SMALL,
-            "as for the energy",
+            INVARIANT_BOUND,
+            "as for `energy`",
             float(momentum.max()),
             baseline,
             float(baseline_momentum.max()),

@@ -1,4 +1,4 @@
-"""Case 11: every integrator at the edge of its stability, and beyond."""
+"""Case 11: every integrator at its stability limit, and beyond."""
 
 import numpy as np
 
@@ -9,27 +9,27 @@ from lapwing.studies.accuracy.systems.gyrostat import BLOCKED
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.sampled_runs import rows
 
-HARD = "steps at the edge of the stability of each integrator, on a damped spin of rate 1, and beyond it"
+HARD = "steps at the stability limit of each integrator and beyond, for a damped spin with rate 1"
 
 SPIN = BLOCKED._replace(damping=BLOCKED.inertia[2])  # omega_3' = -omega_3
 START = RigidBody(NO_ROTATION, (0.0, 0.0, 1.0))
-KICKED = "rigid_splitting"  # takes no torque that depends on the rate
-INSIDE, BEYOND = 0.95, 1.3  # of the edge
-LONG, GROWN = 2000, 20_000  # steps: until a spin must be gone, until what grows is beyond all numbers
+UNSUPPORTED = "rigid_splitting"  # supports no torque that depends on the angular velocity
+INSIDE, BEYOND = 0.95, 1.3  # of the stability limit
+DECAY_STEPS, GROWTH_STEPS = 2000, 20_000  # steps: until a spin has decayed; until a growing one has overflowed
 
 
 def methods() -> list[str]:
     """Return the integrators that support this system."""
-    return [name for name in integrators.names() if name != KICKED]
+    return [name for name in integrators.names() if name != UNSUPPORTED]
 
 
 def spin(method: str, step: float, steps: int) -> float:
-    """Return the size of the spin after so many steps; NaN if it is not finite."""
+    """Return the absolute value of the spin after `steps` steps; NaN if it is not finite."""
     return abs(float(rows(method, SPIN, START, steps * step, steps, 1)[-1, 6]))
 
 
 def edge(method: str) -> float:
-    """Return the maximum step that reduces the spin, by bisection."""
+    """Return the largest step that reduces the spin, by bisection."""
     low, high = 0.5, 16.0
     for _ in range(40):
         middle = 0.5 * (low + high)
@@ -37,53 +37,52 @@ def edge(method: str) -> float:
     return low
 
 
-def silent(method: str, step: float) -> float:
+def is_silent(method: str, step: float) -> float:
     """Return 1 if a diverged run raises no error, 0 if the error names time, system and value."""
     try:
-        integrators.simulate(integrators.get(method), SPIN, START, step, GROWN, GROWN)
+        integrators.simulate(integrators.get(method), SPIN, START, step, GROWTH_STEPS, GROWTH_STEPS)
     except ValueError as error:
         return 0.0 if f"with step {step:g}" in str(error) and "t = " in str(error) else 1.0
     return 1.0
 
 
 def run() -> CaseResult:
-    """Measure steps just below and above the stability limit."""
+    """Measure steps below and above the stability limit."""
     names = methods()
     edges = np.array([edge(name) for name in names])
-    inside = np.array([spin(name, INSIDE * h, LONG) for name, h in zip(names, edges, strict=True)])
-    quiet = sum(silent(name, BEYOND * h) for name, h in zip(names, edges, strict=True))
+    inside = np.array([spin(name, INSIDE * h, DECAY_STEPS) for name, h in zip(names, edges, strict=True)])
+    silent_count = sum(is_silent(name, BEYOND * h) for name, h in zip(names, edges, strict=True))
     widest = float(edges.max())
     with np.errstate(over="ignore"):
         baseline = np.abs(1.0 - INSIDE * widest) ** 100.0
-        unchecked = sum(np.isinf(np.float64(BEYOND * h) ** GROWN) for h in edges)
+        unchecked = sum(np.isinf(np.float64(BEYOND * h) ** GROWTH_STEPS) for h in edges)
     result = [
         Row(
             "edge",
-            f"all {len(names)} integrators at 0.95 of their own edge",
-            f"spin left after {LONG} steps, of 1",
+            f"all {len(names)} integrators at 0.95 of their limit",
+            f"spin after {DECAY_STEPS} steps, relative",
             1.0,
-            "inside of its stability region a method damps what is damped",
+            "inside its stability region a method damps the spin",
             float(inside.max()),
-            f"forward Euler at the widest of these steps, {INSIDE * widest:.3g}, 100 of them",
+            f"forward Euler with 100 steps of {INSIDE * widest:.3g}, the largest of these",
             float(baseline),
         ),
         Row(
             "beyond",
-            "`simulate` at 1.3 of the edge",
-            "integrators that end in no number without a word",
+            "`simulate` at 1.3 of the limit",
+            "integrators with a non-finite state and no error",
             0.0,
-            "never NaN in silence",
-            quiet,
-            "the same growth in plain floats",
+            "every non-finite state raises an error",
+            silent_count,
+            "the same growth without a check",
             float(unchecked),
         ),
     ]
-    walked = sweep()
-    return CaseResult(result, walked.plot())
+    return CaseResult(result, sweep().plot())
 
 
 def sweep() -> Sweep:
     """Increase the step."""
     steps = np.geomspace(0.25, 8.0, 41)
     curves = [Curve(name, steps, np.array([spin(name, float(h), 200) for h in steps])) for name in methods()]
-    return Sweep("step times rate", "spin left after 200 steps, of 1", 1.0, curves)
+    return Sweep("step times rate", "spin after 200 steps, relative", 1.0, curves)

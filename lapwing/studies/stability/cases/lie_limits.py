@@ -1,4 +1,4 @@
-"""Case 4: the closed forms on SO(3) at the angles where they divide zero by zero."""
+"""Case 4: closed forms on SO(3) at their removable singularities."""
 
 import math
 from decimal import Decimal, localcontext
@@ -9,10 +9,10 @@ from lapwing.dynamics.lie import ratios, so3
 from lapwing.kernels import python_function
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
-HARD = "dexp inverse at angles towards 0 and towards its pole at 2 pi; the logarithm of rotations by nearly pi"
+HARD = "the inverse of dexp at angles near 0 and near its pole at 2 pi; the logarithm of rotations by nearly pi"
 
 BOUND = 1e-14
-WHY = "some fifty units in the last place: nothing is lost but the rounding of the operations themselves"
+WHY = "fifty units in the last place: only the round-off of the operations"
 AXIS = np.array([2.0, -3.0, 6.0]) / 7.0
 DIGITS = 60
 
@@ -28,7 +28,7 @@ def series(x: Decimal, first: Decimal, k: int) -> Decimal:
 
 
 def exact(v: tuple[float, ...]) -> float:
-    """Return (1 - (a/2) cot(a/2)) / a^2 of a = |v|, of exactly these floats."""
+    """Return (1 - (a/2) cot(a/2)) / a^2 with a = |v|, exact for these floats."""
     with localcontext() as context:
         context.prec = DIGITS
         square = sum((Decimal(c) * Decimal(c) for c in v), Decimal(0))
@@ -37,14 +37,14 @@ def exact(v: tuple[float, ...]) -> float:
 
 
 def baseline_ratio(v: tuple[float, ...]) -> float:
-    """Return the textbook formula."""
+    """Return the ratio of `exact` by the textbook formula (baseline)."""
     a = np.float64(np.linalg.norm(v))
     with np.errstate(all="ignore"):
         return float((1.0 - 0.5 * a / np.tan(0.5 * a)) / (a * a))
 
 
 def baseline_log(m: np.ndarray) -> np.ndarray:
-    """Return the textbook formula: angle by the arc cosine, axis by the skew part."""
+    """Return the logarithm by the textbook formula: angle from the arc cosine, axis from the skew part (baseline)."""
     R = m.reshape(3, 3)
     with np.errstate(all="ignore"):
         angle = np.arccos(np.clip(0.5 * (np.trace(R) - 1.0), -1.0, 1.0))
@@ -53,7 +53,7 @@ def baseline_log(m: np.ndarray) -> np.ndarray:
 
 
 def ratio_errors(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the relative errors of ours and of the baseline ratio at these angles [rad], (k,) each."""
+    """Return the relative errors of Lapwing's and of the baseline ratio at angles [rad], shape (k,) each."""
     vectors = [tuple(float(c) for c in a * AXIS) for a in angles]
     true = np.array([exact(v) for v in vectors])
     ours, baseline = (
@@ -63,7 +63,10 @@ def ratio_errors(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def log_errors(gaps: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the errors [rad] of ours and of the baseline logarithm of rotations by pi less these gaps, (k,) each."""
+    """Return the errors [rad] of Lapwing's and of the baseline logarithm, shape (k,) each.
+
+    The rotations are by pi minus `gaps` [rad], shape (k,).
+    """
     vectors = [(math.pi - gap) * AXIS for gap in gaps]
     matrices = [np.array(so3.exp(tuple(float(c) for c in v))) for v in vectors]
     ours = [np.abs(np.array(so3.log(tuple(m.tolist()))) - v).max() for m, v in zip(matrices, vectors, strict=True)]
@@ -75,12 +78,12 @@ def run() -> CaseResult:
     """Measure the three limits."""
     gaps = np.geomspace(1e-1, 1e-9, 33)
     small, at_pole, at_pi = ratio_errors(gaps), ratio_errors(2.0 * math.pi - gaps), log_errors(gaps)
-    what = "third coefficient of dexp inverse, relative"
+    invariant = "error of the third coefficient of the inverse of dexp, relative"
     rows = [
         Row(
             "dexpinv_at_zero",
             "series below 1 rad",
-            what,
+            invariant,
             BOUND,
             WHY,
             float(small[0].max()),
@@ -89,8 +92,8 @@ def run() -> CaseResult:
         ),
         Row(
             "dexpinv_at_2_pi",
-            "length of the vector to twice the digits",
-            what,
+            "vector length in double-double precision",
+            invariant,
             BOUND,
             WHY,
             float(at_pole[0].max()),
@@ -99,7 +102,7 @@ def run() -> CaseResult:
         ),
         Row(
             "log_at_pi",
-            "by the largest component of the quaternion",
+            "from the largest component of the quaternion",
             "error of the rotation vector [rad]",
             BOUND,
             WHY,

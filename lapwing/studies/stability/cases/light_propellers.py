@@ -1,4 +1,4 @@
-"""Case 8: propellers a thousand times too light, at 1000 rad/s."""
+"""Case 8: propellers with a thousandth of their inertia, at 1000 rad/s."""
 
 from typing import Any
 
@@ -15,33 +15,33 @@ from lapwing.dynamics.multibody.five_body_stabilisation import (
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.drone import PAPER, delivery_drone, spinning_state
 
-HARD = "propellers with a thousandth of their inertia at 1000 rad/s: a mass ratio of 10 to 1e-8, and 0.25 rad a step"
+HARD = "propellers with a thousandth of their inertia at 1000 rad/s: inertia ratio of 10 to 1e-8, 0.25 rad per step"
 
 METHOD = integrators.get("rk4_renormalised").Method()
-SCALE, SPEED, STEP, LOOKS, EACH = 1e-3, 1000.0, 2.5e-4, 40, 200
+SCALE, SPEED, STEP, SAMPLES, STEPS_PER_SAMPLE = 1e-3, 1000.0, 2.5e-4, 40, 200
 OMEGA = (1.0, -0.7, 0.4)
 BOUND = 1e-9
-WHY = "round-off of a propeller's rate, 1e-13, times the number of steps in which it can add up"
-WAYS = {"projection": PROJECTION, "partitioning": PARTITION, "none": NONE}
+WHY = "round-off of a propeller's rate, 1e-13, times the number of steps"
+METHODS = {"projection": PROJECTION, "partitioning": PARTITION, "none": NONE}
 
 
-def defects(way: int, scale: float, speed: float, step: float, looks: int) -> np.ndarray:
-    """Return the largest defect on either level after every EACH steps, shape (looks,)."""
+def defects(method: int, scale: float, speed: float, step: float, samples: int) -> np.ndarray:
+    """Return the largest position or velocity defect after every `STEPS_PER_SAMPLE` steps, shape (samples,)."""
     inertia = tuple(scale * i for i in PAPER["propeller_inertia"])
     p: Any
     p, x = spinning_state(
         delivery_drone(**{**PAPER, "propeller_inertia": inertia}, driven="speed"), OMEGA, (speed, -speed) * 2
     )
     result = []
-    for look in range(looks):
-        x = advance(METHOD, p, look * EACH * step, x, step, EACH, way)
+    for sample in range(samples):
+        x = advance(METHOD, p, sample * STEPS_PER_SAMPLE * step, x, step, STEPS_PER_SAMPLE, method)
         result.append(max(constraint_violation(p, x)))
     return np.array(result)
 
 
 def run() -> CaseResult:
     """Measure the hinge defects over two seconds."""
-    drift = {name: defects(way, SCALE, SPEED, STEP, LOOKS) for name, way in WAYS.items()}
+    drift = {name: defects(method, SCALE, SPEED, STEP, SAMPLES) for name, method in METHODS.items()}
     rows = [
         Row(
             name,
@@ -55,7 +55,7 @@ def run() -> CaseResult:
         )
         for name in ("projection", "partitioning")
     ]
-    t = EACH * STEP * np.arange(1, LOOKS + 1)
+    t = STEPS_PER_SAMPLE * STEP * np.arange(1, SAMPLES + 1)
     curves = [Curve(name, t, np.maximum(values, 1e-17)) for name, values in drift.items()]
     return CaseResult(rows, Plot("time [s]", "largest defect", curves, BOUND))
 
@@ -64,7 +64,7 @@ def sweep() -> Sweep:
     """Increase the propeller speed at the same step."""
     speeds = np.geomspace(100.0, 2e4, 12)
     curves = [
-        Curve(name, speeds, np.array([defects(way, SCALE, float(s), STEP, 10)[-1] for s in speeds]))
-        for name, way in WAYS.items()
+        Curve(name, speeds, np.array([defects(method, SCALE, float(s), STEP, 10)[-1] for s in speeds]))
+        for name, method in METHODS.items()
     ]
     return Sweep("speed of the propellers [rad/s] at a step of 0.25 ms", "largest defect after 0.5 s", 1e-6, curves)

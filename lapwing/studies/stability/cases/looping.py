@@ -10,40 +10,40 @@ from lapwing.studies.accuracy.reference import to_world
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
-HARD = "60 s of continuous looping: pitch goes through 90 degrees twice a turn, and the vehicle flies upside down"
+HARD = "60 s of continuous loops: pitch passes through 90 degrees twice per turn, and the vehicle flies upside down"
 
 INERTIA = (0.27, 0.26, 0.42)  # [kg m^2] of the delivery drone
 DURATION, STEPS, SAMPLES = 60.0, 60_000, 600
-RATE = 2.0 * math.pi  # [rad/s]: a loop a second
-ASIDE = 1e-3  # [rad/s] of roll and yaw beside it: how close to the pole it passes
+RATE = 2.0 * math.pi  # [rad/s] one loop per second
+OFFSET = 1e-3  # [rad/s] roll and yaw rates, which set the distance to the pole
 BOUND = 1.3e-11
-WHY = "round-off: 2e-16 for each of 60 000 steps, were every one of one sign"
+WHY = "round-off of 2e-16 in each of 60 000 steps, all of one sign"
 
 
-def start(aside: float) -> RigidBody:
-    """Return a looping with a little roll and yaw."""
-    return RigidBody(from_roll_pitch_yaw(0.0, 0.0, 0.0), (aside, RATE, aside))
+def initial_state(offset: float) -> RigidBody:
+    """Return the initial state of a loop with equal roll and yaw rates `offset` [rad/s]."""
+    return RigidBody(from_roll_pitch_yaw(0.0, 0.0, 0.0), (offset, RATE, offset))
 
 
 def momentum(y: np.ndarray) -> np.ndarray:
-    """Return the angular momentum in the world [N m s], shape (k, 3), a constant."""
+    """Return the angular momentum in the world [N m s], shape (k, 3), which is constant."""
     return to_world(y[:, :9], y[:, 9:12] * INERTIA)
 
 
-def euler_angles(aside: float, steps: int, samples: int) -> np.ndarray:
-    """Return the coordinates, shape (samples + 1, 12), of RK4 on Euler angles with 1/cos(pitch): the baseline."""
+def euler_angles(offset: float, steps: int, samples: int) -> np.ndarray:
+    """Return the coordinates, shape (samples + 1, 12), of RK4 on Euler angles with 1/cos(pitch) (baseline)."""
     A, B, C = INERTIA
 
     def rate(y: tuple[float, ...]) -> tuple[float, ...]:
         roll, pitch, _, p, q, r = y
-        cosine = math.cos(pitch) or 1e-300  # all that the baseline way looks at is that it does not divide by zero
+        cosine = math.cos(pitch) or 1e-300  # avoids only division by zero
         turn = q * math.sin(roll) + r * math.cos(roll)
         return (
             p + turn * math.sin(pitch) / cosine, q * math.cos(roll) - r * math.sin(roll), turn / cosine,
             (B - C) / A * q * r, (C - A) / B * r * p, (A - B) / C * p * q,
         )  # fmt: skip
 
-    y: tuple[float, ...] = (0.0, 0.0, 0.0, aside, RATE, aside)
+    y: tuple[float, ...] = (0.0, 0.0, 0.0, offset, RATE, offset)
     h, result = DURATION / steps, []
     for i in range(steps + 1):
         if i % (steps // samples) == 0:
@@ -66,11 +66,11 @@ def _coordinates(y: tuple[float, ...]) -> list[float]:
 
 
 def run() -> CaseResult:
-    """Measure the angular momentum in the world, which no torque changes."""
+    """Measure the angular momentum in the world, which is constant without torque."""
     ours = drift(
-        momentum(run_fixed_steps("rkmk4", FreeBodyParameters(INERTIA), start(ASIDE), DURATION, STEPS, SAMPLES))
+        momentum(run_fixed_steps("rkmk4", FreeBodyParameters(INERTIA), initial_state(OFFSET), DURATION, STEPS, SAMPLES))
     )
-    baseline = drift(momentum(euler_angles(ASIDE, STEPS // 4, SAMPLES)))
+    baseline = drift(momentum(euler_angles(OFFSET, STEPS // 4, SAMPLES)))
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     row = Row(
         "momentum",
@@ -89,12 +89,17 @@ def run() -> CaseResult:
 
 
 def sweep() -> Sweep:
-    """Pass the pole ever closer."""
-    asides = np.geomspace(10.0, 1e-6, 15)
+    """Decrease the distance to the pole."""
+    offsets = np.geomspace(10.0, 1e-6, 15)
     ours = [
-        drift(momentum(run_fixed_steps("rkmk4", FreeBodyParameters(INERTIA), start(a), DURATION, STEPS, 60))).max()
-        for a in asides
+        drift(
+            momentum(run_fixed_steps("rkmk4", FreeBodyParameters(INERTIA), initial_state(a), DURATION, STEPS, 60))
+        ).max()
+        for a in offsets
     ]
-    baseline = [drift(momentum(euler_angles(a, STEPS // 6, 100))).max() for a in asides]
-    curves = [Curve("rkmk4 on SO(3)", asides, np.array(ours)), Curve("RK4 on Euler angles", asides, np.array(baseline))]
-    return Sweep("roll and yaw rate beside the loop [rad/s]", "change of momentum", 1e-3, curves, falling=True)
+    baseline = [drift(momentum(euler_angles(a, STEPS // 6, 100))).max() for a in offsets]
+    curves = [
+        Curve("rkmk4 on SO(3)", offsets, np.array(ours)),
+        Curve("RK4 on Euler angles", offsets, np.array(baseline)),
+    ]
+    return Sweep("roll and yaw rate [rad/s]", "change of momentum", 1e-3, curves, falling=True)

@@ -1,4 +1,4 @@
-"""Case 5: bodies whose moments of inertia are as unequal, or as equal, as bodies can have them."""
+"""Case 5: bodies with extremely different, or nearly equal, moments of inertia."""
 
 import numpy as np
 
@@ -9,55 +9,55 @@ from lapwing.studies.accuracy.systems.free_rigid_body import closed_form
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
-HARD = "a needle (a moment a millionth of the others), a flat plate, a body spherical but for 1e-9"
+HARD = "a needle (one moment a millionth of the others), a flat plate, a body spherical to 1e-9"
 
 BODIES = {
     "needle": ((1e-6, 1.0, 1.0 + 7e-7), (400.0, 1.0, -0.7)),
     "flat": ((1e-6, 1.0, 1.0 + 1e-6), (50.0, -0.3, 2.0)),
 }
-ASKEW = exp((0.3, -0.5, 0.2))
-SPHERICAL, ALMOST = (1.0, 1.0 + 1e-9, 1.0 + 2e-9), (1.0, 2.0, 5.0)
+ATTITUDE = exp((0.3, -0.5, 0.2))
+SPHERICAL, RATES = (1.0, 1.0 + 1e-9, 1.0 + 2e-9), (1.0, 2.0, 5.0)
 DURATION, STEPS, SAMPLES = 100.0, 100_000, 200
 METHOD, BASELINE = "rigid_splitting", "rk4"
 BOUND = 2e-11
-WHY = "2e-16 for each of 100 000 steps, were every rounding of one sign"
+WHY = "round-off of 2e-16 in each of 100 000 steps, all of one sign"
 
 
 def drifts(method: str, body: str, steps: int) -> np.ndarray:
-    """Return the larger of the drifts of energy and momentum, shape (k,)."""
+    """Return the larger of the relative drifts of energy and momentum, shape (k,)."""
     inertia, omega = BODIES[body]
-    y = run_fixed_steps(method, FreeBodyParameters(inertia), RigidBody(ASKEW, omega), DURATION, steps, SAMPLES)
+    y = run_fixed_steps(method, FreeBodyParameters(inertia), RigidBody(ATTITUDE, omega), DURATION, steps, SAMPLES)
     return drifts_of_run(y, inertia)
 
 
 def drifts_of_run(y: np.ndarray, inertia: tuple[float, float, float]) -> np.ndarray:
-    """Return the `drifts` of a run: R_world_body and omega_body at every sample, shape (k, 12)."""
+    """Return the `drifts` of a run; `y` has R_world_body and omega_body at every sample, shape (k, 12)."""
     energy = (y[:, 9:12] ** 2 * inertia).sum(axis=1)
     return np.maximum(drift(energy), drift(to_world(y[:, :9], y[:, 9:12] * inertia)))
 
 
-def bend(inertia: tuple, omega: np.ndarray) -> np.ndarray:
+def angular_acceleration(inertia: tuple, omega: np.ndarray) -> np.ndarray:
     """Return omega' of Euler's equations [rad/s^2]."""
     return np.cross(np.multiply(inertia, omega), omega) / inertia
 
 
 def nearly_spherical() -> tuple[float, float]:
-    """Return the errors of the final rates [rad/s], ours and of the closed form in floats.
+    """Return the errors of the final rates [rad/s] of Lapwing's method and of the closed form in floats.
 
-    The body axes hardly rotate: the second order of their Taylor series is exact to 1e-17.
+    The rates hardly change: their Taylor series of second order is exact to 1e-17.
     """
-    o = np.array(ALMOST)
-    first = bend(SPHERICAL, o)
-    second = bend(SPHERICAL, o + 0.5 * first) - bend(SPHERICAL, o - 0.5 * first)
+    o = np.array(RATES)
+    first = angular_acceleration(SPHERICAL, o)
+    second = angular_acceleration(SPHERICAL, o + 0.5 * first) - angular_acceleration(SPHERICAL, o - 0.5 * first)
     exact = o + DURATION * first + 0.5 * DURATION**2 * second
-    start = RigidBody(ASKEW, ALMOST)
+    start = RigidBody(ATTITUDE, RATES)
     ours = run_fixed_steps(METHOD, FreeBodyParameters(SPHERICAL), start, DURATION, STEPS, SAMPLES)[-1, 9:12]
     baseline = closed_form(SPHERICAL, start, DURATION)[9:12]
     return float(np.abs(ours - exact).max()), float(np.abs(baseline - exact).max())
 
 
 def run() -> CaseResult:
-    """Measure energy and momentum of the first two bodies, the rates of the third."""
+    """Measure energy and momentum of two bodies, and the rates of the third."""
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     rows, curves = [], []
     for body in BODIES:
@@ -70,7 +70,7 @@ def run() -> CaseResult:
                 BOUND,
                 WHY,
                 float(ours.max()),
-                "RK4 on the quaternion's numbers",
+                "RK4 on the components of the quaternion",
                 float(baseline.max()),
             )
         )
@@ -82,9 +82,9 @@ def run() -> CaseResult:
             f"{METHOD}, 1 ms",
             "error of the body rates [rad/s]",
             1e-10,
-            "as above, for 5 rad/s",
+            "as for `needle`, for 5 rad/s",
             off,
-            "Jacobi's functions as in books: differences of moments cancel",
+            "Jacobi's functions in textbook form, with cancellation of the moments",
             baseline_off,
         )
     )

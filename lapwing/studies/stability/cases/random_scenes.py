@@ -1,4 +1,4 @@
-"""Case 22: scenes drawn at random: all that validate fly, and fly alike twice."""
+"""Case 22: random scenes: valid scenes fly, and repeated flights are bit-for-bit identical."""
 
 import numpy as np
 
@@ -8,13 +8,13 @@ from lapwing.studies.simulate import fly
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.flights import finite
 
-HARD = "missions whose vehicle, ground, wind, sensors and exchange are drawn at random over decades"
+HARD = "missions with random vehicle, ground, wind, sensors and communication step, over decades"
 
 COUNT = 50
-WHY = "none: what validates flies"
+WHY = "none: a valid scene flies"
 
 
-def drawn(seed: int) -> list[str]:
+def random_overrides(seed: int) -> list[str]:
     """Return random overrides of the delivery mission."""
     rng = np.random.default_rng(seed)
 
@@ -40,57 +40,57 @@ def drawn(seed: int) -> list[str]:
         "effects.random_wind_force.mean": [float(v) for v in rng.normal(0.0, 15.0, 3)],
         "effects.random_wind_force.sigma": decades(0.01, 10.0),
     }
-    slow = {f"rates.{name}": 10 for name in ("pose", "estimate", "status", "battery", "body_states", "commands")}
-    return [f"{key}={value}" for key, value in {**result, **slow}.items()]
+    slow_rates = {f"rates.{name}": 10 for name in ("pose", "estimate", "status", "battery", "body_states", "commands")}
+    return [f"{key}={value}" for key, value in {**result, **slow_rates}.items()]
 
 
 def flights(seed: int) -> tuple[FlightData, FlightData] | None:
-    """Fly a scene twice. Return None if it is invalid."""
+    """Return two flights of the same random scene; None if it is invalid."""
     try:
-        first: FlightData = fly(load("delivery_mission", drawn(seed)))
-    except ValueError:  # also: too heavy for its rotors
+        first: FlightData = fly(load("delivery_mission", random_overrides(seed)))
+    except ValueError:  # invalid, or too heavy for its rotors
         return None
-    second: FlightData = fly(load("delivery_mission", drawn(seed)))
+    second: FlightData = fly(load("delivery_mission", random_overrides(seed)))
     return first, second
 
 
 def run() -> CaseResult:
     """Count flights that diverge, and those that differ when repeated."""
     pairs = [pair for seed in range(COUNT) if (pair := flights(seed))]
-    broken = [bool(first.failure) or not finite(first) for first, _ in pairs]
-    unlike = [first.digest != second.digest for first, second in pairs]
-    generator = np.random.default_rng(1)  # the baseline way: one generator with a state for all that is random
-    again = [generator.normal(size=3).tobytes() != generator.normal(size=3).tobytes() for _ in pairs]
+    diverged = [bool(first.failure) or not finite(first) for first, _ in pairs]
+    different = [first.digest != second.digest for first, second in pairs]
+    generator = np.random.default_rng(1)  # baseline: one generator with a state for all random numbers
+    baseline_different = [generator.normal(size=3).tobytes() != generator.normal(size=3).tobytes() for _ in pairs]
     unsplit = [1.0 / float(lag) * float(step) > 2.0 for lag, step in map(_lag_and_step, range(COUNT))]
     rows = [
         Row(
-            "sound",
-            "checks; steps are split where lag or ground ask for it",
-            f"of {len(pairs)} scenes that validate, ending in no number within 1 s",
+            "finite",
+            "validation; steps split for motor lag and ground",
+            f"valid scenes with a non-finite state within 1 s, of {len(pairs)}",
             0.0,
             WHY,
-            float(sum(broken)),
-            "forward Euler on the motors' lag, as the step is",
+            float(sum(diverged)),
+            "forward Euler on the motor lag, without substeps",
             float(sum(unsplit)),
         ),
         Row(
             "digest",
-            "randomness by counter",
-            f"of {len(pairs)} scenes, unlike when flown again",
+            "counter-based random numbers",
+            f"scenes that differ when repeated, of {len(pairs)}",
             0.0,
-            "none: same scene and seed, same bits",
-            float(sum(unlike)),
-            "one generator with a state",
-            float(sum(again)),
+            "none: equal scene and seed give identical bits",
+            float(sum(different)),
+            "a single generator with a state",
+            float(sum(baseline_different)),
         ),
     ]
-    highest = [float(np.abs(first.truth.angular_velocity).max()) for first, _ in pairs]
+    turn_rate = [float(np.abs(first.truth.angular_velocity).max()) for first, _ in pairs]
     x = np.arange(len(pairs), dtype=float)
     return CaseResult(
-        rows, Plot("scene", "highest turn rate [rad/s]", [Curve("in flight", x, np.array(highest) + 1e-12)])
+        rows, Plot("scene", "largest angular velocity [rad/s]", [Curve("in flight", x, np.array(turn_rate) + 1e-12)])
     )
 
 
 def _lag_and_step(seed: int) -> tuple[str, str]:
-    result = dict(item.split("=", 1) for item in drawn(seed))
+    result = dict(item.split("=", 1) for item in random_overrides(seed))
     return result["airframe.motor.time_constant"], result["solver.step"]

@@ -1,4 +1,4 @@
-"""Case 6: more constraints than freedoms, singular positions, and starts that do not fit together."""
+"""Case 6: redundant constraints, singular positions, and inconsistent initial states."""
 
 import math
 
@@ -24,16 +24,16 @@ from lapwing.dynamics.multibody.stabilisation import defects, rows
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.drone import PAPER, delivery_drone
 
-HARD = "32 rows of rank 24; the Bricard loop, whose count leaves no freedom; a four-bar through its singular position"
+HARD = "32 constraints of rank 24; the overconstrained Bricard loop; a four-bar through its singular position"
 
 GRAVITY = 9.81  # [m/s^2]
 POSITION = 1e-6  # [m]
-END, STEPS, LOOKS = 5.0, 2500, 50  # of the four-bars
-GUESSES = np.geomspace(1e-9, 1e-2, 8)
+END, STEPS, RECORD_EVERY = 5.0, 2500, 50  # [s]; steps; steps between two samples: of the four-bars
+DEFECTS = np.geomspace(1e-9, 1e-2, 8)
 
 
 def saddle(system, q, v, drive) -> np.ndarray:  # type: ignore[no-untyped-def]
-    """Return the accelerations (6 n,) by one LU of the assembled matrix of masses and constraints: the baseline."""
+    """Return the accelerations (6 n,) by one LU decomposition of the saddle-point matrix (baseline)."""
     p, e = rows(system.arrays, q, v, drive)
     root, rotational = mass_roots(system.arrays, p)
     J = e.jacobian_t.T
@@ -48,7 +48,7 @@ def saddle(system, q, v, drive) -> np.ndarray:  # type: ignore[no-untyped-def]
     try:
         return np.linalg.solve(M, np.concatenate([force, e.gamma]))[:n]
     except np.linalg.LinAlgError:
-        return np.zeros(n)  # it has no answer
+        return np.zeros(n)  # singular: no solution
 
 
 def constraint_violation(system, q, v, drive, a) -> float:  # type: ignore[no-untyped-def]
@@ -57,8 +57,8 @@ def constraint_violation(system, q, v, drive, a) -> float:  # type: ignore[no-un
     return float(np.abs(e.jacobian_t.T @ a - e.gamma).max() / max(np.abs(e.gamma).max(), 1.0))
 
 
-def redundant() -> tuple[float, float]:
-    """Return the errors of the drone with imposed propeller speeds, ours and the baseline's, of 20 random states."""
+def redundancy_errors() -> tuple[float, float]:
+    """Return the largest errors of Lapwing and baseline in 20 random states of the drone with imposed rotor speeds."""
     rng, worst = np.random.default_rng(5), np.zeros(2)
     drone = delivery_drone(**PAPER, driven="speed")
     system = drone_system(drone)
@@ -76,24 +76,24 @@ def redundant() -> tuple[float, float]:
     return float(worst[0]), float(worst[1])
 
 
-def off_by(size: float) -> tuple[float, float]:
-    """Return the relative errors of the Bricard loop's accelerations with joints apart by `size` [m].
+def bricard_errors(size: float) -> tuple[float, float]:
+    """Return the relative errors of the Bricard loop's accelerations with joint defects of `size` [m].
 
-    With the initial rank as a bound, and with a newly determined rank.
+    The first with the initial rank as a bound, the second with a newly determined rank.
     """
     system, q, v = bricard()
     off = add_increment(q, size * np.random.default_rng(1).normal(size=v.shape))
     no_load, no_drive = np.zeros((5, 6)), np.zeros((0, 2))
     true = accelerations(system, q, v).acceleration
     result = []
-    for most in (29, ANY):
-        a, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, most)
+    for rank in (29, ANY):
+        a, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, rank)
         result.append(float(np.abs(a.acceleration - true).max() / np.abs(true).max()))
     return result[0], result[1]
 
 
 def tips(t: np.ndarray, n: int) -> np.ndarray:
-    """Return the first crank's tip of n four-bars at times t [s], from one equation of motion [m], shape (k, 3)."""
+    """Return the first crank's tip [m] of n four-bars at times t [s] from one equation of motion, shape (k, 3)."""
     inertia, weight = (n + 1) * (1.0 / 12.0 + 0.25) + n, GRAVITY * ((n + 1) * 0.5 + n)
     theta = solve_ivp(
         lambda t, y: [y[1], weight / inertia * math.sin(y[0])],
@@ -103,18 +103,18 @@ def tips(t: np.ndarray, n: int) -> np.ndarray:
 
 
 def singular_position() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return (times, error of the first crank's tip [m], the baseline's) of two four-bars that turn over."""
+    """Return (times [s], error of the first crank's tip [m], error of the baseline [m]) of two four-bars."""
     n = 2
     system, q, v = four_bars(n)
-    motion = simulate(system, q, v, END / STEPS, STEPS, record_every=LOOKS)
+    motion = simulate(system, q, v, END / STEPS, STEPS, record_every=RECORD_EVERY)
     tip = tips(motion.time, n)
     off = np.abs(2.0 * motion.configuration[:, 0, :3] - tip).max(axis=1)
-    baseline = simulate(system, q, v, END / STEPS, STEPS, "none", record_every=LOOKS)
+    baseline = simulate(system, q, v, END / STEPS, STEPS, "none", record_every=RECORD_EVERY)
     return motion.time, off, np.abs(2.0 * baseline.configuration[:, 0, :3] - tip).max(axis=1)
 
 
-def inconsistent() -> tuple[float, float]:
-    """Return the maximum constraint defect of a hand-assembled four-bar, after correction and before."""
+def start_defects() -> tuple[float, float]:
+    """Return the largest constraint defects of an inaccurately assembled four-bar, after and before correction."""
     system, q, v = four_bars()
     rng, none = np.random.default_rng(1), np.zeros((0, 2))
     q, v = add_increment(q, 0.02 * rng.normal(size=v.shape)), v + 0.1 * rng.normal(size=v.shape)
@@ -123,49 +123,49 @@ def inconsistent() -> tuple[float, float]:
 
 
 def run() -> CaseResult:
-    """Measure rank, redundancy off the constraints, a singular position and an inconsistent start."""
+    """Measure redundant constraints, a singular position and an inconsistent initial state."""
     t, off, baseline_off = singular_position()
-    ours_off, fresh = off_by(1e-6)
+    ours_off, baseline_rank_error = bricard_errors(1e-6)
     figures = [
         Row(
             "rank_24_of_32",
-            "pivoted QR, rank revealed",
+            "rank-revealing QR",
             "J a - gamma, relative",
             1e-10,
-            "1e-16 times the condition of the rows, where blades turn at 400 rad/s",
-            redundant()[0],
-            "LU of the saddle-point matrix (none: singular)",
-            redundant()[1],
+            "1e-16 times the condition number of the constraints, at propeller speeds of 400 rad/s",
+            redundancy_errors()[0],
+            "LU of the saddle-point matrix, singular",
+            redundancy_errors()[1],
         ),
         Row(
             "bricard",
-            "rank of the start as a bound",
+            "initial rank as a bound",
             "error of the accelerations 1e-6 m off the constraints, relative",
             1e-3,
-            "a thousand times what the mechanism is apart by, which is what it can be",
+            "a thousand times the joint defect",
             ours_off,
-            "rank found afresh",
-            fresh,
+            "newly determined rank",
+            baseline_rank_error,
         ),
         Row(
             "four_bar",
             "RK4 with projection, 2 ms",
             "error of a crank's tip in 5 s [m]",
             POSITION,
-            "a thousandth of the benchmark's own 1e-3 (IFToMM A02)",
+            "a thousandth of the tolerance of the benchmark, 1e-3 (IFToMM A02)",
             float(off.max()),
             "RK4 without stabilisation, 2 ms",
             float(np.nanmax(baseline_off)),
         ),
         Row(
             "start",
-            "made consistent in the metric of the masses",
-            "largest defect of a start off by 2 cm",
+            "correction in the mass metric",
+            "largest defect of an initial state with errors of 2 cm",
             1e-12,
             "round-off of coordinates of a few metres",
-            inconsistent()[0],
-            "the start as it was given",
-            inconsistent()[1],
+            start_defects()[0],
+            "no correction",
+            start_defects()[1],
         ),
     ]
     curves = [Curve("projection", t, off), Curve("no stabilisation", t, baseline_off)]
@@ -174,7 +174,7 @@ def run() -> CaseResult:
 
 def sweep() -> Sweep:
     """Increase the joint defect of the Bricard loop."""
-    result = np.array([off_by(size) for size in GUESSES])
-    names = ("rank of the start as a bound", "rank found afresh")
-    curves = [Curve(name, GUESSES, result[:, k]) for k, name in enumerate(names)]
-    return Sweep("joints apart by [m]", "error of the accelerations, relative", 0.5, curves)
+    result = np.array([bricard_errors(size) for size in DEFECTS])
+    names = ("initial rank as a bound", "newly determined rank")
+    curves = [Curve(name, DEFECTS, result[:, k]) for k, name in enumerate(names)]
+    return Sweep("joint defect [m]", "error of the accelerations, relative", 0.5, curves)

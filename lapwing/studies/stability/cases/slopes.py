@@ -1,4 +1,4 @@
-"""Case 18: slopes up to the friction angle and beyond it, bumps, a landing on one foot."""
+"""Case 18: slopes up to the friction angle and beyond, bumps, a touchdown on one foot."""
 
 import math
 from typing import Any
@@ -9,28 +9,28 @@ from lapwing.dynamics.lie.quaternion import exp, multiply
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.cases.landing import STEP, G, baseline_restitution, run_on, state_above_slope
 
-HARD = "slopes up to where feet that are loaded unevenly let go, and beyond; bumps; a touch with one foot first"
+HARD = "slopes up to the friction angle, with unevenly loaded feet, and beyond; bumps; a touchdown on one foot"
 
 STATIC, DYNAMIC = 0.5, 0.3  # coefficients of the effect
-# The uphill feet carry less and let go first, but creeping by hundredths of a millimetre they still hold by mu_s
+# The uphill feet carry less load and slip first, by hundredths of a millimetre, but still hold by mu_s
 EDGE = math.degrees(math.atan(STATIC))  # 26.6
-MARGIN = 1.0  # [degrees] below it: let go at once, not tilted slowly, the feet overshoot
-STILL, SLIDES = 1e-6, 1e-3  # [m], relative
+MARGIN = 1.0  # [degrees] below it: after a sudden release the feet overshoot
+REST, SLIDE = 1e-6, 1e-3  # [m], relative
 
 
-def way(degrees: float, seconds: float = 60.0) -> float:
-    """Return the distance [m] that a vehicle at rest moves on a slope."""
-    # set down gently: held until the springs across the slope carry the weight, and then let go
+def distance(degrees: float, seconds: float = 60.0) -> float:
+    """Return the motion [m] of a vehicle at rest on a slope [degrees] in a time [s]."""
+    # held by high friction until the springs along the slope carry the weight, then released
     model, state = state_above_slope(0.0, 0.0, math.radians(degrees), friction_static=5.0)
     state = run_on(model, state, 3.0)
     p, _ = state_above_slope(0.0, 0.0, math.radians(degrees))
-    state = run_on(p, state, 3.0)  # the uphill feet slip by hundredths of a millimetre, and stick again
+    state = run_on(p, state, 3.0)  # the uphill feet slip by hundredths of a millimetre and stick again
     later = run_on(p, state, seconds).motion
     return float(np.linalg.norm(np.subtract(later.position_world, state.motion.position_world)))
 
 
 def chatter_distance(degrees: float, seconds: float = 60.0) -> float:
-    """Return the distance [m] with sign friction and forward Euler at the plant's step: the baseline."""
+    """Return the motion [m] under sign friction and forward Euler at the plant's step (baseline)."""
     a, x, v = math.radians(degrees), 0.0, 0.0
     for _ in range(round(seconds / STEP)):
         v += STEP * G * (math.sin(a) - STATIC * math.cos(a) * math.copysign(1.0, v))
@@ -39,7 +39,7 @@ def chatter_distance(degrees: float, seconds: float = 60.0) -> float:
 
 
 def slide_acceleration(degrees: float) -> float:
-    """Return the downhill acceleration [m/s^2] while it slides."""
+    """Return the downhill acceleration [m/s^2] of a slide on a slope [degrees]."""
     a = math.radians(degrees)
     p, state = state_above_slope(0.0, 0.0, a)
     early = run_on(p, state, 0.3)
@@ -57,7 +57,7 @@ def energy(p: Any, m: Any) -> float:
 
 
 def one_foot() -> float:
-    """Return the maximum energy over the initial one, minus one, of a landing on one foot at 1 m/s."""
+    """Return the largest energy over the initial one, minus one, of a touchdown on one foot at 1 m/s."""
     p, state = state_above_slope(0.1, 1.0)
     m = state.motion
     state = state._replace(motion=m._replace(attitude=multiply(m.attitude, exp((0.15, -0.12, 0.3)))))
@@ -69,7 +69,7 @@ def one_foot() -> float:
 
 
 def bumps() -> float:
-    """Return the distance [m] moved in a minute at rest on bumps of 2 cm."""
+    """Return the motion [m] in a minute of rest on bumps of 2 cm."""
     p, state = state_above_slope(0.1, 0.0, ground={"bump_height": 0.02, "bump_length": 0.7})
     state = run_on(p, state, 3.0)
     later = run_on(p, state, 60.0).motion
@@ -77,26 +77,38 @@ def bumps() -> float:
 
 
 def run() -> CaseResult:
-    """Measure sticking, sliding, landing on one foot, and rest on bumps."""
+    """Measure sticking, sliding, a touchdown on one foot, and rest on bumps."""
     below, beyond = EDGE - MARGIN, 30.0
     a = math.radians(beyond)
     exact = G * (math.sin(a) - DYNAMIC * math.cos(a))
     one_coefficient = G * (math.sin(a) - STATIC * math.cos(a))
-    sign, anchored = "friction against the sign of the slip", "friction elements, RK4 at 1 ms"
+    sign, anchored = "sign friction", "friction elements, RK4 at 1 ms"
     gain = max(baseline_restitution(1.0, phase / 8, STEP) for phase in range(8)) ** 2 - 1.0
-    stuck, slid = "a thousandth of a millimetre: it sticks", "what the feet's springs still swing after 0.3 s"
-    steep, gained = f"way [m] in a minute at {below:.1f} degrees", "energy gained in a landing on one foot, relative"
+    no_slip, transient = (
+        "a thousandth of a millimetre: the feet stick",
+        "remaining oscillation of the feet's springs after 0.3 s",
+    )
+    steep, gained = f"motion [m] in a minute at {below:.1f} degrees", "energy gain of a touchdown on one foot, relative"
     against, on_bumps = (
-        "acceleration on 30 degrees, relative to g (sin - mu cos)",
-        "way [m] in a minute on bumps of 2 cm",
+        "error of the acceleration on 30 degrees, relative to g (sin - mu cos)",
+        "motion [m] in a minute on bumps of 2 cm",
     )
     off, baseline_off = abs(slide_acceleration(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
-    none, euler = "none but round-off: the ground adds no energy", "forward Euler on spring and damper, upright"
+    none, euler = "round-off: the ground adds no energy", "forward Euler on spring and damper, upright"
     rows = [
-        Row("below", anchored, steep, STILL, stuck, way(below), sign, chatter_distance(below)),
-        Row("beyond", anchored, against, SLIDES, slid, off, "one coefficient for both", baseline_off),
+        Row("below", anchored, steep, REST, no_slip, distance(below), sign, chatter_distance(below)),
+        Row(
+            "beyond",
+            anchored,
+            against,
+            SLIDE,
+            transient,
+            off,
+            "one coefficient for static and dynamic friction",
+            baseline_off,
+        ),
         Row("one_foot", anchored, gained, 1e-9, none, one_foot(), euler, gain),
-        Row("bumps", anchored, on_bumps, STILL, stuck, bumps(), sign, chatter_distance(5.0)),
+        Row("bumps", anchored, on_bumps, REST, no_slip, bumps(), sign, chatter_distance(5.0)),
     ]
     return CaseResult(rows, sweep().plot())
 
@@ -104,6 +116,6 @@ def run() -> CaseResult:
 def sweep() -> Sweep:
     """Increase the slope."""
     angles = np.array([5.0, 10.0, 15.0, 20.0, 22.0, 22.5, 23.0, 23.5, 24.0, 25.0, 26.0, 26.5, 26.7, 28.0])
-    ways = {"friction elements": way, "sign of the slip": chatter_distance}
-    curves = [Curve(name, angles, np.maximum([f(float(d), 5.0) for d in angles], 1e-17)) for name, f in ways.items()]
-    return Sweep(f"slope [degrees], uphill feet let go at {EDGE:.1f}", "way in 5 s [m]", STILL, curves, log_x=False)
+    methods = {"friction elements": distance, "sign friction": chatter_distance}
+    curves = [Curve(name, angles, np.maximum([f(float(d), 5.0) for d in angles], 1e-17)) for name, f in methods.items()]
+    return Sweep(f"slope [degrees], friction angle {EDGE:.1f}", "motion in 5 s [m]", REST, curves, log_x=False)

@@ -1,4 +1,4 @@
-"""Case 21: a load with stiff control in a separate process."""
+"""Case 21: a carried load with its stiff control in a separate process."""
 
 from functools import cache
 from typing import Any
@@ -10,27 +10,34 @@ from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, 
 from lapwing.studies.stability.flights import fly
 from lapwing.studies.stability.sampled_runs import rows
 
-HARD = "a carried load whose control is another process: each is constant for the other during a step"
+HARD = "a carried load with its control in another process: inputs are constant during a communication step"
 
-DURATION, LOOKS = 5.0, 50  # [s], times at which runs are compared: a multiple of every interval
+DURATION, SAMPLES = 5.0, 50  # [s]; samples at which runs are compared, at multiples of every interval
 RATES = (400, 200, 100, 50, 40, 20, 10)  # [Hz]
 STEP = 0.0025  # [s] of the plant
-ALLOWED = 0.02  # [m]
-SLOW = 20  # [Hz]
+BOUND = 0.02  # [m]
+LOW_RATE = 20  # [Hz]
 
 
 @cache
-def together(steps: int) -> np.ndarray:
+def single_process(steps: int) -> np.ndarray:
     """Return the load's positions [m] with the control inside the plant's equations, shape (LOOKS + 1, 3)."""
     services = resolve(load("cooperative_load", [])).services
     law: Any = services["formation"].parameters
     start: Any = services["plant"].parameters.start
-    return rows("cf4", law.formation, start, DURATION, steps, LOOKS)[:, :3]
+    return rows("cf4", law.formation, start, DURATION, steps, SAMPLES)[:, :3]
 
 
 @cache
-def apart(rate: int, coupling: str) -> np.ndarray:
-    """Return the positions with plant and control in two processes that exchange at a rate [Hz]; NaN after the end."""
+def two_processes(rate: int, coupling: str) -> np.ndarray:
+    """Return the load's positions [m] with plant and control in two processes, shape (SAMPLES + 1, 3).
+
+    Args:
+        rate: communication rate [Hz].
+        coupling: "gauss_seidel" or "jacobi".
+
+    Samples after the end of a run are NaN.
+    """
     slow = [f"rates.{name}=10" for name in ("pose", "estimate", "status", "battery", "commands")]
     interval = 1.0 / rate
     solver = f"solver.step={interval / round(interval / STEP)!r}"
@@ -44,47 +51,76 @@ def apart(rate: int, coupling: str) -> np.ndarray:
             *slow,
         ],
     ).truth
-    result = np.full((LOOKS + 1, 3), np.nan)
-    at = truth.position[:: round(DURATION / LOOKS * rate)]
+    result = np.full((SAMPLES + 1, 3), np.nan)
+    at = truth.position[:: round(DURATION / SAMPLES * rate)]
     result[: len(at)] = at
     return result
 
 
-def off(positions: np.ndarray) -> float:
-    """Return the maximum distance [m] from the single-process run, over the finite samples."""
-    distance = np.linalg.norm(positions - together(2000), axis=1)
+def distance_from_single(positions: np.ndarray) -> float:
+    """Return the largest distance [m] from the single-process run over the finite samples."""
+    distance = np.linalg.norm(positions - single_process(2000), axis=1)
     return float(np.nanmax(distance))
 
 
 def run() -> CaseResult:
     """Compare one process with two."""
-    one = float(np.linalg.norm(together(1000) - together(2000), axis=1).max())
-    why = "the formation flies at 5 m/s: in an exchange of 2.5 ms it moves by 12 mm"
-    broken, drowned = off(apart(SLOW, "jacobi")), "two processes in parallel (Jacobi) at 20 Hz"
-    what, exchanging = "load's distance [m] from the same in one", "two processes at 400 Hz"
-    near, far = off(apart(400, "gauss_seidel")), off(apart(400, "jacobi"))
-    how = "control inside of the plant's equations, 5 ms"
-    cost = "a hundredth of what the exchange costs is what the step may"
+    one = float(np.linalg.norm(single_process(1000) - single_process(2000), axis=1).max())
+    why = "the formation flies at 5 m/s, 12 mm per communication step of 2.5 ms"
+    baseline_distance, baseline = (
+        distance_from_single(two_processes(LOW_RATE, "jacobi")),
+        "two processes with Jacobi coupling at 20 Hz",
+    )
+    invariant, processes = "distance of the load [m] from the single-process run", "two processes at 400 Hz"
+    gauss_seidel, jacobi = (
+        distance_from_single(two_processes(400, "gauss_seidel")),
+        distance_from_single(two_processes(400, "jacobi")),
+    )
+    method = "control in the plant's equations, 5 ms"
+    cost = "a hundredth of the error of the coupling"
     figures = [
-        Row("sequential", exchanging, what, ALLOWED, why, near, drowned, broken),
-        Row("parallel", exchanging, what, ALLOWED, why, far, drowned, broken),
-        Row("one", how, "load's distance [m] from that at 2.5 ms", 1e-4, cost, one, drowned, broken),
+        Row("sequential", processes, invariant, BOUND, why, gauss_seidel, baseline, baseline_distance),
+        Row("parallel", processes, invariant, BOUND, why, jacobi, baseline, baseline_distance),
+        Row(
+            "one",
+            method,
+            "distance of the load [m] from the run at 2.5 ms",
+            1e-4,
+            cost,
+            one,
+            baseline,
+            baseline_distance,
+        ),
     ]
-    t = np.linspace(0.0, DURATION, LOOKS + 1)
+    t = np.linspace(0.0, DURATION, SAMPLES + 1)
     curves = [
-        Curve(f"{coupling}, {rate} Hz", t, np.linalg.norm(apart(rate, coupling) - together(2000), axis=1))
+        Curve(f"{coupling}, {rate} Hz", t, np.linalg.norm(two_processes(rate, coupling) - single_process(2000), axis=1))
         for coupling in ("gauss_seidel", "jacobi")
-        for rate in (400, 40, SLOW)
+        for rate in (400, 40, LOW_RATE)
     ]
-    return CaseResult(figures, Plot("time [s]", "distance from the run in one process [m]", curves, ALLOWED))
+    return CaseResult(figures, Plot("time [s]", "distance from the single-process run [m]", curves, BOUND))
 
 
 def sweep() -> Sweep:
     """Decrease the communication rate."""
     intervals = 1.0 / np.array(RATES)
     curves = [
-        Curve(f"two processes, {coupling}", intervals, np.array([off(apart(rate, coupling)) for rate in RATES]))
+        Curve(
+            f"two processes, {coupling}",
+            intervals,
+            np.array([distance_from_single(two_processes(rate, coupling)) for rate in RATES]),
+        )
         for coupling in ("gauss_seidel", "jacobi")
     ]
-    one = np.array([off(together(round(DURATION * rate))) if rate >= LOOKS / DURATION else np.nan for rate in RATES])
-    return Sweep("exchange interval, or step [s]", "distance [m]", 1.0, [*curves, Curve("one process", intervals, one)])
+    one = np.array(
+        [
+            distance_from_single(single_process(round(DURATION * rate))) if rate >= SAMPLES / DURATION else np.nan
+            for rate in RATES
+        ]
+    )
+    return Sweep(
+        "communication step, or integrator step [s]",
+        "distance [m]",
+        1.0,
+        [*curves, Curve("one process", intervals, one)],
+    )

@@ -1,4 +1,4 @@
-"""Case 19: where the unloaded pack comes to lie, under longer and longer steps."""
+"""Case 19: final position of the unloaded pack at several steps."""
 
 from functools import cache
 
@@ -10,47 +10,47 @@ from lapwing.services.scene_resolver import load
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.flights import fly
 
-HARD = "a pack that rollers push over a door that falls open: contacts that begin, slide, stick and end"
+HARD = "a pack pushed by rollers over an opening door: contacts that begin, slide, stick and end"
 
 STEPS = (0.25e-3, 0.5e-3, 1e-3, 2e-3)  # [s]
 BASELINE = 0.5e-3  # [s]
 BOUND = 1e-5  # [m]
-TAKEN = 4.9  # [s] just before it is taken away
+REMOVAL = 4.9  # [s] just before the removal of the pack
 
 
 @cache
-def end(step: float, *more: str) -> np.ndarray:
-    """Return the pack's position before removal [m], NaN if the run ended before; shape (3,)."""
-    flight = fly("unload", [f"solver.step={step!r}", f"run.duration={TAKEN!r}", *more])
+def end_position(step: float, *overrides: str) -> np.ndarray:
+    """Return the position of the pack before its removal [m], shape (3,); NaN if the run ended early."""
+    flight = fly("unload", [f"solver.step={step!r}", f"run.duration={REMOVAL!r}", *overrides])
     return np.full(3, np.nan) if flight.failure else flight.truth.position[-1]
 
 
-def off(step: float) -> float:
+def end_error(step: float) -> float:
     """Return the distance [m] from the final position at an accuracy of 1e-8."""
-    return float(np.linalg.norm(end(step) - end(STEPS[0], "solver.accuracy=1e-8")))
+    return float(np.linalg.norm(end_position(step) - end_position(STEPS[0], "solver.accuracy=1e-8")))
 
 
-def baseline(step: float) -> float:
-    """Return the position error of steps without error control; infinite if the run ends with an error."""
+def baseline_error(step: float) -> float:
+    """Return the position error [m] of steps without error control; infinite if the run ends with an error."""
     p, start = unloading.system(load("unload"))
     try:
-        _, rows = integrators.simulate(integrators.get("rk4_renormalised"), p, start, step, round(TAKEN / step), 100)
+        _, rows = integrators.simulate(integrators.get("rk4_renormalised"), p, start, step, round(REMOVAL / step), 100)
     except ValueError:
         return np.inf
-    return float(np.linalg.norm(rows[-1][:3] - end(STEPS[0], "solver.accuracy=1e-8")))
+    return float(np.linalg.norm(rows[-1][:3] - end_position(STEPS[0], "solver.accuracy=1e-8")))
 
 
 def run() -> CaseResult:
-    """Compare the end at every step."""
+    """Compare the final positions at several steps."""
     row = Row(
         "end",
-        "RK4 with its error controlled, steps of 0.25 to 2 ms at most",
-        "distance [m] of the pack's end from that at an accuracy of 1e-8, worst of 4 steps",
+        "RK4 with error control, steps of at most 0.25 to 2 ms",
+        "distance [m] of the final position from that at an accuracy of 1e-8, worst of 4 steps",
         BOUND,
-        "the tolerance of a part of a step",
-        max(off(step) for step in STEPS),
-        "RK4 at 0.5 ms as it is",
-        baseline(BASELINE),
+        "the tolerance of a substep",
+        max(end_error(step) for step in STEPS),
+        "RK4 at 0.5 ms without error control",
+        baseline_error(BASELINE),
     )
     return CaseResult([row], sweep().plot())
 
@@ -59,7 +59,7 @@ def sweep() -> Sweep:
     """Increase the step; without control the run ends with an error at 1 ms."""
     steps = np.array(STEPS)
     curves = [
-        Curve("RK4, error controlled", steps, np.array([off(float(step)) for step in steps])),
-        Curve("RK4 as it is", steps, np.array([baseline(float(step)) for step in steps])),
+        Curve("RK4 with error control", steps, np.array([end_error(float(step)) for step in steps])),
+        Curve("RK4 without error control", steps, np.array([baseline_error(float(step)) for step in steps])),
     ]
-    return Sweep("step [s]", "distance from the end at an accuracy of 1e-8 [m]", BOUND, curves)
+    return Sweep("step [s]", "distance from the final position at an accuracy of 1e-8 [m]", BOUND, curves)
