@@ -1,4 +1,4 @@
-"""`lapwing new`: files to start from."""
+"""`lapwing new`: templates of scenes, airframes and extensions."""
 
 from pathlib import Path
 from string import Template
@@ -74,7 +74,7 @@ def write_scene(name: str, folder: Path) -> Path:
 
 
 def write_module(kind: str, name: str, folder: Path) -> list[Path]:
-    """Write an extension that works and its test, and return their paths.
+    """Write a working extension and its test. Return their paths.
 
     Raises:
         ValueError: the name is invalid or taken, or a file exists.

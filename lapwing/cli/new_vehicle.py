@@ -15,7 +15,7 @@ from lapwing.dynamics.config_error import ConfigError
 if TYPE_CHECKING:
     from lapwing.vehicle_measurements import Figure
 
-WEAK = 1.4  # ratio of thrust to weight below which control authority is small
+WEAK = 1.4  # thrust-to-weight ratio below which control authority is small
 
 
 @new.command()
@@ -109,7 +109,7 @@ class Interview:
         self._name, self._answers, self._started = name, dict(values), False
 
     def ask(self, figure: "Figure", guess: float) -> float | None:
-        """Return the measured value of a figure; None to accept the guess.
+        """Return the measured value of a figure, or None to accept the guess.
 
         Raises:
             ValueError: no user answers.

@@ -114,7 +114,7 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str]) -> "Flight
 
 
 def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
-    """Print and write the error of a flight. Return True if it is at most what was asked for."""
+    """Print and write the error of a flight. Return True if it is at most `solver.accuracy`."""
     from lapwing.studies.accuracy import flight_accuracy_output
     from lapwing.studies.terminal import console
 
@@ -125,7 +125,7 @@ def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
 
 
 def _with_bar(setup: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
-    """Do work on a run in this process, with a line of what is flown and a progress bar."""
+    """Work on a run in this process, with a line that describes the run and a progress bar."""
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.runs.work_progress import WorkProgress
 

@@ -1,4 +1,4 @@
-"""Run whose services are started separately."""
+"""Run with services that are started separately."""
 
 import re
 import time
@@ -21,7 +21,7 @@ LOST = 6.0  # [s] without a message after which a run counts as lost: TCP retrie
 GRACE = 2.0  # [s] largest difference of the delays of two links
 JOIN_TIMEOUT = 120.0  # [s] until all services have joined
 CLOSE_TIMEOUT = 5.0  # [s] for the recorder to close its log after a failure
-CONFIRMED = 60.0  # [s] without news after the end until a participant counts as stalled
+CONFIRMED = 60.0  # [s] without a message after the end until a participant counts as stalled
 
 
 def monitor_run(
@@ -86,7 +86,7 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
 
 
 def _becomes_true(watch: RunMonitor, condition: Callable[[], bool], seconds: float) -> bool:
-    """Poll until `condition` is true, at most `seconds`. Return its value."""
+    """Poll until `condition` is true, for at most `seconds`. Return its value."""
     deadline = time.monotonic() + seconds
     while not condition() and time.monotonic() < deadline:
         watch.poll(0.2)
