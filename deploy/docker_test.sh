@@ -238,7 +238,7 @@ docker kill "$victim" > /dev/null
 wait $up || true
 seconds=$(echo "$begun $(date +%s.%N)" | awk '{ printf "%.1f", $2 - $1 }')
 idle=$(echo "$before $(processors)" | awk '{ used = $3 - $1; idle = $4 - $2; printf "%d", 100 * idle / (used + idle) }')
-grep -q "lapwing: sensors: gone at t = " compose.log || fail "nobody says that sensors is gone"
+grep -q "lapwing: sensors: left the run at t = " compose.log || fail "no message says that sensors has left"
 limit=$WITHIN
 if [ "$idle" -lt 20 ]; then limit=$BUSY; fi
 [ "${seconds%.*}" -lt "$limit" ] || fail "ended $seconds s after sensors was killed, $idle % idle: allowed are $limit s"

@@ -32,7 +32,7 @@ def scenes(
     with user_errors():
         paths = sorted((folder or SHIPPED).glob("*.toml"))
         if not paths:
-            raise ValueError(f"{folder}: no scenes there; expected a folder with .toml files")
+            raise ValueError(f"{folder}: contains no scenes; expected a folder with .toml files")
         names = [str(path) if folder else path.stem for path in paths]
         width = max(map(len, names))
         for name, path in zip(names, paths, strict=True):
@@ -176,7 +176,7 @@ def _scenes_of(path: Path) -> list[Path]:
         return [path]
     result = sorted(path.glob("*.toml"))
     if not result:
-        raise ValueError(f"{path}: no scenes there; expected a folder with .toml files")
+        raise ValueError(f"{path}: contains no scenes; expected a folder with .toml files")
     return result
 
 

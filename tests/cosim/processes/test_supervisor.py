@@ -220,7 +220,7 @@ def test_process_that_does_not_exit_is_named(run):
     run.monitor.ended, run.monitor.outcome = True, ""
     run.exit("plant", "sensors")
     run.update_for(SHUTDOWN_TIMEOUT)
-    with fails("recorder: did not end within 10 s of the last news"):
+    with fails("recorder: did not end within 10 s of the last message"):
         run.update_for(1.0)
 
 
@@ -250,6 +250,6 @@ def test_divergence_is_orderly_end(run):
 
 def test_lost_external_service_is_named(monkeypatch):
     run = Run(monkeypatch, external=["sensors"]).start()
-    run.monitor.gone = {"sensors"}
-    with fails("sensors: gone at t = 0.000 s"):
+    run.monitor.left = {"sensors"}
+    with fails("sensors: left the run at t = 0.000 s"):
         run.update()

@@ -139,4 +139,6 @@ def test_shares_are_in_per_cent_and_consistency_ratios_are_not():
     shares = {"saturation", "within_95.nees", *(f"within_3sigma.{axis}" for axis in "xyz")}
     numbers = {name for name, unit in METRICS.items() if not unit and not name.startswith("outcome")}
     assert {name for name in numbers if campaign_plots.label_and_factor(name) == (f"{name} [%]", 100.0)} == shares
-    assert {campaign_plots.label_and_factor(name) for name in numbers - shares} == {(name, 1.0) for name in numbers - shares}
+    assert {campaign_plots.label_and_factor(name) for name in numbers - shares} == {
+        (name, 1.0) for name in numbers - shares
+    }
