@@ -77,7 +77,7 @@ def write_vehicle(
     if path.exists() or (SHIPPED / "vehicles" / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: a vehicle has this name; choose another")
     values: dict[str, float] = {}
-    known = set(measured)
+    own = set(measured)
     remarks: list[str] = []
     for figure in FIGURES:
         guess = figure.guess(values)
@@ -85,7 +85,7 @@ def write_vehicle(
             value: float | None = measured[figure.name]
             remarks += filter(None, [figure.plausibility_question(measured[figure.name], guess)])
         elif (value := ask(figure, guess) if ask else None) is not None:
-            known.add(figure.name)
+            own.add(figure.name)
         values[figure.name] = guess if value is None else value
         figure.check(values[figure.name])
     try:
@@ -97,7 +97,7 @@ def write_vehicle(
     except ValueError as error:  # a remark about a unit may name the cause
         raise ValueError("; ".join([str(error), *remarks])) from None
     path.parent.mkdir(exist_ok=True)
-    path.write_text(airframe_text(name, values, known), encoding="utf-8")
+    path.write_text(airframe_text(name, values, own), encoding="utf-8")
     warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"
     return path, [*remarks, warning] if thrust_to_weight < WEAK else remarks
 

@@ -119,7 +119,7 @@ def test_signal_ends_loop_at_once(log):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "output"),
     [
         (["missing.mcap"], "missing.mcap"),
         (["LOG", "--from", "-1"], "--from -1"),

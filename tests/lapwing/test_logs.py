@@ -274,7 +274,7 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("arguments", "output"),
     [
         (["info", "none.mcap"], "none.mcap: cannot read the log"),
         (["info", "text.mcap"], "text.mcap: not an MCAP file"),

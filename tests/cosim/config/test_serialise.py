@@ -102,7 +102,7 @@ def test_class_is_named_and_found_again():
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "output"),
     [
         ('{"$":"none.such:Thing"}', "none.such:Thing: no such class; expected one of lapwing or "),
         ('{"$":"lapwing.dynamics.effects.gravity:Weight"}', "Weight: no such class"),

@@ -28,7 +28,7 @@ def test_module_is_found_on_pythons_path(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "said"),
+    ("name", "output"),
     [
         ("own_nowhere", "key: no module own_nowhere; expected"),
         ("numpy", "another module has this name; expected a unique name"),
