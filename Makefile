@@ -17,7 +17,7 @@ $(VENV)/.installed: pyproject.toml deploy/requirements.lock
 	@echo "installing the pinned packages into $(VENV) (once)"
 	$(INSTALL) --require-hashes --requirement deploy/requirements.lock
 	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' deploy/requirements.lock > $(VENV)/versions.txt
-	$(PINNED) ".[dev]"
+	$(PINNED) ".[dev]" --no-build-isolation  # setuptools is locked
 	touch $@
 
 mission: $(VENV)/.installed

@@ -4,7 +4,6 @@ import importlib.util
 import io
 import re
 import zipfile
-import zlib
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -75,6 +74,8 @@ def _check_files(key: str, path: Path, archive: zipfile.ZipFile) -> None:
         raise ConfigError(key, f"{path}: its files have {size / 1e9:.3g} GB", f"at most {LARGEST / 1e9:g} GB")
     if archive.getinfo(DESCRIPTION).file_size > LARGEST_DESCRIPTION:
         raise ConfigError(key, f"{path}: {DESCRIPTION} is too large", f"at most {LARGEST_DESCRIPTION / 1e6:g} MB")
+    if damaged := archive.testzip():
+        raise ConfigError(key, f"{path}: file {damaged} is damaged", "a whole FMU")
 
 
 def _version(key: str, path: Path, text: bytes) -> int:
@@ -116,9 +117,6 @@ def _check_library(key: str, path: Path, archive: zipfile.ZipFile, version: int,
     name = f"{folder}/{identifier}.so"
     if name not in names:
         raise ConfigError(key, f"{path}: has no file {name}", "the library that modelIdentifier names")
-    try:
-        library = archive.read(name)
-    except (zipfile.BadZipFile, zlib.error):
-        raise ConfigError(key, f"{path}: file {name} is damaged", "a whole FMU") from None
+    library = archive.read(name)
     if not library.startswith(b"\x7fELF") or library[_MACHINE] != _X86_64:
         raise ConfigError(key, f"{path}: {name} is no library for x86-64", "an FMU for Linux on x86-64")

@@ -16,7 +16,7 @@ def lapwing(monkeypatch, tmp_path, capfd):
     """Calls `lapwing` in an empty folder with the scenes in it: exit code, standard output, standard error."""
     (tmp_path / "scenes").symlink_to(ROOT / "lapwing/scenes")
     monkeypatch.chdir(tmp_path)
-    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
 
     def call(*arguments):
         monkeypatch.setattr(sys, "argv", ["lapwing", *map(str, arguments)])

@@ -1,10 +1,12 @@
-"""Ctrl-C and SIGTERM: a run ends in order, other commands end immediately."""
+"""Ctrl-C, SIGTERM and a closed terminal: a run ends in order, other commands end immediately."""
 
 import signal
 import sys
 from contextlib import suppress
-from signal import SIGINT, SIGTERM
+from signal import SIGHUP, SIGINT, SIGTERM
 
+# nohup ignores SIGHUP, which a closed terminal sends
+ENDING = (SIGINT, SIGTERM) if signal.getsignal(SIGHUP) == signal.SIG_IGN else (SIGINT, SIGTERM, SIGHUP)
 REPEAT_DELAY = 0.5  # [s] until an interrupt that was lost in compiled code is raised again
 
 
@@ -17,13 +19,13 @@ class Interrupted(BaseException):
 
 
 class Stop:
-    """Context in which SIGINT and SIGTERM are stored instead of raised."""
+    """Context in which the signals of `ENDING` are stored instead of raised."""
 
     def __init__(self) -> None:
         self.number: int | None = None
 
     def __enter__(self) -> "Stop":
-        self._before = {n: signal.signal(n, self._note) for n in (SIGINT, SIGTERM)}
+        self._before = {n: signal.signal(n, self._note) for n in ENDING}
         return self
 
     def _note(self, number: int, _: object) -> None:
@@ -40,7 +42,7 @@ class Stop:
 
 
 def raise_on_interrupt() -> None:
-    """Let SIGINT and SIGTERM raise `Interrupted` immediately; a run uses `Stop` instead."""
+    """Let the signals of `ENDING` raise `Interrupted` immediately; a run uses `Stop` instead."""
 
     def raise_(number: int, _: object) -> None:
         # An exception that is raised inside a call from the compiler's library is lost there: raise it again, later.
@@ -53,7 +55,7 @@ def raise_on_interrupt() -> None:
             sys.__unraisablehook__(unraisable)
 
     sys.unraisablehook = report_unraisable
-    for number in (SIGINT, SIGTERM):
+    for number in ENDING:
         signal.signal(number, raise_)
 
 
@@ -62,11 +64,11 @@ def report_interrupt(interrupted: Interrupted) -> int:
 
     Signals are ignored until the line is printed; later ones end a hanging process.
     """
-    for number in (SIGINT, SIGTERM):
+    for number in ENDING:
         signal.signal(number, signal.SIG_IGN)
     signal.setitimer(signal.ITIMER_REAL, 0.0)
     with suppress(OSError):  # the exit code also reports it
         print(f"lapwing: {interrupted}", file=sys.stderr, flush=True)
-    for number in (SIGINT, SIGTERM):
+    for number in ENDING:
         signal.signal(number, signal.SIG_DFL)
     return 128 + interrupted.signal

@@ -108,12 +108,15 @@ def test_large_file_is_not_read(tmp_path: Path) -> None:
 
 def test_damaged_member_is_one_line(tmp_path: Path, files: Files) -> None:
     path = tmp_path / "bad.fmu"
+    table = "resources/table.csv"  # no part that is read before the FMU is extracted
     with zipfile.ZipFile(path, "w") as archive:
-        for name, content in files.items():
+        for name, content in (files | {table: b"time,voltage\n0,12\n"}).items():
             archive.writestr(name, content)
-    content = bytearray(path.read_bytes())
-    content[content.index(b"\x7fELF") + 5000] ^= 0xFF
-    path.write_bytes(content)
-    assert_rejected(tmp_path, f"file {LIBRARY} is damaged; expected a whole FMU")
+    whole = path.read_bytes()
+    for name, place in ((LIBRARY, whole.index(b"\x7fELF") + 5000), (table, whole.index(b"time,voltage"))):
+        content = bytearray(whole)
+        content[place] ^= 0xFF
+        path.write_bytes(content)
+        assert_rejected(tmp_path, f"file {name} is damaged; expected a whole FMU")
     path.write_bytes(content[: len(content) // 2])
     assert_rejected(tmp_path, "not an FMU: File is not a zip file")
