@@ -118,7 +118,7 @@ def test_empty_terrain_is_level_ground():
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "text"),
     [
         ({"slope": (0.8, 0.8)}, "slope: ground steeper than 45 degrees, tangent 1.13; expected a tangent of at most 1"),
         ({"bump_height": 1.0}, "bump_height: ground steeper than 45 degrees"),

@@ -87,7 +87,7 @@ class Faulty(NamedTuple):
 
 
 @pytest.mark.parametrize(
-    ("controller", "said"),
+    ("controller", "text"),
     [
         (Faulty((1.0, 2.0)), "step returned tuple, expected MotorVoltages or ThrustAndMoments"),
         (Faulty(ThrustAndMoments(1.0, (0.0, 0.0))), "step returned moments_body = (0.0, 0.0), expected 3 numbers"),
@@ -142,7 +142,7 @@ def test_campaign_varies_loaded_scene_by_seed_and_run():
 
 
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("wrong", "text"),
     [
         (lambda: lapwing.campaign("hover", [1], {"vehicle.mass": 10.4}), "vehicle.mass: expected a distribution"),
         (lambda: lapwing.campaign("hover", [1], {"vehicle.mas": lapwing.normal(1.0, 0.0)}), "did you mean mass?"),

@@ -43,7 +43,7 @@ def test_invalid_simulator_arguments_are_rejected():
 
 
 @pytest.mark.parametrize(
-    ("given", "said"),
+    ("values", "text"),
     [
         ({"motor_voltages": (1.0, 2.0)}, "motor_voltages: expected 4 numbers [V], got (1.0, 2.0)"),
         ({"motor_voltages": (1.0, 2.0, 3.0, math.nan)}, "motor_voltages[3] = nan at t = 0 s: must be finite"),

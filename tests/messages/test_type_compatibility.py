@@ -29,7 +29,7 @@ def test_nested_types_may_have_any_order():
 
 
 @pytest.mark.parametrize(
-    ("there", "here", "said"),
+    ("there", "here", "output"),
     [
         ("float64 air_density", "float32 air_density", "has float32 air_density where this version has float64 air_"),
         ("float64 air_density", "#", "has bool ground_contact where this version has float64 air_density"),

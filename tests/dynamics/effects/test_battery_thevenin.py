@@ -80,7 +80,7 @@ def test_cutoff_has_hysteresis(drone, situation, rotors):
 
 
 @pytest.mark.parametrize(
-    ("table", "said"),
+    ("table", "text"),
     [
         (
             {"restart": 2.9, "cutoff_voltage": 3.0},

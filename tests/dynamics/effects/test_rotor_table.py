@@ -61,7 +61,7 @@ def test_hubs_have_their_own_advance_and_rotors_at_rest_no_loads(drone, situatio
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "output"),
     [
         ("J CT CP\n0 0.1 0.04\n0.2 0.08\n", "line 3 has 2 columns; expected 3|expected 3 as its first line"),
         ("J,CT,CP\n0,0.1,0.04\n0.2,,0.03\n", "line 3: '0.2,,0.03' has a hole"),
