@@ -17,9 +17,7 @@ class FmuTable(BaseModel):
     fmu: str  # path of the FMU, relative to the scene
     embed: bool = False  # store the FMU in the run configuration, and therefore in the log
     content: str | None = None  # the embedded FMU in base64; written by `embed`
-    interface: Literal["co_simulation", "model_exchange", "scheduled_execution"] | None = (
-        None  # default: the first one of the FMU
-    )
+    interface: Literal["co_simulation", "model_exchange", "scheduled_execution"] | None = None  # default: the first
     integrator: str | None = None  # method for model exchange, default rk4
     accuracy: float | None = Field(default=None, ge=1e-12, le=1e-2)  # relative to 1 + size of a state; default 1e-8
     inputs: dict[str, str] = Field(default_factory=dict)  # FMU variable = "PORT.COLUMN", or "NAME.VARIABLE" of an FMU
