@@ -18,7 +18,7 @@ def autopilot(
     set_: Overrides = None,
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="MCAP log to write")] = None,
 ) -> None:
-    """Fly a scene's autopilot on a simulator with PX4's simulator interface.
+    """Fly a scene's autopilot over PX4's simulator interface.
 
     The simulator replaces the plant and the sensors of the scene.
 

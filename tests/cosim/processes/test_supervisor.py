@@ -178,7 +178,7 @@ def test_optional_process_may_finish_while_there_are_news(run):
     assert run.state is RunState.ENDING
 
 
-@pytest.mark.parametrize("measure", ["waited", "ran"])
+@pytest.mark.parametrize("measure", ["starved_time", "cpu_time"])
 def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
     run = Run(monkeypatch)
     run.processes["mavlink"].pid = 1 << 29
@@ -199,7 +199,7 @@ def test_time_that_launcher_waits_for_processor_is_no_stall(monkeypatch):
     run = Run(monkeypatch)
     own = os.getpid()
     monkeypatch.setattr(
-        "lapwing.cosim.processes.cpu_starvation.waited", lambda pid: 0.9 * run.now if pid == own else 0.0
+        "lapwing.cosim.processes.cpu_starvation.starved_time", lambda pid: 0.9 * run.now if pid == own else 0.0
     )
     run.start().update_for(15.0)
     assert run.state is RunState.RUNNING
