@@ -12,7 +12,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.studies.accuracy.coordinates import error, of_state
-from lapwing.studies.accuracy.reference import turning
+from lapwing.studies.accuracy.reference import attitude_rate
 from lapwing.studies.accuracy.systems.multirotor import START
 
 DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
@@ -38,7 +38,7 @@ def rate(p, volts, side, y):
     omega_rate = (torque - np.cross(o, np.array(p.body.inertia) * o)) / p.body.inertia
     acceleration = R[:, 2] * thrust.sum() / p.body.mass - [0.0, 0.0, gravity.acceleration]
     lag = p.layout.lag_rate * (np.array(volts) * p.layout.speed_per_volt - speed)
-    return np.concatenate([y[12:15], turning(y[3:12], o), acceleration, omega_rate, lag])
+    return np.concatenate([y[12:15], attitude_rate(y[3:12], o), acceleration, omega_rate, lag])
 
 
 def advance_of(p, y):
