@@ -22,7 +22,7 @@ class Kind(Enum):
 
 @app.command()
 def schema(
-    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="kind of file: scene, airframe or gains")] = Kind.scene,
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="kind of file")] = Kind.scene,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="output file [standard output]")] = None,
 ) -> None:
     """Write a JSON schema with which editors check TOML files."""
