@@ -57,7 +57,7 @@ def performance(
 ) -> None:
     """Compute hover time, range, payload, ceiling and top speed.
 
-    Published values are shown beside the computed ones.
+    Published values are shown next to the computed ones.
     """
     from lapwing.studies import performance_card as study
     from lapwing.studies.terminal import console

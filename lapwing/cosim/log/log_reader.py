@@ -53,7 +53,7 @@ class LogReader:
         self.complete, self.damaged = self._contents.complete, self._contents.damaged
 
     def topics(self) -> dict[str, str]:
-        """Full type name of each topic, in order of the topics' names."""
+        """Return the full type name of each topic, sorted by topic."""
         channels = sorted(self._contents.channels.values(), key=lambda channel: channel.topic)
         return {channel.topic: self._contents.schemas[channel.schema_id] for channel in channels}
 
