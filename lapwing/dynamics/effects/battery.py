@@ -21,9 +21,7 @@ class Settings(NamedTuple):
     """Scene table."""
 
     initial_charge: Annotated[float, Gt(0), Le(1)] = 1.0  # fraction of the capacity at the start
-    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = (
-        3.0  # [V] per cell, below which the motors stop for the rest of the run
-    )
+    cutoff_voltage: Annotated[float, Ge(2.5), Le(3.7)] = 3.0  # [V] per cell, below which the motors stay off
 
 
 class Battery(NamedTuple):

@@ -25,9 +25,7 @@ LARGEST = 0.9  # of the inductance at which speed and current oscillate
 class Settings(NamedTuple):
     """Scene table; the rest is in the airframe's [motor] and [rotors]."""
 
-    braking_current: Annotated[float, Ge(0), Le(1e4)] = (
-        0.0  # [A] limit of the braking current; 0: the controller does not brake
-    )
+    braking_current: Annotated[float, Ge(0), Le(1e4)] = 0.0  # [A] limit of the braking current; 0: no braking
     inductance: Annotated[float, Ge(0), Le(1)] = 0.0  # [H] of the winding, between two leads
 
 

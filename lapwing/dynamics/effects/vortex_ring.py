@@ -32,9 +32,7 @@ class Settings(NamedTuple):
     """Scene table."""
 
     loss: Annotated[float, Ge(0), Le(0.6)] = 0.2  # share of the mean thrust that is lost in the strongest ring
-    unsteadiness: Annotated[float, Ge(0), Le(0.4)] = (
-        0.13  # standard deviation over the thrust without a ring, in the strongest ring
-    )
+    unsteadiness: Annotated[float, Ge(0), Le(0.4)] = 0.13  # share of the thrust, standard deviation in the ring
 
 
 class VortexRing(NamedTuple):
