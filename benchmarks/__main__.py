@@ -1,8 +1,8 @@
-"""All benchmarks one after the other, and at the end every figure that has a bar beside it: `make bench`.
+"""All benchmarks one after another, and a table of all figures with targets: `make bench`.
 
     python -m benchmarks [--quick] [NAME...]
 
-Each module of this folder with a `main()` is one; what it returns are its rows of the table.
+A benchmark is a module of this folder with a `main()` that returns its rows of the table.
 """
 
 import argparse
@@ -13,24 +13,24 @@ import benchmarks
 from benchmarks._targets import show
 from lapwing.dynamics import discovery
 
-measured = discovery.modules(benchmarks)
+modules_by_name = discovery.modules(benchmarks)
 parser = argparse.ArgumentParser(prog="python -m benchmarks")
-parser.add_argument("names", metavar="NAME", nargs="*", help=f"one of {', '.join(measured)}; all if none is named")
-parser.add_argument("--quick", action="store_true", help="leave out those that take many minutes")
+parser.add_argument("names", metavar="NAME", nargs="*", help=f"one of {', '.join(modules_by_name)}; default: all")
+parser.add_argument("--quick", action="store_true", help="skip benchmarks that take many minutes")
 options = parser.parse_args()
-if unknown := set(options.names) - measured.keys():
-    parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; expected one of {', '.join(measured)}")
+if unknown := set(options.names) - modules_by_name.keys():
+    parser.error(f"unknown benchmark {', '.join(sorted(unknown))}; expected one of {', '.join(modules_by_name)}")
 rows, failed = [], []
-for name, module in measured.items():
+for name, module in modules_by_name.items():
     if (options.names and name not in options.names) or (options.quick and getattr(module, "SLOW", False)):
         continue
     print(f"== {name}", flush=True)
     try:
         rows += module.main() or []
-    except Exception:  # what the others have measured for an hour is shown all the same
+    except Exception:  # the results of the other benchmarks are still shown
         traceback.print_exc()
         failed.append(name)
-print("== beside their bars")
+print("== targets")
 show(rows)
 if failed:
     sys.exit(f"not measured: {', '.join(failed)}")

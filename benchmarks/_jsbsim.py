@@ -1,4 +1,4 @@
-"""A quadrotor in JSBSim, for benchmarks: our model of one (`jsbsim_quad.xml`) in its rigid body and control system."""
+"""Quadrotor in JSBSim for benchmarks: the model `jsbsim_quad.xml` of its rigid body and control system."""
 
 import tempfile
 from pathlib import Path
@@ -7,13 +7,13 @@ import numpy as np
 
 MODEL = Path(__file__).with_name("jsbsim_quad.xml")
 CONTROL = 0.004  # [s] between two steps of the control channel
-FOOT = 0.3048  # [m]
+FOOT = 0.3048  # [m] in a foot
 HEIGHT = 10.0  # [m] above the ground at the start
 AXES = ("north", "east", "up")
 
 
 class JsbsimQuad:
-    """The vehicle, loaded once and flown again and again from its start."""
+    """Vehicle that is loaded once and flown repeatedly from its start."""
 
     def __init__(self, step: float):
         """Create the aircraft with `step` [s], a divisor of the control interval; ImportError without JSBSim."""
@@ -28,7 +28,7 @@ class JsbsimQuad:
             self._fdm = fdm = jsbsim.FGFDMExec(folder, None)
             fdm.set_debug_level(0)
             fdm.set_aircraft_path(folder)
-            fdm.set_dt(step)  # the filters of what is loaded then are made for it
+            fdm.set_dt(step)  # before loading: filters are built for this step
             fdm.load_model(MODEL.stem)
         fdm.disable_output()
         fdm["ic/lat-geod-deg"], fdm["ic/long-gc-deg"] = 45.0, 0.0

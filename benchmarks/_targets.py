@@ -16,29 +16,29 @@ LAPWING = [sys.executable, "-m", "lapwing"]
 
 
 class Row(NamedTuple):
-    """One figure."""
+    """Measured figure and its target."""
 
-    what: str
+    name: str
     measured: float
     unit: str
-    bar: float
-    more: bool = False  # whether more is better
+    target: float
+    larger_is_better: bool = False
 
     @property
-    def short(self) -> bool:
+    def missed(self) -> bool:
         """True if the figure misses its target."""
-        return self.measured < self.bar if self.more else self.measured > self.bar
+        return self.measured < self.target if self.larger_is_better else self.measured > self.target
 
 
 def show(rows: Iterable[Row]) -> list[Row]:
-    """Print a table and what falls short; return the rows."""
+    """Print a table that marks missed targets. Return the rows."""
     rows = list(rows)
-    print(f"{'':58}{'measured':>10}{'bar':>11}")
+    print(f"{'':58}{'measured':>10}{'target':>11}")
     for row in rows:
-        least = ">=" if row.more else "<="
-        note = "  falls short" if row.short else ""
-        print(f"{f'{row.what} [{row.unit}]':58}{row.measured:10.3g}{least:>4}{row.bar:7g}{note}", flush=True)
-    print(f"{sum(row.short for row in rows)} of {len(rows)} fall short")
+        relation = ">=" if row.larger_is_better else "<="
+        note = "  missed" if row.missed else ""
+        print(f"{f'{row.name} [{row.unit}]':58}{row.measured:10.3g}{relation:>4}{row.target:7g}{note}", flush=True)
+    print(f"{sum(row.missed for row in rows)} of {len(rows)} targets missed")
     return rows
 
 
@@ -50,7 +50,7 @@ def percentile(values: Iterable[float], share: float) -> float:
 
 @contextmanager
 def empty_cache() -> Iterator[dict[str, str]]:
-    """An environment with a kernel cache of its own, empty at first."""
+    """Yield an environment with a separate kernel cache that is empty at the start."""
     folder = tempfile.mkdtemp()
     try:
         yield {**os.environ, "LAPWING_CACHE": folder}
@@ -59,7 +59,7 @@ def empty_cache() -> Iterator[dict[str, str]]:
 
 
 def wall(command: list[str], repeats: int = 1, **options) -> float:
-    """Seconds that a command takes, the median of some runs after one that is not counted (none if it is one)."""
+    """Return the median wall time [s] of a command; of several runs, a first one is not counted."""
     times = []
     for _ in range(repeats + 1 if repeats > 1 else 1):
         began = time.perf_counter()

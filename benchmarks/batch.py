@@ -1,8 +1,8 @@
-"""Steps a second of the plant, many vehicles side by side on all cores, beside one vehicle after the other.
+"""Plant steps per second of a SIMD batch on all cores, compared with one vehicle after another.
 
     python -m benchmarks.batch [SCENE...]
 
-Steps of the scene's own solver, exchange intervals of the scene; the best of some runs, so that other work shows least.
+Solver and communication steps of the scene; the best of several runs, which other work disturbs least.
 """
 
 import sys
@@ -39,7 +39,7 @@ def best(run):
 
 
 def rates(scene: str) -> tuple[float, float, float]:
-    """10^6 steps/s of a scene's plant: of a batch on all cores and on one, and of one vehicle after the other."""
+    """Return 10^6 steps/s of a scene's plant: batch on all cores, batch on one core, and one vehicle after another."""
     batch = lapwing.BatchSimulator(scene, N)
     batch.reset(position_world=(0.0, 0.0, 2000.0), rotor_speed=np.full(4, 330.0))
     core, volts = batch._core, np.full((N, 4), 31.6)

@@ -2,10 +2,11 @@
 
     python -m benchmarks.batch_others
 
-RK4 steps of 1 ms a second of processor time (so a core's worth, whatever else runs and however many threads), the
-median of repeats, each simulator in a process of its own. The error is that of the attitude after half a second of
-tumbling at 13 rad/s under constant commands, against the same simulator at an eighth of the step. MuJoCo flies our
-drone; Crazyflow flies its own, in single precision. Those that are not installed (extra `bench`) are left out.
+RK4 steps of 1 ms per second of processor time (independent of other work and of the number of threads), the median of
+repeats, each simulator in a separate process. The error is that of the attitude after half a second of
+tumbling at 13 rad/s under constant commands, against the same simulator at an eighth of the step. MuJoCo flies the
+delivery drone; Crazyflow flies its Crazyflie in single precision. Simulators that are not installed (extra `bench`) are
+skipped.
 """
 
 import json
@@ -24,13 +25,13 @@ from benchmarks._targets import Row, show
 N, STEPS, REPEATS, ROUNDS, FINER = 512, 100, 5, 1, 8
 STEP, SECONDS = 1e-3, 0.5
 HIGH, OMEGA = (0.0, 0.0, 2000.0), (10.0, -7.0, 4.0)  # [m], [rad/s]
-MASS, INERTIA, HUB = 10.0224, (0.27, 0.26, 0.42), 0.35171491  # of the delivery drone [kg, kg m^2, m]
+MASS, INERTIA, HUB = 10.0224, (0.27, 0.26, 0.42), 0.35171491  # [kg, kg m^2, m] of the delivery drone
 SIGNS, TORQUE = ((1, 1), (-1, 1), (-1, -1), (1, -1)), 0.02  # of the hubs; [m] reaction torque to thrust
 VOLTS = 31.6
 
 
 class Lapwing:
-    """`lapwing.BatchSimulator` of the scene `hover`."""
+    """Return the functions of `lapwing.BatchSimulator` with the scene `hover`."""
 
     def __init__(self, n, step):
         self.batch = lapwing.BatchSimulator("hover", n, overrides=[f"solver.step={step}"])
@@ -46,7 +47,7 @@ class Lapwing:
 
 
 class MuJoCo:
-    """mujoco.rollout in one thread, of a free body with four rotors that give constant thrust."""
+    """Return the functions of mujoco.rollout in one thread: a free body with four rotors of constant thrust."""
 
     def __init__(self, n, step):
         import mujoco
@@ -74,11 +75,11 @@ class MuJoCo:
         self.states = result[:, -1].copy()
 
     def attitude(self):
-        return self.states[0, 4:8]  # behind time and position
+        return self.states[0, 4:8]  # after time and position
 
 
 class Crazyflow:
-    """Crazyflow's Crazyflie, from first principles, compiled by JAX for the CPU."""
+    """Return the functions of Crazyflow's Crazyflie from first principles, compiled by JAX for the CPU."""
 
     def __init__(self, n, step):
         import jax.numpy as jnp
@@ -107,7 +108,7 @@ class Crazyflow:
         return np.asarray(self.sim.data.states.quat[0, 0], float)
 
 
-CONTESTANTS = {"lapwing": Lapwing, "mujoco": MuJoCo, "crazyflow": Crazyflow}  # by the package that they need
+CONTESTANTS = {"lapwing": Lapwing, "mujoco": MuJoCo, "crazyflow": Crazyflow}  # by required package
 
 
 def main():
@@ -126,15 +127,15 @@ def main():
 
 
 def alone(name):
-    """(steps a second of processor time, error) of a contestant in a process of its own."""
-    environment = {**os.environ, "SCIPY_ARRAY_API": "1"}  # Crazyflow wants it before SciPy is imported
+    """Return (steps per second of processor time, error) of a simulator in a separate process."""
+    environment = {**os.environ, "SCIPY_ARRAY_API": "1"}  # Crazyflow needs it before SciPy is imported
     command = [sys.executable, "-W", "ignore", "-m", "benchmarks.batch_others", name]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
 
 def measure(contestant):
-    """(steps a second of processor time, error)."""
+    """Return (steps per second of processor time, error)."""
     one, rates = contestant(N, STEP), []
     one.advance(STEPS)
     for _ in range(REPEATS):
@@ -145,7 +146,7 @@ def measure(contestant):
 
 
 def error(contestant):
-    """Greatest difference of the attitude's quaternion from that of a finer step, after the tumbling."""
+    """Return the largest difference of the quaternion after tumbling from that of a finer step."""
     ends = []
     for finer in (1, FINER):
         one = contestant(2, STEP / finer)

@@ -1,6 +1,6 @@
-"""Speed of campaigns on one core, and the share of a run besides its flight, with compiled kernels.
+"""Speed of campaigns on one core, and the overhead of a run relative to its flight, with compiled kernels.
 
-Besides its flight a run takes resolving the scene, making and reading its graph, and its figures: each is told.
+The overhead is resolving the scene, creating and reading the block diagram, and computing metrics; each is printed.
 
 python -m benchmarks.campaign [RUNS]
 """
@@ -23,7 +23,7 @@ SCENE = "delivery_mission"
 VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.random_wind_force.mean.0": parse("uniform(0, 12)")}
 FLIGHT = "flight"
 PARTS = {
-    "scene and set-up": (campaign_runs, "setup_of"),
+    "scene and configuration": (campaign_runs, "setup_of"),
     "services": (lapwing.studies.simulate, "create_all"),
     "graph": (lapwing.studies.simulate, "BlockDiagram"),
     FLIGHT: (BlockDiagram, "advance"),
@@ -47,7 +47,7 @@ def main(runs=20):
 def flown(options):
     """Return processor time [s], ratio of other work to the flight, and simulated time [s] of the runs of a plan."""
     rows, total, simulated = {}, [], 0.0
-    row_of(options, 0, rows)  # loads what is compiled
+    row_of(options, 0, rows)  # loads compiled kernels
     with ExitStack() as stack:
         spent = {part: stack.enter_context(timed(*place)) for part, place in PARTS.items()}
         for run in range(options.runs):
@@ -61,7 +61,7 @@ def flown(options):
 
 @contextmanager
 def timed(of, name):
-    """The list that gets the processor time [s] of each call of a function."""
+    """Record the processor time [s] of each call of a function in the returned list."""
     function, spent = getattr(of, name), []
 
     def call(*args, **kwargs):

@@ -1,8 +1,8 @@
-"""Processor time for each run and peak memory of a campaign over its size, report included.
+"""Processor time per run and peak memory of campaigns of increasing size, including the report.
 
     python -m benchmarks.campaign_scaling [MOST]
 
-Two seconds of hover on one worker, 100, 1000, 10000 ... runs up to MOST, each campaign a process of its own.
+Two seconds of hover on one worker, 100, 1000, 10000 ... runs up to MOST, each campaign in a separate process.
 """
 
 import os
@@ -23,7 +23,7 @@ def main(most=10000):
         for runs in counts:
             cost[runs] = taken([*CAMPAIGN, "--runs", str(runs), "--out", f"{folder}/{runs}"])
             print(f"{runs:9} runs: {cost[runs][0]:8.1f} s, {cost[runs][1]:5.0f} MB", flush=True)
-    each = [(cost[b][0] - cost[a][0]) / (b - a) for a, b in pairwise(counts)]  # [s] of every further run
+    each = [(cost[b][0] - cost[a][0]) / (b - a) for a, b in pairwise(counts)]  # [s] for every further run
     for runs, further in zip(counts[1:], each, strict=True):
         print(f"up to {runs:9} runs: {1e3 * further:.2f} ms for every further one")
     result = [
@@ -34,7 +34,7 @@ def main(most=10000):
 
 
 def taken(command):
-    """Processor time [s] and peak memory [MB] of a command."""
+    """Return processor time [s] and peak memory [MB] of a command."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)
     if status:

@@ -1,13 +1,17 @@
-"""Closed-loop flights for Monte Carlo on one core: ours beside RotorPy's and JSBSim's, and how exact each is.
+"""Closed-loop flights for Monte Carlo on one core: speed and accuracy of Lapwing, RotorPy and JSBSim.
 
     python -m benchmarks.closed_loop
 
-Simulated seconds to a second of processor time, the median of interleaved repeats, of flights of two seconds: `hover`
-as campaigns fly it, with its figures (steps of 1 ms, control at 250 Hz); RotorPy's Crazyflie that goes to a point 0.5 m
-away under its SE(3) controller, as it comes (100 Hz, RK45 of SciPy); a quadrotor of ours in JSBSim, which ships none,
-that goes as far under cascaded PID in JSBSim's own flight control system (`_jsbsim.py`), with steps of 1 ms as ours and
-with one step to a control interval, without any figures. The error is that of the last position, against the same
-simulator at an eighth of the step or a relative tolerance of 1e-10. What is not installed (extra `bench`) is left out.
+Simulated seconds per second of processor time, the median of interleaved repeats, of flights of two seconds:
+
+- `hover` as in campaigns, with its metrics (steps of 1 ms, control at 250 Hz);
+- RotorPy's Crazyflie, which flies to a point 0.5 m away under its SE(3) controller, with default settings (100 Hz, RK45
+  of SciPy);
+- a quadrotor in JSBSim (`_jsbsim.py`), which flies as far under cascaded PID in JSBSim's flight control system, with
+  steps of 1 ms and with one step per control interval, without metrics.
+
+The error is that of the last position relative to the same simulator with an eighth of the step or a relative tolerance
+of 1e-10. Simulators that are not installed (extra `bench`) are skipped.
 """
 
 import time
@@ -27,7 +31,7 @@ from lapwing.studies.campaign.runs import row_of
 from lapwing.studies.simulate import fly
 
 SECONDS, RUNS, REPEATS = 2.0, 10, 3
-AWAY = 0.5  # [m] the others fly to a point so far
+AWAY = 0.5  # [m] distance of the target of the other simulators
 STEP = 1e-3  # [s]
 OVERRIDES = (f"run.duration={SECONDS}",)
 GIVEN, ROWS = plan("hover", OVERRIDES, runs=1000), {}
@@ -47,7 +51,7 @@ def our_error():
 
 
 def rotorpy(**integrator):
-    """The last position [m] of a flight."""
+    """Return the last position [m] of a flight."""
     from rotorpy.controllers.quadrotor_control import SE3Control
     from rotorpy.environments import Environment
     from rotorpy.trajectories.hover_traj import HoverTraj
@@ -61,11 +65,11 @@ def rotorpy(**integrator):
 
 
 class Simulator(NamedTuple):
-    """One simulator's closed loop."""
+    """Closed loop of one simulator."""
 
-    fly: Callable[[], object]  # some flights
-    flights: int  # how many these are
-    error: Callable[[], float]  # of the last position [m]
+    fly: Callable[[], object]  # runs several flights
+    flights: int  # number of these flights
+    error: Callable[[], float]  # [m] error of the last position
 
 
 def simulators():
@@ -80,7 +84,7 @@ def simulators():
 
 
 def in_jsbsim(step):
-    """JSBSim with steps of `step` [s]."""
+    """Return JSBSim with steps of `step` [s]."""
     vehicle = JsbsimQuad(step)
 
     def fly():
@@ -94,7 +98,7 @@ def in_jsbsim(step):
 
 
 def apart(one, other):
-    """The greatest difference of two places [m] along any axis."""
+    """Return the largest difference of two positions [m] along any axis."""
     return np.abs(one - other).max()
 
 
@@ -102,7 +106,7 @@ def main():
     result = simulators()
     rates = {name: [] for name in result}
     for each in result.values():
-        each.fly()  # loads what is compiled
+        each.fly()  # loads compiled kernels
     for _ in range(REPEATS):
         for name, each in result.items():
             began = time.process_time()

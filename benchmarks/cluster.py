@@ -2,7 +2,7 @@
 
     python -m benchmarks.cluster [SHARDS]
 
-Shards of 250 runs whose rows are there at once, on one worker; scheduler and command are this process. It needs
+Shards of 250 runs with immediate results, on one worker; scheduler and command run in this process. It needs
 `pip install lapwing[cluster]`.
 """
 
@@ -15,7 +15,7 @@ from lapwing.studies.metrics import METRICS
 
 
 def rows(shard):
-    """Rows of a shard as they come from a flight, made up."""
+    """Return synthetic rows of a shard with the columns of a flight."""
     numbers = {name: 1.0 / (1 + k) for k, name in enumerate(METRICS)}
     return [{"run": RUNS * shard + k, "seed": k + 1, **numbers} for k in range(RUNS)]
 

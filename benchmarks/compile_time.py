@@ -1,4 +1,4 @@
-"""Processor time to compile, from an empty cache until a scene has flown, imports included.
+"""Processor time from an empty cache to the end of a scene's flight, including imports.
 
 python -m benchmarks.compile_time
 """
@@ -10,7 +10,7 @@ from benchmarks._targets import Row, empty_cache, show
 
 DRAG = {"effects.body_drag.area": [0.06, 0.06, 0.06], "effects.random_wind_force.allow_body_drag": True}
 EULER = {"vehicle.model": "multibody", "multibody.coordinates": "euler", "run.duration": 0.1}
-# What is flown: the function of `lapwing` and its arguments, and the bar [s]; those of one group share a cache.
+# Flights: function of `lapwing`, its arguments, and target [s]; those of one group share a cache.
 GROUPS = (
     (("hover, cold", "fly('hover')", 12.0),),
     (
@@ -24,7 +24,7 @@ GROUPS = (
 
 
 def taken(environment, call):
-    """Processor time [s] of a process that makes this call."""
+    """Return the processor time [s] of a process with this call."""
     code = f"import time, lapwing; lapwing.{call}; print(time.process_time())"
     return float(subprocess.check_output([sys.executable, "-c", code], env=environment, text=True).splitlines()[-1])
 

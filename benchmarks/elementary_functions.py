@@ -1,7 +1,7 @@
-"""Time per call of the elementary functions beside those of the C library, and of SVML where it is installed.
+"""Time per call of the elementary functions compared with the C library, and with SVML if it is installed.
 
-Values of an array of arguments of usual size, by a compiled loop. SVML computes four values with one call, in the
-variant with an error below 1 ulp. It is found in the environment (`pip install intel-cmplr-lib-rt`) or by the loader.
+A compiled loop over an array of arguments of usual size. SVML computes four values per call, in the variant with an
+error below 1 ulp. It is located in the environment (`pip install intel-cmplr-lib-rt`) or by the loader.
 """
 
 import ctypes
@@ -27,7 +27,7 @@ RANGES = {
     "pow": (0.1, 3.0),
 }  # fmt: skip
 PAIRS = ("atan2", "hypot", "pow")
-_ENGINES: list[Any] = []  # own the code of the loops over SVML
+_ENGINES: list[Any] = []  # owners of the code of the loops over SVML
 
 
 def _loop(function: Any, pairs: bool) -> Any:

@@ -1,11 +1,11 @@
-"""Steps a second of the Gymnasium environments beside `Simulator` and `BatchSimulator`, in one process.
+"""Steps per second of the Gymnasium environments, compared with `Simulator` and `BatchSimulator` in one process.
 
     python -m benchmarks.environments [VEHICLES...]
 
 A step is 20 ms of flight: five ticks of scene hover, each of four RK4 steps of 1 ms. All hover; `Simulator` under motor
-voltages, with the scene's sensors; `BatchSimulator` under thrust and body rates, as the environments. The contestants
-alternate in short rounds. The best round is the one that other work on the machine disturbed least, and is what the
-targets are compared with; the median shows how busy the machine was.
+voltages, with the scene's sensors; `BatchSimulator` under thrust and body rates, as the environments. They alternate
+in short rounds. The best round, which other work disturbed least, is compared with the targets; the median shows how
+busy the machine was.
 """
 
 import sys
@@ -20,12 +20,12 @@ import lapwing
 import lapwing.gym
 from benchmarks._targets import Row, show
 
-TICKS, ROUNDS, SECONDS = 5, 120, 0.02  # of a round of each contestant
-SINGLE, SHARE = 20_000.0, 0.6  # steps/s; of the speed of a batch
+TICKS, ROUNDS, SECONDS = 5, 120, 0.02  # [s] duration of a round
+SINGLE, SHARE = 20_000.0, 0.6  # targets: steps/s; ratio to the speed of a batch
 
 
 def simulator() -> Callable[[], None]:
-    """Return a step of one vehicle by `Simulator`, begun anew at the end of its run."""
+    """Return a step of one vehicle by `Simulator`, restarted at the end of its run."""
     sim = lapwing.Simulator("hover")
 
     def step() -> None:
@@ -65,7 +65,7 @@ def vector(n: int) -> Callable[[], None]:
 
 
 def rates(contestants: dict[str, tuple[int, Callable[[], None]]]) -> dict[str, list[float]]:
-    """Return vehicle steps per second of each contestant in each round, given (vehicles, step)."""
+    """Return the vehicle steps per second of each contestant (vehicles, step) in each round."""
     measured: dict[str, list[float]] = {name: [] for name in contestants}
     for _, step in contestants.values():
         step()

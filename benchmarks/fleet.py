@@ -1,9 +1,9 @@
-"""Processor time for a simulated second over the size of a fleet, in one process and in several.
+"""Processor time per simulated second over the size of a fleet, in one process and in several.
 
     python -m benchmarks.fleet [MOST]
 
-1, 2, 4, ... MOST quadrotors of one type on their sensors, each with all its messages in the log. What a run takes
-before it flies is taken off: a short flight is subtracted from a long one.
+1, 2, 4, ... MOST equal quadrotors with sensors and all messages in the log. The start-up time is removed: a short
+flight is subtracted from a long one.
 """
 
 import sys
@@ -18,7 +18,7 @@ from lapwing.services.scene_resolver import load, resolve
 
 BRIEF, LONG = 1.0, 11.0  # [s]
 APART = 3.0  # [m]
-ROW = 8  # vehicles side by side
+ROW = 8  # vehicles in a row
 COMMON = """
 [run]
 duration = 11.0
@@ -50,7 +50,7 @@ def main(most=32):
     with tempfile.TemporaryDirectory() as folder:
         scenes = {n: scene(n, Path(folder, f"fleet_{n}.toml")) for n in counts}
         log = Path(folder, "log.mcap")
-        fly_single(resolve(load(scenes[1])), log)  # everything is compiled, and loaded
+        fly_single(resolve(load(scenes[1])), log)  # compiles and loads everything
         single, apart = {}, {}
         for n in counts:
             single[n], apart[n] = (
@@ -66,7 +66,7 @@ def main(most=32):
 
 
 def scene(n, path):
-    """The path of a scene of n vehicles."""
+    """Write a scene of n vehicles. Return its path."""
     entries = [
         f'[[vehicle]]\nairframe = "quad_x"\nstart = [{APART * (i // ROW)}, {APART * (i % ROW)}]\n' for i in range(n)
     ]
@@ -75,12 +75,12 @@ def scene(n, path):
 
 
 def per_second(flight):
-    """Processor time [s] for each simulated second; `fly` flies for a duration [s] and says what that took."""
+    """Return processor time per simulated second; `fly` flies for a duration [s] and returns its processor time [s]."""
     return (flight(LONG) - flight(BRIEF)) / (LONG - BRIEF)
 
 
 def alone(path, log, duration):
-    """Processor time [s] of a flight in this process."""
+    """Return the processor time [s] of a flight in this process."""
     setup = resolve(load(path, [f"run.duration={duration}"]))
     began = time.process_time()
     fly_single(setup, log)
@@ -88,7 +88,7 @@ def alone(path, log, duration):
 
 
 def processes(path, log, duration):
-    """Processor time [s] of a command and all its processes."""
+    """Return the processor time [s] of a command and all its processes."""
     fly = [*LAPWING, "run", str(path), "--log", str(log), "--key-prefix", "benchmark-fleet"]
     return taken([*fly, "--set", f"run.duration={duration}"])[0]
 

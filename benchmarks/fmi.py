@@ -44,7 +44,7 @@ def best(function: Callable[[], float]) -> float:
 
 
 def in_the_air(diagram: BlockDiagram) -> None:
-    """Put the vehicle to its start height."""
+    """Move the vehicle to its start height."""
     blocks = zip(diagram._parts, diagram._codes, strict=True)
     image = image_of([(part.name, bound.cell) for part, bound in blocks if bound], diagram._rows)
     (leaf,) = (leaf for leaf in image.leaves if leaf.path == "plant|state.vehicle.motion.position_world[2]")
@@ -139,8 +139,8 @@ def main(scene: str, rate: str = "1000") -> None:
 def import_overhead(scene: str, settings: list[str], path: Path, own: float) -> None:
     """Print the time that an imported FMU of the plant adds to a tick of the scene.
 
-    The scene flies in turns without the FMU and with it, in which case the FMU moves the vehicle and Lapwing's own
-    plant steps beside it. The flights have the same bits, so that the difference is the import and the doStep (`own`).
+    The scene flies alternately without and with the FMU, which then moves the vehicle while Lapwing's plant is stepped,
+    too. The flights are bit-for-bit identical, so the difference is the import and the doStep (`own`).
     """
     from fmpy import read_model_description
 
@@ -172,7 +172,7 @@ def import_overhead(scene: str, settings: list[str], path: Path, own: float) -> 
     added = np.diff(1e6 * np.median(times, axis=2), axis=1) - own  # in pairs; medians, as other work interrupts steps
     print(f"  import with {len(inputs)} inputs and {len(outputs)} outputs: {np.median(added):.1f} us a step beyond")
     print(f"    the FMU's own time (median of {IMPORT_REPEATS} pairs; {added.min():.1f} to {added.max():.1f} us)")
-    free = np.diff(1e6 * np.quantile(times, 0.1, axis=2), axis=1) - own  # steps that other work rarely interrupts
+    free = np.diff(1e6 * np.quantile(times, 0.1, axis=2), axis=1) - own  # short steps, rarely interrupted by other work
     print(f"    {np.median(free):.1f} us from the lowest deciles ({free.min():.1f} to {free.max():.1f} us)")
 
 

@@ -1,7 +1,7 @@
 """Parts of a scene as FMUs that FMPy couples: `python -m benchmarks.fmu_coupling [SCENE [RATE ...]]`.
 
-Flies the scene with exported FMUs under a Gauss-Seidel and a Jacobi master, and compares with the same couplings of
-Lapwing. Noise is removed as by `lapwing accuracy`.
+Flies the scene with exported FMUs under a Gauss-Seidel and a Jacobi master, and compares them with the same couplings
+in Lapwing. Noise is removed as by `lapwing accuracy`.
 """
 
 import sys
@@ -20,11 +20,11 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.error_budget import noise_overrides, rate_overrides
 from lapwing.studies.simulate import fly
 
-FINEST = 2  # times the highest rate
+FINEST = 2  # factor from the highest rate
 
 
 class Part:
-    """An FMU with its connections."""
+    """FMU with its connections."""
 
     def __init__(self, name: str, path: Path):
         self.name, model = name, fmpy.read_model_description(str(path))
@@ -50,7 +50,7 @@ class Part:
             self.inputs.append((others[k], kind, read, [self.variables[name].valueReference for name in names]))
 
     def values(self) -> list[Any]:
-        """Return the present values of all inputs at their sources."""
+        """Return the current values of all inputs at their sources."""
         return [getattr(part.fmu, f"get{kind}")(read) for part, kind, read, _ in self.inputs]
 
     def set(self, values: list[Any]) -> None:
@@ -72,7 +72,7 @@ def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) 
         part.connect(parts)
     plant = next(part for part in parts if part.name == "plant")
     references = [plant.variables[f"truth.position_world[{i}]"].valueReference for i in range(3)]
-    for part in parts:  # in the order of execution, so that outputs of tick 0 are there before they are read
+    for part in parts:  # in the order of execution, so that outputs of tick 0 exist before they are read
         part.fmu.enterInitializationMode()
         if part is not plant:
             part.set(part.values())
@@ -94,7 +94,7 @@ def flown(scene: str, settings: list[str], coupling: str) -> np.ndarray:
 
 
 def distance(one: np.ndarray, other: np.ndarray) -> str:
-    """Return the 90th percentile and the maximum of the distance between two flights, of which one may be finer."""
+    """Return the 90th percentile and the maximum of the distance between two flights; one may have a higher rate."""
     every = max(1, round((len(other) - 1) / (len(one) - 1)))
     n = min(len(one), len(other[::every]))
     d = np.linalg.norm(one[:n] - other[::every][:n], axis=1)
@@ -106,7 +106,7 @@ def main(scene: str, *rates: str) -> None:
     chosen = [int(rate) for rate in rates] or [250, 500, 1000]
 
     def settings(rate: int) -> list[str]:
-        step = 1.0 / (FINEST * max(chosen))  # the same for all rates
+        step = 1.0 / (FINEST * max(chosen))  # equal for all rates
         return [*noise_overrides(loaded), *rate_overrides(loaded, rate), f"solver.step={step!r}"]
 
     finest = flown(scene, settings(FINEST * max(chosen)), "gauss_seidel")

@@ -1,5 +1,5 @@
-// Steps a page of the 3D view frame by frame on a clock of its own, on the path of a graphics processor that draws
-// nothing: what is left is the work of the page. Evaluated before the page's own scripts.
+// Steps a page of the 3D view frame by frame on a simulated clock, with the code path of a graphics processor and drawing
+// calls that do nothing: only the work of the page remains. Evaluated before the scripts of the page.
 (() => {
   const UNMASKED_RENDERER = 0x9246;
   const gl = WebGL2RenderingContext.prototype, { getParameter } = gl;
@@ -18,8 +18,8 @@
     };
   }
 
-  let now = null, queue = []; // [ms] of the stepped clock; what runs in the next frame
-  const ticks = []; // timers that are faster than a frame: the player's
+  let now = null, queue = []; // [ms] of the simulated clock; callbacks of the next frame
+  const ticks = []; // timers faster than a frame, those of the player
   const clock = performance.now.bind(performance), date = Date.now, every = setInterval, ask = requestAnimationFrame;
   const since = Date.now() - clock();
   performance.now = () => now ?? clock();
@@ -31,8 +31,8 @@
     ticks.push(run);
     return every(() => now === null && run(...rest), period);
   };
-  const { port1: asked, port2: answered } = new MessageChannel(), waiting = [];
-  answered.onmessage = () => waiting.shift()();
+  const { port1: request, port2: reply } = new MessageChannel(), waiting = [];
+  reply.onmessage = () => waiting.shift()();
 
   window.stepFrames = async (count, rate) => { // returns draw calls, uploaded bytes and simulated time [s] of a frame
     now ??= clock();
@@ -46,7 +46,7 @@
       for (const run of due) run(now);
       await new Promise((done) => { // lets the page handle its messages
         waiting.push(done);
-        asked.postMessage(0);
+        request.postMessage(0);
       });
     }
     return [work.draws / count, work.bytes / count, (lapwingView.time - begin) / count];

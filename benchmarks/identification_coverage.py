@@ -1,6 +1,6 @@
 """Coverage of the standard errors of `lapwing identify` on simulated flights with sensor noise.
 
-`python -m benchmarks.identification_coverage [SEEDS [FIRST]]` flies so many seeds from the first, estimates four
+`python -m benchmarks.identification_coverage [SEEDS [FIRST]]` flies SEEDS seeds from FIRST on, estimates four
 parameters from each flight, and prints how many true values lie within two standard errors. Exact standard errors give
 95 %.
 """

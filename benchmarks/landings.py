@@ -1,4 +1,4 @@
-"""python -m benchmarks.landings: error over accuracy in 200 random landings and other kinds; in pieces."""
+"""python -m benchmarks.landings: ratio of error to required accuracy in 200 random landings and other contacts."""
 
 import argparse
 from collections.abc import Collection

@@ -2,9 +2,9 @@
 
     python -m benchmarks.learning [STEPS]
 
-STEPS are those of the environments, of all vehicles together, the same for both; each simulator has a process of its
-own. gym-pybullet-drones has one vehicle an environment: Gymnasium's SyncVectorEnv of them, one after the other. It is
-left out where it is not installed (`pip install git+https://github.com/utiasDSL/gym-pybullet-drones`).
+STEPS is the number of environment steps of all vehicles together, equal for both; each simulator has a process of its
+own. gym-pybullet-drones has one vehicle per environment: Gymnasium's SyncVectorEnv steps them one after another. It is
+skipped if it is not installed (`pip install git+https://github.com/utiasDSL/gym-pybullet-drones`).
 """
 
 import multiprocessing
@@ -18,27 +18,30 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-STEPS, ALONE, WARM = 3000 * 256, 200, 20  # ALONE: actions of each vehicle without an agent, after WARM
+STEPS, ALONE, WARM = 3000 * 256, 200, 20  # actions of each vehicle without an agent: ALONE after WARM
 SLOW = True
 
 
 class Contestant(NamedTuple):
-    """A simulator with its own task of hovering."""
+    """Simulator with its own hover task."""
 
-    made: Callable[[int], Any]  # a vector environment of so many vehicles
-    way: Callable[[np.ndarray], np.ndarray]  # to the target [m], (n, 3), of its observations
-    judges: int  # vehicles that show how well it flies
+    create: Callable[[int], Any]  # returns a vector environment of a number of vehicles
+    displacement: Callable[[np.ndarray], np.ndarray]  # observations to displacement to the target [m], (n, 3)
+    evaluated: int  # number of vehicles in the evaluation
 
 
 def lapwing_gym(n):
-    """Start up to 2 m from the target, ten seconds, actions of 20 ms: thrust and body rates."""
+    """Return environments: start up to 2 m from the target, ten seconds, actions of 20 ms: thrust and body rates."""
     from examples import ppo_hover
 
-    return ppo_hover.made(n)
+    return ppo_hover.create_environments(n)
 
 
 def hover_aviary(n):
-    """Start on the ground below the target, eight seconds, actions of 33 ms: rotor speeds. As it ships, but flat."""
+    """Return environments: start on the ground below the target, eight seconds, actions of 33 ms: rotor speeds.
+
+    The shipped environment with flat observations.
+    """
     from gym_pybullet_drones.envs.HoverAviary import HoverAviary
     from gym_pybullet_drones.utils.enums import ActionType, ObservationType
     from gymnasium.spaces import Box
@@ -47,31 +50,31 @@ def hover_aviary(n):
 
     def one():
         alone = FlattenObservation(HoverAviary(obs=ObservationType.KIN, act=ActionType.RPM))
-        flat = Box(-1.0, 1.0, (4,), np.float32)  # it clips no actions itself
+        flat = Box(-1.0, 1.0, (4,), np.float32)  # it does not clip actions
         return TransformAction(alone, lambda action: np.clip(action, -1.0, 1.0).reshape(1, 4), flat)
 
     with redirect_stdout(None):  # it prints its parameters
         return SyncVectorEnv([one] * n)
 
 
-CONTESTANTS = {  # by the package that they need
-    "lapwing": Contestant(lapwing_gym, lambda observed: observed[:, :3], 64),
-    "gym_pybullet_drones": Contestant(hover_aviary, lambda observed: (0.0, 0.0, 1.0) - observed[:, :3], 1),
-}  # the second begins every episode alike
+CONTESTANTS = {  # by required package
+    "lapwing": Contestant(lapwing_gym, lambda observations: observations[:, :3], 64),
+    "gym_pybullet_drones": Contestant(hover_aviary, lambda observations: (0.0, 0.0, 1.0) - observations[:, :3], 1),
+}  # all episodes of the second start equally
 
 
 def main(steps=STEPS):
     if not find_spec("skrl"):
         print("skrl is not installed: pip install 'lapwing[learn]'")
         return
-    there = [name for name in CONTESTANTS if find_spec(name)]
-    if "gym_pybullet_drones" not in there:
+    installed = [name for name in CONTESTANTS if find_spec(name)]
+    if "gym_pybullet_drones" not in installed:
         print("gym-pybullet-drones is not installed: pip install git+https://github.com/utiasDSL/gym-pybullet-drones")
-    for name in there:
+    for name in installed:
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(1, context) as alone:
             rate, cost, took, before, after = alone.submit(measure, name, steps).result()
-        print(f"{name}: {rate:.0f} environment steps a second, {1e6 * cost:.1f} us of processor time each, alone")
+        print(f"{name}: {rate:.0f} environment steps per second, {1e6 * cost:.1f} us of processor time each, alone")
         print(f"  learning {steps} of them: {took[0]:.0f} s, {took[1]:.0f} s of processor time")
         for when, (total, away, flight) in (("before", before), ("after", after)):
             print(f"  {when:6} return {total:6.1f}, {away:.2f} m from the target after {flight:.0f} actions")
@@ -81,8 +84,8 @@ def measure(name, steps):
     """Train a contestant.
 
     Returns:
-        environment steps a second [1/s] and processor time of one [s], with random actions;
-        (wall, processor) time of learning [s]; what `ppo_hover.judged` says before it and after it.
+        environment steps per second [1/s] and processor time of one [s], with random actions;
+        (wall, processor) time of learning [s]; results of `ppo_hover.evaluate` before and after it.
     """
     from skrl.envs.wrappers.jax import wrap_env
     from skrl.utils import set_seed
@@ -91,19 +94,19 @@ def measure(name, steps):
 
     contestant = CONTESTANTS[name]
     set_seed(1)
-    environments, judges = contestant.made(ppo_hover.VEHICLES), contestant.made(contestant.judges)
+    environments, evaluated = contestant.create(ppo_hover.VEHICLES), contestant.create(contestant.evaluated)
     wall, processor = random_actions(environments)
     n = ALONE * environments.num_envs
     environments = wrap_env(environments, verbose=False)
-    agent = ppo_hover.learner(environments)
-    before = ppo_hover.judged(agent, judges, contestant.way)
+    agent = ppo_hover.create_agent(environments)
+    before = ppo_hover.evaluate(agent, evaluated, contestant.displacement)
     took = timed(lambda: ppo_hover.train(agent, environments, steps // environments.num_envs))
-    after = ppo_hover.judged(agent, judges, contestant.way)
+    after = ppo_hover.evaluate(agent, evaluated, contestant.displacement)
     return n / wall, processor / n, took, before, after
 
 
 def random_actions(environments):
-    """(wall, processor) time [s] of ALONE steps of all vehicles, with the resets that they need."""
+    """Return (wall, processor) time [s] of ALONE steps of all vehicles, including resets."""
     environments.reset(seed=1)
     environments.action_space.seed(1)
     actions = [environments.action_space.sample() for _ in range(WARM + ALONE)]
@@ -113,7 +116,7 @@ def random_actions(environments):
 
 
 def timed(work):
-    """(wall, processor) time that it takes [s]."""
+    """Return (wall, processor) time [s] of a function call."""
     began, processor = time.perf_counter(), time.process_time()
     work()
     return time.perf_counter() - began, time.process_time() - processor

@@ -2,9 +2,9 @@
 
     python -m benchmarks.lockstep [CYCLES] [REPEATS]
 
-The ping: three processes hand 200 bytes round in a circle over the same Zenoh configuration, nothing else. The lock
-step: plant, sensors, autopilot and trajectory with bundles of real size, the plant's messages in batches, but no
-physics and no recorder, so that what is compared is the exchange.
+Ping: three processes pass 200 bytes in a circle over the same Zenoh configuration. Lock step: plant, sensors, autopilot
+and trajectory with step packets of real size and log packets of the plant, but without physics and recorder, so that
+only the exchange is compared.
 """
 
 import json
@@ -48,7 +48,7 @@ PARTS = {  # inputs and ports of the mission's services
 
 
 class Constant:
-    """Gives the same values at every tick, without physics; the plant's notes the time and ends the run."""
+    """Block that publishes the same values at every tick; that of the plant records the time and ends the run."""
 
     def __init__(self, name, cycles):
         self.name, self.inputs, self.outputs = name, *PARTS[name]
@@ -117,7 +117,7 @@ KINDS = {"ping": (ping_process, ["a", "b", "c"]), "lockstep": (lockstep_process,
 
 
 def measure(kind, cycles, core):
-    """Seconds of each cycle."""
+    """Return the duration [s] of each cycle."""
     with private_endpoints(KINDS[kind][1]) as peers:
         more = [json.dumps(peers), str(cycles), json.dumps(core)]
         children = [
@@ -129,11 +129,11 @@ def measure(kind, cycles, core):
         output = "".join(child.communicate(timeout=120)[0] for child in children)
     stamps = json.loads(output)
     cycles_s = [b - a for a, b in pairwise(stamps)]
-    return cycles_s[len(cycles_s) // 10 :]  # without the start
+    return cycles_s[len(cycles_s) // 10 :]  # without the start-up
 
 
 def compare(cycles, repeats, core):
-    """Medians over interleaved repeats."""
+    """Return medians over interleaved repeats."""
     figures = {kind: [] for kind in KINDS}
     for _ in range(repeats):
         for kind in KINDS:

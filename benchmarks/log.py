@@ -2,8 +2,8 @@
 
     python -m benchmarks.log [SECONDS]
 
-A process hands batches over on the bus as services do, at so many messages a second of wall time; the recorder is a
-process of its own. Counted is what stands in the log.
+A process publishes log packets on the bus at a rate of messages per second of wall time; the recorder runs in a
+separate process. The messages in the log are counted.
 """
 
 import resource
@@ -41,7 +41,7 @@ SAMPLES = {
     ODOM: Odometry(header(0, "world")),
     POSE: PoseStamped(header(0, "world")),
 }
-ROWS = (  # messages a second, bytes a second that the disk takes; 0: as it is
+ROWS = (  # messages per second, speed of the disk [bytes/s]; 0: unlimited
     (5_000, 0),
     (20_000, 0),
     (50_000, 0),
@@ -58,7 +58,7 @@ def setup(rate, seconds):
 
 
 def batch(options, first, stop):
-    """All messages of some ticks; their numbers are noise, as those of a flight nearly are."""
+    """Return a log packet of the ticks [first, stop) with random numbers, which compress like those of a flight."""
     ticks = np.arange(first, stop)
     noise = np.random.default_rng(first)
     pages = []
@@ -72,8 +72,8 @@ def batch(options, first, stop):
     return pack_log_packet(pages, first, stop)
 
 
-def hand_over(options, endpoints, seconds):
-    """At the rate of the set-up, ten times a second; messages handed over, and seconds it took."""
+def publish(options, endpoints, seconds):
+    """Publish ten times per second at the configured rate. Return the number of messages and the duration [s]."""
     listen, connect = mesh(SOURCE, endpoints)
     with ZenohBus(listen, connect, gid=PARTICIPANTS.gid(SOURCE)) as bus:
         process = Participant(SOURCE, options, bus, PARTICIPANTS, [SOURCE, RECORDER])
@@ -92,14 +92,14 @@ def hand_over(options, endpoints, seconds):
             time.sleep(max(0.0, started + stop / options.rate - time.perf_counter()))
             put(payload, (stop - 1) * options.interval_ns)
             first = stop
-        taken = time.perf_counter() - started
+        elapsed = time.perf_counter() - started
         put(b"", end * options.interval_ns)
         process.leave(lambda: put(b"", end * options.interval_ns))
-        return end * len(SAMPLES), taken
+        return end * len(SAMPLES), elapsed
 
 
 def record(options, endpoints, log, disk):
-    """The recorder, on a disk that takes so many bytes a second."""
+    """Run the recorder on a disk with a speed [bytes/s]."""
     if disk:
         write = Container._write
 
@@ -121,17 +121,17 @@ def measure(rate, disk, seconds, folder):
         words = [rate, disk, seconds, log, *endpoints.values()]
         command = [sys.executable, "-m", "benchmarks.log", "--record", *map(str, words)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
-            sent, taken = hand_over(setup(rate, seconds), endpoints, seconds)
+            sent, elapsed = publish(setup(rate, seconds), endpoints, seconds)
             memory = float(child.communicate()[0])
     with LogReader(log) as read:
         recorded = sum(1 for topic, *_ in read.messages() if topic != "/wall_time")
         waited = read.metadata.get("waited_for_disk", "")
     size = log.stat().st_size / 1e6
     at = f"disk of {disk / 1e6:g} MB/s" if disk else "this disk"
-    held = f", the recorder waited {waited} for the disk" if waited else ""
+    waiting = f", the recorder waited {waited} for the disk" if waited else ""
     print(
-        f"{rate} messages/s for {seconds:g} s, {at}: {sent} handed over in {taken:.1f} s, {recorded} recorded, "
-        f"{sent - recorded} lost; {size:.0f} MB; the recorder's memory at most {memory:.0f} MB{held}",
+        f"{rate} messages/s for {seconds:g} s, {at}: {sent} published in {elapsed:.1f} s, {recorded} recorded, "
+        f"{sent - recorded} lost; {size:.0f} MB; the recorder's memory at most {memory:.0f} MB{waiting}",
         flush=True,
     )
 

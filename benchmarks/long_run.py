@@ -1,9 +1,9 @@
-"""Peak memory of a run over its length, metrics and report included.
+"""Peak memory of a run over its length, including metrics and report.
 
     python -m benchmarks.long_run [MOST]
 
-The delivery mission, which hovers until its time is over, in one process; 75, 150, 300 ... s up to MOST. Each run is a
-process of its own.
+The delivery mission, which hovers to the end of the run, in one process; 75, 150, 300 ... s up to MOST. Each run has a
+separate process.
 """
 
 import sys

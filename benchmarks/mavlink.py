@@ -1,11 +1,11 @@
-"""The MAVLink link: what it costs, how evenly its telemetry leaves, and whether it slows the lock step.
+"""MAVLink link: cost, jitter of the telemetry, and influence on the lock step.
 
     python -m benchmarks.mavlink [--soak]
 
-Start: from the command to the first heartbeat and to the first position, all kernels on the disk. Processor time: an
+Start: from the command to the first heartbeat and the first position, with cached kernels. Processor time: an
 adapter with one client at PX4's rates in real time, fed by a run. Jitter: of ATTITUDE at 50 Hz as a
-client on UDP sees it, in a run at real time. Lock step: the same scene at top speed without an operator, with one who
-says nothing, and with a link; the best of repeats in turn. The soak: a client flies 30 simulated minutes at ten times
+client on UDP sees it, in a run at real time. Lock step: the same scene at top speed without an operator, with a silent
+operator, and with a link; the best of alternating repeats. The soak: a client flies 30 simulated minutes at ten times
 real time, and counts heartbeats.
 """
 
@@ -25,10 +25,10 @@ from benchmarks._targets import Row, percentile, show
 from tests.participants import participants
 
 MISSION, GROUND = "lapwing/scenes/delivery_mission.toml", "lapwing/scenes/groundstation.toml"
-SECONDS = 30.0  # of real time for jitter and processor time
+SECONDS = 30.0  # [s] of real time for jitter and processor time
 REPEATS = 5
 SOAK, SOAK_SPEED = 1800.0, 10.0  # [s] simulated, simulated seconds per second
-QUIET = 3.0  # [s] of simulation time: a gap between heartbeats that a client takes for a lost link
+QUIET = 3.0  # [s] of simulation time: a client treats a longer gap between heartbeats as a lost link
 
 
 def free_port():
@@ -44,7 +44,7 @@ def start(scene, folder, *more):
 
 
 def adapter_ticks(process):
-    """Processor time that the link's process has used [s], None before it is there."""
+    """Return the processor time [s] of the link's process, None before it exists."""
     child = participants(process.pid).get("mavlink")
     if child is None:
         return None
@@ -52,8 +52,8 @@ def adapter_ticks(process):
     return (int(fields[11]) + int(fields[12])) / 100.0
 
 
-def first_news(folder):
-    """Time from the start of a run to its first heartbeat and to its first position [s]."""
+def start_times(folder):
+    """Return the times from the start of a run to its first heartbeat and first position [s]."""
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     began, result = time.perf_counter(), []
@@ -67,12 +67,12 @@ def first_news(folder):
 
 
 def real_time(folder):
-    """Share of a core, jitter (median, p99, worst) [ms], messages per second, and the link's own report."""
+    """Return the share of a core, jitter (median, p99, worst) [ms], messages per second, and the report of the link."""
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     with start(MISSION, folder, "--mavlink", f"udpout:127.0.0.1:{port}", "--set", f"run.duration={SECONDS}") as run:
         station.recv_match(type="ATTITUDE", blocking=True, timeout=300)
-        time.sleep(2.0)  # past the start
+        time.sleep(2.0)  # skip the start-up
         while station.recv_msg():
             pass
         used, began, arrived, count = adapter_ticks(run), time.monotonic(), [], 0
@@ -91,14 +91,14 @@ def real_time(folder):
 
 
 def top_speed(folder, *more):
-    """Real-time factor of the mission at top speed."""
+    """Return the real-time factor of the mission at top speed."""
     with start(MISSION, folder, "--speed", "max", "--set", "run.duration=20", *more) as run:
         run.communicate(timeout=300)
     return json.loads((folder / "figures.json").read_text())["real_time_factor"]
 
 
 def soak(folder):
-    """A client flies up and down for 30 simulated minutes; (simulated [s], wall [s], longest gap [s], flights)."""
+    """Fly up and down for 30 simulated minutes. Return (simulated [s], wall [s], longest gap [s], flights)."""
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
     more = [
@@ -142,22 +142,22 @@ def soak(folder):
 def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        starts = [first_news(folder) for _ in range(REPEATS)][1:]  # the first loads the disk's cache
+        starts = [start_times(folder) for _ in range(REPEATS)][1:]  # the first run loads the disk cache
         heartbeat, position = (median(times) for times in zip(*starts, strict=True))
         share, (middle, p99, worst), rate, report = real_time(folder)
         print(f"one client at PX4's rates: {100.0 * share:.1f} % of a core, {rate:.0f} messages/s")
         print(f"50 Hz as the client sees it: jitter median {middle:.2f} ms, p99 {p99:.2f} ms, worst {worst:.1f} ms")
-        print(f"as the link sees it: {report}")
+        print(f"reported by the link: {report}")
         variants = {
-            "nobody listens": [],
-            "an operator is listened to": ["--set", "autopilot.accept_commands=true"],
+            "no operator": [],
+            "commands accepted": ["--set", "autopilot.accept_commands=true"],
             "with a link": ["--mavlink", f"udpout:127.0.0.1:{free_port()}"],
         }
         factors = {name: [] for name in variants}
         for _ in range(REPEATS):
             for name, more in variants.items():
                 factors[name].append(top_speed(folder, *more))
-        best = max(factors["nobody listens"])
+        best = max(factors["no operator"])
         rows = [
             Row("link: from the command to the first heartbeat, warm", heartbeat, "s", 2.0),
             Row("link: from the command to the first position, warm", position, "s", 2.0),

@@ -2,7 +2,7 @@
 
     python -m benchmarks.mission [REPEATS]
 
-The log is written in both modes. Kernels are compiled before anything is timed.
+The log is written in both modes. Kernels are compiled before the measurement.
 """
 
 import json
@@ -18,7 +18,7 @@ SCENE = "lapwing/scenes/delivery_mission.toml"
 
 
 def fly(mode, folder):
-    """The figures of one run."""
+    """Return the results of one run."""
     figures = Path(folder, "figures.json")
     arguments = ["run", SCENE, "--mode", mode, "--log", str(Path(folder, "log.mcap")), "--json", str(figures)]
     subprocess.run([sys.executable, "-m", "lapwing", *arguments, "--key-prefix", "benchmark"], check=True,

@@ -1,9 +1,9 @@
-"""The multibody engine: times with ratios to MuJoCo in one run, and what the reduced model leaves out.
+"""Multibody engine: times with ratios to MuJoCo in one run, and error of the reduced model.
 
     python -m benchmarks.multibody [--json FILE]
 
 Times are the best of interleaved repeats on one thread. MuJoCo (optional extra `bench`) steps the same five bodies with
-its own RK4. The second part flies it with its propellers as they are and with symmetric ones (the reduced model).
+its own RK4. The second part flies it with its real propellers and with symmetric ones (the reduced model).
 """
 
 import json
@@ -54,7 +54,7 @@ def five_body_solves(p, x, n):
 
 @kernel
 def least_solves(flight, x, n):
-    # every number of the state changes, so that nothing can be taken out of the loop
+    # every number of the state changes, so that nothing can be moved out of the loop
     for _ in range(n):
         x = axpy(1e-12, embed(x, delivery_drone_rate(flight, 0.0, x)), x)
     return x
@@ -80,7 +80,7 @@ def mujoco_model(drone, step):
 
 
 def times(repeats=200):
-    """Seconds a call of every contestant, the best of interleaved repeats, each shorter than a time slice."""
+    """Return seconds per call of each function, the best of interleaved repeats that are shorter than a time slice."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
     p = five_bodies.machine(drone, GRAVITY)
     x = five_body_stabilisation.assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
@@ -116,7 +116,7 @@ def times(repeats=200):
         model, data = mujoco_model(drone, h)
         state = np.zeros(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_FULLPHYSICS))
         mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_FULLPHYSICS)
-        # rollout steps inside the library: no Python call a step
+        # rollout steps inside the library, without a Python call for each step
         contestants["MuJoCo RK4 step"] = (lambda n: rollout.rollout(model, data, state[None, :], nstep=n), 50)
     except ImportError:
         print("MuJoCo is not installed: pip install 'lapwing[bench]'")
@@ -132,7 +132,7 @@ def times(repeats=200):
 
 
 def errors(h=1e-3, seconds=2.0):
-    """Largest attitude error [-] at the same step, against a step of h / 16: ours (two ways) and MuJoCo's."""
+    """Return the largest attitude error [-] against a step of h / 16: Lapwing (two methods) and MuJoCo."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
     n, flight = round(seconds / h), Flight(delivery_drone(**PAPER, propeller_inertia=INERTIA), QUIET)
     true = np.array(integrate_fixed(METHOD, flight, 0.0, START, h / 16, 16 * n).attitude)
@@ -161,8 +161,11 @@ def errors(h=1e-3, seconds=2.0):
 
 
 def left_out(speed, seconds=2.0, h=5e-5):
-    """Reduced against multibody at a rotor speed [rad/s]: ripple of the rates [rad/s], of the angular acceleration
-    [rad/s^2], and the attitude difference [deg] at the end of a tumble that starts at 1 rad/s."""
+    """Return the differences of the reduced and the multibody model at a rotor speed [rad/s].
+
+    Ripple of the rates [rad/s] and of the angular acceleration [rad/s^2], and attitude difference [deg] at the end of a
+    tumble that starts at 1 rad/s.
+    """
     mean = 0.5 * (INERTIA[0] + INERTIA[1])
     x = START._replace(speeds=tuple(np.sign(SPEEDS) * speed), angles=ZERO4)
     full = Flight(delivery_drone(**PAPER, propeller_inertia=INERTIA), QUIET)

@@ -1,9 +1,9 @@
-"""Size of the mission's report and time until it answers, first live picture, film, frames a second of the 3D view.
+"""Size and loading time of the mission's report, first live image, video, and frames per second of the 3D view.
 
-    python -m benchmarks.pages [LOG]      (of the delivery mission, where none is named)
+    python -m benchmarks.pages [LOG]      (default: a log of the delivery mission)
 
 In headless Chromium with software rendering, which is the slow case: a laptop has a graphics processor. The work of the
-page for a frame is what remains there: it is measured as processor time, in a page whose drawing calls do nothing.
+page for a frame is measured as processor time in a page whose drawing calls do nothing.
 """
 
 import copy
@@ -30,7 +30,7 @@ from lapwing.studies.view3d.recording import page
 from lapwing.studies.view3d.render import Shot, render
 
 VEHICLES, APART = 8, 3.0  # [m] between neighbours
-SECONDS = 10.0  # of which frames are counted
+SECONDS = 10.0  # [s] time in which frames are counted
 SIZE = (1280, 720)  # [pixel]
 DRAWN = """
 for (;;) {
@@ -60,14 +60,14 @@ def rows(log):
             report = write(flight, Path(folder, "report.html"), view3d)
             name = "with" if view3d else "without"
             yield Row(f"report of the mission {name} 3D view", report.stat().st_size / 1e6, "MB", bar)
-            wall, cpu = drawn(report)
+            wall, cpu = loading_time(report)
             yield Row(f"first plot of that report {name} 3D view", wall, "s", 1.0)
-            yield Row(f"the same {name} 3D view, processor time of its thread", cpu, "s", 1.0)
-        yield Row("first picture of --view after the first tick", first_picture(), "s", 1.0)
+            yield Row(f"first plot {name} 3D view, processor time of its thread", cpu, "s", 1.0)
+        yield Row("first image of --view after the first tick", first_image(), "s", 1.0)
         start = time.monotonic()
         render([flight], [flight.vehicle], Path(folder, "film.mp4"), Shot())
         yield Row(
-            "film of the mission, {}x{}, {:g} pictures a second".format(*Shot().size, Shot().rate),
+            "video of the mission, {}x{}, {:g} frames per second".format(*Shot().size, Shot().rate),
             time.monotonic() - start,
             "s",
             FILM,
@@ -84,14 +84,14 @@ def rows(log):
 
 
 def frame_work(view):
-    """Processor time [ms] of a page's thread, draw calls and uploads [byte] for a frame at 60 frames a second."""
+    """Return processor time [ms] of a page's thread, draw calls and uploads [bytes] per frame at 60 frames/s."""
     with Browser("data:text/html,empty", size=SIZE) as browser:
         script = Path(__file__).with_name("frame_work.js").read_text(encoding="utf-8")
         browser.call("Page.addScriptToEvaluateOnNewDocument", source=script)
         browser.call("Performance.enable", timeDomain="threadTicks")
         browser.call("Page.navigate", url=view.resolve().as_uri())
         step = f"return stepFrames({FRAMES}, {1000.0 / FRAME});"
-        browser.run(f"{READY} {step}")  # until the browser has compiled its scripts
+        browser.run(f"{READY} {step}")  # first run: the browser compiles its scripts
         before = _task_duration(browser)
         draws, sent, played = browser.run(step)
         assert abs(1000.0 * played - FRAME) < 1.0, f"{played} s of flight in a frame"
@@ -99,13 +99,13 @@ def frame_work(view):
 
 
 def _task_duration(browser):
-    """Processor time [s] of the page's thread since its start."""
+    """Return the processor time [s] of the page's thread since its start."""
     metrics = {entry["name"]: entry["value"] for entry in browser.call("Performance.getMetrics")["metrics"]}
     return metrics["TaskDuration"]
 
 
-def drawn(report):
-    """[s] from the request of a page to its first plot: by the clock, and processor time of its thread; best of 3."""
+def loading_time(report):
+    """Return wall time and processor time [s] from the request of a page to its first plot; best of 3."""
     times = []
     for _ in range(3):
         with Browser("data:text/html,empty", size=SIZE) as browser:
@@ -117,7 +117,7 @@ def drawn(report):
 
 
 class Watch:
-    """Hover in this process, seen as by the launcher."""
+    """Hover flight in this process with the interface of a run monitor."""
 
     def __init__(self):
         self.setup = resolve(load("hover"))
@@ -136,8 +136,8 @@ class Watch:
         self.time_ns = (stop - 1) * self.setup.interval_ns
 
 
-def first_picture():
-    """[s] from the first step of a flight to the first picture with the vehicle, in a page that is open."""
+def first_image():
+    """Return the time [s] from the first step of a flight to the first image with the vehicle in an open page."""
     watch = Watch()
     with LivePage(watch.setup) as live:
         feed = LiveFeed(watch.setup, [live.show])
@@ -146,7 +146,7 @@ def first_picture():
             browser.run("while (!document.querySelector('canvas')) await new Promise((done) => setTimeout(done, 50));")
             time.sleep(3.0)
             start = time.monotonic()
-            for _ in range(3):  # ten steps a second, as of a run
+            for _ in range(3):  # ten steps per second, as in a run
                 watch.step(0.1)
                 feed.observe(watch)
             browser.run(READY)
@@ -154,7 +154,7 @@ def first_picture():
 
 
 def fleet(flight, count):
-    """The flight with copies of itself beside it."""
+    """Return a fleet of `count` copies of a flight in a row."""
     first = copy.copy(flight)
     others = []
     for k in range(1, count):

@@ -1,5 +1,5 @@
-// The bare drone (gravity, static thrust, rotor lag) with classical Runge-Kutta steps, written by hand: the peer that
-// benchmarks/plant.py compares with. Same equations, same order of the method, attitude renormalised after every step.
+// The bare drone (gravity, static thrust, rotor lag) with classical Runge-Kutta steps, written by hand: the reference
+// of benchmarks/plant.py. Same equations, same order of the method, attitude renormalised after every step.
 #include <chrono>
 #include <cmath>
 #include <cstdio>

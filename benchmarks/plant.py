@@ -2,9 +2,9 @@
 
     python -m benchmarks.plant
 
-Best of many short runs, so that other work on the machine shows least; ratios are medians over pairs of runs one after
-the other. "bare" is gravity, thrust and lag; its kernel
-"without the catalogue" is written by hand here and knows of no effects: what inactive effects cost is the ratio.
+Best of many short runs, which other work on the machine disturbs least; ratios are medians over pairs of consecutive
+runs. "bare" is gravity, thrust and lag; its kernel "without the catalogue" is written by hand here without effects: the
+ratio is the cost of inactive effects.
 """
 
 import shutil
@@ -30,8 +30,8 @@ HERE = Path(__file__).parent
 DRONE = load_airframe(HERE.parent / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
 KEY = noise.stream_key(1, "drone1", "effects")
-H, STEPS, REPETITIONS = 1e-3, 2000, 200  # runs short enough not to be interrupted, most of them
-HOVER = (31.6, 31.61, 31.62, 31.6)  # nearly: all four rotors and all axes take part
+H, STEPS, REPETITIONS = 1e-3, 2000, 200  # short runs, most of which are not interrupted
+HOVER = (31.6, 31.61, 31.62, 31.6)  # slightly different, so that all rotors and axes are involved
 
 BARE = {"gravity": {}, "rotor_thrust": {}}
 MISSION = BARE | {
@@ -40,7 +40,7 @@ MISSION = BARE | {
     "random_wind_force": {"mean": [3.0, 1.0, 0.0]},
     "ground_contact": {},
 }
-EXCLUDED = (  # another one of their kind is among the rest, or the drone cannot have them
+EXCLUDED = (  # excluded by another effect of their kind, or not supported by the drone
     "battery_thevenin", "coaxial_interference", "gravity", "dynamic_inflow", "multirotor_ground_effect",
     "rotor_quadratic", "rotor_table", "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
@@ -65,7 +65,7 @@ def exchanges(method, p, key, state, command, h, n, ticks):
 
 
 def taken(*runs):
-    """ns per step, a row for each repetition, the runs taking turns so that they share the machine's moods."""
+    """Return ns per step, a row for each repetition; the runs alternate, so that other work affects all of them."""
     for run in runs:
         run()
     times = np.empty((REPETITIONS, len(runs)))
@@ -78,7 +78,7 @@ def taken(*runs):
 
 
 def measure(tables, height, command, n):
-    """ns per step, n steps in an exchange."""
+    """Return ns per step with n steps in a communication step."""
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
     state = multirotor.initial_state(p, (0.0, 0.0, height), rotor_speed=330.0 if height > 1.0 else 0.0)
     return taken(lambda: exchanges(RK4, p, KEY, state, command, H, n, STEPS // n)).min()
@@ -118,7 +118,7 @@ def bare_steps(p, motion, command, h, n):
 
 
 def bare():
-    """ns per step with the catalogue and without it, the ratio, and the position reached."""
+    """Return ns per step with and without the catalogue, the ratio, and the final position."""
     p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
     state = multirotor.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=330.0)
     times = taken(
@@ -130,7 +130,7 @@ def bare():
 
 
 def cpp_reference():
-    """(ns per step of the C++ reference, position reached); None where there is no compiler."""
+    """Return (ns per step of the C++ reference, final position); None without a compiler."""
     if not shutil.which("g++"):
         return None
     p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))

@@ -1,4 +1,4 @@
-"""Cost of a scanning lidar of 16 x 360 rays at 10 Hz: share of one core in simulated real time, messages included."""
+"""Cost of a scanning lidar of 16 x 360 rays at 10 Hz: share of one core in simulated real time, including messages."""
 
 import time
 
@@ -15,7 +15,7 @@ from lapwing.services.sensors.scan import ScanPose
 
 SCANS = 20
 REPEATS = 5
-BAR = 0.20  # of one core
+TARGET = 0.20  # share of one core
 
 
 def terrains():
@@ -54,7 +54,7 @@ def main():
     for name, terrain in terrains().items():
         value = share(terrain)
         print(f"{name}: {100.0 * value:.1f} % of a core")
-        rows.append(Row(f"lidar 16 x 360 at 10 Hz, {name}", value, "core", BAR))
+        rows.append(Row(f"lidar 16 x 360 at 10 Hz, {name}", value, "core", TARGET))
     return rows
 
 

@@ -27,44 +27,44 @@ from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import load, resolve
 
 SCENE, HOVER = "delivery_mission", "trajectory.phase.2.duration=1e6"
-LINES = 40  # samples of a run
+LINES = 40  # number of samples of a run
 TICKS = os.sysconf("SC_CLK_TCK")
 PAGE_MB = os.sysconf("SC_PAGESIZE") / 1e6
 
 
 class Sample(NamedTuple):
-    """A run at one moment, all its processes together."""
+    """Sample of all processes of a run."""
 
-    wall: float  # [s] since its first
-    simulated: float  # [s]
+    wall: float  # [s] since the first tick
+    simulated: float  # [s] simulation time
     memory: float  # [MB] resident
-    files: int  # open
+    files: int  # number of open files
     threads: int
-    processor: float  # [s]
-    log: float  # [MB]
+    processor: float  # [s] processor time
+    log: float  # [MB] size of the log
 
 
 class Sampler(Silent):
-    """Takes samples of the flight and of this process, and ends it after so many minutes of wall time, if any."""
+    """Observer that samples the flight and this process, and ends the flight after a wall time."""
 
     def __init__(self, log: Path, minutes: float = 0.0, hours: float = 0.0):
-        """Start a flight of so many minutes of wall time, or of so many simulated hours."""
+        """Prepare a flight of `minutes` of wall time, or of `hours` of simulation time."""
         self._log, self._minutes = log, minutes
         self._period = (60.0 * minutes or 3600.0 * hours) / LINES
         self._began, self._next = time.monotonic(), 0.0
         self.samples: list[Sample] = []
 
     def begin(self) -> None:
-        """The first tick is being flown."""
+        """Print the header at the first tick."""
         self._began = time.monotonic()
         print(" ".join(f"{name:>10}" for name in Sample._fields), flush=True)
 
     def say(self, line: str) -> None:
-        """Print it."""
+        """Print a line."""
         print(line, flush=True)
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
-        """The run is at `time_ns`."""
+        """Take a sample if one is due at `time_ns`."""
         wall, simulated = time.monotonic() - self._began, time_ns * 1e-9
         if (wall if self._minutes else simulated) < self._next:
             return
@@ -76,12 +76,12 @@ class Sampler(Silent):
 
 
 def sample(wall: float, simulated: float, log: Path) -> Sample:
-    """This process and its children now."""
+    """Return a sample of this process and its children."""
     memory, files, threads, processor = 0.0, 0, 0, 0.0
     mine = Path(f"/proc/{os.getpid()}")
     children = (mine / "task" / mine.name / "children").read_text().split()
     for folder in (mine, *(Path("/proc", child) for child in children)):
-        fields = (folder / "stat").read_text().rpartition(")")[2].split()  # from the third of proc(5) on
+        fields = (folder / "stat").read_text().rpartition(")")[2].split()  # from the third field of proc(5) on
         processor += (int(fields[11]) + int(fields[12])) / TICKS
         threads += int(fields[17])
         memory += int(fields[21]) * PAGE_MB
@@ -90,8 +90,10 @@ def sample(wall: float, simulated: float, log: Path) -> Sample:
 
 
 def rows(samples: list[Sample], name: str) -> list[Row]:
-    """The last quarter of the samples beside the second, in which all that is loaded once is there; speed beside the
-    first."""
+    """Return ratios of the last quarter of the samples to the second one, and to the first one for the speed.
+
+    In the second quarter, everything that is loaded once is in memory.
+    """
     quarter = len(samples) // 4
     first, early, late = samples[: quarter + 1], samples[quarter : 2 * quarter + 1], samples[-quarter - 1 :]
 
@@ -108,7 +110,7 @@ def rows(samples: list[Sample], name: str) -> list[Row]:
     speed, last = rate(samples, "simulated", "wall"), samples[-1]
     cost, size = rate(samples, "processor", "simulated"), rate(samples, "log", "simulated")
     print(f"{name}: {last.simulated:.0f} s in {last.wall:.0f} s, {speed:.1f} times real time; a simulated second takes")
-    print(f"{1e3 * cost:.1f} ms of processor time and {1e3 * size:.0f} kB of log; the last quarter to the second:")
+    print(f"{1e3 * cost:.1f} ms of processor time and {1e3 * size:.0f} kB of log; last quarter over second:")
     return [
         Row(f"{name}: memory", grown("memory"), "", 1.02),
         Row(f"{name}: open files", grown("files"), "", 1.0),
@@ -116,12 +118,12 @@ def rows(samples: list[Sample], name: str) -> list[Row]:
         Row(f"{name}: processor time", ratio("processor", "simulated", early), "", 1.1),
         Row(f"{name}: log", ratio("log", "simulated", early), "", 1.02),
         Row(f"{name}: processor time, to the first", ratio("processor", "simulated", first), "", 1.1),
-        Row(f"{name}: speed, to the first", ratio("simulated", "wall", first), "", 0.9, more=True),
+        Row(f"{name}: speed, to the first", ratio("simulated", "wall", first), "", 0.9, larger_is_better=True),
     ]
 
 
 def processes(minutes: float, log: Path) -> list[Sample]:
-    """A process for each service, at full speed."""
+    """Fly with a process for each service at full speed. Return the samples."""
     sampler = Sampler(log, minutes=minutes)
     setup = resolve(load(SCENE, [HOVER, "run.duration=1e6"]))
     with suppress(Interrupted):
@@ -130,7 +132,7 @@ def processes(minutes: float, log: Path) -> list[Sample]:
 
 
 def single(hours: float, log: Path) -> list[Sample]:
-    """All services in this process."""
+    """Fly with all services in this process. Return the samples."""
     sampler = Sampler(log, hours=hours)
     with suppress(Interrupted):
         fly_single(resolve(load(SCENE, [HOVER, f"run.duration={3600.0 * hours}"])), log, observer=sampler)
@@ -138,21 +140,21 @@ def single(hours: float, log: Path) -> list[Sample]:
 
 
 def main(minutes: float = 2.0, hours: float = 0.0) -> list[Row]:
-    """One of the two; each ends with a log that opens and holds all."""
+    """Fly in one or several processes, check the log, and print the table."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log.mcap")
         samples = single(hours, log) if hours else processes(minutes, log)
         simulated = samples[-1].simulated
         with LogReader(log) as read:
             last = max(time_ns for _, _, time_ns, _ in read.messages(start_ns=int(1e9 * (simulated - 10.0)))) * 1e-9
-        print(f"the log opens, complete: {read.complete}, to {last:.1f} s")
+        print(f"log complete: {read.complete}, to {last:.1f} s")
     result = rows(samples, "soak, one process" if hours else "soak, processes")
     return show(result)
 
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="python -m benchmarks.soak")
-    parser.add_argument("--minutes", type=float, default=2.0, help="of wall time, a process for each service")
-    parser.add_argument("--hours", type=float, default=0.0, help="simulated, in one process, instead")
+    parser.add_argument("--minutes", type=float, default=2.0, help="wall time, with a process for each service")
+    parser.add_argument("--hours", type=float, default=0.0, help="simulation time, in one process")
     options = parser.parse_args()
     main(options.minutes, options.hours)

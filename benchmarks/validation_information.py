@@ -1,6 +1,6 @@
 """Information of the start state and of the commands about attitude and rate after 0.5 s.
 
-`python -m benchmarks.validation_information MAPPING FLIGHTS...` fits regressions without physics to all flights but
+`python -m benchmarks.validation_information MAPPING FLIGHTS...` fits regressions without physics to all flights except
 one, predicts that one, and prints the errors by the inputs of the regression: the start state, commands before the
 window, and commands up to some time in the window.
 """
@@ -23,7 +23,7 @@ def main(mapping: str, *paths: str) -> None:
     flights = [open_flight(Path(path), mapping) for path in paths]
     starts = [window_starts(flight, LONGEST, STRIDE) for flight in flights]
     used = [(f, s) for f, s in zip(flights, starts, strict=True) if len(s)]
-    known = [_regressors(f, s, LONGEST) for f, s in used]
+    regressors = [_regressors(f, s, LONGEST) for f, s in used]
     desired = [_targets(f, s, (LONGEST,))[:, 6:] for f, s in used]
     rotors = used[0][0].rotors
     columns = {"start state": 0, "commands before the window, too": PAST}
@@ -32,12 +32,12 @@ def main(mapping: str, *paths: str) -> None:
         chosen = np.r_[: STATES + rotors * slices, -1]
         errors = []
         for k in range(len(used)):
-            x = np.concatenate([r[:, chosen] for j, r in enumerate(known) if j != k])
+            x = np.concatenate([r[:, chosen] for j, r in enumerate(regressors) if j != k])
             y = np.concatenate([t for j, t in enumerate(desired) if j != k])
             scale = np.maximum(x.std(axis=0), 1e-6)
             x, scale[-1] = x / np.r_[scale[:-1], 1.0], 1.0
             gain = np.linalg.solve(x.T @ x + RIDGE * len(x) * np.eye(x.shape[1]), x.T @ y)
-            errors.append(desired[k] - known[k][:, chosen] / scale @ gain)
+            errors.append(desired[k] - regressors[k][:, chosen] / scale @ gain)
         error = np.concatenate(errors)
         angle = np.linalg.norm(error[:, :3], axis=1).mean()
         print(f"{name}: rate {np.abs(error[:, 3:]).mean():.4f} rad/s, attitude {angle:.4f} rad", flush=True)

@@ -1,11 +1,11 @@
 #!/bin/sh
-# Builds the local image lapwing-base:bookworm, of the shape of a slim official Python image, from Debian's packages.
+# Builds the local image lapwing-base:bookworm, similar to a slim official Python image, from Debian's packages.
 #
 #   deploy/base-image.sh [TAG]
 #
-# For places where no image can be pulled. It needs a Debian-like host (apt-get, dpkg-deb) whose apt sources offer
-# Debian bookworm, and the Docker engine; it needs no root and changes nothing on the host. apt works on a state of its
-# own with the host's sources, proxies and keys, and none of these enter the image.
+# For hosts that cannot pull images. It needs a Debian-like host (apt-get, dpkg-deb) whose apt sources offer Debian
+# bookworm, and the Docker engine; it needs no root and changes nothing on the host. apt uses a separate state with the
+# host's sources, proxies and keys, and none of these enter the image.
 set -eu
 
 TAG=${1:-lapwing-base:bookworm}
@@ -29,13 +29,13 @@ trap 'exit 1' INT TERM
 mkdir -p "$work/state/lists/partial" "$work/cache/archives/partial" "$work/tree" "$work/debs"
 : > "$work/status"
 
-# Only the entries for this release, whatever else the host installs from.
+# Only the entries for this release.
 apt-get indextargets --format "deb [signed-by=$KEYRING] \$(REPO_URI) \$(RELEASE) \$(COMPONENT)" \
     'Created-By: Packages' 'Component: main' |
     grep -E " $RELEASE(-updates|-security)? main\$" | sort -u > "$work/sources.list" ||
     fail "the host's apt sources offer no Debian $RELEASE"
 
-# A state of its own, and none of the host's hooks.
+# A separate state, without the host's hooks.
 cat > "$work/apt.conf" <<CONF
 Dir::State "$work/state";
 Dir::State::status "$work/status";
@@ -54,7 +54,7 @@ private_apt install --yes --download-only '?essential' $PACKAGES > /dev/null ||
     fail "apt-get could not fetch the packages"
 cp "$work"/cache/archives/*.deb "$work/debs/"
 
-# A tree that is just able to run dpkg: merged /usr, every package unpacked over it, nothing configured.
+# A minimal tree that can run dpkg: merged /usr, every package unpacked over it, nothing configured.
 mkdir -p "$work/tree/usr/bin" "$work/tree/usr/sbin" "$work/tree/usr/lib" "$work/tree/usr/lib64"
 for name in bin sbin lib lib64; do ln -s "usr/$name" "$work/tree/$name"; done
 mkdir -p "$work/tree/etc/dpkg/dpkg.cfg.d" "$work/tree/var/lib/dpkg/info" "$work/tree/var/lib/dpkg/updates"

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Builds the images lapwing and lapwing-tests (`make docker-build`), also where no image can be pulled.
+# Builds the images lapwing and lapwing-tests (`make docker-build`), also without access to a registry.
 #
 #   [BASE=IMAGE] [IMAGE=NAME] [PYTHON=python3] deploy/build.sh
 set -eu
 cd "$(dirname "$0")/.."
 . deploy/compose.sh
 
-# The base: the one asked for, else the official one, else one built here from Debian's packages.
+# Base image: $BASE, otherwise the official one, otherwise one built here from Debian's packages.
 local_base=lapwing-base:bookworm
 official=python:3.11-slim-bookworm
 if [ -z "${BASE:-}" ]; then
@@ -22,7 +22,7 @@ if [ -z "${BASE:-}" ]; then
 fi
 export BASE
 
-# The last build's kernels: what has not changed since is not compiled again.
+# Kernels of the last build: unchanged ones are not compiled again.
 mkdir -p build
 rm -rf build/kernels
 if last=$(docker create "${IMAGE:-lapwing}" 2> /dev/null); then
@@ -30,7 +30,7 @@ if last=$(docker create "${IMAGE:-lapwing}" 2> /dev/null); then
     docker rm "$last" > /dev/null
 fi
 
-# With the host's pip the wheels are fetched by its settings; without, pip in the build asks the index itself.
+# With pip on the host, the wheels are downloaded with its settings; otherwise pip in the build uses the index.
 WHEELS=
 if ${PYTHON:-python3} -m pip --version > /dev/null 2>&1; then
     WHEELS=${IMAGE:-lapwing}-wheels

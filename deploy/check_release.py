@@ -1,4 +1,4 @@
-"""Install a wheel into an empty environment for each Python found, check its top-level names, and fly."""
+"""Install a wheel into an empty environment for each available Python, check its top-level names, and fly."""
 
 import shutil
 import subprocess
@@ -14,7 +14,7 @@ def check(python: str, wheel: Path) -> None:
 
     Raises:
         subprocess.CalledProcessError: a step failed.
-        SystemExit: the wheel installs another top-level name than `lapwing`.
+        SystemExit: the wheel installs a top-level name other than `lapwing`.
     """
     with tempfile.TemporaryDirectory() as folder:
         environment, work = Path(folder) / "venv", Path(folder) / "work"

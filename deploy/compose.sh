@@ -1,5 +1,5 @@
 # shellcheck shell=sh disable=SC2034
-# Sourced: $COMPOSE is the compose command, whichever of Docker's two is there.
+# To be sourced: sets $COMPOSE to the available compose command.
 if docker compose version > /dev/null 2>&1; then
     COMPOSE="docker compose"
 else

@@ -1,10 +1,10 @@
 #!/bin/sh
-# Runs a command of the image as the user who shall own what it writes.
+# Runs a command of the image as the user that shall own its output files.
 #
-# The image's own user is not root. A service that writes to the host is started as root by docker-compose.yml, and
-# becomes here whoever owns the mounted recordings folder, before anything of the project runs. So logs and reports
-# belong to the user with any UID, without a file or a variable that tells it, and under a rootless engine too.
-# Root without any capability (USER_ID=0 of deploy/hosts) stays who it is, and has none to give up.
+# The user of the image is not root. docker-compose.yml starts a service that writes to the host as root; here it becomes
+# the owner of the mounted recordings folder, before any code of the project runs. Logs and reports therefore belong to
+# that user, with any UID and without further settings, also under a rootless engine. Root without capabilities
+# (USER_ID=0 in deploy/hosts) stays root, and has no capabilities to drop.
 set -eu
 
 if [ "$(id -u)" -eq 0 ] && ! grep -q "^CapEff:[[:space:]]*0*$" /proc/self/status; then

@@ -1,12 +1,12 @@
 #!/bin/sh
-# Build step of the Dockerfile: the pinned packages to /opt/lapwing, what the tests need besides to /opt/lapwing-tests.
+# Build step of the Dockerfile: installs the pinned packages to /opt/lapwing, those of the tests to /opt/lapwing-tests.
 set -eu
 cd /build
 
-# With wheels there (deploy/wheels.sh) no index is asked.
+# With downloaded wheels (deploy/wheels.sh) no index is used.
 if ls ./*.whl > /dev/null 2>&1; then export PIP_NO_INDEX=1 PIP_FIND_LINKS=/build; fi
 
-# The environment gets no pip of its own: the base's serves, and nothing is installed at run time.
+# The environment has no pip: that of the base image installs the packages, and nothing is installed at run time.
 python3 -m venv --without-pip /opt/lapwing
 for lock in requirements*.lock; do
     case $lock in

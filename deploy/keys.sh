@@ -1,16 +1,16 @@
 #!/bin/sh
-# A certificate for each participant of a flight in containers: the service `keys` of docker-compose.yml.
+# Creates a certificate for each participant of a flight in containers: the service `keys` of docker-compose.yml.
 #
-#   keys.sh [NAME...]    of whom the owner of recordings/ is the user (deploy/entrypoint.sh), not the image's own user
+#   keys.sh [NAME...]    containers that run as the owner of recordings/ (deploy/entrypoint.sh), not as the image's user
 #
-# keys/NAME is a volume that no other container sees but that of NAME. What is there stays while all of it is of one
-# authority and good for another week; else everybody's is made anew. The authority's own key is never written there.
-# Needs no capability but CHOWN: the folders are root's, a key is of who uses it.
+# keys/NAME is a volume that only the container NAME mounts. Existing certificates are kept if all have the same authority
+# and are valid for another week; otherwise all are created again. The authority's private key is never stored.
+# Needs only the capability CHOWN: the folders belong to root, a key belongs to its user.
 set -eu
 
 WEEK=604800 # [s]
 
-sound() {
+are_valid() {
     authority=
     for own in keys/*; do
         [ -s "$own/authority.pem" ] && [ -s "$own/key.pem" ] && [ -s "$own/zenoh.json5" ] || return 1
@@ -20,15 +20,15 @@ sound() {
     done
 }
 
-if ! sound; then
-    made=$(mktemp -d)
-    trap 'rm -rf "$made"' EXIT
-    lapwing certificates "$made/keys" > /dev/null
-    rm -f keys/*/authority.pem # whatever ends this early: what is left is not sound
+if ! are_valid; then
+    new=$(mktemp -d)
+    trap 'rm -rf "$new"' EXIT
+    lapwing certificates "$new/keys" > /dev/null
+    rm -f keys/*/authority.pem # if this is interrupted, the remaining files are invalid
     for own in keys/*; do
         for file in key.pem zenoh.json5 certificate.pem authority.pem; do
             rm -f "$own/$file"
-            cp -p "$made/$own/$file" "$own/"
+            cp -p "$new/$own/$file" "$own/"
         done
     done
 fi
@@ -40,6 +40,6 @@ for own in keys/*; do
     done
     chown "$user" "$own/key.pem" "$own/zenoh.json5"
     until=$(openssl x509 -in "$own/certificate.pem" -noout -enddate)
-    everybody="${everybody:+$everybody, }${own#keys/}"
+    names="${names:+$names, }${own#keys/}"
 done
-echo "certificates of $everybody, until ${until#*=}"
+echo "certificates of $names, until ${until#*=}"

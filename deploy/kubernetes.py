@@ -1,9 +1,9 @@
-"""Manifests of a run on Kubernetes: a pod for each service, which only the others reach, with its certificate.
+"""Kubernetes manifests of a run: a pod with a certificate for each service, reachable only from the other services.
 
     lapwing certificates keys
     python deploy/kubernetes.py delivery_mission | kubectl apply -f -
 
-docs/guides/several_hosts.md tells the rest.
+See docs/guides/several_hosts.md.
 """
 
 import argparse
@@ -16,12 +16,12 @@ from lapwing.services.scene_resolver import load, resolve
 
 NAMESPACE, PORT, USER = "lapwing", 7447, 1000
 RECORDINGS = {"name": "recordings", "mountPath": "/app/recordings"}
-MEMORY = {"recorder": "2Gi", MONITOR: "2Gi"}  # of each other 1 GiB
+MEMORY = {"recorder": "2Gi", MONITOR: "2Gi"}  # limit; 1 GiB for all others
 LABELS = {"app.kubernetes.io/part-of": NAMESPACE}
 
 
 def manifests(scene: str, image: str) -> list[dict[str, Any]]:
-    """All objects of a run of a scene."""
+    """Return all objects of a run of a scene."""
     names = [*process_table.required_processes(resolve(load(scene))), MONITOR]
     table = ",".join(f"{name}=tls/{name}:{PORT}" for name in names)
     result: list[dict[str, Any]] = [
@@ -48,7 +48,7 @@ def _metadata(name: str) -> dict[str, Any]:
 
 
 def _policy() -> dict[str, Any]:
-    """The pods of a run reach one another at their port, and the cluster's names; nobody else reaches them."""
+    """Return the network policy: pods of a run only reach each other's port and the cluster's name service."""
     ours = {"podSelector": {"matchLabels": LABELS}}
     at = [{"protocol": "TCP", "port": PORT}]
     names = [{"protocol": protocol, "port": 53} for protocol in ("UDP", "TCP")]
@@ -105,7 +105,7 @@ def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
         "kind": "Pod",
         "metadata": _metadata(name),
         "spec": {
-            "hostname": name,  # so that it can listen at its name at once
+            "hostname": name,  # so that it can listen on its name immediately
             "restartPolicy": "Never",
             "automountServiceAccountToken": False,
             "enableServiceLinks": False,
@@ -116,7 +116,7 @@ def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
                 "fsGroup": USER,
                 "seccompProfile": {"type": "RuntimeDefault"},
             },
-            # a secret's files are readable by the group, and such a key is refused
+            # files of a secret are readable by the group, and Lapwing rejects such keys
             "initContainers": [
                 {
                     "name": "keys",
@@ -149,9 +149,9 @@ def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
 
 
 def main() -> None:
-    """Print them, as JSON, which kubectl takes as it takes YAML."""
-    parser = argparse.ArgumentParser(description="Kubernetes manifests of a run: a pod a service.")
-    parser.add_argument("scene", help="the name of a scene that ships")
+    """Print the manifests as JSON, which kubectl accepts like YAML."""
+    parser = argparse.ArgumentParser(description="Kubernetes manifests of a run: one pod for each service.")
+    parser.add_argument("scene", help="name of a shipped scene")
     parser.add_argument("--image", default="lapwing:latest")
     options = parser.parse_args()
     print(json.dumps({"apiVersion": "v1", "kind": "List", "items": manifests(options.scene, options.image)}, indent=2))

@@ -1,11 +1,12 @@
 #!/bin/sh
-# Pins what the images contain, from the lower bounds in pyproject.toml.
+# Pins the packages of the images, from the lower bounds in pyproject.toml.
 #
-#   deploy/lock.sh [PACKAGE]     all anew, or only PACKAGE to its newest version
+#   deploy/lock.sh [PACKAGE]     update all packages, or only PACKAGE, to the newest version
 #
-# Writes requirements.lock (what an installation needs, and the build backend) and for each of $MORE what it needs on top
-# of it (a Dask cluster and the server for Foxglove, in the image too; the tests, in theirs), each with the hashes of all files
-# of that version, for every platform. pip refuses what has another hash. A local environment gets the same versions by `pip install --constraint`.
+# Writes requirements.lock (an installation and the build backend), and for each of $MORE the additional packages (a Dask
+# cluster and the Foxglove server in the image, the tests in their image), each with the hashes of all files of that
+# version, for every platform. pip rejects files with another hash. `pip install --constraint` installs the same versions
+# in a local environment.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -33,7 +34,7 @@ for more in $MORE; do
         pyproject.toml "$work/backend.in" > /dev/null
 done
 
-# A package a line, in one sorting order whatever the locale, and a hash a line again.
+# One package per line, in a sorting order independent of the locale; then one hash per line again.
 lines() { sed -e :again -e '/\\$/{N; s/ *\\\n */ /; b again' -e '}' "$1" | LC_ALL=C sort; }
 hashes() { sed 's/ --hash/ \\\n    --hash/g'; }
 lines "$work/runtime" > "$work/runtime.lines"

@@ -1,4 +1,4 @@
-"""Make a folder of installed packages small: drop tests, headers, what nobody imports, symbols.
+"""Reduce the size of a folder of installed packages: remove tests, headers, unused modules and symbols.
 
 Used by the Dockerfile:  python3 slim.py SITE_PACKAGES...
 """
@@ -9,12 +9,12 @@ import sys
 from pathlib import Path
 
 UNUSED = {".pyi", ".pxd", ".pyx", ".c", ".h", ".hpp", ".a"}  # for type checkers and C compilers
-# pymavlink needs lxml to make dialects, not to speak them; plotly needs narwhals, but only its script is read; dateutil
-# and pydantic need tzdata for time zones by name, which Lapwing does not use.
+# pymavlink needs lxml only to generate dialects; plotly needs narwhals, but only its script is read; dateutil and
+# pydantic need tzdata for time zones by name, which Lapwing does not use.
 NOT_IMPORTED = ("lxml", "narwhals", "tzdata", "dask/array", "dask/dataframe", "numpy/distutils")
 PLOTLY_SCRIPT = Path("package_data", "plotly.min.js")
-# The modules of these folders that are imported: the dialects that the link speaks and pymavlink takes by default; the
-# language of tracebacks.
+# Modules of these folders that are kept: the MAVLink dialects of the link and the default one of pymavlink; the lexers
+# of tracebacks.
 MODULES = {
     "pymavlink/dialects/v*": {"__init__", "all"},
     "pygments/lexers": {"__init__", "_mapping", "diff", "python", "special"},
@@ -24,7 +24,7 @@ PT_LOAD_END = slice(8, 40)  # p_offset, p_vaddr, p_paddr, p_filesz of an Elf64_P
 
 
 def loadable_end(elf: bytes) -> int:
-    """Offset behind the last byte that any program header of an ELF64 file names."""
+    """Return the end [bytes] of the last segment in the program headers of an ELF64 file."""
     table, entry, count = struct.unpack_from("<Q", elf, 32)[0], *struct.unpack_from("<HH", elf, 54)
     end = table + entry * count
     for k in range(count):
@@ -34,9 +34,9 @@ def loadable_end(elf: bytes) -> int:
 
 
 def strip(path: Path) -> int:
-    """Cut a shared library behind its last segment: symbols, debug data, section headers. Returns the bytes saved.
+    """Truncate a shared library after its last segment: symbols, debug data, section headers. Return the saved bytes.
 
-    The dynamic loader reads program headers only. This is what binutils' strip is for; slim base images have none.
+    The dynamic loader reads program headers only. Replaces `strip` of binutils, which slim base images lack.
     """
     elf = path.read_bytes()
     if not elf.startswith(ELF64_LITTLE):
@@ -50,14 +50,14 @@ def strip(path: Path) -> int:
 
 
 def remove(folder: Path) -> int:
-    """Remove a folder. Returns the bytes saved."""
+    """Remove a folder. Return the saved bytes."""
     saved = sum(f.stat().st_size for f in folder.rglob("*") if f.is_file())
     shutil.rmtree(folder)
     return saved
 
 
 def keep(folder: Path, file: Path) -> int:
-    """Remove all of a folder but one file. Returns the bytes saved."""
+    """Remove all files of a folder except one. Return the saved bytes."""
     others = [path for path in folder.rglob("*") if path.is_file() and path != folder / file]
     saved = sum(path.stat().st_size for path in others)
     for path in others:
@@ -69,7 +69,7 @@ def keep(folder: Path, file: Path) -> int:
 
 
 def slim(packages: Path) -> int:
-    """Slim one folder of packages. Returns the bytes saved."""
+    """Reduce one folder of packages. Return the saved bytes."""
     saved = 0
     for folder in sorted(packages.rglob("tests"), reverse=True):
         if folder.is_dir():
@@ -82,9 +82,9 @@ def slim(packages: Path) -> int:
     for path in [path for path in packages.rglob("*.*") if path.suffix in UNUSED]:
         saved += path.stat().st_size
         path.unlink()
-    for folder, kept in MODULES.items():
+    for folder, modules in MODULES.items():
         for path in packages.glob(f"{folder}/**/*.*"):
-            if path.suffix == ".xml" or path.name.split(".")[0] not in kept:
+            if path.suffix == ".xml" or path.name.split(".")[0] not in modules:
                 saved += path.stat().st_size
                 path.unlink()
     return saved + sum(strip(path) for path in packages.rglob("*.so*") if not path.is_symlink())

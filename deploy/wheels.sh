@@ -1,11 +1,11 @@
 #!/bin/sh
-# Fetches the pinned wheels to build/wheels, and makes an image of them, in which the Dockerfile finds them.
+# Downloads the pinned wheels to build/wheels, and builds an image of them for the Dockerfile.
 #
 #   deploy/wheels.sh BASE IMAGE
 #
-# The host's own pip does it, so whatever the host is set up with (index, proxy, certificates, a folder of wheels)
-# holds, and none of it enters the Dockerfile, the images or their history. The build then needs no network at all.
-# Folder and image are kept; they are filled anew when the pins change.
+# The host's pip downloads them with the settings of the host (index, proxy, certificates, a folder of wheels), none of
+# which enter the Dockerfile, the images or their history. The build then needs no network. Folder and image are kept,
+# and replaced when the pins change.
 set -eu
 cd "$(dirname "$0")/.."
 

@@ -1,9 +1,10 @@
-"""Geometric tracking control on SE(3), compiled: joins the compiled loop at full speed.
+"""Geometric tracking control on SE(3) as compiled code, which runs in the compiled loop without Python.
 
 T. Lee, M. Leok, N. H. McClamroch: Geometric tracking control of a quadrotor UAV on SE(3), 49th IEEE Conference on
-Decision and Control, 2010, eqs. (7) to (16), written for z up; with an integral of the position error, which takes up
-a steady wind (F. Goodarzi, D. Lee, T. Lee: Geometric nonlinear PID control of a quadrotor UAV on SE(3), European
-Control Conference, 2013). The attitude that is commanded turns as fast as the last two commands differ, smoothed.
+Decision and Control, 2010, eqs. (7) to (16), written for z up; with an integral of the position error, which
+compensates a steady wind (F. Goodarzi, D. Lee, T. Lee: Geometric nonlinear PID control of a quadrotor UAV on SE(3),
+European Control Conference, 2013). The rate of the commanded attitude is the smoothed difference of the last two
+commands.
 """
 
 import math
@@ -35,7 +36,7 @@ IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Parameters(NamedTuple):
-    """Gains on a vehicle."""
+    """Gains for a vehicle."""
 
     rate: float  # [Hz]
     mass: float  # [kg]
@@ -46,16 +47,16 @@ class Parameters(NamedTuple):
     k_i: float  # [N/(m s)]
     k_attitude: Vec3  # [N m] about each body axis
     k_omega: Vec3  # [N m s]
-    smoothing: float  # share of a new rate of the commanded attitude in the smoothed one
+    smoothing: float  # weight of a new rate of the commanded attitude in the smoothed one
 
 
 class State(NamedTuple):
-    """Memory from step to step."""
+    """Controller state."""
 
-    integral_world: Vec3  # of the position error [m s]
+    integral_world: Vec3  # [m s] integral of the position error
     R_commanded: Mat3
     omega_commanded: Vec3  # [rad/s] in axes of the commanded attitude
-    begun: bool
+    started: bool
 
 
 def build(
@@ -67,15 +68,15 @@ def build(
     yaw: float = 4.0,
     smoothing: float = 10.0,
 ) -> tuple[Parameters, State]:
-    """Parameters and first state.
+    """Return parameters and initial state.
 
     Args:
-        vehicle: what is flown.
-        position: bandwidth of the position loop [rad/s]; the others likewise: attitude, yaw.
-        damping: of all loops; 1 is critical.
-        integral: rate at which a steady force is taken up [rad/s].
-        attitude: [rad/s].
-        yaw: [rad/s].
+        vehicle: model of the vehicle.
+        position: bandwidth of the position loop [rad/s].
+        damping: damping ratio of all loops; 1 is critical.
+        integral: rate of the compensation of a steady force [rad/s].
+        attitude: bandwidth of the roll and pitch loops [rad/s].
+        yaw: bandwidth of the yaw loop [rad/s].
         smoothing: bandwidth of the rate of the commanded attitude [rad/s].
     """
     m, (ix, iy, iz) = vehicle.mass, vehicle.inertia_body
@@ -97,7 +98,7 @@ def build(
 
 @kernel
 def commanded_attitude(force_world, yaw):
-    """Body axes in the world whose third points along a force and whose first looks towards a heading."""
+    """Return body axes in the world, the third along a force and the first towards a heading [rad]."""
     b3 = scale(1.0 / max(norm(force_world), 1e-6), force_world)
     b2 = cross(b3, (math.cos(yaw), math.sin(yaw), 0.0))
     b2 = scale(1.0 / max(norm(b2), 1e-6), b2)
@@ -107,7 +108,7 @@ def commanded_attitude(force_world, yaw):
 
 @kernel
 def step(p, s, time, estimate, setpoint):
-    """State and command at `time` [s]."""
+    """Return state and command at `time` [s]."""
     R = rotation_matrix(estimate.attitude)
     omega = estimate.omega_body
     e_x = subtract(estimate.position_world, setpoint.position_world)
@@ -118,18 +119,18 @@ def step(p, s, time, estimate, setpoint):
     force = subtract(scale(p.mass, acceleration), feedback)
     R_c = commanded_attitude(force, setpoint.yaw)  # eq. (12)
     omega_c = s.omega_commanded
-    if s.begun:
-        turned = matmul(transpose(s.R_commanded), R_c)
-        fresh = scale(p.rate, vee(turned))
+    if s.started:
+        rotation = matmul(transpose(s.R_commanded), R_c)
+        fresh = scale(p.rate, vee(rotation))
         omega_c = add(omega_c, scale(p.smoothing, subtract(fresh, omega_c)))
     error = matmul(transpose(R_c), R)
     e_R = vee(error)  # eq. (10)
-    omega_wanted = apply_transposed(error, omega_c)
-    e_omega = subtract(omega, omega_wanted)  # eq. (11)
+    omega_desired = apply_transposed(error, omega_c)
+    e_omega = subtract(omega, omega_desired)  # eq. (11)
     gyroscopic = cross(omega, multiply(p.inertia_body, omega))
-    carried = multiply(p.inertia_body, cross(omega, omega_wanted))
+    transport = multiply(p.inertia_body, cross(omega, omega_desired))
     restoring = add(multiply(p.k_attitude, e_R), multiply(p.k_omega, e_omega))
-    moments = subtract(subtract(gyroscopic, carried), restoring)  # eq. (16)
+    moments = subtract(subtract(gyroscopic, transport), restoring)  # eq. (16)
     thrust = dot(force, apply(R, (0.0, 0.0, 1.0)))  # eq. (15)
     roll_pitch = (math.atan2(R_c[7], R_c[8]), -math.asin(min(max(R_c[6], -1.0), 1.0)))
     return State(integral, R_c, omega_c, True), ThrustAndMoments(thrust, moments, roll_pitch)

@@ -1,9 +1,9 @@
-"""Linear-quadratic regulator about hover, with integral action: a controller of one's own in Python.
+"""Linear-quadratic regulator about hover, with integral action: a user controller in Python.
 
-The state is that of a rigid body near hover, in axes that turn with the heading (yaw scheduling: the gain is computed
-once, the errors are turned): position error [m], velocity error [m/s], roll, pitch and yaw error [rad], body rates
-[rad/s], and the integral of the position error [m s], which takes up a steady wind. The input is the thrust beyond the
-weight [N] and the moments [N m]. Weights after Bryson: one over the square of the largest deviation that is tolerated.
+The state is that of a rigid body near hover, in axes that rotate with the heading (yaw scheduling: the gain is computed
+once, the errors are rotated): position error [m], velocity error [m/s], roll, pitch and yaw error [rad], body rates
+[rad/s], and the integral of the position error [m s], which compensates a steady wind. The input is the thrust beyond
+the weight [N] and the moments [N m]. Weights by Bryson's rule: one over the square of the largest tolerated deviation.
 B. D. O. Anderson, J. B. Moore: Optimal Control: Linear Quadratic Methods, Prentice Hall 1990.
 """
 
@@ -17,7 +17,7 @@ from lapwing.plugins import Setpoint, StateEstimate, ThrustAndMoments, VehicleMo
 
 
 class Lqr:
-    """u = -K x, and the setpoint's acceleration fed forward."""
+    """State feedback u = -K x with feed-forward of the setpoint's acceleration."""
 
     rate = 250.0  # [Hz]
 
@@ -38,17 +38,17 @@ class Lqr:
         """Solve the Riccati equation.
 
         Args:
-            vehicle: what is flown.
-            position: tolerated deviation [m]; the others likewise.
-            velocity: [m/s].
-            tilt: [rad].
-            yaw: [rad].
-            body_rate: [rad/s].
-            integral: [m s].
-            thrust: [N].
-            moment: about the roll and pitch axes [N m].
-            yaw_moment: [N m].
-            tilt_max: of the acceleration that is asked for, over gravity.
+            vehicle: model of the vehicle.
+            position: tolerated deviation of the position [m].
+            velocity: tolerated deviation of the velocity [m/s].
+            tilt: tolerated deviation of roll and pitch [rad].
+            yaw: tolerated deviation of yaw [rad].
+            body_rate: tolerated deviation of the body rates [rad/s].
+            integral: tolerated integral of the position error [m s].
+            thrust: tolerated deviation of the thrust [N].
+            moment: tolerated moment about the roll and pitch axes [N m].
+            yaw_moment: tolerated moment about the yaw axis [N m].
+            tilt_max: limit of the setpoint's horizontal acceleration over gravity.
         """
         g = vehicle.gravity
         A = np.zeros((15, 15))
@@ -65,7 +65,7 @@ class Lqr:
         self.integral = np.zeros(3)  # world [m s]
 
     def step(self, time: float, estimate: StateEstimate, setpoint: Setpoint) -> ThrustAndMoments:
-        """Thrust and moments at `time` [s]."""
+        """Return thrust and moments at `time` [s]."""
         w, x, y, z = estimate.attitude
         heading, pitch, roll = Rotation.from_quat([x, y, z, w]).as_euler("ZYX")
         c, s = math.cos(heading), math.sin(heading)

@@ -1,10 +1,10 @@
-"""Learns to hover by proximal policy optimisation (PPO of skrl, on JAX): 256 vehicles of `lapwing.gym` at once.
+"""Learning to hover by proximal policy optimisation (PPO of skrl, on JAX) with 256 vehicles of `lapwing.gym`.
 
     pip install lapwing[learn]
     python examples/ppo_hover.py [STEPS] [SEED]
 
-Prints the mean return of whole episodes, how far from the target they end and after how many actions, before and
-after; 500 is the most that ten seconds, 500 actions, could give.
+Prints the mean return, final distance from the target and number of actions of whole episodes before and after the
+training; the largest possible return of ten seconds (500 actions) is 500.
 """
 
 import sys
@@ -24,13 +24,13 @@ from skrl.utils import set_seed
 
 import lapwing.gym  # noqa: F401 (registers the environments)
 
-VEHICLES, JUDGES, ROLLOUT = 256, 64, 32  # that learn, and that show how well; ROLLOUT in actions of 20 ms
-FIRST = -1.0  # logarithm of the actions' standard deviation at first
-SAID = "{:6} return {:6.1f}, {:.2f} m from the target at the end, after {:.0f} actions"
+VEHICLES, EVALUATED, ROLLOUT = 256, 64, 32  # number of vehicles in training and evaluation; actions of 20 ms
+INITIAL_LOG_STD = -1.0  # logarithm of the initial standard deviation of the actions
+LINE = "{:6} return {:6.1f}, {:.2f} m from the target at the end, after {:.0f} actions"
 
 
 class Policy(GaussianMixin, Model):
-    """Actions of an observation, and how much to try around them."""
+    """Policy network: mean and standard deviation of the actions of an observation."""
 
     def __init__(self, observation_space, action_space, **options):
         Model.__init__(self, observation_space=observation_space, action_space=action_space, **options)
@@ -38,12 +38,12 @@ class Policy(GaussianMixin, Model):
 
     @nn.compact
     def __call__(self, inputs, role):
-        """(mean action, logarithm of the standard deviation)."""
+        """Return (mean action, logarithm of the standard deviation)."""
         x = inputs["observations"]
         for _ in range(2):
             x = nn.tanh(nn.Dense(64)(x))
         mean = nn.Dense(4, kernel_init=nn.initializers.orthogonal(0.01))(x)
-        return mean, {"log_std": self.param("log_std", lambda _: FIRST * jnp.ones(4))}
+        return mean, {"log_std": self.param("log_std", lambda _: INITIAL_LOG_STD * jnp.ones(4))}
 
 
 class Value(DeterministicMixin, Model):
@@ -55,15 +55,15 @@ class Value(DeterministicMixin, Model):
 
     @nn.compact
     def __call__(self, inputs, role):
-        """The expected return."""
+        """Return the expected return."""
         x = inputs["observations"]
         for _ in range(2):
             x = nn.tanh(nn.Dense(64)(x))
         return nn.Dense(1)(x), {}
 
 
-def learner(environments):
-    """A PPO agent for these environments."""
+def create_agent(environments):
+    """Return a PPO agent for these environments."""
     spaces = environments.observation_space, environments.action_space
     models = {"policy": Policy(*spaces), "value": Value(*spaces)}
     for role, model in models.items():
@@ -86,7 +86,7 @@ def learner(environments):
 
 
 def train(agent, environments, steps):
-    """Let it learn for so many steps of all vehicles."""
+    """Train the agent for a number of steps of all vehicles."""
     SequentialTrainer(
         env=environments,
         agents=agent,
@@ -94,43 +94,44 @@ def train(agent, environments, steps):
     ).train()
 
 
-def made(vehicles):
-    """So many of them, in one environment."""
+def create_environments(vehicles):
+    """Return a vector environment of this number of vehicles."""
     return gymnasium.make_vec("lapwing/Hover-v0", vehicles, "vector_entry_point")
 
 
-def way(observed):
-    """To the target [m], shape (n, 3), of observations (n, 21)."""
-    return observed[:, :3]
+def displacement_to_target(observations):
+    """Return the displacement to the target [m], shape (n, 3), of observations (n, 21)."""
+    return observations[:, :3]
 
 
-def judged(agent, environments, way=way, seed=10**6):
+def evaluate(agent, environments, displacement=displacement_to_target, seed=10**6):
     """Return mean return, final distance [m] and final actions of one episode of each vehicle with the mean actions."""
-    observed, _ = environments.reset(seed=seed)
+    observations, _ = environments.reset(seed=seed)
     n = environments.num_envs
     total, away, flight, over = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n, bool)
     while not over.all():
-        _, outputs = agent.policy.act({"observations": jnp.asarray(observed)}, role="policy")
-        observed, reward, terminated, truncated, _ = environments.step(np.asarray(outputs["mean_actions"]))
+        _, outputs = agent.policy.act({"observations": jnp.asarray(observations)}, role="policy")
+        observations, reward, terminated, truncated, _ = environments.step(np.asarray(outputs["mean_actions"]))
         total += np.where(over, 0.0, reward)
-        away = np.where(over, away, np.linalg.norm(way(observed), axis=1))
+        away = np.where(over, away, np.linalg.norm(displacement(observations), axis=1))
         flight += ~over
         over |= terminated | truncated
     return total.mean(), away.mean(), flight.mean()
 
 
 def main(steps=2000, seed=1):
-    """Learn for so many steps of 20 ms of all vehicles; what `judged` says before and after."""
+    """Train for a number of steps of 20 ms of all vehicles. Return the results of `evaluate` before and after."""
     set_seed(seed)
-    environments, judges = wrap_env(made(VEHICLES), verbose=False), made(JUDGES)
-    agent = learner(environments)
-    before = judged(agent, judges)
-    print(SAID.format("before", *before), flush=True)
+    environments = wrap_env(create_environments(VEHICLES), verbose=False)
+    evaluated = create_environments(EVALUATED)
+    agent = create_agent(environments)
+    before = evaluate(agent, evaluated)
+    print(LINE.format("before", *before), flush=True)
     began, processor = time.monotonic(), time.process_time()
     train(agent, environments, steps)
     took = time.process_time() - processor
-    after = judged(agent, judges)
-    print(SAID.format("after", *after))
+    after = evaluate(agent, evaluated)
+    print(LINE.format("after", *after))
     print(f"{steps * VEHICLES} steps, {took:.0f} s of processor time, {time.monotonic() - began:.0f} s")
     return before, after
 

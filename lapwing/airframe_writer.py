@@ -1,4 +1,4 @@
-"""The airframe that figures of a vehicle make, as a file."""
+"""Airframe file from the measurements of a vehicle."""
 
 import json
 import math
@@ -29,10 +29,10 @@ SPINS = {  # clockwise or counter-clockwise seen from above, alternating
 
 
 def airframe_of(v: Values) -> Airframe:
-    """Return the airframe for the figures.
+    """Return the airframe for the measurements.
 
     Raises:
-        ValueError: figures that do not go together.
+        ValueError: inconsistent measurements.
     """
     try:
         return Airframe.model_validate(tomllib.loads(airframe_text("new", v, set(v))))
@@ -40,8 +40,8 @@ def airframe_of(v: Values) -> Airframe:
         raise fault(error, Airframe) from None
 
 
-def airframe_text(name: str, v: Values, known: set[str]) -> str:
-    """Return the text of the airframe file; figures that are not `known` are marked as guessed."""
+def airframe_text(name: str, v: Values, measured: set[str]) -> str:
+    """Return the text of the airframe file; figures that are not in `measured` are marked as guessed."""
     count = int(v["rotors"])
     geometry = {"diameter": v["diameter"], "pitch": v["pitch"], "blades": int(v["blades"]), **FAMILY}
     shape = Propeller.model_validate({**geometry, "lift_correction": 1.0, "zero_lift_drag": 0.0})
@@ -50,7 +50,7 @@ def airframe_text(name: str, v: Values, known: set[str]) -> str:
     hubs = [_place(v["arm"], math.pi / count + 2.0 * math.pi * k / count, 0.0) for k in range(count)]
     feet = [_place(v["foot_distance"], math.pi / 4.0 + math.pi / 2.0 * k, -v["foot_depth"]) for k in range(4)]
     inertia = [v["inertia_x"], v["inertia_y"], v["inertia_z"]]
-    guessed = ", ".join(sorted(set(v) - known))
+    guessed = ", ".join(sorted(set(v) - measured))
 
     motor = ("speed_constant", "gear_ratio", "no_load_current", "resistance", "time_constant")
     units = {figure.name: figure.unit for figure in FIGURES}

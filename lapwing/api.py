@@ -1,4 +1,4 @@
-"""Functions of `import lapwing`."""
+"""Functions of the public interface `lapwing`."""
 
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -136,7 +136,7 @@ def campaign(
     with WorkProgress(f"campaign {base.name}", len(seeds), "flights", workers) as bar:
         first = setup(0)
         with notify_on_compile(first, bar.compiling):
-            flights = [_fly(first)]  # alone: it compiles
+            flights = [_fly(first)]  # one flight alone, which compiles the kernels
         bar.show(1)
         with ThreadPoolExecutor(workers) as pool:
             for flight in pool.map(one, range(1, len(seeds))):

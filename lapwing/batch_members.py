@@ -1,4 +1,4 @@
-"""Members of a batch: the plant of each scene, their common effects and tables, and the states they can start in."""
+"""Members of a batch: the plant of each scene, and checks of their common effects, tables and start states."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -15,7 +15,7 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.service_config import PlantSetup
 from lapwing.services.scene_resolver import resolve
 
-UNIT = 1e-6  # largest difference of the norm of an attitude from 1
+UNIT = 1e-6  # largest error of the norm of an attitude
 DEEPEST = 1e-3  # [m] largest depth of a centre of mass below the ground
 
 
@@ -32,7 +32,7 @@ def plant_of(scene: Scene) -> PlantSetup:
         raise SceneError("services", "batches step the plant without FMUs", "no FMU with inputs of effects")
     if plant.others:
         raise SceneError(
-            "effects.shared_slung_load", "batches step vehicles without what they carry", "a scene without it"
+            "effects.shared_slung_load", "batches step vehicles without carried loads", "a scene without it"
         )
     return plant
 
@@ -46,7 +46,7 @@ def check_alike(k: int, core: MultirotorPlant, first: MultirotorPlant) -> None:
     """Check that member k has the effects, solver and tables of member 0, which all members share.
 
     Raises:
-        ValueError: it has not.
+        ValueError: they differ.
     """
     if _kinds(core) != _kinds(first):
         raise ValueError(f"member {k}: has other effects or another solver than member 0")
@@ -71,7 +71,7 @@ def _arrays(tree: Any, path: str = "") -> Iterator[tuple[str, np.ndarray]]:
 
 
 def check_start(state: Mapping[str, ArrayLike], members: np.ndarray, terrains: Sequence[Any]) -> None:
-    """Check that vehicles can have a state.
+    """Check start states of vehicles.
 
     Args:
         state: fields of `BatchState`, one value for all members or one for each.
@@ -79,7 +79,7 @@ def check_start(state: Mapping[str, ArrayLike], members: np.ndarray, terrains: S
         terrains: ground of every member of the batch, see `terrain_of`.
 
     Raises:
-        ValueError: none can have it.
+        ValueError: a state is invalid.
     """
     checks: dict[str, tuple[str, Any]] = {
         "attitude": ("unit quaternions", lambda v: abs(np.linalg.norm(v, axis=1) - 1.0) <= UNIT),
@@ -96,14 +96,14 @@ def check_start(state: Mapping[str, ArrayLike], members: np.ndarray, terrains: S
 def _above_ground(places: np.ndarray, members: np.ndarray, terrains: Sequence[Any]) -> np.ndarray:
     """Return True for each of the places [m], shape (n, 3), that is above the ground of its member or of all."""
     if places.shape[1:] != (3,) or not np.isfinite(places).all() or len(places) not in (1, len(members)):
-        return np.ones(len(places), bool)  # `finite_array` names these
-    every, height = np.broadcast_to(places, (len(members), 3)), np.zeros(len(members))
+        return np.ones(len(places), bool)  # reported by `finite_array`
+    positions, height = np.broadcast_to(places, (len(members), 3)), np.zeros(len(members))
     groups: dict[int, tuple[Any, list[int]]] = {}
     for i, k in enumerate(members):
         groups.setdefault(id(terrains[k]), (terrains[k], []))[1].append(i)
     for ground, own in groups.values():
-        height[own] = -np.inf if ground is None else _heights(ground, np.ascontiguousarray(every[own]))
-    above: np.ndarray = every[:, 2] >= height - DEEPEST
+        height[own] = -np.inf if ground is None else _heights(ground, np.ascontiguousarray(positions[own]))
+    above: np.ndarray = positions[:, 2] >= height - DEEPEST
     return above if len(places) == len(members) else np.array([above.all()])
 
 

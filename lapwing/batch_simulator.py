@@ -34,13 +34,13 @@ RATE_BANDWIDTH = 15.0  # [rad/s] of the body-rate controller
 class BatchState(NamedTuple):
     """States of n vehicles as arrays; world ENU, body FLU."""
 
-    time: np.ndarray  # [s] of each since its reset, shape (n,)
+    time: np.ndarray  # [s] time of each since its reset, shape (n,)
     position_world: np.ndarray  # [m], shape (n, 3)
     attitude: np.ndarray  # unit quaternions w, x, y, z, body to world, shape (n, 4)
     velocity_world: np.ndarray  # [m/s], shape (n, 3)
     omega_body: np.ndarray  # [rad/s], shape (n, 3)
     rotor_speed: np.ndarray  # [rad/s], shape (n, rotors)
-    valid: np.ndarray  # shape (n,): False after a step that left a state non-finite, or turning too fast for its error
+    valid: np.ndarray  # shape (n,): False after a step with a non-finite state, or a rotation too fast for the solver
 
 
 class BatchSimulator:
@@ -90,7 +90,7 @@ class BatchSimulator:
         self._motion = row_width(self._like.motion)
         self._blocks = simd_batch.blocks(n, self._like)
         self._flat = self._blocks.reshape(-1)
-        members = len(self._blocks) * simd_batch.WIDTH  # those beyond n fill the last block
+        members = len(self._blocks) * simd_batch.WIDTH  # members beyond n fill the last block
         name = base[Vehicle].name
         self._keys = np.array([noise_key(batch_plan.seed_of(min(k, n - 1)), name) for k in range(members)], np.int64)
         self._ticks = np.zeros(members, np.int64)

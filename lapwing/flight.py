@@ -102,13 +102,13 @@ class Flight(studied.FlightData):
         """Plot displacements and references over time, and the path in space.
 
         Args:
-            path: also write the picture to this file: .png, .svg or .pdf.
+            path: also write the plot to this file: .png, .svg or .pdf.
 
         Returns:
             The matplotlib figure; a notebook shows it.
 
         Raises:
-            ValueError: the picture cannot be written.
+            ValueError: the plot cannot be written.
         """
         from lapwing.studies.report.matplotlib_figure import (  # matplotlib takes half a second to import
             figure,

@@ -1,4 +1,4 @@
-"""Interface for extensions: everything that a user's own module imports, besides `lapwing` itself.
+"""Interface for extensions: all names that a user's module imports, besides `lapwing` itself.
 
 - controllers: `VehicleModel`, `StateEstimate`, `Setpoint`, `ThrustAndMoments`, `MotorVoltages`
 - estimators: `VehicleModel`, `StateEstimate` and the readings of the sensors

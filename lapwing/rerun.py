@@ -15,15 +15,15 @@ PLOTTED = ("battery", "sonar", "baro", "imu")  # topics that Rerun draws as curv
 
 
 def program() -> str | None:
-    """Return the path of Rerun's program, of this environment or the search path; None if it is missing."""
+    """Return the path of the program `rerun` in this environment or on the PATH; None if it is missing."""
     return shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
 
 
 def open_in_rerun(log: Path) -> None:
-    """Write a recording of Rerun's beside a log, start the viewer on it, and leave it.
+    """Write a Rerun recording next to a log, and start the viewer in the background.
 
     Raises:
-        ValueError: no log, or Rerun is not installed.
+        ValueError: not a log, or Rerun is not installed.
     """
     with LogReader(log) as recorded:
         topics = set(recorded.topics())
@@ -36,7 +36,7 @@ def open_in_rerun(log: Path) -> None:
 
 
 def convert(log: Path, topics: set[str], target: Path) -> None:
-    """Write a log with these topics as a recording of Rerun's that begins with its blueprint."""
+    """Write a log with these topics as a Rerun recording that starts with its blueprint."""
     import rerun
 
     recording = rerun.RecordingStream(APPLICATION)
@@ -47,20 +47,20 @@ def convert(log: Path, topics: set[str], target: Path) -> None:
 
 
 def blueprint(topics: set[str]) -> Any:
-    """Space beside curves, map and events, of those topics that there are."""
+    """Return the layout of the viewer: 3D view next to curves, map and events of the existing topics."""
     import rerun.blueprint as layout
 
     vehicle = next((topic.split("/")[1] for topic in sorted(topics) if topic.endswith("/ground_truth")), "")
 
-    def there(name: str) -> str | None:
+    def existing(name: str) -> str | None:
         topic = f"/{vehicle}/{name}"
         return topic if topic in topics else None
 
-    views: list[Any] = [layout.TimeSeriesView(origin=t, name=name) for name in PLOTTED if (t := there(name))]
-    if place := there("gps/fix"):
+    views: list[Any] = [layout.TimeSeriesView(origin=t, name=name) for name in PLOTTED if (t := existing(name))]
+    if place := existing("gps/fix"):
         views.append(layout.MapView(origin=place, name="map"))
-    if source := there("events"):
+    if source := existing("events"):
         views.append(layout.TextLogView(origin=source, name="events"))
-    shown = [topic for topic in ("/tf", there("pose"), there("mag")) if topic in topics]
-    space = layout.Spatial3DView(origin="/", contents=shown, name="in space")
+    shown = [topic for topic in ("/tf", existing("pose"), existing("mag")) if topic in topics]
+    space = layout.Spatial3DView(origin="/", contents=shown, name="3D view")
     return layout.Blueprint(layout.Horizontal(space, layout.Vertical(*views)), collapse_panels=True)

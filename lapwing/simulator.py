@@ -1,4 +1,4 @@
-"""A vehicle that you step yourself, with motor voltages or with setpoints."""
+"""Simulator of one vehicle for user code, which steps it with motor voltages or setpoints."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoin
 from lapwing.services.process_table import create, foreign_firmware
 from lapwing.services.scene_resolver import load, load_one, resolve
 
-KEEP = 64  # [ticks] whose values are kept
+KEEP = 64  # [ticks] history of port values
 LOOK = 250  # [ticks] between two updates of the progress bar
 
 
@@ -30,9 +30,9 @@ class Observation(NamedTuple):
 
     time: float  # [s] simulation time
     truth: TrueState  # SI, world ENU, body FLU
-    sensors: dict[str, Any]  # the newest reading of each sensor, by its name
-    estimate: StateEstimate | None  # of the autopilot; None with motor voltages
-    done: bool  # the run has reached its duration, or its state is invalid
+    sensors: dict[str, Any]  # newest reading of each sensor by name
+    estimate: StateEstimate | None  # estimate of the autopilot; None with motor voltages
+    done: bool  # True at the end of the run, or if the state is invalid
 
 
 class UserCommandBlock:

@@ -12,7 +12,7 @@ ROTORS = (4, 6, 8)
 
 
 class Figure(NamedTuple):
-    """A figure to be measured."""
+    """Quantity to be measured."""
 
     name: str
     unit: str
@@ -42,39 +42,47 @@ class Figure(NamedTuple):
 
 
 FIGURES = (
-    Figure("mass", "kg", lambda v: 2.0, "All of it, with battery and payload, on scales.", most=1e4, far=100.0),
-    Figure("payload", "kg", lambda v: 0.0, "The part of the mass that is released in flight.", zero=True),
-    Figure("rotors", "count", lambda v: 4.0, "4, 6 or 8, on a circle, with two of them side by side in front."),
-    Figure("arm", "m", lambda v: 0.16 * v["mass"] ** 0.5, "From the centre of mass to a hub, with a ruler.", most=1e2),
+    Figure("mass", "kg", lambda v: 2.0, "Total mass with battery and payload, on scales.", most=1e4, far=100.0),
+    Figure("payload", "kg", lambda v: 0.0, "Part of the mass that is released in flight.", zero=True),
+    Figure(
+        "rotors", "count", lambda v: 4.0, "Number of rotors, 4, 6 or 8, on a circle with two side by side in front."
+    ),
+    Figure("arm", "m", lambda v: 0.16 * v["mass"] ** 0.5, "Distance from the centre of mass to a hub.", most=1e2),
     Figure(
         "inertia_x",
         "kg m^2",
         lambda v: 0.2 * v["mass"] * v["arm"] ** 2,
-        "Hang it by two parallel wires of length L, b apart, with body x (ahead) vertical, and time a swing T: "
+        "Hang the vehicle by two parallel wires of length L, b apart, with body x (ahead) vertical; with a period T: "
         "m g b^2 T^2 / (16 pi^2 L).",
     ),
-    Figure("inertia_y", "kg m^2", lambda v: 1.1 * v["inertia_x"], "The same with body y (left) vertical."),
+    Figure("inertia_y", "kg m^2", lambda v: 1.1 * v["inertia_x"], "As inertia_x, with body y (left) vertical."),
     Figure(
         "inertia_z",
         "kg m^2",
         lambda v: 0.9 * (v["inertia_x"] + v["inertia_y"]),
-        "The same with body z (up) vertical; of a flat frame nearly the sum of the other two, and not more.",
+        "As inertia_x, with body z (up) vertical; for a flat frame slightly less than the sum of the other two.",
     ),
     Figure(
         "diameter",
         "m",
         lambda v: 1.12 * v["arm"] * (4.0 / v["rotors"]) ** 0.5,
-        "Of the propeller, printed on it: inches times 0.0254.",
+        "Diameter of the propeller, printed on it: inches times 0.0254.",
         most=1e2,
     ),
-    Figure("pitch", "m", lambda v: 0.45 * v["diameter"], "Printed beside the diameter: inches times 0.0254.", most=1e2),
-    Figure("blades", "count", lambda v: 2.0, "Of one propeller.", most=20.0),
-    Figure("stand_density", "kg/m^3", lambda v: 1.225, "Of the air at the thrust stand: pressure / (287.05 T [K])."),
+    Figure(
+        "pitch",
+        "m",
+        lambda v: 0.45 * v["diameter"],
+        "Pitch of the propeller, printed next to the diameter: inches times 0.0254.",
+        most=1e2,
+    ),
+    Figure("blades", "count", lambda v: 2.0, "Number of blades of one propeller.", most=20.0),
+    Figure("stand_density", "kg/m^3", lambda v: 1.225, "Air density at the thrust stand: pressure / (287.05 T [K])."),
     Figure(
         "stand_speed",
         "rad/s",
         lambda v: 160.0 / v["diameter"],
-        "One propeller on a thrust stand, at about the thrust of hover; its speed by tachometer: rpm times 0.10472.",
+        "Speed of one propeller on a thrust stand at about hover thrust, by tachometer: rpm times 0.10472.",
     ),
     Figure("stand_thrust", "N", lambda v: _thrust(v), "Thrust on the stand at that speed."),
     Figure(
@@ -87,51 +95,63 @@ FIGURES = (
         "rotor_inertia",
         "kg m^2",
         lambda v: 6.0e-5 * (v["diameter"] / 0.254) ** 5,
-        "Propeller and bell about the shaft: two threads at the tips, as for the vehicle.",
+        "Propeller and motor bell about the shaft: hung by two threads at the tips, as for inertia_x.",
     ),
-    Figure("cells", "count", lambda v: max(3.0, round(2.8 * v["mass"] ** 0.5)), "Of the battery in series.", most=1e3),
-    Figure("capacity", "mAh", lambda v: 10_000.0 * v["mass"] / v["cells"], "Printed on the battery."),
-    Figure("c_rating", "C", lambda v: 30.0, "Printed on the battery."),
+    Figure(
+        "cells",
+        "count",
+        lambda v: max(3.0, round(2.8 * v["mass"] ** 0.5)),
+        "Number of battery cells in series.",
+        most=1e3,
+    ),
+    Figure("capacity", "mAh", lambda v: 10_000.0 * v["mass"] / v["cells"], "Capacity, printed on the battery."),
+    Figure("c_rating", "C", lambda v: 30.0, "C rating, printed on the battery."),
     Figure(
         "cell_resistance",
         "ohm",
         lambda v: 20.0 / v["capacity"],
-        "A step of load on the warm, half-charged battery: drop of voltage over current and cells.",
+        "Load step on the warm, half-charged battery: voltage drop over current and number of cells.",
         zero=True,
     ),
     Figure(
         "speed_constant",
         "rpm/V",
         lambda v: 1.75 * _hover(v) * 30.0 / math.pi / (CELL_VOLTAGE * v["cells"]),
-        "KV: the motor without propeller, rpm over (V - R I).",
+        "KV of the motor without propeller: rpm over (V - R I).",
     ),
     Figure("gear_ratio", "-", lambda v: 1.0, "Propeller speed over motor speed; 1 for direct drive."),
-    Figure("no_load_current", "A", lambda v: 0.6, "In the same run, without propeller.", zero=True),
+    Figure(
+        "no_load_current",
+        "A",
+        lambda v: 0.6,
+        "Current of the motor without propeller, measured together with speed_constant.",
+        zero=True,
+    ),
     Figure(
         "resistance",
         "ohm",
         lambda v: 0.07 * (CELL_VOLTAGE * v["cells"]) ** 2 / _hover_power(v),
-        "Between two leads of the motor, four wires, with the leads of the controller.",
-        far=50.0,  # motors of one power differ widely; a wrong unit is a factor of 1000
+        "Four-wire resistance between two motor leads, including the leads of the speed controller.",
+        far=50.0,  # motors of equal power differ widely; a wrong unit is a factor of 1000
     ),
     Figure(
         "esc_current",
         "A",
         lambda v: 6.0 * _hover_power(v) / (CELL_VOLTAGE * v["cells"]),
-        "Printed on the speed controller.",
+        "Current limit, printed on the speed controller.",
     ),
     Figure(
         "time_constant",
         "s",
         lambda v: 0.05 * v["diameter"] ** 0.5,
-        "A step of throttle by 10 % about hover, propeller mounted: time to 63 % of the change of speed.",
+        "Throttle step of 10 % about hover with propeller: time to 63 % of the speed change.",
     ),
-    Figure("foot_depth", "m", lambda v: 0.7 * v["arm"], "From the centre of mass down to the ground, standing."),
+    Figure("foot_depth", "m", lambda v: 0.7 * v["arm"], "Height of the centre of mass above the ground, standing."),
     Figure(
         "foot_distance",
         "m",
         lambda v: 0.75 * v["arm"],
-        "From the centre of mass to a foot, seen from above; four feet, at the corners of a square.",
+        "Horizontal distance from the centre of mass to a foot; four feet at the corners of a square.",
     ),
     Figure(
         "drag_area",
@@ -144,12 +164,15 @@ FIGURES = (
 
 
 def _thrust(v: Values) -> float:
-    """Guessed thrust [N] on the stand: 5.1 N for 10 inches at 628.3 rad/s, scaled with density, speed and diameter."""
+    """Return a guess of the thrust [N] on the stand.
+
+    It is 5.1 N for 10 inches at 628.3 rad/s, scaled with density, speed and diameter.
+    """
     return 5.1 * v["stand_density"] / 1.225 * (v["stand_speed"] / 628.3) ** 2 * (v["diameter"] / 0.254) ** 4
 
 
 def _hover(v: Values) -> float:
-    """Rotor speed [rad/s] in hover."""
+    """Return the rotor speed [rad/s] in hover."""
     return v["stand_speed"] * math.sqrt(v["mass"] * 9.80665 / v["rotors"] / v["stand_thrust"])
 
 

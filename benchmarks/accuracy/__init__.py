@@ -14,12 +14,12 @@ from lapwing.studies.report.style import DPI
 
 CASES = ("free_rigid_body", "heavy_top", "gyrostat_steady")
 LEVELS = [10.0**-k for k in range(2, 11)]
-LONGEST = 1.0  # [s] of another simulator's run
+LONGEST = 1.0  # [s] limit of a run of another simulator
 PICTURE = Path(__file__).parents[2] / "docs/pictures/accuracy_other_simulators.png"
 
 
 def best(points: list[Point], level: float) -> Point | None:
-    """The fastest point with this error or less."""
+    """Return the fastest point with at most this error."""
     return min((p for p in points if p.error <= level), key=lambda p: p.time, default=None)
 
 
@@ -58,9 +58,9 @@ def draw(results: dict[str, list[Point]]) -> None:
         for axes, (title, points) in zip(all_axes, results.items(), strict=True):
             for index, name in enumerate(names):
                 reached = [best([p for p in points if simulator(p) == name], level) for level in LEVELS]
-                kept = [(level, p) for level, p in zip(LEVELS, reached, strict=True) if p]
+                points = [(level, p) for level, p in zip(LEVELS, reached, strict=True) if p]
                 axes.plot(
-                    [1e3 * p.time for _, p in kept], [level for level, _ in kept],
+                    [1e3 * p.time for _, p in points], [level for level, _ in points],
                     color=COLOURS[index], marker=MARKERS[index], markersize=4.5, label=name,
                 )  # fmt: skip
             axes.set_xscale("log")

@@ -1,4 +1,4 @@
-"""Ten hours of gyrostat: the compiled time of 60 000 steps of RKMK4, of the cheapest runs, and their errors."""
+"""Ten hours of the gyrostat: time of 60 000 steps of RKMK4 and of the cheapest runs, with their errors."""
 
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import solver_methods
@@ -8,7 +8,7 @@ from lapwing.studies.accuracy.systems import gyrostat
 from lapwing.studies.accuracy.work_precision import Point, measure
 
 DURATION = 600.0  # [min]
-SEED_STEPS = 60_000  # of 0.01 min
+SEED_STEPS = 60_000  # number of steps of 0.01 min
 LEVELS = (1e-2, 1e-4, 1e-6, 1e-8)
 CASES = {
     "rotors blocked": gyrostat.BLOCKED,
@@ -20,7 +20,7 @@ CASES = {
 
 def problem(name: str) -> Problem:
     p = CASES[name]
-    # of all the counts of steps, one is the paper's
+    # one of the numbers of steps is that of the paper
     return Problem(
         f"gyrostat, {name}", "min", DURATION, solver_methods(p, gyrostat.START, DURATION, SEED_STEPS // 32),
         lambda: dop853(lambda t, y: gyrostat.right_hand_side(p, t, y), of_state(gyrostat.START), DURATION),
@@ -38,7 +38,7 @@ def main() -> None:
     for name in CASES:
         points = measure(problem(name))
         of_seed = [p for p in points if p.method == "rkmk4" and abs(p.setting - DURATION / SEED_STEPS) < 1e-9]
-        cells: list[Point | None] = [*of_seed] or [None]  # none where fewer steps reach round-off
+        cells: list[Point | None] = [*of_seed] or [None]  # none if fewer steps reach round-off
         for level in LEVELS:
             cells.append(min((p for p in points if p.error <= level), key=lambda p: p.time, default=None))
         print(f"{name:24}" + "".join(f"{text(p):>32}" for p in cells))

@@ -1,10 +1,11 @@
-"""A cycle of the lock step beside federations of HELICS and mosaik of the same shape, interleaved in one run.
+"""Cycle time of the lock step compared with equal federations of HELICS and mosaik, interleaved in one run.
 
     python -m benchmarks.federations [CYCLES] [REPEATS]
 
-Plant, sensors, autopilot and trajectory, a process each, hand over the same numbers at every tick as in
-`benchmarks.lockstep`, and compute nothing. A cycle is plant, sensors, autopilot, plant. The others are given what suits
-them: HELICS raw bytes over ZeroMQ, mosaik lists of numbers. Those that are not installed (extra `bench`) are left out.
+Plant, sensors, autopilot and trajectory, each in a process, exchange the same numbers at every tick as in
+`benchmarks.lockstep`, without computation. A cycle is plant, sensors, autopilot, plant. The data have the most suitable
+form: raw bytes over ZeroMQ for HELICS, lists of numbers for mosaik. Packages that are not installed (extra `bench`) are
+skipped.
 """
 
 import json
@@ -20,7 +21,7 @@ from benchmarks import lockstep
 from benchmarks._targets import Row, show
 from benchmarks.lockstep import PARTS
 
-OTHERS = {"HELICS": "helics", "mosaik": "mosaik"}  # package of each; the module of its name here has its processes
+OTHERS = {"HELICS": "helics", "mosaik": "mosaik"}  # packages; the module of the same name has the processes
 PATIENCE = 120.0  # [s]
 
 
@@ -43,12 +44,12 @@ def main(cycles=1000, repeats=1):
 
 
 def measure(package, cycles, core):
-    """Seconds of each cycle of a federation."""
+    """Return the duration [s] of each cycle of a federation."""
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     module, more = f"benchmarks.federations.{package}_federation", [str(cycles), json.dumps(core), str(port)]
-    roles = ["broker"] if package == "mosaik" else ["broker", *PARTS]  # mosaik starts the others itself
+    roles = ["broker"] if package == "mosaik" else ["broker", *PARTS]  # mosaik starts the other processes
     children = [
         subprocess.Popen(
             [sys.executable, "-m", module, name, *more], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
@@ -64,10 +65,10 @@ def measure(package, cycles, core):
     if not stamps:
         raise RuntimeError(f"{package}: the federation did not come together within {PATIENCE:g} s")
     seconds = [b - a for a, b in pairwise(json.loads(stamps[0]))]
-    return seconds[len(seconds) // 10 :]  # without the start
+    return seconds[len(seconds) // 10 :]  # without the start-up
 
 
 def pin(core):
-    """Let this process, and those that it starts, run on this core only; None: on any."""
+    """Run this process and its children on one core only; None: on any core."""
     if core is not None:
         os.sched_setaffinity(0, {core})

@@ -1,4 +1,4 @@
-"""The processes of a HELICS federation: python -m ... broker|NAME CYCLES CORE PORT."""
+"""Processes of a HELICS federation: python -m ... broker|NAME CYCLES CORE PORT."""
 
 import json
 import sys
@@ -11,17 +11,22 @@ from benchmarks.lockstep import PARTS
 from lapwing.kernels.row_packing import row_width
 
 WIDTH = {port.name: 8 * row_width(port.like) for _, outputs in PARTS.values() for port in outputs}  # [bytes]
-OFFSET = {"plant": 0.0, "sensors": 0.25, "trajectory": 0.25, "autopilot": 0.5}  # [s] of its step within one of 1 s
+OFFSET = {
+    "plant": 0.0,
+    "sensors": 0.25,
+    "trajectory": 0.25,
+    "autopilot": 0.5,
+}  # [s] of its step in a cycle of 1 s
 
 
 def broker(port):
-    """Hand over what the others say, until all have said goodbye."""
-    made = helics.helicsCreateBroker("zmq", "bench", f"-f {len(PARTS)} --port={port} --loglevel=error")
-    helics.helicsBrokerWaitForDisconnect(made, int(1e3 * PATIENCE))
+    """Run the broker until all federates have disconnected."""
+    handle = helics.helicsCreateBroker("zmq", "bench", f"-f {len(PARTS)} --port={port} --loglevel=error")
+    helics.helicsBrokerWaitForDisconnect(handle, int(1e3 * PATIENCE))
 
 
 def federate(name, cycles, port):
-    """Take and give at every second."""
+    """Read inputs and publish outputs at every second."""
     inputs, outputs = PARTS[name]
     info = helics.helicsCreateFederateInfo()
     helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
@@ -34,12 +39,12 @@ def federate(name, cycles, port):
     value = [
         (helics.helicsFederateRegisterGlobalPublication(fed, p.name, raw, ""), bytes(WIDTH[p.name])) for p in outputs
     ]
-    taken = [(helics.helicsFederateRegisterSubscription(fed, i.port, ""), WIDTH[i.port]) for i in inputs]
+    subscriptions = [(helics.helicsFederateRegisterSubscription(fed, i.port, ""), WIDTH[i.port]) for i in inputs]
     helics.helicsFederateEnterExecutingMode(fed)
     stamps = []
     for tick in range(1, cycles + 1):
         helics.helicsFederateRequestTime(fed, tick + OFFSET[name])
-        for subscription, size in taken:
+        for subscription, size in subscriptions:
             result = helics.helicsInputGetBytes(subscription)
             assert tick < 3 or len(result) == size
         for publication, payload in value:

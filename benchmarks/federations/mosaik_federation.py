@@ -1,4 +1,4 @@
-"""A mosaik scenario, and its simulators as processes: python -m ... broker CYCLES CORE PORT, or NAME HOST:PORT."""
+"""Mosaik scenario with its simulators as processes: python -m ... broker CYCLES CORE PORT, or NAME HOST:PORT."""
 
 import json
 import sys
@@ -12,11 +12,11 @@ from benchmarks.lockstep import PARTS
 from lapwing.kernels.row_packing import pack_row
 
 MODULE = "benchmarks.federations.mosaik_federation"
-LATER = ("plant", "trajectory")  # take what was given at a tick before
+LATER = ("plant", "trajectory")  # inputs from an earlier tick
 
 
 class Simulator(mosaik_api_v3.Simulator):
-    """A process that gives the same numbers at every tick."""
+    """Process that publishes the same numbers at every tick."""
 
     def __init__(self, name):
         self.name = name
@@ -46,7 +46,7 @@ class Simulator(mosaik_api_v3.Simulator):
 
 
 def scenario(cycles, port):
-    """Start the simulators, join them, and run."""
+    """Start and connect the simulators, and run the scenario."""
     commands = {name: {"cmd": f"{sys.executable} -m {MODULE} {name} %(addr)s"} for name in PARTS}
     with mosaik.World(commands, mosaik_config={"addr": ("127.0.0.1", port), "start_timeout": PATIENCE}) as world:
         entities = {name: world.start(name).Service.create(1)[0] for name in PARTS}
@@ -65,4 +65,4 @@ if __name__ == "__main__":
         pin(core)
         scenario(cycles, port)
     else:
-        mosaik_api_v3.start_simulation(Simulator(sys.argv.pop(1)))  # which reads the rest itself
+        mosaik_api_v3.start_simulation(Simulator(sys.argv.pop(1)))  # which reads the remaining arguments

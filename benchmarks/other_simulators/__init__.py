@@ -2,7 +2,7 @@
 
     python -m benchmarks.other_simulators [CASE...]
 
-Each folder has one file for each simulator. A simulator whose package is not installed is skipped.
+Each folder has one file per simulator. A simulator whose package is not installed is skipped.
 """
 
 from types import ModuleType

@@ -3,7 +3,7 @@
     python deploy/portability/compare.py [--seconds S] [--only NAME...] [--python NAME=COMMAND...] [SCENE...]
 
 The reference is this interpreter without any change. Variants of the environment are those of `VARIANTS`; another
-system, version of numba or processor is given by the command that starts its Python, e.g.
+system, version of numba or processor is specified by the command that starts its Python, e.g.
 
     --python "debian13=chroot /srv/trixie /usr/bin/env -C /lapwing PYTHONPATH=/lapwing:/site python3"
     --python "aarch64=qemu-aarch64-static -L /srv/arm64 /srv/arm64/usr/bin/python3"
@@ -33,7 +33,7 @@ VARIANTS = {
     "cpu-avx2": {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": AVX2},
     "cpu-avx512": {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": AVX512},
 }
-LIMIT = 4 * 3600.0  # [s] of one variant
+LIMIT = 4 * 3600.0  # [s] limit of one variant
 
 
 def _missing_features(variables: dict[str, str]) -> str:
@@ -44,7 +44,7 @@ def _missing_features(variables: dict[str, str]) -> str:
 
 
 def _digests(command: list[str], variables: dict[str, str], words: list[str]) -> dict[str, str]:
-    """Return the digest of every scene that a variant flew."""
+    """Return the digest of every scene flown by a variant."""
     run = subprocess.run(
         [*command, WORKER, *words], cwd=ROOT, env={**os.environ, **variables}, capture_output=True, text=True,
         timeout=LIMIT, check=False,

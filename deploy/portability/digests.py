@@ -1,6 +1,6 @@
 """Print the digests of scenes, flown in this process: `python deploy/portability/digests.py SECONDS SCENE...`.
 
-Runs under every system that `deploy/portability/compare.py` compares. SECONDS limits a flight; 0 flies it whole.
+Runs under every system that `deploy/portability/compare.py` compares. SECONDS limits a flight; 0: no limit.
 """
 
 import sys

@@ -5,9 +5,9 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
-GROUPS = {  # in the order of a workflow
+GROUPS = {  # headings and commands in the order of a workflow
     "Fly": ("scenes", "check", "run", "service", "autopilot"),
-    "Look": ("studio", "report", "view", "render", "parameters"),
+    "Inspect": ("studio", "report", "view", "render", "parameters"),
     "Study": ("performance", "effects", "accuracy", "stability", "tune", "campaign", "compare", "validate", "identify"),
     "Logs": ("import", "info", "verify", "recover", "export", "replay", "resimulate"),
     "Couple": ("export-fmu", "export-ssp", "export-library"),
@@ -16,7 +16,7 @@ GROUPS = {  # in the order of a workflow
 
 
 class GroupedCommands(TyperGroup):
-    """Lists the commands under the headings of `GROUPS`, others last."""
+    """Group that lists its commands under the headings of `GROUPS`, others last."""
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write each command with the whole first line of its help."""

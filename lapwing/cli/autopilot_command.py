@@ -14,11 +14,11 @@ from lapwing.cli.output_paths import check_log, remove_on_failure, reserve_log
 @app.command()
 def autopilot(
     scene: SceneFile,
-    px4_sim: Annotated[str, typer.Option(metavar="HOST:PORT", help="simulator that speaks PX4's simulator interface")],
+    px4_sim: Annotated[str, typer.Option(metavar="HOST:PORT", help="address of the simulator")],
     set_: Overrides = None,
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="MCAP log to write")] = None,
 ) -> None:
-    """Fly a scene's autopilot on a simulator made for PX4.
+    """Fly a scene's autopilot over PX4's simulator interface.
 
     The simulator replaces the plant and the sensors of the scene.
 

@@ -157,7 +157,7 @@ def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":
 
 
 def _part(shard: str | None, shards: int) -> range | None:
-    """Return the shards of part I of N, None for all."""
+    """Return the shards of part I of N; None without --shard."""
     if shard is None:
         return None
     i, _, n = shard.partition("/")

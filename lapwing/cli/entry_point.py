@@ -1,6 +1,6 @@
 """Entry point of the command `lapwing`: handles Ctrl-C before the other modules are imported."""
 
-FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # by their numbers
+FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # file descriptors
 
 
 def main() -> None:

@@ -21,9 +21,9 @@ MappingName = Annotated[
         "--mapping", metavar="NAME|FILE", help="columns: nanobench, betaflight, crazyflie_usd, or a .toml file"
     ),
 ]
-TrimForce = Annotated[float, typer.Option(metavar="S", min=0.0, help="memory of the force trim; 0: none")]
-TrimTorque = Annotated[float, typer.Option(metavar="S", min=0.0, help="memory of the torque trim; 0: none")]
-FORCE_MEMORY, TORQUE_MEMORY = 0.15, 10.0  # [s] as `start_states.USUAL_TRIM`, which takes time to import
+TrimForce = Annotated[float, typer.Option(metavar="S", min=0.0, help="time constant of the force trim; 0: no trim")]
+TrimTorque = Annotated[float, typer.Option(metavar="S", min=0.0, help="time constant of the torque trim; 0: no trim")]
+FORCE_MEMORY, TORQUE_MEMORY = 0.15, 10.0  # [s] equal to `start_states.USUAL_TRIM`, which takes time to import
 
 
 @app.command()
@@ -69,13 +69,15 @@ def validate(
 def identify(
     scene: SceneFile,
     flights: Flights,
-    out: Annotated[Path, typer.Option(metavar="FILE", help="the file to write: the airframe, or the sensors (.toml)")],
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="output file (.toml): the airframe, or with --sensors the sensors")
+    ],
     free: Annotated[str, typer.Option(metavar="KEY,KEY,...", help="parameters to estimate: numbers of the scene")] = "",
     sensors: Annotated[
         bool, typer.Option("--sensors", help="estimate noise, bias and latency of sensors instead")
     ] = False,
     mapping: MappingName = None,
-    windows: Annotated[int, typer.Option(metavar="N", min=20, help="windows to fit, about")] = 1000,
+    windows: Annotated[int, typer.Option(metavar="N", min=20, help="approximate number of windows to fit")] = 1000,
     trim_force: TrimForce = FORCE_MEMORY,
     horizons: Annotated[str, typer.Option(metavar="N,N,...", help="samples after which errors count")] = "10,25,50",
     trim_torque: TrimTorque = TORQUE_MEMORY,
@@ -85,7 +87,7 @@ def identify(
 ) -> None:
     """Estimate parameters of a scene's plant from recorded flights.
 
-    An interrupted estimation continues where it was, from FILE.progress beside the airframe file.
+    An interrupted estimation resumes from FILE.progress next to the airframe file.
     """
     from lapwing.cli.progress import step_progress
     from lapwing.studies.identification import console_output, procedure

@@ -1,4 +1,4 @@
-"""Playback of logs: published with the recorded timing, or resimulated from the recorded inputs."""
+"""Playback of logs: publication with the recorded timing, and resimulation from the recorded inputs."""
 
 import time
 from collections.abc import Callable
@@ -38,7 +38,7 @@ class ReplayOptions(LinkOptions):
     record: Annotated[Path | None, typer.Option(metavar="FILE", help="write the published messages to a log")] = None
 
     def validate(self) -> None:
-        """Raise ValueError for options that are malformed, unsafe, or do not go together."""
+        """Raise ValueError for options that are malformed, unsafe, or incompatible."""
         from lapwing.cosim.transport.bus_keys import check_key_prefix
 
         check_key_prefix(self.key_prefix)
@@ -56,7 +56,7 @@ class ReplayOptions(LinkOptions):
 def replay(options: ReplayOptions) -> None:
     """Publish a log on Zenoh with its recorded timing.
 
-    Keys in a terminal: space pauses and continues, a full stop plays one instant, q quits.
+    Keys in a terminal: space pauses and resumes, a full stop plays the messages of the next time, q quits.
     """
     from lapwing.cli.keyboard import Keyboard
     from lapwing.cosim.processes.interrupt import Stop

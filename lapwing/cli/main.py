@@ -33,7 +33,7 @@ from lapwing.cli.stdout_guard import check_output
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
 
 
-FEWEST_FILES = 64  # that may be open; a run in processes needs about 30
+FEWEST_FILES = 64  # open files; a run with several processes needs about 30
 
 
 def _check_working_directory() -> None:
@@ -44,7 +44,7 @@ def _check_working_directory() -> None:
 
 
 def _check_encoding() -> None:
-    """Raise ValueError for a name that no log or page could contain, before a flight is lost with it."""
+    """Raise ValueError for a name that logs and pages cannot contain, before the flight and not after it."""
     for what, text in (("working directory", os.getcwd()), *(("argument", each) for each in sys.argv[1:])):
         try:
             text.encode()
@@ -57,7 +57,7 @@ def _check_encoding() -> None:
 
 
 def _check_open_files() -> None:
-    """Raise ValueError if so few files may be open that libraries end the process."""
+    """Raise ValueError if the limit of open files is so low that libraries would end the process."""
     limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     if 0 <= limit < FEWEST_FILES:
         raise ValueError(f"too many open files: at most {limit} are allowed; use ulimit -n 1024")

@@ -1,4 +1,4 @@
-"""`lapwing new`: files to start from."""
+"""`lapwing new`: templates of scenes, airframes and extensions."""
 
 from pathlib import Path
 from string import Template
@@ -67,14 +67,14 @@ def write_scene(name: str, folder: Path) -> Path:
         raise ValueError(f"NAME {name}: is invalid or a shipped scene; choose another name, e.g. my_flight")
     path = folder / f"{name}.toml"
     if path.exists():
-        raise ValueError(f"{path}: exists already; choose another name")
+        raise ValueError(f"{path}: already exists; choose another name")
     text = (SHIPPED / "hover.toml").read_text(encoding="utf-8")
     path.write_text(text.partition("\n\n")[2], encoding="utf-8")  # without the comment at its head
     return path
 
 
 def write_module(kind: str, name: str, folder: Path) -> list[Path]:
-    """Write an extension that works and its test, and return their paths.
+    """Write a working extension and its test. Return their paths.
 
     Raises:
         ValueError: the name is invalid or taken, or a file exists.
@@ -90,7 +90,7 @@ def write_module(kind: str, name: str, folder: Path) -> list[Path]:
     paths = [folder / f"{name}.py", folder / f"test_{name}.py"]
     for path in paths:
         if path.exists():
-            raise ValueError(f"{path}: exists already; choose another name")
+            raise ValueError(f"{path}: already exists; choose another name")
     if name in {*effects.names(), *registry.sensors(), *KINDS} or installed_module(name):
         raise ValueError(f"NAME {name}: an effect, sensor, segment or module has this name; choose another")
     for path, text in zip(paths, templates(kind, name), strict=True):

@@ -15,7 +15,7 @@ from lapwing.dynamics.config_error import ConfigError
 if TYPE_CHECKING:
     from lapwing.vehicle_measurements import Figure
 
-WEAK = 1.4  # ratio of thrust to weight below which control authority is small
+WEAK = 1.4  # thrust-to-weight ratio below which control authority is small
 
 
 @new.command()
@@ -77,7 +77,7 @@ def write_vehicle(
     if path.exists() or (SHIPPED / "vehicles" / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: a vehicle has this name; choose another")
     values: dict[str, float] = {}
-    known = set(measured)
+    own = set(measured)
     remarks: list[str] = []
     for figure in FIGURES:
         guess = figure.guess(values)
@@ -85,7 +85,7 @@ def write_vehicle(
             value: float | None = measured[figure.name]
             remarks += filter(None, [figure.plausibility_question(measured[figure.name], guess)])
         elif (value := ask(figure, guess) if ask else None) is not None:
-            known.add(figure.name)
+            own.add(figure.name)
         values[figure.name] = guess if value is None else value
         figure.check(values[figure.name])
     try:
@@ -97,7 +97,7 @@ def write_vehicle(
     except ValueError as error:  # a remark about a unit may name the cause
         raise ValueError("; ".join([str(error), *remarks])) from None
     path.parent.mkdir(exist_ok=True)
-    path.write_text(airframe_text(name, values, known), encoding="utf-8")
+    path.write_text(airframe_text(name, values, own), encoding="utf-8")
     warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"
     return path, [*remarks, warning] if thrust_to_weight < WEAK else remarks
 
@@ -109,7 +109,7 @@ class Interview:
         self._name, self._answers, self._started = name, dict(values), False
 
     def ask(self, figure: "Figure", guess: float) -> float | None:
-        """Return the measured value of a figure; None to accept the guess.
+        """Return the measured value of a figure, or None to accept the guess.
 
         Raises:
             ValueError: no user answers.

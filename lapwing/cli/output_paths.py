@@ -31,7 +31,7 @@ def claim(path: Path | None) -> None:
 
 
 def claim_named(option: str, path: Path | None, ending: str) -> None:
-    """Claim a file of an option; raise ValueError unless its name has this ending and it can be written."""
+    """Claim the file of an option; raise ValueError unless it has this extension and can be written."""
     if path is not None and path.suffix != ending:
         raise ValueError(f"{option} {path}: expected a name that ends in {ending}")
     claim(path)
@@ -52,7 +52,7 @@ def claim_folder(path: Path, shared: bool = False) -> None:
 
 
 def claim_plot(path: Path | None) -> None:
-    """Claim a picture; raise ValueError unless it is a .png, .svg or .pdf file that can be written."""
+    """Claim an image file; raise ValueError unless it is a .png, .svg or .pdf file that can be written."""
     if path is not None and path.suffix not in (".png", ".svg", ".pdf"):
         raise ValueError(f"--plot {path}: unknown format; use a name that ends in .png, .svg or .pdf")
     claim(path)

@@ -1,4 +1,4 @@
-"""Preparation of a scene: solver selection, success criteria, gain check, program of the firmware."""
+"""Preparation of a scene: solver selection, success criteria, gain check, firmware executable."""
 
 import shutil
 from pathlib import Path
@@ -40,7 +40,7 @@ def warn_of_gains(scene: "Scene") -> None:
 
 
 def check_firmware_program(scene: "Scene") -> None:
-    """Raise ConfigError if `autopilot.command` or `autopilot.directory` names no program or folder of this machine."""
+    """Raise ConfigError if `autopilot.command` or `autopilot.directory` names no program or folder on this machine."""
     from lapwing.dynamics.config_error import ConfigError
     from lapwing.services.common.firmware.schema import TABLE, flown_by_firmware
 

@@ -33,7 +33,7 @@ class _Done(ProgressColumn):
 
 
 class _TerminalBar:
-    """Context in which the bar is shown, if the output is a terminal."""
+    """Context manager that shows the bar if the output is a terminal."""
 
     _bar: Progress | None
 
@@ -48,7 +48,7 @@ class _TerminalBar:
 
 
 class RunProgress(_TerminalBar):
-    """Shows simulation time, real-time factor, position and phase."""
+    """Progress display with simulation time, real-time factor, position and phase."""
 
     def __init__(self, console: Console, duration: float):
         """Show a bar that ends at `duration` [s]."""
@@ -109,16 +109,16 @@ class RunProgress(_TerminalBar):
 
 
 class StudyProgress(_TerminalBar):
-    """Shows how many flights of a study are finished, and its remaining time."""
+    """Progress display with the number of finished flights of a study, and its remaining time."""
 
     def __init__(self, console: Console, unit: str, parallel: int = 0, every: float = 0.0, most: bool = False):
         """Create the display.
 
         Args:
             console: a terminal has a bar, other output lines.
-            unit: of the parts of the work.
+            unit: name of the parts of the work.
             parallel: number of parts that run at the same time; 0: unknown or unequal parts, without a remaining time.
-            every: [s] between two lines, at least.
+            every: [s] least time between two lines.
             most: the study may end before all parts are finished.
         """
         self._console, self._left, self._unit, self._most = console, TimeLeft(parallel), unit, most

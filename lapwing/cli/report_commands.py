@@ -1,4 +1,4 @@
-"""Reports, views and films of logs."""
+"""Reports, views and videos of logs."""
 
 from functools import partial
 from pathlib import Path
@@ -69,20 +69,20 @@ def view(
 @app.command()
 def render(
     log: LogFile,
-    out: Annotated[Path, typer.Option(metavar="FILE.mp4|webp|gif|png", help="film or picture to write")],
+    out: Annotated[Path, typer.Option(metavar="FILE.mp4|webp|gif|png", help="video or image to write")],
     other: Annotated[
         Path | None, typer.Option("--with", metavar="FILE", help="second log, drawn translucent in the same scene")
     ] = None,
-    camera: Annotated[str, typer.Option(metavar="follow|orbit|top|onboard", help="place of the camera")] = "follow",
-    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="pixels, even numbers")] = "960x540",
+    camera: Annotated[str, typer.Option(metavar="follow|orbit|top|onboard", help="camera position")] = "follow",
+    size: Annotated[str, typer.Option(metavar="WIDTHxHEIGHT", help="size in pixels, even numbers")] = "960x540",
     start: Annotated[
-        float | None, typer.Option("--from", metavar="S", help="first time; of a picture its time [middle]")
+        float | None, typer.Option("--from", metavar="S", help="start time; of an image, its time [middle]")
     ] = None,
-    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="last time of a film")] = None,
-    fps: Annotated[float, typer.Option(metavar="N", help="pictures a second of a film")] = 20.0,
-    speed: Annotated[float, typer.Option(metavar="N", help="simulated seconds in a second of a film")] = 1.0,
+    stop: Annotated[float | None, typer.Option("--to", metavar="S", help="end time of a video")] = None,
+    fps: Annotated[float, typer.Option(metavar="N", help="frames per second of a video")] = 20.0,
+    speed: Annotated[float, typer.Option(metavar="N", help="simulated seconds per second of a video")] = 1.0,
 ) -> None:
-    """Write a film or a picture of a log's 3D view.
+    """Write a video or an image of a log's 3D view.
 
     Needs chromium, and pip install lapwing[view3d].
     """

@@ -155,7 +155,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
 def _fly_and_report(
     options: RunOptions, scene: "Scene", spec: "ProcessSpec", early: dict[str, Child]
 ) -> "list[Flight]":
-    """Fly, and return the recorded flights; a run that fails or is interrupted is reported before its error."""
+    """Fly and return the recorded flights. A failed or interrupted run is reported before its error."""
     log = Path(spec.log) if options.log is None else options.log
     before = modification_time(log)
 
@@ -185,7 +185,7 @@ def _fly_and_report(
 
 
 def _advise_recovery(log: Path) -> None:
-    """Print the command that completes a log without an end, which some programs reject."""
+    """Print the command that completes a truncated log, which some programs reject."""
     from lapwing.cosim.log.mcap_contents import has_footer
 
     if log.is_file() and not has_footer(log):

@@ -1,4 +1,4 @@
-"""Options of `lapwing run`, validated before anything is read or started."""
+"""Options of `lapwing run`, validated before any file is read or process started."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +65,7 @@ class RunOptions(LinkOptions):
         return None if self.endpoints is None else parse_endpoints(self.endpoints)
 
     def validate(self) -> None:
-        """Raise ValueError for options that are malformed, unsafe, or do not go together."""
+        """Raise ValueError for options that are malformed, unsafe, or incompatible."""
         from lapwing.runs.distributed_run import check_endpoint
 
         self.validate_mode()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from lapwing.runs.observer import Elapsed
     from lapwing.services.process_main import ProcessSpec
 
-MAX_EVENTS = 60  # events that are printed
+MAX_EVENTS = 60  # limit of the printed events
 COLOURS = {"landed": "green", "completed": "green", "landed elsewhere": "yellow", "timed out": "yellow"}  # default: red
 
 

@@ -32,7 +32,7 @@ def scenes(
     with user_errors():
         paths = sorted((folder or SHIPPED).glob("*.toml"))
         if not paths:
-            raise ValueError(f"{folder}: no scenes there; expected a folder with .toml files")
+            raise ValueError(f"{folder}: contains no scenes; expected a folder with .toml files")
         names = [str(path) if folder else path.stem for path in paths]
         width = max(map(len, names))
         for name, path in zip(names, paths, strict=True):
@@ -114,7 +114,7 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str]) -> "Flight
 
 
 def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
-    """Print and write the error of a flight. Return True if it is at most what was asked for."""
+    """Print and write the error of a flight. Return True if it is at most `solver.accuracy`."""
     from lapwing.studies.accuracy import flight_accuracy_output
     from lapwing.studies.terminal import console
 
@@ -125,7 +125,7 @@ def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
 
 
 def _with_bar(setup: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
-    """Do work on a run in this process, with a line of what is flown and a progress bar."""
+    """Work on a run in this process, with a line that describes the run and a progress bar."""
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.runs.work_progress import WorkProgress
 
@@ -176,7 +176,7 @@ def _scenes_of(path: Path) -> list[Path]:
         return [path]
     result = sorted(path.glob("*.toml"))
     if not result:
-        raise ValueError(f"{path}: no scenes there; expected a folder with .toml files")
+        raise ValueError(f"{path}: contains no scenes; expected a folder with .toml files")
     return result
 
 

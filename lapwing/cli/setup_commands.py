@@ -13,7 +13,7 @@ from lapwing.cli.output_paths import claim
 
 
 class Kind(Enum):
-    """A kind of file that users write."""
+    """Kind of TOML file."""
 
     scene = "scene"
     airframe = "airframe"
@@ -22,8 +22,8 @@ class Kind(Enum):
 
 @app.command()
 def schema(
-    kind: Annotated[Kind, typer.Argument(help="the kind of file")] = Kind.scene,
-    out: Annotated[Path | None, typer.Option(metavar="FILE", help="the output file [standard output]")] = None,
+    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="kind of file")] = Kind.scene,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="output file [standard output]")] = None,
 ) -> None:
     """Write a JSON schema with which editors check TOML files."""
     from lapwing.file_schemas.json_schema import SCHEMAS
@@ -44,7 +44,7 @@ def certificates(
 ) -> None:
     """Create TLS certificates for runs on several hosts.
 
-    FOLDER gets a certificate for each service, and a read-only one for viewers.
+    Writes a certificate for each service and a read-only one for viewers to FOLDER.
     """
     from lapwing.cosim.access.certificates import make
     from lapwing.cosim.access.zenoh_access import VIEWER

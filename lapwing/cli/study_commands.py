@@ -57,7 +57,7 @@ def performance(
 ) -> None:
     """Compute hover time, range, payload, ceiling and top speed.
 
-    Published values are shown beside the computed ones.
+    Published values are shown next to the computed ones.
     """
     from lapwing.studies import performance_card as study
     from lapwing.studies.terminal import console
@@ -76,7 +76,7 @@ def effects(
 ) -> None:
     """Measure the cost and influence of each effect of a scene.
 
-    Names the effects that the scene does not need tolerance --tolerance.
+    Lists the effects that could be omitted within --tolerance.
     """
     from lapwing.cli.progress import StudyProgress
     from lapwing.services.scene_resolver import load
@@ -126,7 +126,7 @@ def stability(
     case: Annotated[str | None, typer.Argument(metavar="CASE", help="case to run [all]")] = None,
     slow: Annotated[bool, typer.Option("--slow", help="include cases that take minutes")] = False,
     sweep: Annotated[
-        bool, typer.Option("--sweep", help="raise the difficulty of each case until every method fails")
+        bool, typer.Option("--sweep", help="increase the difficulty of each case until every method fails")
     ] = False,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all results as JSON")] = None,
     report: Annotated[Path | None, typer.Option(metavar="FILE", help="write results and plots (HTML)")] = None,
@@ -176,7 +176,7 @@ def tune(
 ) -> None:
     """Design controller gains and refine them in simulated flight.
 
-    Each loop gets its bandwidth with margins of 45 degrees and 6 dB at hover.
+    Each loop gets the given bandwidth, with margins of 45 degrees and 6 dB at hover.
     """
     from lapwing.cli.progress import step_progress
     from lapwing.runs.compile_notice import notify_on_compile

@@ -6,15 +6,15 @@ Imports only the standard library, so that the command line knows the errors bef
 import signal
 from enum import IntEnum
 
-END_SIGNAL = signal.SIGHUP  # from a launcher: end in order; SIGTERM comes from elsewhere, and its receiver is named
+END_SIGNAL = signal.SIGHUP  # launcher's request to end; SIGTERM has other senders, and the error names its receiver
 
 
 class ExitCode(IntEnum):
     """Exit code of a participant's process."""
 
-    COMPLETED = 0  # the run has reached its end
+    COMPLETED = 0  # the run is complete
     FAILED = 1
-    REJECTED = 2  # invalid configuration, which the user can correct
+    REJECTED = 2  # invalid configuration
     DIVERGED = 3
     CUT_SHORT = 4  # another participant ended before the run did
     TERMINATED = 128 + signal.SIGTERM

@@ -1,5 +1,5 @@
 """Pure mathematics and physics: no clock, no input or output, no global randomness.
 
 Read `lie` for the geometry, `integrators` for the methods, `effects` for the physics of a scene and
-`vehicles` for what flies.
+`vehicles` for the equations of motion of the vehicles.
 """

@@ -1,4 +1,4 @@
-"""The International Standard Atmosphere up to 20 km, at another sea-level pressure or temperature if need be.
+"""The International Standard Atmosphere up to 20 km, optionally with another sea-level pressure or temperature.
 
 ISO 2533:1975; theory.md, eqs. (2.3) and (3.8).
 """
@@ -10,7 +10,7 @@ from annotated_types import Ge, Le
 from lapwing.kernels import always_inline, math
 
 GRAVITY = 9.80665  # [m/s^2] g_0
-EARTH_RADIUS = 6_356_766.0  # [m] by which geometric altitude becomes geopotential
+EARTH_RADIUS = 6_356_766.0  # [m] converts geometric to geopotential altitude
 GAS_CONSTANT = 287.05287  # [J/(kg K)] of dry air
 SEA_LEVEL_TEMPERATURE = 288.15  # [K]
 LAPSE_RATE = 0.0065  # [K/m] up to the tropopause, none above it
@@ -27,10 +27,10 @@ LAPSE_POLYNOMIAL = (
 
 
 class Atmosphere(NamedTuple):
-    """The air of a day: in hydrostatic balance, its temperature off the standard by as much at every altitude."""
+    """Atmosphere of a day in hydrostatic balance, with a constant temperature offset from the standard."""
 
     sea_level_pressure: Annotated[float, Ge(85e3), Le(110e3)] = 101_325.0  # [Pa]
-    temperature_offset: Annotated[float, Ge(-60), Le(60)] = 0.0  # [K] from the standard's 15 degC at sea level
+    temperature_offset: Annotated[float, Ge(-60), Le(60)] = 0.0  # [K] offset from the standard's 15 degC at sea level
 
 
 @always_inline

@@ -1,4 +1,4 @@
-"""A fault in a value that has a name, as a value: which key, what is wrong, what would be right."""
+"""Error in a configuration value: its key, the fault, and the expected values."""
 
 import difflib
 from collections.abc import Iterable
@@ -11,7 +11,7 @@ class ConfigError(ValueError):
         """Create the error.
 
         Args:
-            key: dotted path of the key, "" for the whole.
+            key: dotted path of the key, "" for the whole configuration.
             message: description, for example "missing" or "got -1".
             expected: valid values, for example "a number above 0"; "" if the message is complete.
         """
@@ -20,7 +20,7 @@ class ConfigError(ValueError):
 
     @classmethod
     def unknown(cls, key: str, what: str, name: object, choices: Iterable[str]) -> "ConfigError":
-        """Return the error of a name that is none of the choices; it lists them, the nearest first."""
+        """Return the error of an unknown name; it lists the choices, the nearest first."""
         listed = sorted(choices)
         near = difflib.get_close_matches(str(name), listed, n=1)
         hint = f"; did you mean {near[0]}?" if near else ""

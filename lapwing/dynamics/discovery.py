@@ -1,4 +1,4 @@
-"""Finds the modules of a folder by name: adding an effect, an integrator, a sensor or a plot is adding one file."""
+"""Discovery of the modules of a folder: to add an effect, an integrator, a sensor or a plot, add one file."""
 
 import difflib
 import importlib
@@ -22,7 +22,7 @@ def modules(package: ModuleType | str) -> dict[str, ModuleType]:
 
 
 def get(package: ModuleType | str, name: str, what: str) -> ModuleType:
-    """Return a module of a package, importing no other.
+    """Import and return one module of a package.
 
     Args:
         package: the package, or its dotted name.

@@ -9,9 +9,9 @@ from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import Vec3
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2] ISO 80000-3
-FIRST_YEAR, LAST_YEAR = 2010, 2029  # of the World Magnetic Models that are known
-TESLA = 1e-9  # in a nanotesla
-DIGITS = 10  # of a field in tesla: a tenth of a nanotesla, as the model's tables have it
+FIRST_YEAR, LAST_YEAR = 2010, 2029  # range of the available World Magnetic Models
+TESLA = 1e-9  # [T] 1 nT
+DIGITS = 10  # decimal places of a field in tesla: 0.1 nT, as in the model's tables
 
 
 class Environment(NamedTuple):
@@ -20,7 +20,7 @@ class Environment(NamedTuple):
     home: Home = Home()
     atmosphere: Atmosphere = Atmosphere()
     gravity: float = STANDARD_GRAVITY  # [m/s^2] at sea level
-    magnetic_field_world: Vec3 = (1.8611e-6, 25.1776e-6, -39.2545e-6)  # [T] world; at that home on 1 July 2025
+    magnetic_field_world: Vec3 = (1.8611e-6, 25.1776e-6, -39.2545e-6)  # [T] world; at the default home on 1 July 2025
     terrain: Any = LEVEL  # Level or Relief
 
 
@@ -28,8 +28,8 @@ def magnetic_field(home: Home, date: datetime.date) -> Vec3:
     """Return the Earth's field at home [T], east, north, up, by the World Magnetic Model.
 
     Args:
-        home: place on the Earth.
-        date: from FIRST_YEAR to LAST_YEAR.
+        home: position on the Earth.
+        date: date from FIRST_YEAR to LAST_YEAR.
     """
     from pygeomag import GeoMag
 

@@ -1,6 +1,6 @@
 """Units and descriptions of a table's keys from the comments of its class.
 
-The comment behind a field (`# [m] of one foot`) is their only source.
+The comment behind a field (`# [m] height of one foot`) is their only source.
 """
 
 import ast

@@ -21,7 +21,7 @@ class Home(NamedTuple):
 
     latitude_deg: Annotated[float, Ge(-90.0), Le(90.0)] = 40.7686  # [deg] north; Fisciano, the home of the drone paper
     longitude_deg: Annotated[float, Ge(-180.0), Le(180.0)] = 14.7907  # [deg] east
-    height: Annotated[float, Gt(-500.0), Le(9000.0)] = 280.0  # [m], over the ellipsoid; also taken as the altitude
+    height: Annotated[float, Gt(-500.0), Le(9000.0)] = 280.0  # [m] above the ellipsoid; also used as the altitude
 
 
 @always_inline
@@ -41,7 +41,7 @@ def geodetic_to_ecef(latitude_deg, longitude_deg, height):
 def ecef_to_geodetic(r):
     """Return latitude [deg], longitude [deg], height [m] of a point near the Earth's surface (theory.md, eq. (3.5))."""
     rho = math.hypot(r[0], r[1])
-    # Bowring's iteration on the reduced latitude: the second pass is already below one rounding up to 20 km height.
+    # Bowring's iteration on the reduced latitude: up to 20 km, the second pass changes less than one rounding.
     tangent_s, tangent_c = r[2] * SEMI_MAJOR, rho * _SEMI_MINOR
     latitude = 0.0
     for _ in range(3):
@@ -66,7 +66,7 @@ def enu_to_geodetic(home, position_world):
     sp, cp, sl, cl = _axes(home)
     e, n, u = position_world
     o = geodetic_to_ecef(home.latitude_deg, home.longitude_deg, home.height)
-    outward = cp * u - sp * n  # away from the Earth's axis
+    outward = cp * u - sp * n  # not on the Earth's axis
     return ecef_to_geodetic((o[0] - sl * e + cl * outward, o[1] + cl * e + sl * outward, o[2] + cp * n + sp * u))
 
 

@@ -1,11 +1,11 @@
-"""Reading of input files that end."""
+"""Reading of regular input files."""
 
 import errno
 from pathlib import Path
 
 
 def check_regular(path: Path) -> None:
-    """Raise OSError for a pipe, a socket or a device, from which a read need not end."""
+    """Raise OSError for a pipe, a socket or a device, since reading it might never end."""
     if path.exists() and not path.is_file() and not path.is_dir():
         raise OSError(errno.EINVAL, "is not a regular file", str(path))
 

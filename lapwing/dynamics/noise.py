@@ -1,9 +1,9 @@
-"""Random numbers without a state: the n-th draw of a tick is a pure function of (key, tick, lane).
+"""Stateless random numbers: a draw is a pure function of (key, tick, lane).
 
 Philox 4x32-10 of Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC'11. Normal draws
 invert the distribution function by Wichura's algorithm AS 241 (PPND16, Applied Statistics 37(3) 1988, 477-484).
-Only +, -, *, / and square roots are used, which IEEE 754 rounds in one way: the same bits on every machine and in every
-mode of a run, whatever mathematics library is installed (theory.md, section 3.1).
+Only +, -, *, / and square roots are used, whose rounding IEEE 754 determines: bit-for-bit identical results on every
+machine and in every mode of a run, with any mathematics library (theory.md, section 3.1).
 """
 
 import hashlib
@@ -14,7 +14,7 @@ from lapwing.kernels import always_inline, kernel, math
 
 Key = tuple[int, int]  # two words of 32 bits
 
-TURN_ON = -1  # tick of the draws that are made once, before the first tick of a run
+TURN_ON = -1  # tick of draws before the first tick of a run
 
 _MULTIPLIER_0, _MULTIPLIER_1 = np.uint64(0xD2511F53), np.uint64(0xCD9E8D57)
 _WEYL_0, _WEYL_1 = np.uint64(0x9E3779B9), np.uint64(0xBB67AE85)
@@ -31,7 +31,7 @@ def stream_key(seed: int, vehicle: str, stream: str) -> Key:
         vehicle: name of the vehicle, or "" for streams shared by all vehicles.
         stream: name of the stream, e.g. "imu" or "wind".
     """
-    # The separator cannot be mistaken for a part of a name: ("a", "bc") and ("ab", "c") differ.
+    # The separator cannot be part of a name: ("a", "bc") and ("ab", "c") differ.
     text = "\0".join((str(int(seed)), vehicle, stream))
     digest = hashlib.blake2b(text.encode(), digest_size=8).digest()
     return int.from_bytes(digest[:4], "little"), int.from_bytes(digest[4:], "little")
@@ -77,7 +77,7 @@ def uniform(key, tick, lane):
 
 @always_inline
 def _log(x):
-    """Return natural logarithm of a positive normal number: exponent and mantissa, then 2 artanh((m - 1)/(m + 1))."""
+    """Return the logarithm of a positive normal number: exponent and mantissa, then 2 artanh((m - 1)/(m + 1))."""
     m, e = math.frexp(x)  # m in [1/2, 1)
     if m < 0.7071067811865476:
         m *= 2.0

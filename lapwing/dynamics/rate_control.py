@@ -1,4 +1,4 @@
-"""Proportional control of body rates with allocation and motor inverse, for many vehicles stepped together."""
+"""Proportional control of body rates with control allocation and inverse motor model, for many vehicles at once."""
 
 from typing import NamedTuple
 
@@ -11,10 +11,10 @@ OMEGA = 10  # first column of the body rates in a motion
 
 
 class RateController(NamedTuple):
-    """Parameters of the controller."""
+    """Parameters of the rate controller."""
 
-    bandwidth: float  # [rad/s]
-    inertia_body: Vec3  # principal [kg m^2]
+    bandwidth: float  # [rad/s] bandwidth
+    inertia_body: Vec3  # [kg m^2] principal moments
     mixer: np.ndarray  # thrust of each rotor for 1 N of thrust and 1 N m about body x, y, z, shape (rotors, 4)
     thrust_coefficient: float  # [N s^2]
     voltage_per_speed: float  # [V s]
@@ -37,8 +37,8 @@ def command(c, memory, at, stride, setpoints, commands, member):
     Args:
         c: a RateController.
         memory: numbers of the vehicles.
-        at: place of the first number of the member's motion.
-        stride: between numbers of a member.
+        at: index of the first number of the member's motion.
+        stride: distance between numbers of a member.
         setpoints: thrust [N] and body rates [rad/s], shape (members, 4).
         commands: shape (members, rotors), changed.
         member: row of `setpoints` and `commands`.

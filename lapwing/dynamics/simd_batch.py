@@ -1,8 +1,8 @@
-"""Many multirotors stepped side by side: blocks of 16 members, a column of 16 numbers for each number of a member.
+"""SIMD batch of multirotors: blocks of 16 members, with a column of 16 values for each number of a member.
 
 LLVM vectorises the loop over the members of a block, because the columns of one array are a constant distance of 16
-numbers apart. What cannot be vectorised, random draws and contact, goes member by member. The operations on the numbers
-of a member are those of `multirotor.advance`, in the same order, and so are the bits.
+numbers apart. Random draws and contact cannot be vectorised and run member by member. The operations on the numbers
+of a member are those of `multirotor.advance` in the same order, so the results are bit-for-bit identical.
 """
 
 # numba.core.types fills itself at import
@@ -31,18 +31,18 @@ from lapwing.kernels import always_inline, kernel, math, vectorise_loops
 from lapwing.kernels.codegen import compile_source, generic, map_index
 from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
 
-WIDTH = 16  # members in a block
-LARGEST_TURN = 0.25  # [rad] in a step, beyond which no method keeps its accuracy
+WIDTH = 16  # number of members of a block
+LARGEST_TURN = 0.25  # [rad] rotation in a step beyond which no method is accurate
 
 
 class Member(NamedTuple):
-    """All numbers of a member; those that a step changes stand in front."""
+    """All numbers of a member, first those that a step changes."""
 
     motion: Any
     memory: tuple
-    body: AnyMassProperties  # of this communication step
+    body: AnyMassProperties  # mass properties in this communication step
     voltage: PerRotor  # [V]
-    start: float  # [s] of this communication step
+    start: float  # [s] start of this communication step
     parameters: MultirotorParameters
 
 
@@ -58,29 +58,29 @@ def blocks(members: int, like: Member) -> np.ndarray:
 
 
 def put(memory: np.ndarray, index: int, value: Member) -> None:
-    """Give a member its numbers."""
+    """Write the numbers of a member."""
     memory[index // WIDTH, :, index % WIDTH] = pack_row(value)
 
 
 @vectorise_loops
 def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count, rates=None, setpoints=None):
-    """Advance the members of the blocks `first` to before `last` by `count` communication steps.
+    """Advance the members of the blocks [first, last) by `count` communication steps.
 
     Args:
         method: `Method()` of an integrator's module.
         like: a Member.
-        memory: of `blocks`, flat.
-        columns: of a block.
-        keys: of the members' random numbers, shape (members, 2); members are a multiple of WIDTH.
-        ticks: of each member's exchange, shape (members,); advanced.
-        commands: [V] of each motor, shape (members, rotors).
-        h: [s] step.
-        n: steps in a communication step.
-        first: block.
-        last: block after the last.
-        count: communication steps.
-        rates: a RateController that overwrites the commands at each communication step; None: there is none.
-        setpoints: of it, thrust [N] and body rates [rad/s], shape (members, 4).
+        memory: memory of `blocks`, flat.
+        columns: number of columns of a block.
+        keys: keys of the members' random numbers, shape (members, 2); members are a multiple of WIDTH.
+        ticks: tick of each member, shape (members,); advanced.
+        commands: voltage [V] of each motor, shape (members, rotors).
+        h: step [s].
+        n: number of steps in a communication step.
+        first: first block.
+        last: last block (exclusive).
+        count: number of communication steps.
+        rates: a RateController that overwrites the commands at each communication step, or None.
+        setpoints: its thrust [N] and body rates [rad/s], shape (members, 4).
     """
     for block in range(first, last):
         base = block * columns * WIDTH
@@ -107,16 +107,16 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
 
 @kernel
 def mark_invalid(memory, columns, motion, step, valid, first, last):
-    """Clear `valid` of members of the blocks `first` to before `last` that are not finite, or turn too fast for a step.
+    """Clear `valid` of members of the blocks [first, last) that are not finite, or turn too fast for a step.
 
     Args:
-        memory: of `blocks`, flat.
-        columns: of a block.
+        memory: memory of `blocks`, flat.
+        columns: number of columns of a block.
         motion: columns of the motion.
-        step: [s] of the integrator.
+        step: step of the integrator [s].
         valid: shape (members,) of bool, changed.
-        first: block.
-        last: block after the last.
+        first: first block.
+        last: last block (exclusive).
     """
     for m in range(first * WIDTH, last * WIDTH):
         at = (m // WIDTH) * columns * WIDTH + m % WIDTH
@@ -130,12 +130,12 @@ def mark_invalid(memory, columns, motion, step, valid, first, last):
 
 @kernel
 def advance_along(method, like, memory, columns, keys, ticks, commands, motions, trace, h, n, first, last):
-    """Advance the members of the blocks `first` to before `last` under commands that change each exchange interval.
+    """Advance the members of the blocks [first, last) under commands that change at each communication step.
 
     See `advance` for the other arguments.
 
     Args:
-        commands: [V] of each motor, shape (intervals, members, rotors).
+        commands: voltage [V] of each motor, shape (intervals, members, rotors).
         motions: first columns of each member to set before each interval, shape (intervals, members, width); shape
             (0, 0, 0) to leave them alone.
         trace: first columns of each member after each interval, shape (intervals, members, width); written.
@@ -238,6 +238,6 @@ def take(like: types.Type, memory: types.Type, at: types.Type) -> Callable:
 
 @generic(inline=True)
 def give(tree: types.Type, memory: types.Type, at: types.Type) -> Callable:
-    """Put a tree where `take` would take it from."""
+    """Write a tree to the position that `take` reads."""
     lines = [f"poke(memory, at + {k * WIDTH}, {path})" for k, path in enumerate(leaves(tree, "tree"))]
     return compile_source("give(tree, memory, at)", {"poke": _poke}, *lines, "return None")

@@ -1,7 +1,6 @@
-"""Linear algebra of a few rows in plain double arithmetic: the same bits whatever BLAS and LAPACK are installed.
+"""Linear algebra of small matrices in plain double arithmetic, with results independent of BLAS and LAPACK.
 
-For parameters that are computed once, at the start of a run; up to about ten rows. Every sum runs in the order of its
-index.
+For parameters that are computed once at the start of a run; up to about ten rows. Sums run in the order of the index.
 """
 
 import math
@@ -12,7 +11,7 @@ from numpy.typing import ArrayLike
 
 
 class SingularMatrixError(ValueError):
-    """A matrix without an inverse."""
+    """The matrix has no inverse."""
 
 
 def _rows(a: ArrayLike) -> list[list[float]]:
@@ -75,13 +74,13 @@ def inverse(a: ArrayLike) -> np.ndarray:
     """Return the inverse of a matrix, shape (n, n).
 
     Raises:
-        SingularMatrixError: there is none.
+        SingularMatrixError: it has no inverse.
     """
     return solve(a, np.eye(len(_rows(a))))
 
 
 def symmetric_eigenvalues(a: ArrayLike) -> list[float]:
-    """Return the eigenvalues of a symmetric matrix, shape (n, n), in rising order, by Jacobi's rotations.
+    """Return the eigenvalues of a symmetric matrix, shape (n, n), in ascending order, by Jacobi's rotations.
 
     Golub and Van Loan, "Matrix Computations", 4th edition, section 8.5.
     """

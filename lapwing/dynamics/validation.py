@@ -16,7 +16,7 @@ NAMES = {float: "a number", int: "a whole number", str: "a text", bool: "true or
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 OF_NUMBERS = ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing", *(
     "greater_than", "greater_than_equal", "less_than", "less_than_equal"))  # fmt: skip
-LONGEST = 60  # characters of a wrong value that are shown
+LONGEST = 60  # shown characters of an invalid value
 
 
 def fault(error: ValidationError, model: type) -> ConfigError:
@@ -29,10 +29,10 @@ def fault(error: ValidationError, model: type) -> ConfigError:
     Returns:
         The error, with a key relative to the table.
     """
-    # A misspelt key also leaves another one missing: name the misspelling.
+    # a misspelt key also leaves another one missing: report the misspelling
     first: Any = min(error.errors(), key=lambda e: e["type"] not in UNKNOWN_KEY)
     kind, value, context = first["type"], first["input"], first.get("ctx", {})
-    location = [part for part in first["loc"] if part != "[key]"]  # [key]: the key itself is at fault
+    location = [part for part in first["loc"] if part != "[key]"]  # [key]: the key itself is invalid
     key = ".".join(map(str, location))
     if kind in UNKNOWN_KEY:
         return ConfigError.unknown(key, "key", location[-1], keys(follow(model, location[:-1])))
@@ -49,7 +49,7 @@ def fault(error: ValidationError, model: type) -> ConfigError:
 def _unit(model: type, location: Sequence[str | int]) -> str:
     """Return " [m/s]" for the unit in the comment of the key at a location; "" without one."""
     path = list(location)
-    while path and isinstance(path[-1], int):  # of a list the unit is that of all its numbers
+    while path and isinstance(path[-1], int):  # the unit of a list applies to all its numbers
         path.pop()
     if not path:
         return ""

@@ -11,7 +11,7 @@ Vec3 = tuple[float, float, float]
 Mat3 = tuple[float, float, float, float, float, float, float, float, float]
 
 ZERO: Vec3 = (0.0, 0.0, 0.0)
-NOTHING: Vec3 = (-0.0, -0.0, -0.0)  # adding it changes no number, not even the sign of 0.0: the compiler drops it
+NOTHING: Vec3 = (-0.0, -0.0, -0.0)  # neutral element of addition, also for the sign of 0.0: the compiler removes it
 IDENTITY: Mat3 = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -35,13 +35,13 @@ def scale(s, a):
 
 @always_inline
 def multiply(a, b):
-    """Multiply element by element."""
+    """Return the elementwise product."""
     return (a[0] * b[0], a[1] * b[1], a[2] * b[2])
 
 
 @always_inline
 def divide(a, b):
-    """Divide element by element."""
+    """Return the elementwise quotient."""
     return (a[0] / b[0], a[1] / b[1], a[2] / b[2])
 
 
@@ -75,7 +75,7 @@ def apply(m, a):
 
 @always_inline
 def apply_transposed(m, a):
-    """Return the transpose(m) a for a 3x3 matrix m in row order."""
+    """Return transpose(m) a for a 3x3 matrix m in row order."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
         m[1] * a[0] + m[4] * a[1] + m[7] * a[2],

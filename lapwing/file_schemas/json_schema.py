@@ -65,10 +65,8 @@ def flight_parameters() -> tuple[list[Parameter], list[Parameter]]:
 
 def scene_schema() -> Schema:
     """Return the JSON schema of a scene file, without the content of the files that it names."""
-    known = vocabulary().sections
-    sections = {
-        name: s for name, s in known.items() if s.model_fields or not s.FROM_FILE
-    }  # omits tables without keys of their own
+    # omits tables without own keys
+    sections = {name: s for name, s in vocabulary().sections.items() if s.model_fields or not s.FROM_FILE}
     tables = {name: _section(section) for name, section in sections.items()}
     tables["effects"] |= _or_own({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
     tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})

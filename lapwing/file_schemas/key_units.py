@@ -7,7 +7,7 @@ from typing import Any
 from lapwing.file_schemas.json_schema import SCHEMAS
 
 UNIT = re.compile(r"\[([^\]]+)\]")
-FILES = ("airframe", "gains")  # files that a scene names; their name is the first part of their keys
+FILES = ("airframe", "gains")  # files that a scene names; the name is the first part of their keys
 
 
 def key_units(keys: Iterable[str]) -> dict[str, str]:

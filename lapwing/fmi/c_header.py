@@ -63,8 +63,8 @@ def header(part: ExportedPart, name: str) -> str:
     """Return the text of the C header.
 
     Args:
-        part: what is exported.
-        name: first part of all names.
+        part: part to export.
+        name: prefix of all names.
     """
     setup = part.setup
     text = _HEAD.format(
@@ -203,7 +203,7 @@ def _fields(port: BoundaryPort) -> str:
 
 
 def _extent(part: object) -> str:
-    """Return the array bounds of nested tuples of equal length; a tree of other shape is one flat array."""
+    """Return the array bounds of nested tuples of equal length; a tree of another shape is one flat array."""
     if not isinstance(part, tuple):
         return ""
     inner = {_extent(item) for item in part}

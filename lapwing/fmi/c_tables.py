@@ -1,4 +1,4 @@
-"""The tables of an exported part as a C header, which `native/runtime.c` includes."""
+"""Tables of an exported part as a C header, which `native/runtime.c` includes."""
 
 from collections.abc import Iterable, Sequence
 
@@ -9,16 +9,16 @@ from lapwing.kernels.row_packing import pack_row, row_width
 
 _PLACES = {kinds.INPUT: "INPUT", kinds.OUTPUT: "OUTPUT", kinds.PARAMETER: "NUMBER", kinds.STATE: "NUMBER"}
 _TYPES = {kinds.REAL: "REAL", kinds.INTEGER: "INTEGER", kinds.BOOLEAN: "BOOLEAN"}
-CONTACT = ".ground_contact"  # end of the name of an output whose change is an event
+CONTACT = ".ground_contact"  # suffix of outputs whose change is an event
 
 
 def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequence[Variable], image: str) -> str:
     """Return the text of tables.h.
 
     Args:
-        part: what is exported.
-        symbols: function of each block, None of a Python block.
-        variables: in the order of their references from 1.
+        part: part to export.
+        symbols: function of each block; None for a Python block.
+        variables: variables in the order of their references from 1.
         image: symbol of the image.
     """
     actions, writes, written = _actions(part)

@@ -22,8 +22,8 @@ class ScheduledBlock(NamedTuple):
 
     part: Any  # `Block` or Python block
     bound: BoundBlock | None
-    every: int  # [ticks]
-    vehicle: int  # index
+    every: int  # [ticks] between two steps
+    vehicle: int  # index of the vehicle
 
 
 class BoundaryPort(NamedTuple):
@@ -32,7 +32,7 @@ class BoundaryPort(NamedTuple):
     port: Port
     lag: int  # [ticks] of an input: 0 if its value belongs to the tick that is computed, else 1
     depth: int  # rows in the ring
-    ring: str  # name of the port in the diagram; another one if an FMU computes columns of the port
+    ring: str  # name of the port in the diagram; it differs if an FMU computes columns of the port
 
 
 @dataclass
@@ -40,8 +40,8 @@ class ExportedPart:
     """A part of a scene.
 
     Attributes:
-        name: of the part, "plant".
-        setup: configuration of the run.
+        name: name of the part, e.g. "plant".
+        setup: run configuration.
         blocks: in the order of execution.
         inputs: ports that blocks outside of the part write.
         outputs: ports of the services of the part.
@@ -62,7 +62,7 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
     """Bind the blocks of a part, and record what its Python blocks do in a run of the scene.
 
     Args:
-        setup: the scene, resolved.
+        setup: run configuration of the scene.
         name: one of `PARTS`.
 
     Raises:
@@ -114,7 +114,7 @@ def _check(part: Any) -> None:
         return
     inner = getattr(part, "_part", part)
     module = type(inner).__module__
-    is_connected = hasattr(inner, "reports")  # to a firmware, or another program
+    is_connected = hasattr(inner, "reports")  # connected to a firmware or another program
     if is_connected or any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
         raise ValueError(f"{part.name}: runs Python code of the scene; only compiled blocks can be exported")
     if type(inner).__name__ == "PropellerFailures":

@@ -1,4 +1,4 @@
-"""Functional mock-up units: the binary of a part with its description and documentation in one archive."""
+"""Functional mock-up units: archive with the binary of a part, its description and documentation."""
 
 import hashlib
 import html
@@ -18,17 +18,17 @@ from lapwing.fmi.native_build import NATIVE, build_folder
 from lapwing.fmi.variables import Variable, variables_of
 
 BINARIES = {3: "binaries/x86_64-linux", 2: "binaries/linux64"}
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # of every file in the archive, so that equal inputs lead to equal bytes
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # date of every file in the archive, so that equal inputs give equal bytes
 
 
 def export_fmu(setup: RunConfig, part_name: str, out: Path, version: int = 3, cpu: str = PORTABLE) -> ExportedPart:
     """Write an FMU for co-simulation.
 
     Args:
-        setup: the scene, resolved.
+        setup: run configuration of the scene.
         part_name: one of `exported_part.PARTS`.
         out: path of the FMU.
-        version: of FMI, 2 or 3.
+        version: version of FMI, 2 or 3.
         cpu: generation of processors that run it.
 
     Raises:
@@ -56,7 +56,7 @@ def export_fmu(setup: RunConfig, part_name: str, out: Path, version: int = 3, cp
 
 
 def _token(part: ExportedPart, variables: Sequence[Variable]) -> str:
-    """Return a text that differs between models, {8-4-4-4-12} hexadecimal digits."""
+    """Return a unique identifier of the model, {8-4-4-4-12} hexadecimal digits."""
     text = hashlib.blake2b(bytes(part.image.data) + repr(variables).encode(), digest_size=16).hexdigest()
     return f"{{{text[:8]}-{text[8:12]}-{text[12:16]}-{text[16:20]}-{text[20:]}}}"
 
@@ -96,7 +96,7 @@ parameters: change them together.</p>
 
 
 def _picture(part: ExportedPart) -> str:
-    """Return an SVG picture of the part with its ports."""
+    """Return an SVG diagram of the part with its ports."""
     inputs, outputs = [p.port.name for p in part.inputs], [p.port.name for p in part.outputs]
     height = 30 * max(len(inputs), len(outputs), 2) + 20
     arrows = [

@@ -1,4 +1,4 @@
-"""Native libraries: the binary of a part as shared and static library, with what a C or C++ project needs to use it."""
+"""Native libraries: the binary of a part as shared and static library, with the files that a C or C++ project needs."""
 
 import re
 from pathlib import Path
@@ -100,7 +100,7 @@ def export_library(setup: RunConfig, part_name: str, out: Path, cpu: str = PORTA
     """Write a shared and a static library with header, C++ wrapper, CMake package, pkg-config file and example.
 
     Args:
-        setup: the scene, resolved.
+        setup: run configuration of the scene.
         part_name: one of `exported_part.PARTS`.
         out: folder, created if missing.
         cpu: generation of processors that run it.

@@ -1,7 +1,7 @@
 """Object code of compiled blocks, from the optimised LLVM code that `lapwing run` executes.
 
-The machine code is emitted once more: position-independent, and for a processor of the chosen generation. The results
-have the same bits, because no floating-point operation may be contracted, reordered or replaced.
+The machine code is emitted again: position-independent, and for a processor of the chosen generation. The results are
+bit-for-bit identical, because no floating-point operation may be contracted, reordered or replaced.
 """
 
 import re
@@ -31,7 +31,7 @@ def step_code(part: Block, bound: BoundBlock, symbol: str, cpu: str, names: Mapp
         names: new names of functions that it calls.
 
     Raises:
-        ValueError: the block allocates memory, or calls what only exists in this process.
+        ValueError: the block allocates memory, or calls a function that only exists in this process.
     """
     signature = (numba.typeof(bound.cell), numba.types.int64)
     compiled: Any = (advance if part.trusted else advance_counted).overloads[signature]  # type: ignore[attr-defined]
@@ -39,7 +39,7 @@ def step_code(part: Block, bound: BoundBlock, symbol: str, cpu: str, names: Mapp
     function = compiled.fndesc.mangled_name
     if _ADDRESS.search(text):
         raise ValueError(f"{part.name}: calls Python code; only compiled blocks can be exported")
-    text = re.sub(r"@sqrt\(", "@llvm.sqrt.f64(", text)  # both are the correctly rounded instruction
+    text = re.sub(r"@sqrt\(", "@llvm.sqrt.f64(", text)  # both become the correctly rounded instruction
     if len(result := re.findall(r"^declare .*@llvm\.sqrt\.f64\(.*$", text, re.M)) > 1:
         text = text.replace(result[0] + "\n", "", 1)
     module = binding.parse_assembly(text)
@@ -82,7 +82,7 @@ def _machine(cpu: str) -> Any:
     """Return LLVM's code generator for a processor.
 
     Raises:
-        ValueError: another platform than Linux on x86-64, or an unknown processor.
+        ValueError: a platform other than Linux on x86-64, or an unknown processor.
     """
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()

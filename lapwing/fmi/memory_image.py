@@ -23,7 +23,7 @@ from lapwing.kernels.native_memory import ARRAY, layout
 META = struct.Struct("<QQQQQQ")  # numba's MemInfo: count, destructor, its argument, data, size, allocator
 META_SIZE, META_DATA = META.size, 24
 COUNT = 1 << 40  # references: never released
-ALIGNMENT = 16  # [bytes] of regions
+ALIGNMENT = 16  # [bytes] alignment of regions
 WORD = 8
 
 
@@ -31,7 +31,7 @@ class Leaf(NamedTuple):
     """A number in the image."""
 
     path: str  # block, "|", path in its `BlockData`: "plant|parameters.vehicle.mass"
-    offset: int  # [bytes] in the image
+    offset: int  # [bytes] position in the image
     kind: types.Type  # a numba scalar type
     owner: type | None  # NamedTuple class that has the field
     field: str  # name of that field
@@ -42,10 +42,10 @@ class Region:
     """A piece of memory in use by a block.
 
     Attributes:
-        address: in this process.
+        address: address in this process.
         size: [bytes]
-        header: whether a MemInfo precedes the data.
-        offset: of the data in the image.
+        header: True if a MemInfo precedes the data.
+        offset: position of the data in the image [bytes].
     """
 
     address: int
@@ -61,7 +61,7 @@ class MemoryImage:
     Attributes:
         data: the bytes, with zeros at each pointer.
         relocations: (offset of a pointer, offset that it points to).
-        cells: offset of the MemInfo of each root cell, in the order given.
+        cells: offset of the MemInfo of each root cell, in the order of `roots`.
         rows: offset of the first row of each port.
         leaves: the numbers in cells, by their paths.
         regions: the memory in this process, to compare it later.
@@ -83,7 +83,7 @@ def image_of(roots: Sequence[tuple[str, Any]], rows: Mapping[str, np.ndarray]) -
         rows: rows of each port.
 
     Raises:
-        ValueError: a value that cannot be copied, such as an array of objects.
+        ValueError: a value cannot be copied, such as an array of objects.
     """
     walk = _Walk()
     for name, array in rows.items():
@@ -106,9 +106,9 @@ class _Walk:
 
     def __init__(self) -> None:
         self._cells: dict[int, Region] = {}  # by address of the MemInfo
-        self._arrays: list[tuple[int, int]] = []  # (first byte, byte after the last), to merge
+        self._arrays: list[tuple[int, int]] = []  # (first byte, byte after the last) of spans to merge
         self._pointers: list[_Pointer] = []
-        self._cleared: list[int] = []  # addresses of words that mean nothing outside this process
+        self._cleared: list[int] = []  # addresses of words that are only valid in this process
         self._found: list[tuple[str, int, types.Type, type | None, str]] = []
 
     def root(self, name: str, cell: Any) -> None:
@@ -116,7 +116,7 @@ class _Walk:
         self._cell(numba.typeof(cell), cell.memory.pointer, f"{name}|")
 
     def array(self, address: int, size: int, name: str) -> None:
-        """Note the memory of an array."""
+        """Add the memory of an array."""
         if size:
             self._arrays.append((address, address + size))
 
@@ -164,7 +164,7 @@ class _Walk:
             self._cleared.append(at + 4 * WORD)
 
     def finish(self, roots: Sequence[Any], rows: Mapping[str, np.ndarray]) -> MemoryImage:
-        """Lay the regions out and copy them."""
+        """Assign offsets to the regions and copy them."""
         regions = [*self._cells.values(), *(Region(a, b - a, False) for a, b in _merge(self._arrays))]
         end = 0
         for region in regions:
@@ -193,7 +193,7 @@ class _Walk:
 
 
 class _Places:
-    """Offsets in the image by addresses in this process."""
+    """Conversion of addresses in this process to offsets in the image."""
 
     def __init__(self, regions: Sequence[Region]):
         self._regions = sorted(regions, key=lambda region: region.address)
@@ -206,7 +206,7 @@ class _Places:
 
 
 def _parts(kind: types.BaseTuple) -> Iterator[tuple[types.Type, str, type | None]]:
-    """Type, name and NamedTuple class of each item."""
+    """Return type, name and NamedTuple class of each item."""
     if isinstance(kind, types.BaseNamedTuple):
         for name, part in zip(kind.fields, kind.types, strict=True):
             yield part, name, kind.instance_class
@@ -236,7 +236,7 @@ def _bytes(at: int, kind: types.Type) -> bytes:
 
 
 def _merge(spans: list[tuple[int, int]]) -> list[tuple[int, int]]:
-    """Overlapping spans joined."""
+    """Return the spans with overlapping ones joined."""
     result: list[tuple[int, int]] = []
     for first, end in sorted(spans):
         if result and first < result[-1][1]:

@@ -37,7 +37,7 @@ _FMI2 = {kinds.REAL: "Real", kinds.INTEGER: "Integer", kinds.BOOLEAN: "Boolean"}
 class ModelNames(NamedTuple):
     """Names of the model in the description."""
 
-    identifier: str  # of the binary
+    identifier: str  # name of the binary
     token: str  # instantiation token (FMI 3.0) or GUID (FMI 2.0)
     tool: str  # "Lapwing 0.2.0"
 
@@ -46,9 +46,9 @@ def description(part: ExportedPart, variables: Sequence[Variable], names: ModelN
     """Return the text of modelDescription.xml.
 
     Args:
-        part: what is exported.
-        variables: in the order of their value references from 1.
-        names: of the model.
+        part: part to export.
+        variables: variables in the order of their value references from 1.
+        names: names of the model.
         version: 2 or 3.
     """
     setup = part.setup
@@ -104,14 +104,14 @@ def _units(root: Xml.Element, variables: Sequence[Variable], version: int) -> No
         assert unit is not None
         base = {key: str(n) for key, n in unit.powers} | ({"factor": repr(unit.factor)} if unit.factor != 1.0 else {})
         Xml.SubElement(Xml.SubElement(units, "Unit", {"name": name}), "BaseUnit", base)
-    known = Xml.SubElement(root, "TypeDefinitions")
+    definitions = Xml.SubElement(root, "TypeDefinitions")
     for name in names:
         if quantity := QUANTITIES.get(name):
             attributes = {"quantity": quantity, "unit": name}
             if version == 3:
-                Xml.SubElement(known, "Float64Type", {"name": quantity, **attributes})
+                Xml.SubElement(definitions, "Float64Type", {"name": quantity, **attributes})
             else:
-                Xml.SubElement(Xml.SubElement(known, "SimpleType", {"name": quantity}), "Real", attributes)
+                Xml.SubElement(Xml.SubElement(definitions, "SimpleType", {"name": quantity}), "Real", attributes)
 
 
 def _time(listed: Xml.Element, version: int) -> None:

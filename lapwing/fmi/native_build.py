@@ -47,7 +47,7 @@ class BuildFolder:
         return out
 
     def link(self, objects: Sequence[Path], out: Path, exported: str) -> None:
-        """Link objects to a shared library that exports the symbols that match a pattern, and needs no other."""
+        """Link objects to a shared library that exports the symbols of a pattern and needs no other library."""
         script = self.path / "exported.map"
         script.write_text(f"{{ global: {exported}; local: *; }};\n", encoding="ascii")
         command = [*compiler(), "-shared", "-nostartfiles", "-Wl,-s", f"-Wl,--version-script={script}"]

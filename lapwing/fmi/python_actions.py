@@ -1,7 +1,7 @@
 """Effects of Python blocks on the memory of compiled ones, recorded in a run of the scene.
 
 The commander of the autopilot is Python code that runs at a few ticks of a mission, and writes its output, gains and
-faults into memory that compiled blocks read. A library without Python repeats what it wrote, at the same ticks.
+faults into memory that compiled blocks read. A library without Python repeats these writes at the same ticks.
 """
 
 import ctypes
@@ -19,10 +19,10 @@ LONGEST = 600.0  # [s] of the recorded run
 
 
 class Action(NamedTuple):
-    """One run of a Python block."""
+    """One execution of a Python block."""
 
     tick: int
-    block: str  # name
+    block: str  # name of the block
     writes: tuple[tuple[int, bytes], ...]  # offset in the image, new bytes
 
 
@@ -31,7 +31,7 @@ class _Watched(NamedTuple):
 
     address: int
     size: int
-    offset: int  # in the image
+    offset: int  # position in the image
 
 
 def record_actions(
@@ -40,9 +40,9 @@ def record_actions(
     """Run the whole scene and return what the Python blocks of a part wrote.
 
     Args:
-        setup: configuration of the run.
+        setup: run configuration.
         services: all services; those of the part share their cells with `part`.
-        image: of the part.
+        image: memory image of the part.
         part: diagram of the part.
 
     Raises:
@@ -56,7 +56,7 @@ def record_actions(
             rows = whole._rows[port.name]
             watched.append(_Watched(rows.ctypes.data, rows.nbytes, image.rows[port.name]))
     actions: list[Action] = []
-    planned: dict[str, int] = {}  # tick of the next run of each block
+    planned: dict[str, int] = {}  # tick of the next execution of each block
 
     def observe(block: Any, tick: int) -> int:
         if block.name not in own:
@@ -78,7 +78,7 @@ def _words(each: _Watched) -> np.ndarray:
 
 
 def _changes(each: _Watched, before: np.ndarray) -> list[tuple[int, bytes]]:
-    """Return (offset in the image, bytes) of each run of changed words."""
+    """Return (offset in the image, bytes) of each sequence of changed words."""
     after: Any = _words(each)
     changed = np.flatnonzero(after != before)
     runs = np.split(changed, np.flatnonzero(np.diff(changed) != 1) + 1) if len(changed) else []

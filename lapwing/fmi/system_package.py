@@ -1,4 +1,4 @@
-"""System Structure and Parameterization packages: the parts of a scene, and its own FMUs, as connected FMUs."""
+"""System Structure and Parameterization packages: the parts of a scene and its imported FMUs as connected FMUs."""
 
 import json
 import tempfile
@@ -28,18 +28,18 @@ from lapwing.services.fmu.service_config import (
     own_port,
 )
 
-SSP_VERSIONS = {3: "2.0", 2: "1.0"}  # by the version of FMI; SSP 1.0 does not know FMI 3.0
+SSP_VERSIONS = {3: "2.0", 2: "1.0"}  # SSP version by version of FMI; SSP 1.0 has no FMI 3.0
 _INTERFACES = {
     CO_SIMULATION: "CoSimulation", MODEL_EXCHANGE: "ModelExchange", SCHEDULED_EXECUTION: "ScheduledExecution",
 }  # fmt: skip
 
 
 class _Source(NamedTuple):
-    """Where a connection begins."""
+    """Start of a connection."""
 
     component: str
     connector: str
-    factor: float  # from its unit to that of the other end
+    factor: float  # conversion from its unit to that of the other end
 
 
 class _Component(NamedTuple):
@@ -56,9 +56,9 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
     """Write a package with an FMU for each service of a scene, and return the names of the services.
 
     Args:
-        setup: the scene, resolved.
+        setup: run configuration of the scene.
         out: path of the package.
-        version: of FMI, 3 (SSP 2.0) or 2 (SSP 1.0).
+        version: version of FMI, 3 (SSP 2.0) or 2 (SSP 1.0).
         cpu: generation of processors that run the FMUs.
 
     Raises:
@@ -87,7 +87,7 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
 
 
 def _check(setup: RunConfig, fmus: Iterable[FmuConfig], version: int) -> None:
-    """Raise ValueError if a scene cannot be a package."""
+    """Raise ValueError if a scene cannot be exported as a package."""
     if setup.modules:
         raise ValueError(f"{setup.scene}: has Python modules, which a package cannot have; export a scene without them")
     if not setup.vehicle and any(fmus_of(member.services) for member in members(setup)):
@@ -176,8 +176,8 @@ def _parameters(start: Sequence[StartValue], version: str) -> Xml.Element:
     description, values = (f"{{{each}}}" for each in (ssp.DESCRIPTION, ssp.VALUES))
     bindings = Xml.Element(f"{description}ParameterBindings")
     binding = Xml.SubElement(bindings, f"{description}ParameterBinding")
-    given = Xml.SubElement(binding, f"{description}ParameterValues")
-    table = Xml.SubElement(given, f"{values}ParameterSet", {"version": version, "name": "start"})
+    parameters = Xml.SubElement(binding, f"{description}ParameterValues")
+    table = Xml.SubElement(parameters, f"{values}ParameterSet", {"version": version, "name": "start"})
     parameters = Xml.SubElement(table, f"{values}Parameters")
     for element, value in start:
         if element.type in ("String", "Binary"):

@@ -15,13 +15,13 @@ REAL, INTEGER, BOOLEAN = "real", "integer", "boolean"
 
 
 class Variable(NamedTuple):
-    """A number that users of the part may read or write."""
+    """Number that users of the part may read or write."""
 
     name: str  # "truth.position_world[0]"
     causality: str  # INPUT, OUTPUT, PARAMETER or STATE
     type: str  # REAL, INTEGER or BOOLEAN
     unit: str  # "m/s"; "" without one
-    start: float | None  # None of an output
+    start: float | None  # None for an output
     port: int  # index of an output port
     offset: int  # number of the input, column of the port, or offset in the image [bytes]
 

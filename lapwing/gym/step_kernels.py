@@ -10,27 +10,27 @@ from lapwing.dynamics.simd_batch import WIDTH
 from lapwing.gym import tasks
 from lapwing.kernels import always_inline, kernel, math
 
-RATES = (6.0, 6.0, 2.0)  # [rad/s] about body x, y, z of an action of 1
-WAY, SPEED, SPIN = 50.0, 50.0, 50.0  # [m], [m/s], [rad/s] at which observations saturate
+RATES = (6.0, 6.0, 2.0)  # [rad/s] body rates at an action of 1
+WAY, SPEED, SPIN = 50.0, 50.0, 50.0  # [m], [m/s], [rad/s] saturation of observations
 BOUNDS = np.array([WAY] * 6 + [SPEED] * 3 + [1.0] * 9 + [SPIN] * 3, np.float32)  # of observations, either sign
 
 
 class Vehicles(NamedTuple):
     """Memory of a `BatchSimulator` of n vehicles."""
 
-    memory: np.ndarray  # of `simd_batch.blocks`, flat
-    columns: int  # of a block
-    ticks: np.ndarray  # since the last reset
-    valid: np.ndarray  # of bool
+    memory: np.ndarray  # memory of `simd_batch.blocks`, flat
+    columns: int  # number of columns of a block
+    ticks: np.ndarray  # [ticks] since the last reset
+    valid: np.ndarray  # bool
     interval: float  # [s] of a tick
     ground: float  # [m] height of a vehicle at rest
 
 
 class Episodes(NamedTuple):
-    """Data of n episodes, besides the state of the vehicles."""
+    """Data of n episodes, in addition to the state of the vehicles."""
 
-    gates: np.ndarray  # passed, shape (n,) of int
-    over: np.ndarray  # shape (n,) of bool: the next step begins anew
+    gates: np.ndarray  # number of gates passed, int, shape (n,)
+    over: np.ndarray  # True if the next step restarts the episode, bool, shape (n,)
     before: np.ndarray  # position [m] and velocity [m/s], world, before a step; shape (n, 6)
 
 
@@ -39,17 +39,17 @@ class Results(NamedTuple):
 
     observations: np.ndarray  # float32, shape (n, 21)
     reward: np.ndarray
-    terminated: np.ndarray  # of bool
-    truncated: np.ndarray  # of bool
+    terminated: np.ndarray  # bool
+    truncated: np.ndarray  # bool
 
 
 @kernel
 def read_actions(actions: np.ndarray, weight: float, setpoints: np.ndarray) -> bool:
-    """Write thrust [N] and body rates [rad/s] of actions, each clipped to -1 and 1; False if one is not finite.
+    """Write thrust [N] and body rates [rad/s] of actions clipped to [-1, 1]. Return False if one is not finite.
 
     Args:
         actions: shape (n, 4).
-        weight: [N].
+        weight: weight of the vehicle [N].
         setpoints: shape (members, 4), changed; members after n repeat the last one.
     """
     for m in range(len(setpoints)):
@@ -69,21 +69,21 @@ def _numbers(memory: np.ndarray, at: int, first: int) -> vector.Vec3:
 
 @always_inline
 def _put(row: np.ndarray, at: int, value: float, bound: float) -> None:
-    """Write a value, or the bound that it exceeds; -bound in place of NaN."""
+    """Write a value clipped to +-bound, and -bound in place of NaN."""
     row[at] = bound if value > bound else (value if value >= -bound else -bound)
 
 
 @kernel
 def judge(task: tasks.Task, v: Vehicles, e: Episodes, r: Results, first: int, last: int) -> None:
-    """Judge the last step of the vehicles of the blocks `first` to before `last`, and observe them.
+    """Compute rewards, ends of episodes and observations of the blocks [first, last) after a step.
 
     Args:
         task: a Task.
         v: Vehicles.
-        e: Episodes, of which `gates` and `before` change.
+        e: Episodes; `gates` and `before` are changed.
         r: Results, written.
-        first: block.
-        last: block after the last.
+        first: first block.
+        last: last block (exclusive).
     """
     for m in range(first * WIDTH, min(last * WIDTH, len(e.over))):
         at = (m // WIDTH) * v.columns * WIDTH + m % WIDTH
@@ -113,7 +113,7 @@ def judge(task: tasks.Task, v: Vehicles, e: Episodes, r: Results, first: int, la
 
 @kernel
 def observe(task: tasks.Task, v: Vehicles, e: Episodes, observations: np.ndarray, m: int) -> None:
-    """Observe vehicle m, and remember its position and velocity; see `judge`."""
+    """Write the observation of vehicle m, and store its position and velocity; see `judge`."""
     at = (m // WIDTH) * v.columns * WIDTH + m % WIDTH
     goal = tasks.target(task.kind, v.ticks[m] * v.interval, e.gates[m], v.ground)
     position, velocity = _numbers(v.memory, at, 0), _numbers(v.memory, at, 7)
@@ -132,6 +132,6 @@ def observe(task: tasks.Task, v: Vehicles, e: Episodes, observations: np.ndarray
 
 @kernel
 def observe_members(task: tasks.Task, v: Vehicles, e: Episodes, observations: np.ndarray, members: np.ndarray) -> None:
-    """Observe these vehicles; see `judge`."""
+    """Write the observations of these vehicles; see `judge`."""
     for m in members:
         observe(task, v, e, observations, m)

@@ -12,22 +12,22 @@ from lapwing.dynamics import vector
 from lapwing.kernels import kernel, math
 
 HOVER, TRACK, LAND, RACE = range(4)
-HIGH = 5.0  # [m] above the ground, where episodes begin
-FAR = 6.0  # [m] from the target: the episode is lost
-FARTHEST = (FAR, FAR, HIGH + FAR, 4.0 * FAR)  # [m] of each kind
+HIGH = 5.0  # [m] height above the ground at the start of an episode
+FAR = 6.0  # [m] distance from the target at which an episode fails
+FARTHEST = (FAR, FAR, HIGH + FAR, 4.0 * FAR)  # [m] largest distance from the target, by kind
 LOST = -10.0  # reward
-SOFT = 1.0  # [m/s] of a landing
+SOFT = 1.0  # [m/s] speed of a landing
 LOW = 0.02  # [m] above the height at rest, below which a vehicle is on the ground
-TRACK_RATE, TRACK_AHEAD = 2.0 * math.pi / 12.0, 0.5  # [rad/s] once around in 12 s; [s]
+TRACK_RATE, TRACK_AHEAD = 2.0 * math.pi / 12.0, 0.5  # [rad/s] one round in 12 s; [s] look-ahead
 TRACK_X, TRACK_Y = 4.0, 2.0  # [m] half of the length and width of the figure of eight
-GATE_SIDE, GATE_RISE, GATE_WIDTH = 5.0, 1.5, 1.0  # [m] half of the square; of every other gate; through it
+GATE_SIDE, GATE_RISE, GATE_WIDTH = 5.0, 1.5, 1.0  # [m] half of the square; rise of every other gate; width of a gate
 
 
 class Task(NamedTuple):
     """Goal of an episode."""
 
     kind: int
-    seconds: float  # of an episode
+    seconds: float  # [s] duration of an episode
 
 
 TASKS = {
@@ -56,10 +56,10 @@ def target(kind: int, time: float, gate: int, ground: float) -> Target:
     """Return the target of a vehicle.
 
     Args:
-        kind: of the task.
-        time: [s] of the episode.
+        kind: kind of the task.
+        time: time of the episode [s].
         gate: number of gates passed.
-        ground: [m] height of a vehicle at rest.
+        ground: height of a vehicle at rest [m].
     """
     zero = (0.0, 0.0, 0.0)
     if kind == LAND:
@@ -94,20 +94,20 @@ def judge(
     omega_body: vector.Vec3,
     ground: float,
 ) -> tuple[float, bool, int]:
-    """Return (reward, whether the episode is over, gates passed) of a step of one vehicle.
+    """Return (reward, True if the episode is over, gates passed) of a step of one vehicle.
 
-    Hover and Track reward being at the target quietly. Land and Race reward each metre nearer to it; Land, besides, a
-    soft and upright touch-down and its precision, Race every gate.
+    Hover and Track reward a small distance to the target at low rates. Land and Race reward the decrease of the
+    distance; Land also a soft, upright and precise touch-down, Race every gate.
 
     Args:
-        kind: of the task.
+        kind: kind of the task.
         goal: a Target.
         before: (position [m], velocity [m/s]) before the step, world.
-        position: [m], world.
-        velocity: [m/s], world.
+        position: position [m], world.
+        velocity: velocity [m/s], world.
         upright: cosine of the tilt.
-        omega_body: [rad/s].
-        ground: [m] height of a vehicle at rest.
+        omega_body: body rates [rad/s].
+        ground: height of a vehicle at rest [m].
     """
     away = vector.norm(vector.subtract(goal.position_world, position))
     nearer = vector.norm(vector.subtract(goal.position_world, before[0])) - away

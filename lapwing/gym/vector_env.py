@@ -22,7 +22,7 @@ try:
 except ImportError:
     raise ImportError("lapwing.gym: Gymnasium is not installed; pip install lapwing[gym]") from None
 
-RATE = 50.0  # [Hz] of the actions
+RATE = 50.0  # [Hz] rate of the actions
 
 
 class DroneVectorEnv(VectorEnv):
@@ -79,7 +79,7 @@ class DroneVectorEnv(VectorEnv):
         self._episodes = Episodes(np.zeros(num_envs, np.int64), np.zeros(num_envs, bool), np.zeros((num_envs, 6)))
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
-        """Begin an episode with every vehicle."""
+        """Start an episode with every vehicle."""
         if seed is not None:
             self._np_random, self._np_random_seed = seeding.np_random(seed)
         observations = np.empty((self.num_envs, len(BOUNDS)), np.float32)
@@ -110,7 +110,7 @@ class DroneVectorEnv(VectorEnv):
         return *results, {}
 
     def _begin(self, members: np.ndarray, observations: np.ndarray) -> None:
-        """Begin episodes of these vehicles, and observe them."""
+        """Start episodes of these vehicles, and write their observations."""
         positions = starts(self.np_random, self._ground, len(members))
         self.batch.restart(members, position_world=positions, rotor_speed=self._hover_speed)
         self._episodes.gates[members], self._episodes.over[members] = 0, False
@@ -128,7 +128,7 @@ class DroneEnv(gymnasium.Env):
         self.observation_space = self._vector_env.single_observation_space
 
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
-        """Begin an episode."""
+        """Start an episode."""
         super().reset(seed=seed)
         observations, _ = self._vector_env.reset(seed=seed)
         return observations[0], {}

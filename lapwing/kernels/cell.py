@@ -31,7 +31,7 @@ class CellType(types.StructRef):
         return self._fields
 
     def __hash__(self) -> int:
-        if self._hash is None:  # types of hundreds of numbers are looked up often
+        if self._hash is None:  # types with hundreds of numbers are looked up often
             self._hash = super().__hash__()
         return self._hash
 
@@ -46,7 +46,7 @@ class CellType(types.StructRef):
 class _Form:
     """Data shared by the cells of one structure."""
 
-    kind: types.Type  # of the value
+    kind: types.Type  # numba type of the value
     cell: CellType
     layout: Layout
     flattener: Flattener | None = None  # generated when a second cell of the structure is created
@@ -67,11 +67,11 @@ def _form(value: Any) -> tuple[_Form, Sequence[Any]]:
         key: Hashable = structure(value)
     except UnknownError:
         key = None
-    known = _forms.get(key)
-    if known is not None:
-        known.flattener = Flattener(value)
-        _by_classes.setdefault(top, []).append(known)
-        return known, leaves(value)
+    existing = _forms.get(key)
+    if existing is not None:
+        existing.flattener = Flattener(value)
+        _by_classes.setdefault(top, []).append(existing)
+        return existing, leaves(value)
     kind = numba.typeof(value)
     form = _Form(kind, CellType([("value", kind)]), layout(kind))
     if key is not None:

@@ -17,7 +17,7 @@ from numba.core.typing.templates import AbstractTemplate, infer_global
 from lapwing.kernels import without_cache
 
 GENERATORS: dict[Callable, Callable[..., Any]] = {}
-"""Functions with an implementation of their own in compiled code: its generator, from the numba types of arguments."""
+"""Functions with a separate implementation in compiled code, and its generator from the numba types of arguments."""
 
 
 def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Callable:

@@ -1,4 +1,4 @@
-"""Calls of C functions at addresses that are known at run time only, and doubles at addresses, in compiled code."""
+"""Calls of C functions at run-time addresses, and access to doubles at addresses, in compiled code."""
 
 # numba.core.types fills itself at import
 # mypy: disable-error-code="attr-defined"
@@ -18,7 +18,7 @@ _INT32, _INT64, _DOUBLE = ir.IntType(32), ir.IntType(64), ir.DoubleType()
 
 
 def address_of(function: Any) -> int:
-    """Return the address of a function of ctypes."""
+    """Return the address of a ctypes function."""
     return ctypes.cast(function, ctypes.c_void_p).value or 0
 
 

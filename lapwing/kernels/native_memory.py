@@ -33,7 +33,7 @@ class Layout(NamedTuple):
     alignment: int  # [bytes]
     counted: tuple[int, ...]  # indices of the values in the format that point to reference counts
     values: int  # number of values
-    leaves: int  # of the value
+    leaves: int  # number of leaves of the value
     others: tuple[int, ...]  # indices of the leaves that are not numbers
 
 

@@ -60,7 +60,7 @@ def columns(like: Any, rows: np.ndarray) -> Any:
 def _columns(part: Any, rows: np.ndarray, left: Iterator[int]) -> Any:
     """Return the columns of `rows` for this part of the tree, starting at the next one.
 
-    This is no inner function, because its reference cycle would keep the rows alive.
+    Not an inner function, because its reference cycle would keep the rows alive.
     """
     if not isinstance(part, tuple):
         return rows[:, next(left)]
@@ -148,7 +148,7 @@ def _first(context: Any, builder: Any, signature: Any, row: int, arguments: Sequ
 @intrinsic
 def load(typing_context: Any, like: types.Type, rows: types.Type, i: types.Type) -> tuple[Any, Callable]:
     """Return row i >= 0 of `rows` (n, width), contiguous, as a tree of the type of `like`."""
-    # one source line for each number would take a seventh of the compile time of a scene
+    # a source line for each number would take 1/7 of the compile time of a scene
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Sequence[Any]) -> Any:
         first, column = _first(context, builder, signature, 1, arguments), itertools.count()

@@ -1,4 +1,4 @@
-"""Generated functions that flatten values of one structure in a tenth of the time of a recursive walk.
+"""Generated functions that flatten values of one structure ten times as fast as a recursive walk.
 
 Cells of a flight hold about two thousand numbers, in trees that a campaign creates for every run.
 """
@@ -50,12 +50,12 @@ class Flattener:
             return None
         if (tuple(map(type, tuples)), tuple(map(type, parts))) != self._types:
             return None
-        return parts if all(_is_of(parts[k], known) for k, known in self._closer) else None
+        return parts if all(_is_of(parts[k], expected) for k, expected in self._closer) else None
 
 
-def _is_of(value: Any, known: Any) -> bool:
+def _is_of(value: Any, expected: Any) -> bool:
     try:
-        return structure(value) == known
+        return structure(value) == expected
     except UnknownError:
         return False
 

@@ -1,4 +1,4 @@
-"""Compile-time notice: tells the user that kernels compile. Nothing of it is measured before, so it has no estimate."""
+"""Compile-time notice: message that kernels compile, without an estimate of the time, which is unknown."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,7 +13,7 @@ class Compilation(NamedTuple):
 
     Attributes:
         scene: name of the scene.
-        services: names of the services, of which some kernels may be in the cache.
+        services: names of the services; some of their kernels may be in the cache.
     """
 
     scene: str

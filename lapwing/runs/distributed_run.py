@@ -1,4 +1,4 @@
-"""Run whose services are started separately."""
+"""Run with services that are started separately."""
 
 import re
 import time
@@ -21,7 +21,7 @@ LOST = 6.0  # [s] without a message after which a run counts as lost: TCP retrie
 GRACE = 2.0  # [s] largest difference of the delays of two links
 JOIN_TIMEOUT = 120.0  # [s] until all services have joined
 CLOSE_TIMEOUT = 5.0  # [s] for the recorder to close its log after a failure
-CONFIRMED = 60.0  # [s] without news after the end until a participant counts as stalled
+CONFIRMED = 60.0  # [s] without a message after the end until a participant counts as stalled
 
 
 def monitor_run(
@@ -49,7 +49,7 @@ def monitor_run(
         except RunFailed:
             leave()  # makes the other participants end
             deadline = time.monotonic() + CLOSE_TIMEOUT
-            while names <= watch.present and process_table.RECORDER not in watch.gone and time.monotonic() < deadline:
+            while names <= watch.present and process_table.RECORDER not in watch.left and time.monotonic() < deadline:
                 watch.poll(0.2)
             raise
     return clock.elapsed
@@ -58,7 +58,7 @@ def monitor_run(
 def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: Callable[[RunMonitor], None]) -> None:
     """Monitor the run of the participants `names` to its end. See `monitor_run` for errors."""
     deadline = time.monotonic() + JOIN_TIMEOUT
-    while not (watch.ended and process_table.RECORDER in watch.gone):
+    while not (watch.ended and process_table.RECORDER in watch.left):
         live(watch)
         watch.poll(0.2)
         clock.observe(watch)
@@ -67,26 +67,26 @@ def _follow(watch: RunMonitor, clock: Clock, stop: Stop, names: set[str], live: 
             watch.last_news = time.monotonic()
             if time.monotonic() > deadline:
                 raise RunFailed(f"no participant {', '.join(sorted(names - watch.present))} within {JOIN_TIMEOUT:g} s")
-        elif not watch.ended and watch.gone & names and not _becomes_true(watch, lambda: watch.ended, GRACE):
-            raise RunFailed(f"{', '.join(sorted(watch.gone))}: gone at t = {watch.time_ns * 1e-9:.3f} s")
+        elif not watch.ended and watch.left & names and not _becomes_true(watch, lambda: watch.ended, GRACE):
+            raise RunFailed(f"{', '.join(sorted(watch.left))}: left the run at t = {watch.time_ns * 1e-9:.3f} s")
         elif watch.start is None and time.monotonic() < deadline:
             watch.last_news = time.monotonic()  # comparing run configurations takes time over a slow network
         elif culprit := watch.stall_message(names):
             raise RunFailed(culprit)
         elif watch.ended and time.monotonic() - watch.last_news > CONFIRMED:
-            silent = sorted(names - watch.gone - watch.confirmed) or [process_table.RECORDER]
+            silent = sorted(names - watch.left - watch.confirmed) or [process_table.RECORDER]
             raise RunFailed(f"{', '.join(silent)}: did not end within {CONFIRMED:g} s of the last news")
     # After a cut, links recover one by one; the clock owner stays until its outcome is confirmed
     others = names - {process_table.RECORDER}
-    _becomes_true(watch, lambda: watch.outcome is not None or bool(watch.gone & others), LOST)
+    _becomes_true(watch, lambda: watch.outcome is not None or bool(watch.left & others), LOST)
     live(watch)
-    _becomes_true(watch, lambda: watch.present <= watch.gone | watch.confirmed, LOST)  # viewers have the last events
+    _becomes_true(watch, lambda: watch.present <= watch.left | watch.confirmed, LOST)  # viewers have the last events
     if early := watch.abort_message():
         raise RunFailed(early)
 
 
 def _becomes_true(watch: RunMonitor, condition: Callable[[], bool], seconds: float) -> bool:
-    """Poll until `condition` is true, at most `seconds`. Return its value."""
+    """Poll until `condition` is true, for at most `seconds`. Return its value."""
     deadline = time.monotonic() + seconds
     while not condition() and time.monotonic() < deadline:
         watch.poll(0.2)

@@ -1,4 +1,4 @@
-"""Run of Lapwing's autopilot on another simulator, over PX4's simulator interface, without own plant and sensors."""
+"""Run of Lapwing's autopilot on another simulator, which replaces plant and sensors over PX4's simulator interface."""
 
 from typing import Any
 
@@ -23,14 +23,14 @@ TRAJECTORY = "trajectory"
 REPLACED = ("plant", "sensors")  # services that the simulator replaces
 _variance = python_function(error_models.sample_variance)
 _deviation = python_function(error_models.white_deviation)
-_NANO = 1e-9  # [T] in nT
+_NANO = 1e-9  # [T] 1 nT
 
 
 def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunConfig:
     """Return the configuration of a run in which a simulator replaces plant and sensors.
 
     Raises:
-        ConfigError: the scene needs something that the simulator's interface does not have.
+        ConfigError: the scene needs data that the simulator's interface lacks.
     """
     if not setup.vehicle:
         raise ConfigError("vehicle", "a fleet", "a scene with one vehicle for --px4-sim")
@@ -40,7 +40,7 @@ def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunCon
         raise ConfigError("sensors", "missing", "the sensors of the simulator, [sensors.imu] and others")
     sensors = setup.services["sensors"]
     services = {name: service for name, service in setup.services.items() if name not in REPLACED}
-    if TRAJECTORY in services:  # the truth only holds it back to the plant's pace
+    if TRAJECTORY in services:  # its input `truth` only keeps it at the plant's pace
         services[TRAJECTORY] = services[TRAJECTORY]._replace(inputs=())
     needed = {i.port for service in services.values() for i in service.inputs} - {
         p.name for service in services.values() for p in service.ports

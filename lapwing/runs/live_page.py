@@ -27,16 +27,16 @@ from lapwing.studies.view3d.stage import Vehicle, add_shaders
 from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
 
-FRAMES = 8  # [frames] of a step, shown evenly until the next step
-LINES = 200  # [lines] of events
+FRAMES = 8  # frames of a step, shown evenly until the next step
+LINES = 200  # lines of events
 LAG = (0.02, 0.5)  # [s] shortest and longest time over which a step is spread
-ERROR = 0.25  # [m] at the end of the trail's colours
-SIZE = 1.0  # [m] from which the camera takes its distance
-FAREWELL = 0.3  # [s] for browsers to receive the last frame
+ERROR = 0.25  # [m] upper end of the trail's colour scale
+SIZE = 1.0  # [m] size that sets the camera's distance
+FAREWELL = 0.3  # [s] time for browsers to receive the last frame
 
 
 class LivePage:
-    """Serves the 3D view of a run; a context manager. The sockets are closed at its end."""
+    """Server of the 3D view of a run; a context manager that closes the sockets at its end."""
 
     def __init__(self, setup: RunConfig):
         """Open the page before the run begins."""

@@ -75,16 +75,16 @@ def fly_processes(
 
 
 class Clock:
-    """Passes the progress of a run to the observer, and measures it from the first to the last log packet."""
+    """Progress of a run for its observer, measured from the first to the last log packet."""
 
     def __init__(self, observer: Observer, setup: RunConfig):
         self._observer, self._started, self._slow_disk = observer, False, False
         self._pose, self._status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
-        self._compilation: Compilation | None = Compilation.of(setup)  # None once shown
+        self._compilation: Compilation | None = Compilation.of(setup)  # None after it was shown
         self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
 
     def observe(self, watch: RunMonitor) -> bool:
-        """Show the progress. Return False: the run continues."""
+        """Show the progress. Return False, so that the run continues."""
         self.rejected = watch.rejected
         if watch.start is None:
             if watch.compiling and self._compilation:

@@ -16,7 +16,7 @@ class Observer(Protocol):
     """Interface of a progress display."""
 
     def begin(self) -> None:
-        """Note that the first tick is flown."""
+        """Start the display: the first tick has been stepped."""
         ...
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:

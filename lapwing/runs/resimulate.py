@@ -24,7 +24,7 @@ from lapwing.services.process_table import Operator
 
 
 def recorded_setup(read: LogReader, modules: Collection[str] = ()) -> RunConfig:
-    """Return the run configuration of a log, which may have classes of these modules.
+    """Return the run configuration of a log, which may contain classes of these modules.
 
     Raises:
         ValueError: the log has no run configuration, or one of another version.
@@ -72,10 +72,10 @@ def recorded_commands(read: LogReader, setup: RunConfig, vehicle: str = "") -> I
 
 
 class RecordedRun(NamedTuple):
-    """Run of a log, with all that it needs to be flown again."""
+    """Run of a log, with all inputs of its resimulation."""
 
     setup: RunConfig
-    operators: dict[str, Operator]  # commands of each vehicle
+    operators: dict[str, Operator]  # commands of each vehicle by name
     firmware: dict[str, Recorded]  # messages of each foreign firmware, by vehicle
     last: int  # tick
     digest: str

@@ -1,4 +1,4 @@
-"""A run with all services in this process."""
+"""Run with all services in this process."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -35,18 +35,18 @@ def fly_single(
     """Fly with all services in this process, to the end or until a state is invalid, which the log records.
 
     Args:
-        setup: what to fly.
-        log: where to record it.
-        sources: the files that were resolved, for the log.
-        speed: simulated seconds per second, None for as fast as it goes.
+        setup: run configuration.
+        log: path of the log.
+        sources: files of the scene, for the log.
+        speed: simulated seconds per second, None for as fast as possible.
         observer: shows the progress.
         operator: returns the commands received until a tick; for several vehicles one function for each, by name.
-        last: the tick after which to stop, None for the end of the run.
-        recorded: messages of foreign firmwares to fly again, by vehicle name (`process_table.create`).
-        services: of the run, in their order; None for those of the process table.
+        last: last tick, None for the end of the run.
+        recorded: messages of foreign firmwares to resimulate, by vehicle name (`process_table.create`).
+        services: services of the run, in order; None for those of the process table.
 
     Raises:
-        LockStepError: an own controller or estimator failed.
+        LockStepError: a user's controller or estimator failed.
         ValueError: the log cannot be written.
         Interrupted: ended by a signal.
     """

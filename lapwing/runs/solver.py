@@ -1,4 +1,4 @@
-"""Integrator and step of scenes that set an accuracy only."""
+"""Integrator and step of scenes that only set an accuracy."""
 
 from lapwing.cosim.scene import Scene
 from lapwing.services.plant.schema import accuracy_to_select_for
@@ -13,6 +13,6 @@ def with_solver(scene: Scene) -> Scene:
     """
     if accuracy_to_select_for(scene) is None:
         return scene
-    from lapwing.studies.accuracy import solver_selection  # scenes that set a step have no use for it
+    from lapwing.studies.accuracy import solver_selection  # not needed for scenes that set a step
 
     return load(scene, solver_selection.overrides(scene, lambda _: None))

@@ -1,4 +1,4 @@
-"""Remaining time of long work, and its bar in a terminal or a notebook if it was started from Python."""
+"""Remaining time of long work, and a progress bar in a terminal or notebook for work started from Python."""
 
 import html
 import sys
@@ -12,33 +12,33 @@ from lapwing.runs.compile_notice import Compilation
 DELAY = 2.0  # [s] of work before a bar appears
 PERIOD = 0.25  # [s] between two updates of the bar
 MEASURED = 1.0  # [s] of measured work before a remaining time is shown
-BASIS, LONG = 0.05, 10.0  # share of the work, or [s] of it, that must have been measured, too
+BASIS, LONG = 0.05, 10.0  # also required: measured share of the work, or measured time [s]
 
 
 class TimeLeft:
-    """Estimate of the remaining time of work in equal parts, from the time that its later half took in this call.
+    """Estimate of the remaining time of work in equal parts, from the duration of its later half in this call.
 
     The first part of each worker takes longer (compilation, start of the worker) and never counts. Parts that run at
     the same time end together, so only spans of a multiple of `parallel` reports have a known duration.
     """
 
     def __init__(self, parallel: int = 1, clock: Callable[[], float] = time.monotonic):
-        """Start now.
+        """Start the measurement.
 
         Args:
             parallel: number of parts that run at the same time; 0: unknown, without an estimate.
             clock: returns seconds.
         """
         self._parallel, self._clock, self._start = parallel, clock, clock()
-        self._reports: list[tuple[float, float]] = []  # ([s] since the start, amount that was done)
+        self._reports: list[tuple[float, float]] = []  # ([s] since the start, completed amount)
 
     def done(self, amount: float) -> None:
-        """Note that `amount` of the work is done by now; each part is one report."""
+        """Record that `amount` of the work is done; call it once for each part."""
         if amount > (self._reports[-1][1] if self._reports else 0.0):
             self._reports.append((self._clock() - self._start, amount))
 
     def seconds(self, total: float) -> float | None:
-        """Return the remaining time [s] up to `total`; None while too little was measured, and at the end."""
+        """Return the remaining time [s] up to `total`; None until enough is measured, and at the end."""
         reports, step = self._reports, self._parallel
         if step < 1 or len(reports) < 2 * step or reports[-1][1] >= total:
             return None
@@ -61,7 +61,7 @@ class TimeLeft:
 
 
 class Picture(Protocol):
-    """Output on which a bar is drawn."""
+    """Interface of an output for a bar."""
 
     def draw(self, share: float, text: str) -> None:
         """Show a bar, `share` of it full (0 to 1), and a line."""
@@ -121,7 +121,7 @@ def picture() -> type[Picture] | None:
 
 
 class WorkProgress:
-    """Bar of one piece of work; a context manager. It appears after DELAY seconds and disappears at the end."""
+    """Progress bar of some work; a context manager. It appears after DELAY seconds and disappears at the end."""
 
     def __init__(self, title: str, total: float, unit: str, parallel: int = 1):
         """Create the bar of work that ends at `total`, a flight in "s" perhaps before it; see `TimeLeft.__init__`."""
@@ -143,11 +143,11 @@ class WorkProgress:
             self._thread.join()
 
     def compiling(self, _: Compilation) -> None:
-        """Note that kernels compile, until the first call of `show`."""
+        """Show that kernels compile, until the first call of `show`."""
         self._start, self._compiles = time.monotonic(), True
 
     def show(self, done: float) -> None:
-        """Note that `done` of the total is reached."""
+        """Show that `done` of the total is reached."""
         if self._compiles:
             self._compiles, self._left = False, TimeLeft(self._parallel)
         self._done = done

@@ -1,1 +1,1 @@
-"""FMUs as services: each runs in a separate process and steps in lock step."""
+"""FMUs as services of the lock step, each in a separate process."""

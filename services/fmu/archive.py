@@ -1,4 +1,4 @@
-"""The zip archive of an FMU: its files are checked before any of them is used."""
+"""Zip archive of an FMU, whose files are checked before any of them is used."""
 
 import importlib.util
 import io
@@ -11,10 +11,10 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.fmu.clocks import DESCRIPTION, Clock, input_clocks
 from lapwing.services.fmu.service_config import CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION
 
-LARGEST = 4_000_000_000  # [bytes] of all files of an FMU together
-LARGEST_DESCRIPTION = 100_000_000  # [bytes]
-BINARIES = {2: "binaries/linux64", 3: "binaries/x86_64-linux"}  # by the version of FMI
-_MACHINE = slice(18, 20)  # of a header in the format ELF
+LARGEST = 4_000_000_000  # [bytes] limit of all files of an FMU together
+LARGEST_DESCRIPTION = 100_000_000  # [bytes] limit of modelDescription.xml
+BINARIES = {2: "binaries/linux64", 3: "binaries/x86_64-linux"}  # folder by version of FMI
+_MACHINE = slice(18, 20)  # position of the machine in an ELF header
 _X86_64 = (62).to_bytes(2, "little")
 
 
@@ -22,7 +22,7 @@ class Content(NamedTuple):
     """Description of an FMU that has a library for this platform."""
 
     model: Any  # FMPy's model description
-    version: int  # of FMI, 2 or 3
+    version: int  # version of FMI, 2 or 3
     interface: str  # CO_SIMULATION, MODEL_EXCHANGE or SCHEDULED_EXECUTION
     clocks: list[Clock]  # input clocks of scheduled execution
 
@@ -31,10 +31,10 @@ def read_archive(key: str, path: Path, content: bytes, interface: str | None) ->
     """Return the description of an FMU.
 
     Args:
-        key: of the FMU in the scene.
-        path: of the FMU, for messages.
-        content: of the file.
-        interface: the desired one; None: the first that the FMU has.
+        key: key of the FMU in the scene.
+        path: path of the FMU, for messages.
+        content: content of the file.
+        interface: desired interface; None for the first one that the FMU has.
 
     Raises:
         ConfigError: not an FMU, too large, damaged, with paths or entities that lead out of it, without the interface,

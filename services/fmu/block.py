@@ -1,4 +1,4 @@
-"""Block that steps one FMU at every tick, in compiled code (`exchange`) as long as the FMU answers at once."""
+"""Block that steps one FMU at every tick, in compiled code (`exchange`) if the FMU answers immediately."""
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
@@ -29,8 +29,8 @@ class FmuBlock:
         """Create the block.
 
         Args:
-            fmu: configuration.
-            outputs: port that it publishes, by the name of the port that is replaced, or its own port by its own name.
+            fmu: configuration of the FMU.
+            outputs: published port by the name of the port that it replaces; an own port by its own name.
         """
         self.name = f"fmu.{fmu.name}"
         self.outputs = tuple(outputs.values())
@@ -49,7 +49,7 @@ class FmuBlock:
         self._report_wait: Callable[[str], None] = lambda text: None
 
     def bind(self, graph: BlockDiagram) -> None:
-        """Have the diagram run compiled code for this block; the process of the FMU starts at the first tick."""
+        """Let the diagram run compiled code for this block; the process of the FMU starts at the first tick."""
         self._interval = graph.setup.interval
         for port in self.outputs:  # columns that the FMU does not compute
             graph.ring(port.name)[:] = pack_row(port.like)
@@ -57,7 +57,7 @@ class FmuBlock:
         graph.replace(graph.part(self.name), code)
 
     def open(self, report_wait: Callable[[str], None]) -> None:
-        """Store the function that reports waits for the FMU, which may take longer than a service may be silent."""
+        """Store the function that reports waits for the FMU, which may exceed the permitted silence of a service."""
         self._report_wait = report_wait
 
     def close(self) -> None:
@@ -66,7 +66,7 @@ class FmuBlock:
 
     @property
     def reports(self) -> dict[str, str]:
-        """No entries of the log's metadata."""
+        """Return no entries of the log's metadata."""
         return {}
 
     def on_tick(self, tick: int) -> int:
@@ -88,7 +88,7 @@ class FmuBlock:
         return LockStepError(f"{self._where}: output {name} is {value} at {where}")
 
     def _finish(self, sent: int, received: int) -> int:
-        """Finish an exchange that compiled code has begun. Return 0 on success."""
+        """Finish an exchange that compiled code has started. Return 0 on success."""
         try:
             if self._host is None:
                 self._host = HostProcess(self._fmu, self._request, self._reply, self._report_wait)
@@ -126,7 +126,7 @@ def _tables(
         graph: the diagram.
         connections: inputs or outputs.
         more: further columns of each port.
-        own: port of the FMU in place of a port.
+        own: port of the FMU by the port that it replaces.
     """
     ports: list[tuple[int, ...]] = []
     places: list[tuple[int, int]] = []

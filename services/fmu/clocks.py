@@ -1,4 +1,4 @@
-"""Input clocks of an FMU for scheduled execution, each of which activates a model partition."""
+"""Input clocks of an FMU for scheduled execution; each activates a model partition."""
 
 import math
 from pathlib import Path
@@ -12,18 +12,18 @@ PERIODIC, COUNTDOWN, TRIGGERED = ("constant", "fixed"), "countdown", "triggered"
 
 
 class Clock(NamedTuple):
-    """An input clock."""
+    """Input clock of an FMU."""
 
     name: str
     reference: int
-    variability: str  # of the interval, as FMI names it
-    interval: float  # [s] between two ticks; 0: the description has none
-    shift: float  # [s] of the first tick
-    priority: int  # of the partition; at one time the lowest number is first
+    variability: str  # interval variability, as FMI names it
+    interval: float  # [s] interval between two ticks; 0: not in the description
+    shift: float  # [s] time of the first tick
+    priority: int  # priority of the partition; of simultaneous ones the lowest number is first
 
 
 def input_clocks(description: bytes) -> list[Clock]:
-    """Return the input clocks of a model description in FMI 3.0, of which FMPy has no intervals and priorities."""
+    """Return the input clocks of a model description in FMI 3.0; FMPy does not read their intervals and priorities."""
     clocks = Xml.fromstring(description).iterfind("ModelVariables/Clock[@causality='input']")
     return [
         Clock(
@@ -39,7 +39,7 @@ def input_clocks(description: bytes) -> list[Clock]:
 
 
 def _seconds(clock: Xml.Element, name: str) -> float:
-    """Return "interval" or "shift" of a clock, which are decimal numbers or counters of a resolution [1/s]."""
+    """Return "interval" or "shift" of a clock [s], given as decimal numbers or as counters with a resolution [1/s]."""
     decimal, counter = clock.get(f"{name}Decimal"), clock.get(f"{name}Counter")
     if decimal is None and counter is not None:
         return int(counter) / int(clock.get("resolution", "1"))
@@ -50,16 +50,19 @@ def check_clock(key: str, path: Path, clock: Clock, tick: float) -> None:
     """Raise ConfigError if a run with ticks of this length [s] cannot activate a clock.
 
     Args:
-        key, path: of the FMU, for messages.
-        clock: of the FMU.
-        tick: length of one [s].
+        key: key of the FMU, for messages.
+        path: path of the FMU, for messages.
+        clock: input clock of the FMU.
+        tick: length of a tick [s].
     """
     if clock.variability in (COUNTDOWN, TRIGGERED):
         return
     where = f"{path}: clock {clock.name}"
     if clock.variability not in PERIODIC:
-        known = ", ".join((*PERIODIC, COUNTDOWN, TRIGGERED))
-        raise ConfigError(key, f"{where} has the interval variability {clock.variability or 'none'}", f"one of {known}")
+        supported = ", ".join((*PERIODIC, COUNTDOWN, TRIGGERED))
+        raise ConfigError(
+            key, f"{where} has the interval variability {clock.variability or 'none'}", f"one of {supported}"
+        )
     if not clock.interval > 0.0:
         raise ConfigError(key, f"{where} has no interval in {DESCRIPTION}", "intervalDecimal above 0")
     for name, value in (("interval", clock.interval), ("shift", clock.shift)):

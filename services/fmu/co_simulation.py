@@ -1,4 +1,4 @@
-"""Co-simulation: the FMU integrates itself. Steps that end early go on after the FMU's event."""
+"""Co-simulation: the FMU integrates its own states. A step that ends early continues after the FMU's event."""
 
 import ctypes
 import os
@@ -18,7 +18,7 @@ LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # kinds of status in FMI 2.0
 
 
 class CoSimulation(FmuInstance):
-    """An FMU that steps itself."""
+    """FMU with its own integrator."""
 
     def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
@@ -45,7 +45,7 @@ class CoSimulation(FmuInstance):
         return {"eventModeUsed": self._event_mode, "earlyReturnAllowed": True}
 
     def after_initialisation(self) -> None:
-        """Settle the discrete states, and enter step mode."""
+        """Update the discrete states until they converge, and enter step mode."""
         self._former[:] = np.frombuffer(self.inputs, np.int64) if len(self.inputs) else 0
         if self._event_mode:
             self.update_discrete_states(0.0)
@@ -62,7 +62,7 @@ class CoSimulation(FmuInstance):
             group.copy_out()
 
     def serve(self, channel: Cell) -> None:
-        """Answer requests in compiled code. Return if the FMU has ended the simulation, and its outputs are not sent.
+        """Answer requests in compiled code. Return without sending outputs if the FMU has ended the simulation.
 
         Args:
             channel: cell of a `stepping.Channel`.
@@ -74,7 +74,7 @@ class CoSimulation(FmuInstance):
         while result == stepping.INTERRUPTED:
             result, status = stepping.serve(self._calls, channel)
         if result == stepping.CLOSED:
-            os._exit(0)  # the run is over; foreign code is not asked
+            os._exit(0)  # the run is over; foreign code is not called
         self._finish(result, status)
 
     def _finish(self, result: int, status: int) -> None:
@@ -85,11 +85,11 @@ class CoSimulation(FmuInstance):
         elif result in stepping.FUNCTIONS:
             self.check(stepping.FUNCTIONS[result], status)
         elif result == stepping.ENDED:
-            raise ValueError(f"asked to end the simulation (t = {self._times[3]:g} s)")
+            raise ValueError(f"requested the end of the simulation (t = {self._times[3]:g} s)")
         elif result == stepping.UNSETTLED:
-            raise ValueError(f"the discrete states do not settle in {UPDATES} updates")
+            raise ValueError(f"the discrete states do not converge in {UPDATES} updates")
         elif result == stepping.STUCK:
-            raise ValueError(f"doStep does not get beyond t = {self._times[2]:g} s")
+            raise ValueError(f"doStep does not advance beyond t = {self._times[2]:g} s")
         elif result == stepping.MANY:
             raise ValueError(f"doStep ended early {UPDATES} times in one step")
 

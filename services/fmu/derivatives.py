@@ -1,6 +1,6 @@
-"""The differential equations of an FMU for model exchange, as a system that Lapwing's integrators step.
+"""Differential equations of an FMU for model exchange, as a system for Lapwing's integrators.
 
-The compiled rate calls the functions of the FMU by their addresses, so that any number of FMUs share its machine code.
+The compiled rate calls the functions of the FMU by their addresses, so all FMUs share its machine code.
 """
 
 # numba.core.types fills itself at import
@@ -16,7 +16,7 @@ from numba.extending import intrinsic
 from lapwing.dynamics.integrators import RATES, StepDoubling, integrate_step_doubling
 from lapwing.kernels import always_inline, kernel
 
-WARNING = 1  # highest status of FMI that is no failure
+WARNING = 1  # highest FMI status of success
 
 
 class FmuFunctions(NamedTuple):
@@ -76,5 +76,5 @@ RATES[FmuFunctions] = rate
 
 @kernel
 def advance_states(method: Any, accuracy: float, p: FmuFunctions, t: float, x: Any, end: float) -> Any:
-    """Return the states at `end` by step doubling of a method, from the states x at t."""
+    """Return the states at `end` by step doubling of a method from the states x at t."""
     return integrate_step_doubling(StepDoubling(method, accuracy), p, t, x, end - t, end)

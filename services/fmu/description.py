@@ -1,4 +1,4 @@
-"""Description of an FMU, and the variables that can be connected."""
+"""Description of an FMU and its connectable variables."""
 
 import base64
 import math
@@ -15,8 +15,8 @@ from lapwing.services.fmu.service_config import CLOCK, SCHEDULED_EXECUTION, Elem
 
 INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
 TYPES = ("Real", "Float64", "Float32", "Integer", *INTEGERS, "Boolean", "Enumeration")
-TEXTS = ("String", "Binary")  # types that start values may have, Binary in hexadecimal
-_BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # base units of FMI
+TEXTS = ("String", "Binary")  # types of start values, Binary in hexadecimal
+_BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # base units in FMI
 
 
 class NamedUnit(NamedTuple):
@@ -27,10 +27,10 @@ class NamedUnit(NamedTuple):
 
 
 class Description:
-    """An FMU that runs on this machine.
+    """FMU that can run on this machine.
 
     Attributes:
-        version: of FMI, 2 or 3.
+        version: version of FMI, 2 or 3.
         interface: CO_SIMULATION, MODEL_EXCHANGE or SCHEDULED_EXECUTION.
     """
 
@@ -38,14 +38,14 @@ class Description:
         """Read the description.
 
         Args:
-            key: of the FMU in the scene.
-            path: of the FMU, for messages.
-            content: of the file.
-            interface: the desired one; None: the first that the FMU has.
-            tick: length of one [s].
+            key: key of the FMU in the scene.
+            path: path of the FMU, for messages.
+            content: content of the file.
+            interface: desired interface; None for the first one that the FMU has.
+            tick: length of a tick [s].
 
         Raises:
-            ConfigError: no FMU, of another platform, without this interface, or with clocks that cannot tick.
+            ConfigError: not an FMU, for another platform, without this interface, or with unsupported clocks.
         """
         model, self.version, self.interface, clocks = read_archive(key, path, content, interface)
         for clock in clocks:
@@ -62,7 +62,7 @@ class Description:
         """Return the scalar of this name, the elements of the array, or the element NAME[i, j] of an array.
 
         Raises:
-            ConfigError: no such variable, or one of another causality or type.
+            ConfigError: no such variable, or it has another causality or type.
         """
         v, index = self._variables.get(name), ""
         if v is None and name.endswith("]"):
@@ -74,7 +74,7 @@ class Description:
             raise ConfigError(key, f"{name} has causality {v.causality}", f"an {causality} of the FMU")
         is_clock = v.type == CLOCK and self.interface == SCHEDULED_EXECUTION and causality
         if is_clock and causality == "input" and v.intervalVariability != TRIGGERED:
-            raise ConfigError(key, f"{name} is a clock with ticks of its own", "a triggered clock, or another variable")
+            raise ConfigError(key, f"{name} is a clock with its own ticks", "a triggered clock, or another variable")
         if not is_clock and v.type not in (TYPES if causality else TYPES + TEXTS):
             raise ConfigError(key, f"{name} has the type {v.type}", f"a variable of type {', '.join(TYPES)}")
         if v.clocks and self.interface != SCHEDULED_EXECUTION:
@@ -91,7 +91,7 @@ class Description:
         return [Element(name, v.valueReference, v.type, _position(key, name, index, shape), size)]
 
     def _shape(self, v: Any) -> tuple[int, ...]:
-        """Return the lengths of an array at the start values of the structural parameters; () of a scalar."""
+        """Return the lengths of an array at the start values of the structural parameters; () for a scalar."""
         lengths = []
         for each in getattr(v, "dimensions", None) or ():
             fixed = getattr(each, "start", None)
@@ -117,13 +117,13 @@ class Description:
         if base is not None:
             powers = tuple((each, int(getattr(base, each))) for each in sorted(_BASE) if getattr(base, each))
             return NamedUnit(name, Unit(float(base.factor), powers))
-        if (known := parse_unit(name)) is None:
+        if (unit := parse_unit(name)) is None:
             raise ConfigError(key, f"{v.name} is in {name}, which the FMU does not define", "a unit with a definition")
-        return NamedUnit(name, known)
+        return NamedUnit(name, unit)
 
 
 def _must_tick(v: Any) -> bool:
-    """Return True for a clock whose ticks are due at times that the FMU or its description defines."""
+    """Return True for a clock whose tick times are defined by the FMU or its description."""
     return v.type == "Clock" and v.causality == "input" and v.intervalVariability != "triggered"
 
 
@@ -142,10 +142,10 @@ def _position(key: str, name: str, index: str, shape: tuple[int, ...]) -> int:
 
 
 def content_of(key: str, path: Path, embedded: str | None) -> bytes:
-    """Return the bytes of an FMU, from its file unless they are embedded in base64.
+    """Return the content of an FMU, from its file unless it is embedded in base64.
 
     Raises:
-        ConfigError: neither can be read.
+        ConfigError: it cannot be read.
     """
     try:
         if not embedded and (size := path.stat().st_size) > LARGEST:

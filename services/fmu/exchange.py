@@ -1,7 +1,7 @@
-"""Compiled exchange of a tick with the process of an FMU: inputs, a request, its answer, outputs.
+"""Compiled exchange of a tick with the process of an FMU: inputs, request, answer, outputs.
 
-Python runs only if the FMU does not answer at once, or not as it should (`wait`). Two pipes connect the processes. A
-request is (time [s], step [s], inputs), an answer (length of an error text, outputs), all doubles.
+Python runs (`wait`) only if the FMU does not answer immediately, or with an error. Two pipes connect the processes. A
+request is (time [s], step [s], inputs), an answer is (length of an error text [bytes], outputs), all of type double.
 """
 
 from typing import Any, NamedTuple
@@ -12,16 +12,16 @@ from lapwing.kernels import always_inline, math
 from lapwing.kernels.native_calls import call_int, call_long, load_double, store_double
 from lapwing.services.fmu.pipe_polling import soon_readable
 
-PROMPT = 2  # [ms] that compiled code waits for an answer; then Python waits, which obeys signals and time limits
+PROMPT = 2  # [ms] wait of compiled code for an answer; then Python waits, which handles signals and time limits
 
 
 class FmuExchange(NamedTuple):
     """Addresses and tables of an exchange. A ring is four integers: address, bytes of a row, rows - 1, period."""
 
-    interval: float  # [s]
-    delay: int  # [ticks] of the inputs
-    request: Any  # doubles
-    reply: Any  # doubles
+    interval: float  # [s] length of a tick
+    delay: int  # [ticks] delay of the inputs
+    request: Any  # array of doubles
+    reply: Any  # array of doubles
     request_address: int
     reply_address: int
     channels: Any  # file descriptors of requests and answers
@@ -30,7 +30,7 @@ class FmuExchange(NamedTuple):
     write: int  # addresses of C functions
     poll: int
     read: int
-    wait: int  # of `wait(bytes sent, bytes received) -> 0 once the answer is there`
+    wait: int  # address of `wait(bytes sent, bytes received) -> 0 after the answer has arrived`
     sources: Any  # (n, 6) ring of each input port, first and last + 1 of its connections
     source_places: Any  # (connections, 2) index of an input, place in a row [bytes]
     source_factors: Any  # (connections,)
@@ -73,7 +73,7 @@ def _publish(p: FmuExchange, tick: int) -> None:
 
 @always_inline
 def _answered(p: FmuExchange) -> bool:
-    """Send the request, and return True once the answer is there without an error."""
+    """Send the request. Return True after an answer without error."""
     size, received = 8 * len(p.request), 0
     sent = call_long(p.write, (p.channels[0], p.request_address, size))
     prompt = sent == size and (

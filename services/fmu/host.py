@@ -1,6 +1,7 @@
-"""Process of one FMU: `python -m lapwing.services.fmu.host REQUESTS REPLIES`. It obeys `host_process.HostProcess`.
+"""Process of one FMU: `python -m lapwing.services.fmu.host REQUESTS REPLIES`, controlled by `host_process.HostProcess`.
 
-The arguments are file descriptors of pipes. Inputs and outputs of type double stay where the pipes put and take them.
+The arguments are file descriptors of pipes. Inputs and outputs of type double are not copied after the transfer over
+the pipes.
 """
 
 import base64
@@ -25,7 +26,7 @@ def instantiated(spec: dict[str, Any], inputs: Any, outputs: Any) -> FmuInstance
     """Extract, load and instantiate an FMU.
 
     Args:
-        spec: its `FmuConfig` as a dictionary, and `folder` to extract it.
+        spec: `FmuConfig` of the FMU as a dictionary, and `folder` to extract it.
         inputs, outputs: see `FmuInstance`.
 
     Raises:
@@ -38,7 +39,7 @@ def instantiated(spec: dict[str, Any], inputs: Any, outputs: Any) -> FmuInstance
     folder, is_3 = Path(spec["folder"]), spec["version"] == 3
     content = base64.b64decode(spec["content"]) if spec["content"] else Path(spec["path"]).read_bytes()
     if hashlib.sha256(content).hexdigest() != spec["sha256"]:
-        raise ValueError("the file differs from the one that was resolved; restore it, or run the scene again")
+        raise ValueError("the file has changed since the start of the run; restore it, or run the scene again")
     archive = folder / "model.zip"
     archive.write_bytes(content)
     fmpy.extract(str(archive), unzipdir=str(folder))
@@ -84,7 +85,7 @@ def serve(requests: int, replies: int) -> None:
                 else:
                     instance.advance(*moment)
             os.write(replies, reply)
-        except Exception as error:  # FMPy raises many
+        except Exception as error:  # FMPy raises exceptions of many classes
             text = (" ".join(str(error).split()) or type(error).__name__).encode()[:500]
             status.value = len(text)
             os.write(replies, reply + text)
@@ -97,7 +98,7 @@ def _read(channel: int, data: bytearray) -> bytearray:
     while size < len(data):
         part = os.readv(channel, [memoryview(data)[size:]])
         if not part:
-            os._exit(0)  # the run is over; foreign code is not asked
+            os._exit(0)  # the run is over; foreign code is not called
         size += part
     return data
 

@@ -1,4 +1,4 @@
-"""The process of an FMU, as seen from the run, which continues if foreign machine code crashes or hangs."""
+"""Process of an FMU as seen from the run, which survives crashes and hangs of foreign machine code."""
 
 import contextlib
 import json
@@ -18,17 +18,17 @@ import numpy as np
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.fmu.service_config import FmuConfig
 
-STARTUP = 300.0  # [s] to load the FMU, compile, and initialise it
-LOOK = 0.1  # [s] after which a wait looks whether the process gets a processor
+STARTUP = 300.0  # [s] limit to load, compile and initialise the FMU
+LOOK = 0.1  # [s] between two checks of the processor time of the process during a wait
 LENGTH = struct.Struct("<q")
 
 
 class HostError(Exception):
-    """Failure of an FMU; the text says how it failed."""
+    """Failure of an FMU; the text describes it."""
 
 
 class HostProcess:
-    """A process that runs one FMU. Two pipes connect it, which are faster than a socket.
+    """Process that runs one FMU. It is connected by two pipes, which are faster than a socket.
 
     Attributes:
         requests, replies: file descriptors of the pipes.
@@ -44,13 +44,13 @@ class HostProcess:
         """Start the process and instantiate the FMU.
 
         Args:
-            fmu: configuration.
-            request: doubles of a request: time [s], step [s] (negative: initialise), inputs.
-            reply: doubles of an answer: length of an error text [bytes], outputs.
-            report_wait: is called with a text during long waits.
+            fmu: configuration of the FMU.
+            request: array of doubles of a request: time [s], step [s] (negative: initialise), inputs.
+            reply: array of doubles of an answer: length of an error text [bytes], outputs.
+            report_wait: function that is called with a text during long waits.
 
         Raises:
-            HostError: the file has changed, or cannot be instantiated.
+            HostError: the file has changed, or the FMU cannot be instantiated.
         """
         self._timeout, self._request, self._reply = fmu.timeout, request, reply
         self._report_wait, self._name = report_wait, f"services.{fmu.name}"
@@ -89,7 +89,7 @@ class HostProcess:
             self._receive(memoryview(text))
             self._end()
             raise HostError(text.decode(errors="replace"))
-        self._limit = self._timeout  # of the next
+        self._limit = self._timeout  # [s] limit of the next request
 
     def _send(self, data: memoryview) -> None:
         try:
@@ -123,7 +123,7 @@ class HostProcess:
 
 
 def _end(process: subprocess.Popen, channels: tuple[int, int], folder: str) -> None:
-    """End the process, which leaves when its pipes close, and remove its files."""
+    """Close the pipes, which ends the process, and remove its files."""
     for each in channels:
         os.close(each)
     with contextlib.suppress(subprocess.TimeoutExpired):

@@ -1,4 +1,4 @@
-"""An instantiated FMU: access to its variables, initialisation and messages. It lives in the process of the FMU."""
+"""Instantiated FMU: access to its variables, initialisation and messages. Used in the process of the FMU."""
 
 import ctypes
 import math
@@ -8,26 +8,26 @@ from lapwing.services.fmu.service_config import CLOCK
 from lapwing.services.fmu.stepping import UPDATES, WARNING
 from lapwing.services.fmu.variable_group import Group
 
-DISCARD = 2  # status of FMI
+DISCARD = 2  # FMI status
 
 
 class FmuInstance:
-    """An instantiated FMU; the subclasses advance its time."""
+    """Instantiated FMU; subclasses advance its time."""
 
     def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """Instantiate the FMU.
 
         Args:
-            spec: the FMU's `FmuConfig` as a dictionary.
+            spec: `FmuConfig` of the FMU as a dictionary.
             model: FMPy's model description.
-            fmu: FMPy's object of the FMU.
-            inputs: array of doubles that the inputs are set to.
+            fmu: FMPy's instance of the FMU.
+            inputs: array of doubles with the values of the inputs.
             outputs: array of doubles that receives the outputs.
         """
         self.spec, self.model, self.fmu, self.inputs = spec, model, fmu, inputs
         self.is_3 = spec["version"] == 3
         self.messages: list[str] = []
-        self.ended: float | None = None  # [s] at which the FMU asked to end the simulation
+        self.ended: float | None = None  # [s] time at which the FMU requested the end of the simulation
         self._instantiate()
         component = fmu.component
         is_number = isinstance(component, int)
@@ -96,7 +96,7 @@ class FmuInstance:
         self.get_outputs()
 
     def after_initialisation(self) -> None:
-        """Leave the mode in which the FMU is after its initialisation."""
+        """Leave the mode that follows the initialisation of the FMU."""
 
     def advance(self, time: float, step: float) -> None:
         """Set inputs at `time`, advance the FMU by `step` [s], and read the outputs."""
@@ -104,7 +104,7 @@ class FmuInstance:
 
     @property
     def inputs_changed(self) -> bool:
-        """True if the inputs differ from the ones that the FMU has."""
+        """Return True if the inputs differ from those that were set last."""
         return bytes(self.inputs) != self._last_inputs
 
     def set_inputs(self) -> None:
@@ -119,10 +119,10 @@ class FmuInstance:
             self.check("get", group.get())
 
     def update_discrete_states(self, time: float) -> float:
-        """Update discrete states in event mode until they settle. Return the time of the next time event [s], or inf.
+        """Update discrete states in event mode until they converge. Return the time of the next time event [s], or inf.
 
         Raises:
-            ValueError: they never settle.
+            ValueError: they do not converge.
         """
         for _ in range(UPDATES):
             again, terminate, has_time, at = self._update()
@@ -130,10 +130,10 @@ class FmuInstance:
                 self.ended = time
             if terminate or not again:
                 return at if has_time else math.inf
-        raise ValueError(f"the discrete states do not settle in {UPDATES} updates")
+        raise ValueError(f"the discrete states do not converge in {UPDATES} updates")
 
     def _update(self) -> tuple[bool, bool, bool, float]:
-        """Return (another update is needed, the FMU asks to end, it has a time event, time of the event [s])."""
+        """Return (another update is needed, the FMU requests the end, it has a time event, time of the event [s])."""
         if not self.is_3:
             again, terminate, _, _, has_time, at = self.fmu.newDiscreteStates()
             return again, terminate, has_time, at

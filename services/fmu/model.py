@@ -25,7 +25,7 @@ INTEGRATOR, ACCURACY = "rk4", 1e-8
 
 
 class ImportedFmu:
-    """An FMU with its table of the scene.
+    """FMU with its table in the scene.
 
     Attributes:
         exported: variables that other FMUs read, in the columns of `own_port`.
@@ -51,15 +51,15 @@ class ImportedFmu:
     def config(
         self, ports: Mapping[str, Port], fmus: Mapping[str, "ImportedFmu"], effects: Mapping[str, Port]
     ) -> FmuConfig:
-        """Connect all variables; the exported ones follow by `with_exports`.
+        """Connect all variables except exported ones, which `with_exports` adds.
 
         Args:
-            ports: of the other services.
+            ports: ports of the other services.
             fmus: all FMUs by name.
             effects: ports of named inputs of effects.
 
         Raises:
-            ConfigError: a connection does not fit.
+            ConfigError: a connection is invalid.
         """
         table, inputs, outputs, start = self.table, [], [], []
         for variable, source in table.inputs.items():
@@ -101,8 +101,8 @@ class ImportedFmu:
         if self.description.interface != MODEL_EXCHANGE:
             for name in ("integrator", "accuracy"):
                 if getattr(table, name) is not None:
-                    known = 'interface = "model_exchange"'
-                    raise ConfigError(f"{self.key}.{name}", "the FMU integrates by itself", known)
+                    expected = 'interface = "model_exchange"'
+                    raise ConfigError(f"{self.key}.{name}", "the FMU has its own integrator", expected)
         name = table.integrator or INTEGRATOR
         if name not in integrators.names():
             raise ConfigError.unknown(key, "integrator", name, integrators.names())
@@ -112,7 +112,7 @@ class ImportedFmu:
 
 
 def _by_type(connections: tuple[Connection, ...]) -> tuple[Connection, ...]:
-    """Return connections with those of one type side by side, so that one call moves them without copies."""
+    """Return connections grouped by type, so that one call moves a group without copies."""
     return tuple(sorted(connections, key=lambda each: each.element.type))
 
 
@@ -171,7 +171,7 @@ def _factor(key: str, variable: str, theirs: NamedUnit | None, column: str, ours
     """Return the factor from the unit of a column to that of a variable.
 
     Raises:
-        ConfigError: they measure different quantities.
+        ConfigError: the units belong to different quantities.
     """
     if ours is None or theirs is None:
         return 1.0

@@ -9,13 +9,13 @@ from lapwing.services.fmu.derivatives import FmuFunctions, advance_states
 from lapwing.services.fmu.instance import FmuInstance
 from lapwing.services.fmu.stepping import UPDATES
 
-WIDTH = 1e-12  # [s] of the interval in which a state event is known to be
+WIDTH = 1e-12  # [s] length of the interval that contains a state event
 
-SLACK = 1e-9  # of a step: a time event this close to its end belongs to it
+SLACK = 1e-9  # relative to a step: a time event this close to its end belongs to the step
 
 
 class ModelExchange(FmuInstance):
-    """An FMU whose states Lapwing integrates."""
+    """FMU whose states Lapwing integrates."""
 
     def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
@@ -33,7 +33,7 @@ class ModelExchange(FmuInstance):
         return int(ctypes.cast(self.function(name), ctypes.c_void_p).value or 0)
 
     def after_initialisation(self) -> None:
-        """Settle the discrete states, and enter continuous-time mode."""
+        """Update the discrete states until they converge, and enter continuous-time mode."""
         self._next_event = self.update_discrete_states(0.0)
         self.call(self._enter_continuous_time_mode)
         states, indicators = self.model.numberOfContinuousStates, self.model.numberOfEventIndicators
@@ -42,9 +42,9 @@ class ModelExchange(FmuInstance):
         self._states, self._indicators = (ctypes.c_double * states)(), (ctypes.c_double * indicators)()
 
     def advance(self, time: float, step: float) -> None:
-        """Set inputs at `time`, which is an event if they differ, integrate over `step` [s], and read the outputs."""
+        """Set inputs at `time` (an event if they changed), integrate over `step` [s], and read the outputs."""
         if self.ended is not None:
-            raise ValueError(f"asked to end the simulation (t = {self.ended:g} s)")
+            raise ValueError(f"requested the end of the simulation (t = {self.ended:g} s)")
         self._integrate_over(time, step)
         self.get_outputs()
 
@@ -90,7 +90,7 @@ class ModelExchange(FmuInstance):
         return end
 
     def _integrate(self, begin: float, x: tuple[float, ...], end: float) -> tuple[float, ...]:
-        """Return the states at `end`, which the FMU has, too.
+        """Return the states at `end`, and set them in the FMU.
 
         Raises:
             ValueError: the FMU reports an error, or a state is not finite.

@@ -1,4 +1,4 @@
-"""Wait for a pipe in compiled code without sleep: a process that sleeps takes 10 to 30 us to wake up."""
+"""Polling of a pipe in compiled code, because a sleeping process takes 10 to 30 us to wake up."""
 
 import os
 
@@ -6,12 +6,12 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.native_calls import call_int
 
 LOOKS = 200 if len(os.sched_getaffinity(0)) > 1 else 0
-"""Looks at a pipe (0.2 us each) before a process sleeps; on one processor, the other end cannot write meanwhile."""
+"""Number of polls (0.2 us each) before a process sleeps; on one processor, the other end cannot write meanwhile."""
 
 
 @always_inline
 def soon_readable(poll: int, entry: int, looks: int) -> bool:
-    """Look at a pipe until there is something to read or its other end is closed, at most `looks` times.
+    """Poll a pipe until it has data or its other end is closed, at most `looks` times.
 
     Args:
         poll: address of the C function.

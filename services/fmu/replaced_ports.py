@@ -1,4 +1,4 @@
-"""Blocks of other services, which read the ports of FMUs in place of the ones that these replace."""
+"""Blocks of other services that read the ports of FMUs in place of the ports that these replace."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ def _renamed(inputs: Sequence[InputPort], replaced: Mapping[str, str]) -> tuple[
 
 
 class _PythonBlock:
-    """A Python block, which reads ports by name from the diagram that it gets."""
+    """Python block with replaced ports; it reads ports by name from the diagram."""
 
     def __init__(self, part: Any, replaced: Mapping[str, str]):
         self._part, self._replaced = part, replaced
@@ -42,7 +42,7 @@ class _PythonBlock:
 
 
 class _Diagram:
-    """View of a block diagram, or of a vehicle's view of one, in which ports of FMUs have the names of others."""
+    """View of a block diagram, or of a vehicle's part, with ports of FMUs under the names of the replaced ports."""
 
     def __init__(self, graph: Any, replaced: Mapping[str, str]):
         self._graph, self._replaced = graph, replaced

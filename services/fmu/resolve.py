@@ -20,20 +20,20 @@ def connect(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Se
     """Return the services of a scene with a service for each of its FMUs.
 
     An FMU publishes a copy of each port of which it computes columns. All services but FMUs read the copy. Outputs that
-    other FMUs read are a port of its own.
+    other FMUs read form a separate port.
 
     Raises:
-        ConfigError: an FMU or a connection is invalid, or the connections are a loop without delay.
+        ConfigError: an FMU or a connection is invalid, or the connections form an algebraic loop.
     """
     if not scene.has(Services):
         return dict(services)
     table = scene[Services]
-    known = {port.name: port for service in services.values() for port in service.ports}
+    published = {port.name: port for service in services.values() for port in service.ports}
     imported = {name: ImportedFmu(name, table.fmu(name), scene[Communication].interval) for name in table.tables}
     effects = _effect_ports(scene, services)
-    configs = [fmu.config(known, imported, effects) for fmu in imported.values()]
+    configs = [fmu.config(published, imported, effects) for fmu in imported.values()]
     fmus = [imported[each.name].with_exports(each) for each in configs]
-    _check_outputs(fmus, known)
+    _check_outputs(fmus, published)
     replaced = replaced_ports(fmus)
     result = {
         name: service._replace(inputs=tuple(i._replace(port=replaced.get(i.port, i.port)) for i in service.inputs))
@@ -41,13 +41,13 @@ def connect(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Se
     }
     for fmu in fmus:
         exported = len(imported[fmu.name].exported)
-        result[fmu.name + FMU_SUFFIX] = _service(fmu, exported, {**known, **effects})
+        result[fmu.name + FMU_SUFFIX] = _service(fmu, exported, {**published, **effects})
     _check_loops(result, fmus)
     return result
 
 
-def _check_outputs(fmus: list[FmuConfig], known: Mapping[str, Port]) -> None:
-    """Raise ConfigError unless each FMU computes something, and each port has columns of one FMU at most."""
+def _check_outputs(fmus: list[FmuConfig], published: Mapping[str, Port]) -> None:
+    """Raise ConfigError unless each FMU computes a column, and each port has columns of at most one FMU."""
     owners: dict[str, str] = {}
     for fmu in fmus:
         key = f"services.{fmu.name}.outputs"
@@ -56,7 +56,7 @@ def _check_outputs(fmus: list[FmuConfig], known: Mapping[str, Port]) -> None:
         for port in dict.fromkeys(each.port for each in fmu.outputs):
             if owners.setdefault(port, fmu.name) != fmu.name:
                 raise ConfigError(key, f"two FMUs compute columns of {port}", "one FMU for each port")
-            if port in known and known[port].period == LATCHED:
+            if port in published and published[port].period == LATCHED:
                 raise ConfigError(key, f"{port} changes at events only", "a port that is published periodically")
 
 
@@ -64,9 +64,9 @@ def _service(fmu: FmuConfig, exported: int, ports: Mapping[str, Port]) -> Servic
     """Return the service of an FMU.
 
     Args:
-        fmu: its configuration.
-        exported: number of the outputs that other FMUs read.
-        ports: of the other services and of the named inputs of effects.
+        fmu: configuration of the FMU.
+        exported: number of outputs that other FMUs read.
+        ports: ports of the other services and of the named inputs of effects.
     """
     inputs = {(each.port, fmu.delay): None for each in fmu.inputs}
     outputs = []
@@ -82,7 +82,11 @@ def _service(fmu: FmuConfig, exported: int, ports: Mapping[str, Port]) -> Servic
 
 
 def _effect_ports(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[str, Port]:
-    """Return the ports of named inputs of effects that FMUs compute. Raise ConfigError if the scene has none such."""
+    """Return the ports of named inputs of effects that FMUs compute.
+
+    Raises:
+        ConfigError: the scene has no such input.
+    """
     for name, table in scene[Services].tables.items():
         for column in table.get("outputs", {}):
             if column.startswith(EFFECT):
@@ -92,7 +96,7 @@ def _effect_ports(scene: Scene, services: Mapping[str, ServiceConfig]) -> dict[s
 
 
 def _check_loops(services: Mapping[str, ServiceConfig], fmus: list[FmuConfig]) -> None:
-    """Raise ConfigError if undelayed inputs of services are a loop."""
+    """Raise ConfigError if undelayed inputs of services form a loop."""
     producers = {port.name: name for name, service in services.items() for port in service.ports}
     sources = {
         name: {producers[i.port] for i in service.inputs if i.delay == 0 and i.port in producers} - {name}
@@ -100,11 +104,11 @@ def _check_loops(services: Mapping[str, ServiceConfig], fmus: list[FmuConfig]) -
     }
     loop: set[str] = set()
     rest = set(services)
-    while rest != loop:  # remove those that no loop leads to or from
+    while rest != loop:  # remove services outside of loops
         loop = rest
         rest = {name for name in loop if sources[name] & loop and any(name in sources[other] for other in loop)}
     if not loop:
         return
     keys = ", ".join(f"services.{fmu.name}.delay" for fmu in fmus if fmu.name + FMU_SUFFIX in loop)
-    message = f"an algebraic loop, a loop without delay, through {', '.join(sorted(loop))}"
+    message = f"an algebraic loop through {', '.join(sorted(loop))}"
     raise ConfigError(keys, message, "delay = 1 for the FMU that closes it")

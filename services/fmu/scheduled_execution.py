@@ -10,22 +10,22 @@ from lapwing.services.fmu.instance import FmuInstance
 from lapwing.services.fmu.service_config import CLOCK
 from lapwing.services.fmu.stepping import UPDATES
 
-SLACK = 1e-9  # [s] between a tick and the computed time of a clock
+SLACK = 1e-9  # [s] tolerance between a tick and the computed time of a clock
 CHANGED = 2  # fmi3IntervalChanged
 
 
 class ScheduledExecution(FmuInstance):
-    """An FMU whose partitions run one after the other: no partition interrupts another one."""
+    """FMU with model partitions that run one after another, without preemption."""
 
     def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
         super().__init__(spec, model, fmu, inputs, outputs)
         address = ctypes.cast(self.function("ActivateModelPartition"), ctypes.c_void_p).value or 0
-        # not FMPy's method, which had another argument until FMI 3.0 was released
+        # not FMPy's method, which has an argument from before the release of FMI 3.0
         self._run = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_double)(address)
         clocks = sorted(input_clocks(Path(spec["folder"], DESCRIPTION).read_bytes()), key=_priority)
         self._due = {clock: clock.shift if clock.variability in PERIODIC else math.inf for clock in clocks}
-        self._ticks = dict.fromkeys(clocks, 0)  # of periodic ones, so that their times have no accumulated error
+        self._ticks = dict.fromkeys(clocks, 0)  # tick counts of periodic clocks, so that no time errors accumulate
         by_reference = {clock.reference: clock for clock in clocks if clock.variability == TRIGGERED}
         self._triggers = [(index, by_reference[reference]) for index, reference in _clocks_of(spec["inputs"])]
         self._outputs, self._output_clocks = outputs, _clocks_of(spec["outputs"])
@@ -35,7 +35,7 @@ class ScheduledExecution(FmuInstance):
         self._intervals, self._qualifiers = (ctypes.c_double * n)(), (ctypes.c_int * n)()
 
     def after_initialisation(self) -> None:
-        """Activate the clocks of time 0."""
+        """Activate the clocks that are due at time 0."""
         self._start_countdowns(0.0)
         self._activate(0.0)
 
@@ -83,5 +83,5 @@ def _priority(clock: Clock) -> int:
 
 
 def _clocks_of(connections: list[Any]) -> list[tuple[int, int]]:
-    """Return index and reference of each connection with a clock."""
+    """Return index and value reference of each connection with a clock."""
     return [(k, element[1]) for k, (_, _, element, _) in enumerate(connections) if element[2] == CLOCK]

@@ -11,20 +11,20 @@ from lapwing.dynamics.config_error import ConfigError
 
 
 class FmuTable(BaseModel):
-    """One `[services.NAME]`."""
+    """Table `[services.NAME]` of an FMU."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     fmu: str  # path of the FMU, relative to the scene
-    embed: bool = False  # store the whole FMU in the run configuration, and so in the log
+    embed: bool = False  # store the FMU in the run configuration, and therefore in the log
     content: str | None = None  # the embedded FMU in base64; written by `embed`
     interface: Literal["co_simulation", "model_exchange", "scheduled_execution"] | None = None  # default: the first
     integrator: str | None = None  # method for model exchange, default rk4
-    accuracy: float | None = Field(default=None, ge=1e-12, le=1e-2)  # of a state, relative to 1 + size; default 1e-8
+    accuracy: float | None = Field(default=None, ge=1e-12, le=1e-2)  # relative to 1 + size of a state; default 1e-8
     inputs: dict[str, str] = Field(default_factory=dict)  # FMU variable = "PORT.COLUMN", or "NAME.VARIABLE" of an FMU
     outputs: dict[str, str] = Field(default_factory=dict)  # "PORT.COLUMN" = FMU variable
     start: dict[str, float | str | list[float]] = Field(default_factory=dict)  # start values of FMU variables
-    delay: int = Field(default=0, ge=0, le=1)  # [ticks] of the inputs; 1 where the FMU closes an algebraic loop
-    timeout: float = Field(default=10.0, gt=0.0)  # [s] of wall time in which a step must end
+    delay: int = Field(default=0, ge=0, le=1)  # [ticks] delay of the inputs; 1 if the FMU closes an algebraic loop
+    timeout: float = Field(default=10.0, gt=0.0)  # [s] limit of the wall time of a step
 
 
 class Services(SceneTable):
@@ -41,13 +41,15 @@ class Services(SceneTable):
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """Make the paths of FMUs absolute, so that a log can be simulated again from another folder, or embed them."""
+        """Make the paths of FMUs absolute, so that a log can be resimulated from another folder, or embed them."""
         entries = tree.get(cls.TABLE, {})
         for entry in entries.values() if isinstance(entries, dict) else ():
             if isinstance(entry, dict) and isinstance(path := entry.get("fmu"), str):
                 absolute = (files.folder / path).resolve()
                 entry["fmu"] = str(absolute)
-                if entry.get("embed") is True and absolute.is_file():  # a missing one is named when it is resolved
+                if (
+                    entry.get("embed") is True and absolute.is_file()
+                ):  # a missing file is reported when the scene is resolved
                     entry["content"] = base64.b64encode(absolute.read_bytes()).decode()
 
     def check(self, scene: Scene) -> None:

@@ -1,4 +1,4 @@
-"""An FMU as a service of the lock step."""
+"""FMU as a service of the lock step."""
 
 from typing import Any
 
@@ -21,8 +21,8 @@ def create(setup: RunConfig, name: str) -> Service:
     """Return the service of an FMU.
 
     Args:
-        setup: configuration of the run.
-        name: of the service.
+        setup: run configuration.
+        name: name of the service.
 
     Raises:
         ValueError: foreign code is not allowed.

@@ -7,51 +7,51 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.services.common.ports import EFFECT
 
 CO_SIMULATION, MODEL_EXCHANGE, SCHEDULED_EXECUTION = "co_simulation", "model_exchange", "scheduled_execution"
-CLOCK = "Clock"  # type of FMI; a number that is not 0 is a tick
+CLOCK = "Clock"  # FMI type; a nonzero number is a tick
 
 
 class Element(NamedTuple):
-    """A scalar variable of an FMU, or an element of an array variable."""
+    """Scalar variable of an FMU, or element of an array variable."""
 
     variable: str  # name, with the index of an element: "u[0]"
     reference: int
-    type: str  # as FMI names it: Real, Float64, Int32, ...
-    position: int  # in the array, row-major; 0 of a scalar
-    size: int  # elements of the variable; 1 of a scalar
+    type: str  # FMI type: Real, Float64, Int32, ...
+    position: int  # index in the array, row-major; 0 for a scalar
+    size: int  # number of elements of the variable; 1 for a scalar
 
 
 class Connection(NamedTuple):
-    """A column of a port and an element of a variable."""
+    """Connection of a column of a port and an element of a variable."""
 
     port: str
     column: int
     element: Element
-    factor: float  # from the source's unit to the target's
+    factor: float  # conversion from the source's unit to the target's
 
 
 class StartValue(NamedTuple):
-    """A start value."""
+    """Start value of an element."""
 
     element: Element
-    value: float | str  # a text for the types String, and Binary in hexadecimal
+    value: float | str  # text for the type String, and for Binary (hexadecimal)
 
 
 class FmuConfig(NamedTuple):
-    """One FMU."""
+    """Configuration of one FMU."""
 
-    name: str  # of the service
+    name: str  # name of the service
     path: str
     sha256: str
     content: str  # the FMU in base64, "" if it stays in its file
-    version: int  # of FMI, 2 or 3
+    version: int  # version of FMI, 2 or 3
     interface: str  # CO_SIMULATION, MODEL_EXCHANGE or SCHEDULED_EXECUTION
-    integrator: str  # method of model exchange
-    accuracy: float  # of model exchange, relative to 1 + size of a state
+    integrator: str  # integrator for model exchange
+    accuracy: float  # tolerance for model exchange, relative to 1 + size of a state
     inputs: tuple[Connection, ...]
     outputs: tuple[Connection, ...]
     start: tuple[StartValue, ...]
-    delay: int  # [ticks] of the inputs
-    timeout: float  # [s]
+    delay: int  # [ticks] delay of the inputs
+    timeout: float  # [s] limit of a step, wall time
 
 
 def fmus_of(services: Mapping[str, ServiceConfig]) -> list[FmuConfig]:
@@ -72,7 +72,7 @@ def own_port(name: str) -> str:
 
 
 def is_new(port: str) -> bool:
-    """Return True for a port that exists only because an FMU writes it: its own one, or named inputs of an effect."""
+    """Return True for a port that only exists for an FMU: its own port, or named inputs of an effect."""
     return port.startswith((own_port(""), EFFECT))
 
 

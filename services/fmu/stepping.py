@@ -6,10 +6,11 @@ from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.native_calls import call_int, call_long
 from lapwing.services.fmu.pipe_polling import soon_readable
 
-WARNING = 1  # highest status of FMI that is no failure
-UPDATES = 1000  # of discrete states at one time, or events in a step, before an FMU counts as one that never settles
+WARNING = 1  # highest FMI status of success
+UPDATES = 1000  # limit of discrete state updates at one time, and of events in a step
 DONE, CLOSED, INTERRUPTED, ENDED, UNSETTLED, STUCK, MANY, SET, GET, DO_STEP, ENTER_EVENT, UPDATE, ENTER_STEP = range(13)
-"""Results: stepped; other end gone; read interrupted; asked to end; three kinds of no progress; a function failed."""
+"""Results: stepped; other end closed; read interrupted; end requested; three kinds of no progress; a function failed.
+"""
 FUNCTIONS = {
     SET: "set", GET: "get", DO_STEP: "doStep", ENTER_EVENT: "enterEventMode", UPDATE: "updateDiscreteStates",
     ENTER_STEP: "enterStepMode",
@@ -20,32 +21,32 @@ class FmuCalls(NamedTuple):
     """Functions of an FMU and the memory that they use."""
 
     component: int
-    do_step: int  # addresses of functions
+    do_step: int  # addresses of the FMU's functions
     enter_event_mode: int
     update_discrete_states: int
     enter_step_mode: int
-    is_3: bool  # FMI 3.0
+    is_3: bool  # True for FMI 3.0
     event_mode: bool
-    sets: Any  # (n, 5) function, references, their number, values, their number
+    sets: Any  # (n, 5) function, references, number of references, values, number of values
     gets: Any
     inputs: Any  # bits of the inputs, int64
-    former: Any  # of those that the FMU has
+    former: Any  # bits of the inputs that were set last
     flags: Any  # bytes: doStep: event needed, terminate, early; update: again, terminate, nominals, values, has time
     flags_address: int
-    times: Any  # [s] reached by doStep, next time event, where it is stuck, when it asked to end (NaN: not yet)
+    times: Any  # [s] reached by doStep, next time event, without progress, of the requested end (NaN: none)
     times_address: int
 
 
 class Channel(NamedTuple):
-    """The pipes to the run."""
+    """Pipes to the run."""
 
     requests: int  # file descriptors
     replies: int
-    request: Any  # doubles
+    request: Any  # array of doubles
     reply: Any
     request_address: int
     reply_address: int
-    received: Any  # (1,) bytes of the present request
+    received: Any  # (1,) received bytes of the current request
     poll_entry: Any  # `struct pollfd` of the requests
     poll_entry_address: int
     looks: int  # see `pipe_polling.LOOKS`
@@ -74,7 +75,7 @@ def _changed(c: FmuCalls) -> bool:
 
 @always_inline
 def _update(c: FmuCalls, time: float) -> tuple[int, int]:
-    """Update discrete states until they settle."""
+    """Update discrete states until they converge."""
     flags, at = c.flags_address, c.times_address + 8
     for _ in range(UPDATES):
         addresses = (c.component, flags + 3, flags + 4, flags + 5, flags + 6, flags + 7, at)
@@ -108,7 +109,7 @@ def _event(c: FmuCalls, time: float, with_inputs: bool) -> tuple[int, int]:
 
 @always_inline
 def _do_step(c: FmuCalls, time: float, step: float) -> tuple[int, int]:
-    """Step to the end, over events at which the FMU returns early."""
+    """Step to the end, across events at which the FMU returns early."""
     flags, stop, at = c.flags_address, time + step, time
     for _ in range(UPDATES if c.is_3 else 1):
         rest = stop - at if c.is_3 else step
@@ -166,7 +167,7 @@ def serve(calls: Any, channel: Any) -> tuple[int, int]:
     c, io = calls.value, channel.value
     while True:
         size = 8 * len(io.request)
-        soon_readable(io.poll, io.poll_entry_address, io.looks)  # if not, read sleeps
+        soon_readable(io.poll, io.poll_entry_address, io.looks)  # otherwise `read` sleeps
         while io.received[0] < size:
             actual = io.received[0]
             n = call_long(io.read, (io.requests, io.request_address + actual, size - actual))

@@ -19,10 +19,10 @@ from lapwing.cosim.scene.scene_error import KeyOrigin
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 DESCRIPTION, COMMON, VALUES = f"{_BASE}Description", f"{_BASE}Common", f"{_BASE}ParameterValues"
 STRUCTURE, SCENE = "SystemStructure.ssd", "resources/scene.json"
-FMU_PATH = "resources/{}.fmu"  # of a service in a package that Lapwing writes
+FMU_PATH = "resources/{}.fmu"  # FMU of a service in a package from Lapwing
 PART = "org.lapwing.part"  # type of the annotation
 FMU_TYPE, SCENE_TYPE = "application/x-fmu-sharedlibrary", "application/x-lapwing-scene"
-LARGEST = 500_000_000  # [bytes] of a file in a package
+LARGEST = 500_000_000  # [bytes] limit of a file in a package
 _NAMES = {"d": DESCRIPTION, "c": COMMON, "v": VALUES}
 
 
@@ -47,11 +47,11 @@ class _Content(NamedTuple):
     parts: dict[str, _Part]
     fmus: dict[str, _Fmu]
     systems: set[str]  # names of the systems in the system
-    sources: dict[_End, _End]  # start of each connection by its end
+    sources: dict[_End, _End]  # source of each connection by its target
 
 
 class _Package:
-    """An open package."""
+    """Open package."""
 
     def __init__(self, path: Path, archive: zipfile.ZipFile):
         self.path, self._archive = path, archive
@@ -83,8 +83,8 @@ def scene_of_package(path: Path, parse: Callable[[Path, str], Any]) -> dict[str,
     """Return the tables of the scene of a package, with its FMUs embedded.
 
     Args:
-        path: of the package.
-        parse: returns the resolved tables of a scene in TOML.
+        path: path of the package.
+        parse: function that returns the resolved tables of a scene in TOML.
 
     Raises:
         SceneError: not a package, or a component or connection that cannot be used.
@@ -119,7 +119,7 @@ def _tables(package: _Package, parse: Callable[[Path, str], Any]) -> dict[str, A
         if end.element not in content.systems:
             _connect(_component_source(package, content, start), end, fmus, own)
     for name in own.keys() - parts.keys():
-        del services[name]  # removed from the package, or exchanged
+        del services[name]  # removed from the package, or replaced
     tables = {name: (part.source, own[name]) for name, part in parts.items() if name in own}
     for name, fmu in fmus.items():
         if not name.isidentifier():
@@ -132,7 +132,7 @@ def _tables(package: _Package, parse: Callable[[Path, str], Any]) -> dict[str, A
 
 
 def _flatten(package: _Package, system: Xml.Element, prefix: str, content: _Content) -> None:
-    """Enter the components and connections of a system and of the systems in it; `prefix` is the name of the system."""
+    """Add the components and connections of a system and its subsystems; `prefix` is the name of the system."""
     for element in system.iterfind("d:Elements/*", _NAMES):
         name, tag = _joined(prefix, element.get("name", "")), element.tag.rpartition("}")[2]
         if name in {*content.parts, *content.fmus, *content.systems}:
@@ -155,7 +155,7 @@ def _joined(prefix: str, name: str) -> str:
 
 
 def _sort(package: _Package, component: Xml.Element, name: str, parts: dict[str, _Part], fmus: dict[str, _Fmu]) -> None:
-    """Put a component into `parts` or `fmus`."""
+    """Add a component to `parts` or `fmus`."""
     kind, source = component.get("type", FMU_TYPE), component.get("source", "")
     note = component.find(f"d:Annotations/c:Annotation[@type='{PART}']/part", _NAMES)
     if note is not None or kind == SCENE_TYPE:
@@ -167,7 +167,7 @@ def _sort(package: _Package, component: Xml.Element, name: str, parts: dict[str,
 
 
 def _start(package: _Package, component: Xml.Element) -> dict[str, float | str]:
-    """Return the start values that parameter bindings give an FMU, in the package or in files of it."""
+    """Return the start values of an FMU from parameter bindings in the package or in its files."""
     result: dict[str, float | str] = {}
     for binding in component.iterfind("d:ParameterBindings/d:ParameterBinding", _NAMES):
         if binding.find("d:ParameterMapping", _NAMES) is not None:
@@ -190,7 +190,7 @@ def _start(package: _Package, component: Xml.Element) -> dict[str, float | str]:
 
 
 def _connections(package: _Package, system: Xml.Element, prefix: str, content: _Content) -> None:
-    """Enter the connections of a system."""
+    """Add the connections of a system."""
     for connection in system.iterfind("d:Connections/d:Connection", _NAMES):
         start, end = (
             _End(_joined(prefix, connection.get(f"{side}Element", "")), connection.get(f"{side}Connector", ""))
@@ -208,7 +208,7 @@ def _connections(package: _Package, system: Xml.Element, prefix: str, content: _
 
 
 def _component_source(package: _Package, content: _Content, start: _End) -> _End:
-    """Return the output of a component that a connection begins at, also through connectors of systems."""
+    """Return the output of a component at the start of a connection, also through connectors of systems."""
     passed = set()
     while start.element in content.systems:
         if start not in content.sources or start in passed:
@@ -220,7 +220,7 @@ def _component_source(package: _Package, content: _Content, start: _End) -> _End
 
 
 def _connect(start: _End, end: _End, fmus: dict[str, _Fmu], own: Mapping[str, Any]) -> None:
-    """Enter a connection into the table of its FMU; `own` FMUs and Lapwing parts have the connections of the scene."""
+    """Add a connection to the table of its FMU; `own` FMUs and Lapwing parts have the connections of the scene."""
     if end.element in fmus:
         is_fmu = start.element in fmus or start.element in own
         source = f"{start.element}.{start.connector}" if is_fmu else _column(start.connector)

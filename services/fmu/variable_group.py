@@ -1,4 +1,4 @@
-"""Variables of an FMU that one call sets or reads. It lives in the process of the FMU."""
+"""Variables of an FMU that one call sets or reads. Used in the process of the FMU."""
 
 import ctypes
 import math
@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 
 
 class _Type(NamedTuple):
-    suffix: str  # of the functions that set and get it
+    suffix: str  # suffix of the set and get functions
     c_type: Any
-    lowest: float  # whole numbers it holds; 0 and 0 of other types
+    lowest: float  # range of integer types; 0 and 0 for other types
     highest: float
 
 
@@ -45,7 +45,7 @@ class Group:
             verb: "Set" or "Get".
             kind: type of the variables.
             elements: (index in `numbers`, `Element`).
-            numbers: array of doubles, which the values of the variables come from or go to.
+            numbers: array of doubles that the variables are set from or read to.
         """
         spec = (_FMI3 if instance.is_3 else _FMI2)[kind]
         begins: dict[int, int] = {}
@@ -60,7 +60,7 @@ class Group:
         self.names = [element[0] for _, element in elements]
         self.partial = len(set(self.places)) < total
         self._numbers = numbers
-        # Doubles side by side are passed to the FMU in place, other numbers side by side by one slice
+        # contiguous doubles are passed to the FMU without a copy, other contiguous numbers by one slice
         begin = self.indices[0]
         is_dense = self.places == [*range(total)] and self.indices == [*range(begin, begin + total)]
         self._slice = slice(begin, begin + total) if is_dense else None
@@ -78,7 +78,7 @@ class Group:
         self._read = instance.function("Get" + spec.suffix)
 
     def fill(self) -> int:
-        """Read all elements, for arrays of which only some are set. Return the status."""
+        """Read all elements, for arrays that are only partly set. Return the status."""
         return int(self._read(*self.arguments))
 
     def set(self) -> int:

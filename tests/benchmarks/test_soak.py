@@ -25,7 +25,7 @@ def samples(slower, dearer):
     ],
 )
 def test_run_that_becomes_slow_falls_short(slower, dearer, short):
-    result = {row.what.removeprefix("flight: "): row for row in rows(samples(slower, dearer), "flight")}
-    assert [what for what, row in result.items() if row.short] == short
+    result = {row.name.removeprefix("flight: "): row for row in rows(samples(slower, dearer), "flight")}
+    assert [what for what, row in result.items() if row.missed] == short
     assert result["speed, to the first"].measured == pytest.approx(1 / slower)
     assert result["processor time, to the first"].measured == pytest.approx(dearer)

@@ -14,7 +14,7 @@ def test_few_updates_change_policy(monkeypatch):
     from examples import ppo_hover
 
     monkeypatch.setattr(ppo_hover, "VEHICLES", 8)
-    monkeypatch.setattr(ppo_hover, "JUDGES", 4)
+    monkeypatch.setattr(ppo_hover, "EVALUATED", 4)
     before, after = ppo_hover.main(2 * ppo_hover.ROLLOUT)
     assert all(map(math.isfinite, (*before, *after)))
     assert before != after

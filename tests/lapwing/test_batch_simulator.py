@@ -152,7 +152,7 @@ def test_elements_that_fill_last_block_repeat_last_member():
         ),
         (
             lambda b: lapwing.BatchSimulator("hover", 2, overrides=LOADED),
-            "effects.shared_slung_load: .*what they carry",
+            "effects.shared_slung_load: .*carried loads",
         ),
         (lambda b: b.step(), "step: expected motor_voltages, or thrust and body_rates"),
         (lambda b: b.step(thrust=np.zeros(N)), "step: expected motor_voltages, or thrust and body_rates"),

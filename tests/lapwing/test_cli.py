@@ -115,8 +115,8 @@ def test_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
     [
         (["check", "scenes/none.toml"], "no such file"),
         (["precompile", "scenes/none.toml"], "no such file"),
-        (["precompile", "scenes/plans"], "scenes/plans: no scenes there; expected a folder with .toml files"),
-        (["scenes", "none"], "none: no scenes there"),
+        (["precompile", "scenes/plans"], "scenes/plans: contains no scenes; expected a folder with .toml files"),
+        (["scenes", "none"], "none: contains no scenes"),
         (["report", "none.mcap"], "none.mcap"),
         (["report", "none.mcap", "--out", "a.txt"], "--out a.txt: expected a name that ends in .html, .pdf or .png"),
         (["report", "none.mcap", "none.mcap"], "the second FILE none.mcap: is the same file as FILE; choose another"),

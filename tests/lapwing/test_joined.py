@@ -63,7 +63,7 @@ def test_dead_service_is_named_and_outcome_is_aborted(tmp_path):
             process.kill()
             process.communicate()
     assert mission.returncode == 1, output
-    assert "plant: gone at t = " in output
+    assert "plant: left the run at t = " in output
     assert json.loads(figures.read_text())["outcome"]["kind"] == "aborted"
 
 

@@ -89,7 +89,7 @@ def test_created_scene_flies(tmp_path):
 
 def test_existing_file_is_kept(tmp_path):
     (tmp_path / f"test_{NAME}.py").write_text("mine")
-    with pytest.raises(ValueError, match="exists already"):
+    with pytest.raises(ValueError, match="already exists"):
         write_module("effect", NAME, tmp_path)
     assert not (tmp_path / f"{NAME}.py").exists()
 

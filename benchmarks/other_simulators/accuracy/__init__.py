@@ -1,7 +1,7 @@
 """Other simulators on problems of the accuracy study.
 
 A file has `NAME`, `MODULE` (the package whose version is printed) and `ways(case)`, its methods on a problem (none if
-it cannot express the problem).
+it cannot represent the problem).
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from lapwing.studies.accuracy.problem import SolverRun
 def outcome(
     duration: float, R_world_body: np.ndarray, omega_body: np.ndarray, evaluations: int | None = None
 ) -> SolverRun:
-    """Return the result of a run of which only the end is known."""
+    """Return the result of a run from its end state only."""
     end = np.concatenate([np.ravel(R_world_body), omega_body])
     return SolverRun(np.array([0.0, duration]), np.array([end, end]), 0.0, evaluations)
 

@@ -1,4 +1,4 @@
-"""Drake: a continuous MultibodyPlant under its error-controlled Runge-Kutta integrators."""
+"""Drake: continuous MultibodyPlant with error-controlled Runge-Kutta integrators."""
 
 from collections.abc import Callable
 from typing import Any
@@ -28,12 +28,12 @@ MODULES = {"free_rigid_body": free_rigid_body, "heavy_top": heavy_top, "gyrostat
 
 
 def inertia(mass: float, place: list[float], about_place: tuple) -> SpatialInertia:
-    """Return the inertia from principal moments about the body's origin; `place` of the centre of mass [m]."""
+    """Return the inertia from principal moments about the body's origin; `place` is the centre of mass [m]."""
     return SpatialInertia(mass, place, UnitInertia(*(i / mass for i in about_place)))
 
 
 def plant_of(case: str) -> tuple[MultibodyPlant, Any, list[Any]]:
-    """(plant, body, rotor joints)."""
+    """Return (plant, body, rotor joints)."""
     plant = MultibodyPlant(0.0)
     plant.mutable_gravity_field().set_gravity_vector([0, 0, -heavy_top.GRAVITY if case == "heavy_top" else 0.0])
     rotors = []

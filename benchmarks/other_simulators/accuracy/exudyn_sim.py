@@ -18,11 +18,11 @@ CASES = {"free_rigid_body": (free_rigid_body, 0.5), "heavy_top": (heavy_top, 0.0
 
 
 def system(case: str) -> tuple[Any, int]:
-    """(main system, body); the top's pivot is where its centre would be, with the weight at the end of its arm."""
+    """Return (main system, body); the top's pivot is the body's origin, and its weight acts at the end of its arm."""
     module, _ = CASES[case]
     R = matrix(np.array(module.START.attitude))
     system = exu.SystemContainer().AddSystem()
-    made = system.CreateRigidBody(
+    body = system.CreateRigidBody(
         inertia=build.RigidBodyInertia(mass=1.0, inertiaTensor=np.diag(module.INERTIA)),
         referenceRotationMatrix=R,
         initialAngularVelocity=list(R @ module.START.omega_body),
@@ -31,12 +31,12 @@ def system(case: str) -> tuple[Any, int]:
     )
     if case == "heavy_top":
         weight = heavy_top.MASS * heavy_top.GRAVITY
-        for place, force in ((heavy_top.ARM, -weight), (0.0, weight)):  # and what holds the pivot
-            marker = build.MarkerBodyPosition(bodyNumber=made["bodyNumber"], localPosition=[place, 0, 0])
+        for place, force in ((heavy_top.ARM, -weight), (0.0, weight)):  # and the force at the pivot
+            marker = build.MarkerBodyPosition(bodyNumber=body["bodyNumber"], localPosition=[place, 0, 0])
             load = build.LoadForceVector(markerNumber=system.AddMarker(marker), loadVector=[0, 0, force])
             system.AddLoad(load)
     system.Assemble()
-    return system, made["bodyNumber"]
+    return system, body["bodyNumber"]
 
 
 def ways(case: str) -> list[SolverMethod]:

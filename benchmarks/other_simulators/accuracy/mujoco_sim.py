@@ -10,7 +10,7 @@ from benchmarks.other_simulators.accuracy import matrix, outcome
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.systems import free_rigid_body, gyrostat, heavy_top
 
-mujoco.set_mju_user_warning(lambda message: None)  # of steps too large to be stable, which are measured as such
+mujoco.set_mju_user_warning(lambda message: None)  # warnings about unstable steps, which are measured, too
 
 NAME, MODULE = "MuJoCo", "mujoco"
 INTEGRATORS = {"RK4": 4, "Euler": 1, "implicitfast": 1}
@@ -36,7 +36,7 @@ def top(integrator: str) -> str:
 
 
 def satellite(integrator: str) -> str:
-    """Three free rotors: each keeps its axial momentum, so that its axial inertia does not turn with the platform."""
+    """Return three free rotors: each keeps its axial momentum, so its axial inertia does not rotate along."""
     platform = " ".join(str(i - 2 * ACROSS) for i in gyrostat.STEADY.inertia)
     rotors = ""
     for i in range(3):

@@ -1,7 +1,7 @@
 """Other simulators on the cases of `lapwing stability`, with the step of each case and otherwise default settings.
 
 A file has `CASES`: for each case that the simulator can run, a function that returns the error of each method by row.
-Files that begin with _ hold what several simulators share.
+Files that begin with _ have functions for several simulators.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.other_simulators import installed
 from lapwing.studies.stability import cases
 
-Errors = Mapping[str, Mapping[str, float]]  # by row, by method
+Errors = Mapping[str, Mapping[str, float]]  # errors by row and method
 
 
 def errors(case: str) -> dict[str, dict[str, float]]:

@@ -1,4 +1,4 @@
-"""Free rigid bodies under any simulator that can integrate them with equal steps."""
+"""Cases of free rigid bodies for simulators with fixed steps."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -14,7 +14,7 @@ March = Callable[[Any, Any, float, int, int], np.ndarray]
 
 
 def cases(methods: Mapping[str, March]) -> dict[str, Callable[[], Errors]]:
-    """The `CASES` of free bodies, of methods by the name that they are shown under."""
+    """Return the `CASES` of free bodies for methods by their displayed names."""
 
     def tumbling() -> Errors:
         c = intermediate_axis

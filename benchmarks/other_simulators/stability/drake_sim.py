@@ -1,5 +1,4 @@
-"""Drake: free bodies by fixed steps of its integrators and as a discrete plant, a vehicle on feet on a plane, four-bars
-closed by constraints."""
+"""Drake: free bodies with fixed steps and as a discrete plant, a vehicle on a plane, four-bars with constraints."""
 
 import math
 from functools import partial
@@ -22,7 +21,7 @@ SCHEMES = {"Drake RK3": "runge_kutta3", "Drake RK5": "runge_kutta5", DISCRETE: N
 
 
 class Model:
-    """A plant, its simulator once it is finished, and the place of its state."""
+    """Plant with its simulator after `finish`, and the position of its state."""
 
     def __init__(self, step: float, scheme: str | None, gravity_world: tuple[float, float, float]) -> None:
         self.builder, self.step, self.scheme = DiagramBuilder(), step, scheme
@@ -31,12 +30,12 @@ class Model:
         self.plant.mutable_gravity_field().set_gravity_vector(gravity_world)
 
     def add_body(self, name: str, mass: float, inertia: tuple[float, float, float], middle: Any = (0, 0, 0)) -> Any:
-        """A body with principal moments [kg m^2] about its centre of mass, which is at `middle` [m]."""
+        """Add a body with principal moments [kg m^2] about its centre of mass at `middle` [m]."""
         unit = UnitInertia(*(i / mass for i in inertia)).ShiftFromCenterOfMass(middle)
         return self.plant.AddRigidBody(name, SpatialInertia(mass, middle, unit))
 
     def add_free_body(self, mass: float, inertia: tuple[float, float, float]) -> Any:
-        """A body with six freedoms."""
+        """Add a body with six degrees of freedom."""
         self.body = self.add_body("body", mass, inertia)
         self.joint = self.plant.AddJoint(
             QuaternionFloatingJoint("free", self.plant.world_frame(), self.body.body_frame())
@@ -44,7 +43,7 @@ class Model:
         return self.body
 
     def finish(self) -> None:
-        """Nothing more is added: the simulator stands at time 0."""
+        """Finish the plant, and create the simulator at time 0."""
         self.plant.Finalize()
         self.simulator = Simulator(self.builder.Build())
         if self.scheme:
@@ -57,20 +56,20 @@ class Model:
         self.simulator.AdvanceTo(self.simulator.get_context().get_time() + seconds)
 
     def attitude_matrix(self) -> np.ndarray:
-        """R_world_body of the free body, shape (3, 3)."""
+        """Return R_world_body of the free body, shape (3, 3)."""
         return np.array(self.plant.EvalBodyPoseInWorld(self.context, self.body).rotation().matrix())
 
     def position_world(self) -> np.ndarray:
-        """Position of the free body [m], world, shape (3,)."""
+        """Return the position of the free body [m], world, shape (3,)."""
         return np.array(self.joint.get_translation(self.context))
 
     def velocity_world(self) -> np.ndarray:
-        """Velocity of the free body [m/s], world, shape (3,)."""
+        """Return the velocity of the free body [m/s], world, shape (3,)."""
         return np.array(self.joint.get_translational_velocity(self.context))
 
 
 def free(scheme: str | None, inertia: Any, start: Any, duration: float, steps: int, samples: int) -> np.ndarray:
-    """R_world_body and omega_body of a free body at equal times, shape (samples + 1, 12)."""
+    """Return R_world_body and omega_body of a free body at equidistant times, shape (samples + 1, 12)."""
     model = Model(duration / steps, scheme, (0.0, 0.0, 0.0))
     body = model.add_free_body(1.0, inertia)
     model.finish()
@@ -86,11 +85,11 @@ def free(scheme: str | None, inertia: Any, start: Any, duration: float, steps: i
 
 
 def vehicle(angle: float, friction: float) -> Model:
-    """The delivery drone on four balls, on a plane that rises along y by an angle [rad]."""
+    """Return the delivery drone on four balls, on a plane that rises along y by an angle [rad]."""
     model = Model(landing.STEP, None, (0.0, -landing.G * math.sin(angle), -landing.G * math.cos(angle)))
     plant, mass, grip = model.plant, landing.DRONE.mass, CoulombFriction(friction, friction)
     body = model.add_free_body(mass.total, mass.inertia)
-    below = RigidTransform([0.0, 0.0, -0.5])  # a half space would warn of deformable bodies, of which there are none
+    below = RigidTransform([0.0, 0.0, -0.5])  # a half space would cause a warning about deformable bodies
     plant.RegisterCollisionGeometry(plant.world_body(), below, Box(100.0, 100.0, 1.0), "ground", grip)
     for k, middle in enumerate(_ball_feet.BALLS):
         ball = Sphere(_ball_feet.RADIUS)
@@ -101,7 +100,7 @@ def vehicle(angle: float, friction: float) -> Model:
 
 
 def way(angle: float, seconds: float) -> float:
-    """Distance [m] that it moves on a slope [rad] once it has stood for 3 s."""
+    """Return the distance [m] that it moves on a slope [rad] after 3 s at rest."""
     model = vehicle(angle, slopes.STATIC)
     model.run_on(3.0)
     before = model.position_world()
@@ -110,7 +109,7 @@ def way(angle: float, seconds: float) -> float:
 
 
 def standing() -> Errors:
-    """Creep on a slope, and what is left of a slide."""
+    """Return the creep on a slope, and the motion after a slide."""
     model = vehicle(0.0, slopes.DYNAMIC)
     model.run_on(3.0)
     model.joint.set_translational_velocity(model.context, [1.0, 0.0, 0.0])
@@ -120,7 +119,7 @@ def standing() -> Errors:
 
 
 def sliding() -> Errors:
-    """Below the angle at which feet let go, and beyond it."""
+    """Return the motion below and above the friction angle."""
     a = math.radians(30.0)
     model = vehicle(a, slopes.DYNAMIC)
     model.run_on(0.3)
@@ -132,7 +131,7 @@ def sliding() -> Errors:
 
 
 def falls(axis: int, angle: float) -> bool:
-    """Return True if a vehicle that is set down leaning topples."""
+    """Return True if a tilted vehicle topples."""
     model = vehicle(0.0, slopes.STATIC)
     height, attitude = _ball_feet.set_down(axis, angle)
     model.joint.SetTranslation(model.context, [0.0, 0.0, height])
@@ -142,12 +141,12 @@ def falls(axis: int, angle: float) -> bool:
 
 
 def leaning() -> Errors:
-    """The angle at which it topples."""
+    """Return the error of the toppling angle."""
     return {"leaning": {DISCRETE: _ball_feet.error(falls)}}
 
 
 def four_bars(n: int = 2) -> Errors:
-    """Two windows: couplers hang on their left crank and are tied to the right one."""
+    """Return the error of two windows: couplers hang on their left crank and are tied to the right one."""
     c = redundant_constraints
     model = Model(c.END / c.STEPS, None, (0.0, -c.GRAVITY, 0.0))
     plant, joints, cranks, couplers = model.plant, [], [], []

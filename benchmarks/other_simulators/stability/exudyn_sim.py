@@ -16,12 +16,13 @@ def settings(duration: float, steps: int, samples: int) -> Any:
     s.timeIntegration.automaticStepSize = False
     s.timeIntegration.verboseMode = 0
     s.solutionSettings.writeSolutionToFile = False
-    s.solutionSettings.sensorsWritePeriod = (duration - 0.25 * duration / steps) / samples  # rounding delays none
+    # with a margin, so that rounding delays no sample
+    s.solutionSettings.sensorsWritePeriod = (duration - 0.25 * duration / steps) / samples
     return s
 
 
 def free(inertia: Any, start: Any, duration: float, steps: int, samples: int) -> np.ndarray:
-    """R_world_body and omega_body of a free body at equal times, shape (samples + 1, 12)."""
+    """Return R_world_body and omega_body of a free body at equidistant times, shape (samples + 1, 12)."""
     w, x, y, z = start.attitude
     R = np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

@@ -14,11 +14,11 @@ from lapwing.studies.stability.cases import landing, redundant_constraints, slop
 INTEGRATORS = ("RK4", "implicitfast")
 CONTACT = "MuJoCo implicitfast, elliptic cone"
 
-mujoco.set_mju_user_warning(lambda message: None)  # of what becomes unstable: that is what is measured
+mujoco.set_mju_user_warning(lambda message: None)  # warnings about instability, which is measured
 
 
 def free(integrator: str, inertia: Any, start: Any, duration: float, steps: int, samples: int) -> np.ndarray:
-    """R_world_body and omega_body of a free body at equal times, shape (samples + 1, 12)."""
+    """Return R_world_body and omega_body of a free body at equidistant times, shape (samples + 1, 12)."""
     model = mujoco.MjModel.from_xml_string(f"""<mujoco>
       <option timestep="{duration / steps!r}" integrator="{integrator}" gravity="0 0 0"/>
       <worldbody><body><freejoint/>
@@ -34,7 +34,7 @@ def free(integrator: str, inertia: Any, start: Any, duration: float, steps: int,
 
 
 def vehicle(angle: float, friction: float) -> tuple[Any, Any]:
-    """(model, data) of the delivery drone on four balls, on a plane that rises along y by an angle [rad]."""
+    """Return (model, data) of the delivery drone on four balls, on a plane that rises along y by an angle [rad]."""
     mass, size = landing.DRONE.mass, _ball_feet.RADIUS
     balls = "".join(f'<geom size="{size}" pos="{x} {y} {z}" mass="0"/>' for x, y, z in _ball_feet.BALLS)
     lean = f"0 {-landing.G * math.sin(angle)!r} {-landing.G * math.cos(angle)!r}"
@@ -49,20 +49,20 @@ def vehicle(angle: float, friction: float) -> tuple[Any, Any]:
 
 
 def run_on(model: Any, data: Any, seconds: float) -> Any:
-    """The data so much later."""
+    """Return the data after `seconds`."""
     mujoco.mj_step(model, data, round(seconds / landing.STEP))
     return data
 
 
 def way(angle: float, seconds: float) -> float:
-    """Distance [m] that it moves on a slope [rad] once it has stood for 3 s."""
+    """Return the distance [m] that it moves on a slope [rad] after 3 s at rest."""
     model, data = vehicle(angle, slopes.STATIC)
     before = run_on(model, data, 3.0).qpos[:3].copy()
     return float(np.linalg.norm(run_on(model, data, seconds).qpos[:3] - before))
 
 
 def standing() -> Errors:
-    """Creep on a slope, and what is left of a slide."""
+    """Return the creep on a slope, and the motion after a slide."""
     model, data = vehicle(0.0, slopes.DYNAMIC)
     run_on(model, data, 3.0).qvel[0] = 1.0
     left = float(np.abs(run_on(model, data, 2.0).qvel[:3]).max())
@@ -70,7 +70,7 @@ def standing() -> Errors:
 
 
 def sliding() -> Errors:
-    """Below the angle at which feet let go, and beyond it."""
+    """Return the motion below and above the friction angle."""
     a = math.radians(30.0)
     model, data = vehicle(a, slopes.DYNAMIC)
     early = run_on(model, data, 0.3).qvel[:3].copy()
@@ -81,7 +81,7 @@ def sliding() -> Errors:
 
 
 def falls(axis: int, angle: float) -> bool:
-    """Return True if a vehicle that is set down leaning topples."""
+    """Return True if a tilted vehicle topples."""
     model, data = vehicle(0.0, slopes.STATIC)
     data.qpos[2], data.qpos[3:7] = _ball_feet.set_down(axis, angle)
     data = run_on(model, data, toppling.SECONDS)
@@ -89,12 +89,12 @@ def falls(axis: int, angle: float) -> bool:
 
 
 def leaning() -> Errors:
-    """The angle at which it topples."""
+    """Return the error of the toppling angle."""
     return {"leaning": {CONTACT: _ball_feet.error(falls)}}
 
 
 def four_bars(n: int = 2) -> Errors:
-    """Two windows: couplers hang on their left crank and are tied to the right one."""
+    """Return the error of two windows: couplers hang on their left crank and are tied to the right one."""
     c = redundant_constraints
     rod = '<inertial pos="0.5 0 0" mass="1" diaginertia="0.0001 0.0833333333333333 0.0833333333333333"/>'
     hinge = '<joint type="hinge" axis="0 0 1"/>'

@@ -1,4 +1,4 @@
-//! The lock step over Zenoh: bundles in, bundles out, in order, with rmw_zenoh's attachment.
+//! Lock step over Zenoh: step packets received and sent in order, with rmw_zenoh's attachment.
 
 use std::collections::HashSet;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,7 +12,7 @@ use zenoh::qos::CongestionControl;
 use zenoh::sample::{Sample, SampleKind};
 use zenoh::{Session, Wait};
 
-const PATIENCE: Duration = Duration::from_secs(1); // after which we say whom we wait for
+const PATIENCE: Duration = Duration::from_secs(1); // after which a wait is reported
 const JOINING: Duration = Duration::from_secs(120);
 const GID: [u8; 16] = *b"rust_controller.";
 
@@ -20,16 +20,16 @@ pub struct Bus {
     session: Session,
     key_prefix: String,
     name: String,
-    pub over: Arc<AtomicBool>, // the run has lost its plant
+    pub over: Arc<AtomicBool>, // true after the plant has left the run
 }
 
-/// Bundles of a service that we take.
+/// Subscription to the step packets of a service.
 pub struct Source {
     subscriber: Subscriber<FifoChannelHandler<Sample>>,
     service: String,
 }
 
-/// Puts on one key, numbered.
+/// Publisher on one key, with sequence numbers.
 pub struct Outlet<'a> {
     publisher: Publisher<'a>,
     sequence: i64,
@@ -78,7 +78,7 @@ impl Bus {
         }
     }
 
-    /// Tell our set-up to whoever compares; say that we are there; wait until all of `others` are.
+    /// Answer queries for the run configuration, declare presence, and wait for all of `others`.
     pub fn join(&self, setup: String, others: &[String]) -> LivelinessToken {
         let key = format!("{}/_setup/{}", self.key_prefix, self.name);
         let reply = key.clone();
@@ -116,10 +116,10 @@ impl Bus {
                     missing.remove(sample.key_expr().as_str());
                 }
             }
-            assert!(Instant::now() < deadline, "nobody answers as {missing:?}");
+            assert!(Instant::now() < deadline, "no participant {missing:?}");
         }
         let (over, plant) = (self.over.clone(), format!("{alive}/plant"));
-        let gone = move |sample: Sample| {
+        let on_change = move |sample: Sample| {
             if sample.kind() == SampleKind::Delete && sample.key_expr().as_str() == plant {
                 over.store(true, Ordering::Relaxed);
             }
@@ -128,7 +128,7 @@ impl Bus {
             .session
             .liveliness()
             .declare_subscriber(format!("{alive}/*"))
-            .callback(gone);
+            .callback(on_change);
         watch.background().wait().unwrap();
         token
     }
@@ -139,7 +139,7 @@ impl Bus {
 }
 
 impl Source {
-    /// The bundle of the instant `time_ns`; None where there will be no other.
+    /// Return the step packet of `time_ns`, or None after the last one.
     pub fn take(&self, time_ns: i64, bus: &Bus, waiting: &mut Outlet) -> Option<Vec<u8>> {
         loop {
             match self.subscriber.recv_timeout(PATIENCE) {
@@ -152,14 +152,14 @@ impl Source {
                     }
                     assert_eq!(
                         stamp, time_ns,
-                        "{}: not the bundle that is due",
+                        "{}: not the step packet that is due",
                         self.service
                     );
                     return Some(payload);
                 }
                 _ if bus.over.load(Ordering::Relaxed) => return None,
                 _ => waiting.put(
-                    format!("the bundle of {time_ns} ns from {}", self.service).into_bytes(),
+                    format!("the step packet of {time_ns} ns from {}", self.service).into_bytes(),
                     0,
                 ),
             }

@@ -1,4 +1,4 @@
-//! A PID controller of position over one of attitude, on the vehicle that the set-up describes.
+//! Cascaded PID controllers of position and attitude for the vehicle of the run configuration.
 
 use serde_json::Value;
 
@@ -9,7 +9,7 @@ const ATTITUDE: f64 = 12.0; // [rad/s]
 const YAW: f64 = 4.0; // [rad/s]
 const DAMPING: f64 = 0.9;
 const INTEGRAL: f64 = 0.8; // [rad/s]
-const CUT_HEIGHT: f64 = 0.05; // [m] over the standing height, below which the motors stop
+const CUT_HEIGHT: f64 = 0.05; // [m] above the height at rest; below it the motors stop
 
 #[derive(Clone, Copy, PartialEq)]
 pub enum Stage {
@@ -32,7 +32,7 @@ pub struct Vehicle {
     resting_height: f64,
 }
 
-/// Of the vehicle, and what is asked of it; world ENU, body FLU, SI.
+/// State of the vehicle and its setpoint; world ENU, body FLU, SI units.
 pub struct State {
     pub position: [f64; 3],
     pub attitude: [f64; 4], // w, x, y, z
@@ -52,7 +52,7 @@ pub struct Setpoint {
 pub struct Command {
     pub volts: [f64; 4],
     pub thrust: [f64; 4],
-    pub angles: [f64; 3], // roll, pitch, yaw that are followed
+    pub angles: [f64; 3], // desired roll, pitch, yaw [rad]
 }
 
 pub struct Controller {
@@ -84,7 +84,7 @@ impl Vehicle {
         }
     }
 
-    /// Control allocation and motor model: the rotors' thrusts [N] and the motors' voltages [V].
+    /// Control allocation and motor model: return the rotors' thrusts [N] and the motors' voltages [V].
     fn allocate(&self, thrust: f64, moments: [f64; 3]) -> ([f64; 4], [f64; 4]) {
         let (mut forces, mut volts) = ([0.0; 4], [0.0; 4]);
         let square = |x: &[f64]| x.iter().map(|v| v * v).sum::<f64>();
@@ -112,13 +112,15 @@ impl Controller {
     }
 
     fn advance_stage(&mut self, s: &State, r: &Setpoint) {
-        let (height, asked) = (
+        let (height, desired) = (
             s.position[2] - self.vehicle.resting_height,
             r.position[2] - self.vehicle.resting_height,
         );
         self.stage = match self.stage {
-            Stage::Standing if asked > 1e-6 || r.velocity[2] > 0.0 => Stage::Flying,
-            Stage::Flying if asked < CUT_HEIGHT && r.velocity[2] <= 0.0 && height < CUT_HEIGHT => {
+            Stage::Standing if desired > 1e-6 || r.velocity[2] > 0.0 => Stage::Flying,
+            Stage::Flying
+                if desired < CUT_HEIGHT && r.velocity[2] <= 0.0 && height < CUT_HEIGHT =>
+            {
                 Stage::Landed
             }
             other => other,

@@ -1,10 +1,10 @@
-//! What `lapwing protocol SCENE --json FILE` has written: ports, their columns, and the set-up.
+//! Output of `lapwing protocol SCENE --json FILE`: ports, their columns, and the run configuration.
 
 use std::collections::HashMap;
 
 use serde_json::Value;
 
-/// A port of a service: what stands where in its rows.
+/// Port of a service with the positions of its columns.
 pub struct Port {
     pub name: String,
     pub period: i64,
@@ -12,7 +12,7 @@ pub struct Port {
     place: HashMap<String, usize>,
 }
 
-/// A row of a port: one number for each column.
+/// Row of a port: one number for each column.
 pub type Row = Vec<f64>;
 
 impl Port {
@@ -38,22 +38,22 @@ impl Port {
         }
     }
 
-    /// The row of this port in the bundle of a tick; a bundle has the ports that are due, in their order.
-    pub fn find(&self, ports: &[Port], bundle: &[u8], tick: i64) -> Row {
+    /// Return the row of this port in the step packet of a tick, which has the due ports in order.
+    pub fn find(&self, ports: &[Port], packet: &[u8], tick: i64) -> Row {
         let before: usize = ports
             .iter()
             .take_while(|p| p.name != self.name)
             .filter(|p| tick % p.period == 0)
             .map(|p| p.width)
             .sum();
-        bundle[8 * before..8 * (before + self.width)]
+        packet[8 * before..8 * (before + self.width)]
             .chunks(8)
             .map(|b| f64::from_le_bytes(b.try_into().unwrap()))
             .collect()
     }
 }
 
-/// The run as far as this program has to know of it.
+/// Data of the run that this program needs.
 pub struct Layout {
     pub interval_ns: i64,
     pub services: Vec<String>,
@@ -81,7 +81,7 @@ impl Layout {
         }
     }
 
-    /// The ports of a service, in the order of its bundles.
+    /// Return the ports of a service in the order of its step packets.
     pub fn ports(&self, service: &str) -> Vec<Port> {
         let ports = self.tree["services"][service]["ports"]
             .as_array()
@@ -110,7 +110,7 @@ impl Layout {
     }
 }
 
-/// A tuple of the set-up as numbers.
+/// Return a tuple of the run configuration as numbers.
 pub fn numbers(value: &Value) -> Vec<f64> {
     value["of"]
         .as_array()

@@ -1,4 +1,4 @@
-//! An autopilot of one's own: the service `autopilot` of a scene whose `autopilot.estimator` is "ground_truth".
+//! External autopilot in Rust: the service `autopilot` of a scene whose `autopilot.estimator` is "ground_truth".
 //!
 //!     lapwing protocol rust_mission.toml --json layout.json
 //!     rust_controller layout.json tcp/127.0.0.1:7450 [SPACE] &
@@ -41,7 +41,7 @@ fn fly(layout: &Layout, bus: &Bus) {
     );
     let (truth, reference) = (named(&plant, "truth"), named(&trajectory, "trajectory"));
     let (from_plant, from_trajectory) = (bus.source("plant"), bus.source("trajectory"));
-    let (mut bundles, mut waiting) = (bus.outlet("_step"), bus.outlet("_waiting"));
+    let (mut packets, mut waiting) = (bus.outlet("_step"), bus.outlet("_waiting"));
     let mut others: Vec<String> = layout
         .services
         .iter()
@@ -54,33 +54,34 @@ fn fly(layout: &Layout, bus: &Bus) {
     let _token = bus.join(layout.setup_text.clone(), &others);
     for tick in 0.. {
         let time_ns = tick * layout.interval_ns;
-        let taken = from_plant.take(time_ns, bus, &mut waiting);
-        let Some((seen, asked)) = taken.zip(from_trajectory.take(time_ns, bus, &mut waiting))
+        let received = from_plant.take(time_ns, bus, &mut waiting);
+        let Some((plant_packet, trajectory_packet)) =
+            received.zip(from_trajectory.take(time_ns, bus, &mut waiting))
         else {
-            bundles.put(Vec::new(), time_ns); // an empty bundle: there will be no other
+            packets.put(Vec::new(), time_ns); // an empty step packet is the last one
             return;
         };
-        let (seen, asked) = (
-            truth.find(&plant, &seen, tick),
-            reference.find(&trajectory, &asked, tick),
+        let (measured, desired) = (
+            truth.find(&plant, &plant_packet, tick),
+            reference.find(&trajectory, &trajectory_packet, tick),
         );
         let state = State {
-            position: truth.three(&seen, "position_world"),
-            attitude: ["w", "x", "y", "z"].map(|c| truth.get(&seen, &format!("attitude.{c}"))),
-            velocity: truth.three(&seen, "velocity_world"),
-            omega: truth.three(&seen, "omega_body"),
+            position: truth.three(&measured, "position_world"),
+            attitude: ["w", "x", "y", "z"].map(|c| truth.get(&measured, &format!("attitude.{c}"))),
+            velocity: truth.three(&measured, "velocity_world"),
+            omega: truth.three(&measured, "omega_body"),
         };
         let setpoint = Setpoint {
-            position: reference.three(&asked, "position_world"),
-            velocity: reference.three(&asked, "velocity_world"),
-            acceleration: reference.three(&asked, "acceleration_world"),
-            yaw: reference.get(&asked, "yaw"),
-            yaw_rate: reference.get(&asked, "yaw_rate"),
+            position: reference.three(&desired, "position_world"),
+            velocity: reference.three(&desired, "velocity_world"),
+            acceleration: reference.three(&desired, "acceleration_world"),
+            yaw: reference.get(&desired, "yaw"),
+            yaw_rate: reference.get(&desired, "yaw_rate"),
         };
         let command = controller.step(&state, &setpoint);
         let flying = controller.stage == Stage::Flying;
-        let finished = controller.stage == Stage::Landed && reference.get(&asked, "final") != 0.0;
-        let mut bundle = Vec::new();
+        let finished = controller.stage == Stage::Landed && reference.get(&desired, "final") != 0.0;
+        let mut packet = Vec::new();
         for port in own.iter().filter(|p| tick % p.period == 0) {
             let mut row: Row = port.blank();
             match port.name.as_str() {
@@ -97,23 +98,23 @@ fn fly(layout: &Layout, bus: &Bus) {
                         "omega_body",
                         "acceleration_world",
                     ] {
-                        port.set_all(&mut row, column, &truth.three(&seen, column));
+                        port.set_all(&mut row, column, &truth.three(&measured, column));
                     }
                     for (column, value) in ["w", "x", "y", "z"].iter().zip(state.attitude) {
                         port.set(&mut row, &format!("attitude.{column}"), value);
                     }
                 }
-                "setpoint" => row.copy_from_slice(&asked),
+                "setpoint" => row.copy_from_slice(&desired),
                 "status" => {
-                    port.set(&mut row, "phase", reference.get(&asked, "phase"));
+                    port.set(&mut row, "phase", reference.get(&desired, "phase"));
                     port.set(&mut row, "armed", f64::from(flying));
                     port.set(&mut row, "landed", f64::from(!flying));
                     port.set(&mut row, "finished", f64::from(finished));
                 }
                 other => panic!("the scene wants a port {other}"),
             }
-            bundle.extend(row.iter().flat_map(|x| x.to_le_bytes()));
+            packet.extend(row.iter().flat_map(|x| x.to_le_bytes()));
         }
-        bundles.put(bundle, time_ns);
+        packets.put(packet, time_ns);
     }
 }

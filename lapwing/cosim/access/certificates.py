@@ -1,9 +1,9 @@
-"""Certificates for participants that meet over a network: one authority, and a folder for each of them.
+"""TLS certificates of participants on several hosts: one authority, and a folder for each participant.
 
 FOLDER/NAME/authority.pem     trusted certificate authority
 FOLDER/NAME/certificate.pem   NAME as its common name
 FOLDER/NAME/key.pem           its private key, mode 0600
-FOLDER/NAME/zenoh.json5       all of it in a Zenoh configuration for programs of one's own, wherever it is taken; 0600
+FOLDER/NAME/zenoh.json5       all of them in a Zenoh configuration for external programs; can be moved; mode 0600
 """
 
 import base64
@@ -26,30 +26,29 @@ _TIME = rb"(?:\x17\x0d|\x18\x0f)(\d{12,14}Z)"
 _VALIDITY = re.compile(rb"\x30." + _TIME + _TIME, re.DOTALL)
 _LINKS = {
     "enable_mtls": True,
-    # both ends identify their peer by its common name (lapwing.cosim.access.zenoh_access),
-    # whatever its address
+    # both ends identify their peer by its common name (lapwing.cosim.access.zenoh_access), not by its address
     "verify_name_on_connect": False,
     "close_link_on_expiration": True,
 }
 
 
 def make(folder: Path, names: Iterable[str], days: int) -> None:
-    """Make a folder of certificates, whole or not at all; the authority's own key is thrown away.
+    """Create a folder of certificates, completely or not at all. The authority's private key is deleted.
 
     Args:
-        folder: must not be there.
-        names: of the participants.
-        days: for which they are valid.
+        folder: folder to create; it must not exist.
+        names: names of the participants.
+        days: validity of the certificates [days].
 
     Raises:
-        ValueError: the folder is there or cannot be made, or the program openssl is missing or fails.
+        ValueError: the folder exists or cannot be created, or the program openssl is missing or fails.
     """
     if folder.exists():
-        raise ValueError(f"{folder}: is there already; remove it, or name another folder")
+        raise ValueError(f"{folder}: already exists; remove it, or choose another folder")
     try:
         with tempfile.TemporaryDirectory(dir=folder.absolute().parent, prefix=".keys-") as place:
-            made = Path(place) / "made"
-            made.mkdir(mode=0o700)
+            complete = Path(place) / "complete"
+            complete.mkdir(mode=0o700)
             authority, secret = Path(place) / AUTHORITY, Path(place) / "authority.key"
             _openssl(
                 *("-x509", *_CURVE, "-days", str(days), "-subj", "/CN=lapwing authority"),
@@ -57,7 +56,7 @@ def make(folder: Path, names: Iterable[str], days: int) -> None:
                 *("-keyout", str(secret), "-out", str(authority)),
             )
             for name in names:
-                own = made / name
+                own = complete / name
                 own.mkdir(mode=0o700)
                 _openssl(
                     *("-x509", *_CURVE, "-days", str(days), "-subj", f"/CN={name}"),
@@ -68,36 +67,36 @@ def make(folder: Path, names: Iterable[str], days: int) -> None:
                 )
                 (own / AUTHORITY).write_bytes(authority.read_bytes())
                 (own / CONFIGURATION).write_text(json.dumps(_configuration(own)) + "\n")
-                for file in (AUTHORITY, CERTIFICATE):  # whatever the umask
+                for file in (AUTHORITY, CERTIFICATE):  # independent of the umask
                     (own / file).chmod(0o644)
                 for file in (KEY, CONFIGURATION):
                     (own / file).chmod(0o600)
-            made.rename(folder)
+            complete.rename(folder)
     except OSError as error:
-        raise ValueError(f"{folder}: cannot be made: {(error.strerror or str(error)).lower()}") from None
+        raise ValueError(f"{folder}: cannot be created: {(error.strerror or str(error)).lower()}") from None
 
 
 def tls(folder: Path, name: str) -> dict[str, Any]:
-    """Zenoh's settings for the certificate of a participant.
+    """Return Zenoh's settings for the certificate of a participant.
 
     Raises:
-        ValueError: it is not there, cannot be read, is not valid now, or others can read its key.
+        ValueError: it is missing, cannot be read, is not valid now, or other users can read its key.
     """
     own = folder.absolute() / name
     for file in (AUTHORITY, CERTIFICATE, KEY):
         if not os.access(own / file, os.R_OK):
             raise ValueError(
-                f"--keys {folder}: {name}/{file} cannot be read; `lapwing certificates {folder}` makes them"
+                f"--keys {folder}: {name}/{file} cannot be read; `lapwing certificates {folder}` creates it"
             )
     for file in (AUTHORITY, CERTIFICATE):
         _check_validity(own / file, f"--keys {folder}: {name}/{file}")
     if stat.S_IMODE((own / KEY).stat().st_mode) & 0o077:
-        raise ValueError(f"--keys {folder}: others can read {name}/{KEY}; chmod 600 mends it")
+        raise ValueError(f"--keys {folder}: other users can read {name}/{KEY}; use chmod 600")
     return {"transport/link/tls": _tls(own)}
 
 
 def _check_validity(path: Path, location: str) -> None:
-    """Raise ValueError for a certificate outside its period, or that is none."""
+    """Raise ValueError for a file that is not a certificate, or is outside its period of validity."""
     try:
         result = _VALIDITY.search(ssl.PEM_cert_to_DER_cert(path.read_text().strip()))
     except ValueError:
@@ -115,7 +114,7 @@ def _check_validity(path: Path, location: str) -> None:
 
 
 def _time(text: bytes) -> datetime:
-    """Return an ASN.1 time: two digits of the year up to 2049, else four."""
+    """Parse an ASN.1 time, whose year has two digits up to 2049, else four."""
     form = "%y%m%d%H%M%SZ" if len(text) == 13 else "%Y%m%d%H%M%SZ"
     return datetime.strptime(text.decode(), form).replace(tzinfo=UTC)
 
@@ -147,6 +146,6 @@ def _openssl(*arguments: str) -> None:
     try:
         subprocess.run(["openssl", "req", *arguments], check=True, capture_output=True, text=True)
     except FileNotFoundError:
-        raise ValueError("openssl: no such program; certificates are made with it") from None
+        raise ValueError("openssl: no such program; install it to create certificates") from None
     except subprocess.CalledProcessError as error:
         raise ValueError(f"openssl: {error.stderr.strip().splitlines()[-1]}") from None

@@ -38,8 +38,8 @@ class PublisherIds(NamedTuple):
         """Return the GID that a message must carry, by Zenoh key; None for an external service, which chooses its own.
 
         Args:
-            key: of the lock step (`lapwing.cosim.transport.bus_keys`).
-            names: of the senders.
+            key: key of the lock step (`lapwing.cosim.transport.bus_keys`).
+            names: names of the senders.
         """
         result: dict[str, bytes | None] = {}
         for name in names:

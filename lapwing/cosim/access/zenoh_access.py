@@ -59,7 +59,8 @@ def _reading(key: str) -> list[dict[str, Any]]:
 
 
 def _withheld(key_prefix: str) -> dict[str, Any]:
-    """Rule that keeps lock-step messages from viewers: a sender would wait for one that stops reading."""
+    """Return the rule that keeps lock-step messages from viewers: a sender would wait for a viewer that stops
+    reading."""
     return _rule("withhold", ["put", "delete"], "egress", [f"{key_prefix}/_$*/**"]) | {"permission": "deny"}
 
 

@@ -13,10 +13,10 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-FORMER_PACKAGES = ("cosim", "dynamics", "messages", "services", "studies")  # top-level before they moved below lapwing
+FORMER_PACKAGES = ("cosim", "dynamics", "messages", "services", "studies")  # top-level before the move to lapwing
 COUPLINGS = {"sequential": "gauss_seidel", "parallel": "jacobi"}
-DIRECTIONS = ("forward", "backward", "right", "left", "vertical")  # of the static pressure error of a barometer
-ANCHOR = 5  # numbers that a foot remembered in former versions
+DIRECTIONS = ("forward", "backward", "right", "left", "vertical")  # keys of the static pressure error of a barometer
+ANCHOR = 5  # numbers in the memory of a foot in former versions
 METADATA = {"coupling": COUPLINGS, "mode": {"processes": "multi-process", "single": "single-process"}}
 
 
@@ -39,17 +39,17 @@ def present_fields(class_path: str, members: Mapping[str, Any]) -> dict[str, Any
     renamed, added = (former_names()[kind].get(class_path, {}) for kind in ("fields", "added"))
     present = added | {renamed.get(key, key): value for key, value in members.items()}
     if class_path.endswith(":GroundContact") and (square := present.pop("square_stiction_velocity", None)):
-        # anchors that a flag held became friction elements
+        # an anchor with a flag became friction elements
         present |= {"tangential_damping": present["damping"], "inverse_stiction": 1.0 / math.sqrt(square)}
     module, _, name = class_path.partition(":")
-    if name == "Barometer" and "static_pressure_error" not in present:  # one share for all directions
+    if name == "Barometer" and "static_pressure_error" not in present:  # the same share in all directions
         share, kind = present.pop("airspeed_error"), importlib.import_module(module).StaticPressureError
         present["static_pressure_error"] = kind(*[share] * len(DIRECTIONS)) if share else None
     return present
 
 
 def present_state(value: Any) -> Any:
-    """Return a recorded value in which feet that remembered an anchor and a flag have friction elements at rest."""
+    """Return a recorded value with friction elements at rest in place of the anchor and flag of each foot."""
     if type(value).__name__ == "MultirotorState":
         feet = [bool(m) and all(isinstance(f, tuple) and len(f) == ANCHOR for f in m) for m in value.memory]
         memory = zip(feet, value.memory, strict=True)

@@ -12,10 +12,10 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import digest, to_json
 
 SETUP_FILE = "setup.json"
-MACHINE = ("python", "packages", "system", "processor")  # keys of the machine that recorded
-FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended before its time: why, and whether it diverged
+MACHINE = ("python", "packages", "system", "processor")  # keys of the recording machine
+FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended early: the reason, and whether it diverged
 
-WAITED = "waited_for_disk"  # key of a run that the disk has held up: for how long
+WAITED = "waited_for_disk"  # key of a run that waited for the disk: the waiting time
 
 
 def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
@@ -37,10 +37,10 @@ def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
 
 
 def failure(text: str, diverged: bool = False) -> dict[str, str]:
-    """Further entries for a run that ended before its time.
+    """Return further entries for a run that ended early.
 
     Args:
-        text: why.
+        text: reason.
         diverged: True if a state became invalid.
     """
     return {FAILURE: text, **({DIVERGED: "yes"} if diverged else {})}
@@ -52,12 +52,12 @@ def attachments(setup: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes
 
 
 def package_version() -> str:
-    """Return the version of the installed package, "unknown" where it is not installed."""
+    """Return the version of the installed package, "unknown" if it is not installed."""
     return _installed_version("lapwing")
 
 
 def machine() -> dict[str, str]:
-    """Return the versions and the processor that this process runs with, by the keys of `MACHINE`."""
+    """Return versions and processor of this process, by the keys of `MACHINE`."""
     packages = " ".join(f"{name} {_installed_version(name)}" for name in ("numba", "llvmlite", "numpy"))
     library, release = platform.libc_ver()
     values = (platform.python_version(), packages, f"{platform.system()} {library} {release}".strip(), _processor())
@@ -72,7 +72,7 @@ def _installed_version(package: str) -> str:
 
 
 def _processor() -> str:
-    """Architecture and model."""
+    """Return architecture and model of the processor."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
@@ -84,7 +84,7 @@ def _processor() -> str:
 @cache
 def source_commit() -> str:
     """Return the commit of the source tree, with "+" if files differ, or "unknown" outside a git checkout."""
-    if stated := os.environ.get("LAPWING_COMMIT"):  # in an image, which has no checkout
+    if stated := os.environ.get("LAPWING_COMMIT"):  # set in an image, which has no checkout
         return stated
     here = Path(__file__).parent
     try:

@@ -31,15 +31,15 @@ class RunConfig(NamedTuple):
     vehicle's `ServiceConfig`, and the names of ports begin with the vehicle's: "left/ground_truth".
     """
 
-    scene: str  # name
+    scene: str  # name of the scene
     title: str
     seed: int
-    last_tick: int  # the run ends here at the latest
-    rate: int  # [Hz] ticks
-    interval_ns: int  # length of a tick
+    last_tick: int  # latest end of the run
+    rate: int  # [Hz] tick rate
+    interval_ns: int  # [ns] length of a tick
     coupling: str  # "gauss_seidel" or "jacobi"
-    vehicle: str  # name, the first part of its topics; "" for a fleet, whose topic names contain it
-    services: dict[str, ServiceConfig]  # those of the lock step, by name
+    vehicle: str  # name, the first part of its topics; "" for a fleet, whose topic names contain the vehicle
+    services: dict[str, ServiceConfig]  # services of the lock step, by name
     auxiliary: dict[str, Any]  # configurations of the processes outside the lock step, by name
     resolved: dict[str, Any]  # tables of the scene, including the content of its files
 

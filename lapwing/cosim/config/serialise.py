@@ -27,7 +27,7 @@ from lapwing.messages.former_names import current_fields
 
 TAG = "$"
 LARGEST = 1 << 26  # [bytes] limit of the text of a run configuration; typical ones have up to a few million
-DTYPES = ("bool", "float64", "int64")  # of arrays
+DTYPES = ("bool", "float64", "int64")  # types of arrays
 SCALARS = ("bool", "float64", "int64", "uint64")
 
 

@@ -1,9 +1,9 @@
 """User modules: found in the folder of the scene or on Python's path, and stored in the run configuration as text.
 
-Each process of a run, and each resimulation, runs that text: no process looks for the file a second time, and an
+Each process of a run, and each resimulation, runs that text: no process searches for the file again, and an
 edit during the start of a run has no effect. The text is written to a folder of the cache that is named by its
-content, so that tracebacks can show it and machine code made of it can be kept. A package, or a module in one, is
-imported as usual: it has to be installed wherever the run is flown.
+content, so that tracebacks can show it and its machine code can be cached. A package, or a module in one, is
+imported as usual: it must be installed on every machine of the run.
 """
 
 import ast
@@ -34,14 +34,14 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
 
     Args:
         key: dotted key of the scene that names it.
-        name: of the module.
-        folder: of the scene.
+        name: name of the module.
+        folder: folder of the scene.
 
     Returns:
         Files by the name of the module; the first is its own.
 
     Raises:
-        ConfigError: there is none, it has no source, or its name is taken.
+        ConfigError: the module does not exist, has no source, or has the name of another module.
     """
     if not all(part.isidentifier() for part in name.split(".")):
         raise ConfigError(key, f"got module {name!r}", "a name that Python can import")
@@ -87,7 +87,7 @@ def _is_carried(name: str, file: Path) -> bool:
 
 
 def _imports(file: Path) -> list[str]:
-    """Top-level names that a source imports; none where it is no Python."""
+    """Return the top-level names that a source imports; an empty set if it is not Python."""
     result: set[str] = set()
     with suppress(SyntaxError, ValueError, OSError):
         for node in ast.walk(ast.parse(file.read_bytes())):
@@ -98,7 +98,7 @@ def _imports(file: Path) -> list[str]:
     return sorted(result)
 
 
-FAULTS = (Exception, SystemExit)  # errors of a user's code that end a run with one line
+FAULTS = (Exception, SystemExit)  # errors of user code that end a run with one line
 _module_folders: set[str] = set()  # folders on `sys.path` with the modules of run configurations
 
 

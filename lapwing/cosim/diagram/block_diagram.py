@@ -42,7 +42,7 @@ class ConnectedBlock(PythonBlock, Protocol):
     """A Python block with a connection to a program outside the run."""
 
     def open(self, report_wait: Callable[[str], None]) -> None:
-        """Connect before the first tick. Call `report_wait` with a text during each wait, here and in `on_tick`."""
+        """Connect before the first tick. Each wait, here and in `on_tick`, calls `report_wait` with a text."""
         ...
 
     def close(self) -> None:
@@ -95,7 +95,7 @@ class BlockDiagram:
             services: all services of the run, or one.
             page: number of most recent ticks whose rows are kept.
             whole: names of the ports with full history.
-            rows: rows of a diagram that is no longer needed; their memory is used again where the shape is equal.
+            rows: rows of a diagram that is no longer needed; their memory is reused if the shape is equal.
         """
         self.setup, self.services = setup, services
         self.tick, self.ended = 0, False
@@ -164,8 +164,8 @@ class BlockDiagram:
 
         Args:
             stop: last tick (exclusive).
-            on_tick: is called in place of the method `on_tick` of a Python block, with the block and the tick; it calls
-                that method and returns its result.
+            on_tick: function that is called with a Python block and the tick in place of the block's `on_tick`; it
+                calls that method and returns its result.
 
         Raises:
             LockStepError: the state of a block is invalid.

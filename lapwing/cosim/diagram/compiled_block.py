@@ -194,8 +194,7 @@ class Schedule(NamedTuple):
 
 
 def schedule(codes: Sequence[BoundBlock | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
-    """Return the schedule of blocks with the vehicle of each; None is a Python block, which first runs at
-    tick 0."""
+    """Return the schedule of blocks with the vehicle of each. None is a Python block, which first runs at tick 0."""
     names = list(dict.fromkeys(vehicles)) or [""]
     return Schedule(
         np.array([code.function if code else 0 for code in codes], np.int64),
@@ -213,8 +212,9 @@ def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]
     """Run the schedule in a cell from block `first` of `tick` to the tick `stop` (exclusive), or to a Python block.
 
     Returns:
-        (tick, part, signal): LOOK: the Python part is to act at the tick, then go on with the next; FAILED: the part's
-        state is non-finite; END: the previous tick was the last; GO_ON: `stop` is reached.
+        (tick, block, status): WAKE_PYTHON: run the Python block at the tick, then continue with the next block;
+        NON_FINITE: the state of the block is non-finite; END: the previous tick was the last; CONTINUE: `stop` is
+        reached.
     """
     plan = schedule.value
     while tick < stop:

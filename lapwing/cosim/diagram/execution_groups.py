@@ -1,7 +1,7 @@
 """Execution groups: sets of blocks that are stepped tick by tick, independently of the other sets.
 
 A vehicle that steps through a block of ticks alone stays in the processor's cache. If 32 vehicles alternate at every
-tick, each step costs a tenth more (docs/reference/benchmarks.md). The results are bit-for-bit identical.
+tick, each step costs 10 % more (docs/reference/benchmarks.md). The results are bit-for-bit identical.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,8 +15,10 @@ from lapwing.kernels.cell import Cell
 
 
 def independent_groups(parts: Sequence[Any]) -> list[list[int]]:
-    """Return the numbers of the blocks of each group: those of each vehicle, or of all if one reads
-    a port of another vehicle or an external port."""
+    """Return the numbers of the blocks of each group.
+
+    A vehicle is a group, unless a block reads a port of another vehicle or an external port: then all form one group.
+    """
     vehicles = [getattr(part, "vehicle", "") for part in parts]
     producer = {port.name: vehicle for part, vehicle in zip(parts, vehicles, strict=True) for port in part.outputs}
     for part, vehicle in zip(parts, vehicles, strict=True):

@@ -40,11 +40,11 @@ def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str
     """Return an order in which each participant steps after the producers of its undelayed inputs.
 
     Args:
-        needs: the inputs of each participant.
+        needs: input ports of each participant.
         gives: names of the output ports of each participant.
 
     Raises:
-        LockStepError: a loop has no delay, or an input has no producer.
+        LockStepError: there is an algebraic loop, or an input has no producer.
     """
     producer = {port: name for name, ports in gives.items() for port in ports}
     for name, inputs in needs.items():
@@ -56,7 +56,8 @@ def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str
     while waiting:
         ready = sorted(name for name, before in waiting.items() if before <= set(order))
         if not ready:
-            raise LockStepError(f"a loop without delay: {', '.join(sorted(waiting))}")
+            loop = ", ".join(sorted(waiting))
+            raise LockStepError(f"algebraic loop: {loop}; give one input a delay of at least 1 tick")
         order += ready
         for name in ready:
             del waiting[name]

@@ -17,7 +17,7 @@ from lapwing.kernels.row_packing import columns
 from lapwing.messages.cdr_arrays import Record
 from lapwing.messages.topics import Topic
 
-Fields = Mapping[str, Any]  # by field name: a column (n,) or (n, k), a scalar, or a function that returns one of them
+Fields = Mapping[str, Any]  # by field name: a column (n,) or (n, k), a scalar, or a function that returns one of these
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class TopicEncoder:
         port: name of the port.
         period: ticks between two messages; a multiple of the port's.
         fields: (columns of the port's tree, instants [ns] (n,) of int64) to the message's fields.
-        sample: returns a message with the texts of a key; the key is () if `texts` is None.
-        texts: returns the columns of the key, each (n,): indices into the tables of texts.
+        sample: function that returns a message with the texts of a key; the key is () if `texts` is None.
+        texts: function that returns the columns of the key, each (n,): indices into the tables of texts.
     """
 
     topic: Topic

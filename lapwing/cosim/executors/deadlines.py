@@ -1,6 +1,6 @@
 """Deadlines of a run with a real-time factor: number of late ticks and largest lateness of each service and of the run.
 
-A service is late at a tick when its own step takes longer than a tick may; the clock owner is late when it cannot
+A service is late at a tick when its own step takes longer than a tick; the clock owner is late when it cannot
 begin a tick in time because the previous tick is not complete, whichever service caused it.
 """
 
@@ -45,11 +45,11 @@ def lateness(text: str) -> Lateness:
         ticks, worst = json.loads(text)
         return Lateness(int(ticks), float(worst))
     except TypeError as error:
-        raise ValueError(f"no lateness: {error}") from None
+        raise ValueError(f"not a lateness: {error}") from None
 
 
 def metadata_entries(services: Mapping[str, Lateness]) -> dict[str, str]:
-    """Return metadata_entries of a log's metadata from the lateness of each service, empty without reports."""
+    """Return entries of a log's metadata from the lateness of each service; empty without reports."""
     if not services:
         return {}
     return {

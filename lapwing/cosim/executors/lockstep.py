@@ -35,7 +35,7 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
     """
     setup = process.setup
     graph = BlockDiagram(setup, [service], 2 * PAGE)
-    graph.advance(0)  # steps nothing, but compiles the loop over the blocks before the clock starts
+    graph.advance(0)  # steps no block, but compiles the loop over the blocks before the clock starts
     receivers = packet_receivers(process, graph)
     sender = PacketSender(process, service, graph)
     backpressure = LogBackpressure(process, recorder) if owns_time else None

@@ -6,10 +6,10 @@ from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import RECORDED_KEY
 
-AHEAD = 8192  # [ticks] that the run of one vehicle may be ahead of its log, about 20 MB; fewer with several vehicles
+AHEAD = 8192  # [ticks] limit of a run's lead over its log (one vehicle), about 20 MB; fewer with several vehicles
 LEAST = 2048  # [ticks] lower limit with many vehicles
 LOOK = 256  # [ticks] between two checks
-_PROGRESS = struct.Struct("<q?")  # ticks before this one are recorded; True while the recorder waits for the disk
+_PROGRESS = struct.Struct("<q?")  # first tick that is not recorded; True while the recorder waits for the disk
 
 
 class LogProgressPublisher:

@@ -30,13 +30,13 @@ __all__ = ["PATIENCE", "POLL", "Participant", "Stopped"]
 POLL = 0.1  # [s] between two checks whether to stop
 OUTSIDE_PERIOD = 0.4  # [s] between two messages about a program outside the run
 PATIENCE = 1.0  # [s] of waiting before a service publishes what it waits for
-JOIN_TIMEOUT = 600.0  # [s] for the others to compile their kernels and to appear
+JOIN_TIMEOUT = 600.0  # [s] for the other participants to compile their kernels and to appear
 ANSWER_TIMEOUT = 5.0  # [s] for the reply of a participant with its run configuration
-CONFIRMED = 60.0  # [s] without a change among the others, which confirm a last message
+CONFIRMED = 60.0  # [s] without a change among the other participants, which confirm a last message
 INTERRUPTED = 1.0  # [s] for these confirmations after a request to stop
 REPEAT = 0.2  # [s] between two last messages, for late subscribers and links that were cut
 BRIEF = 0.02  # [s] between two checks for confirmations
-COMPARE_TIME = 3.0  # [s] for all participants to find a difference
+COMPARE_TIME = 3.0  # [s] for all participants to compare their run configurations
 
 T = TypeVar("T")
 
@@ -74,7 +74,7 @@ class Participant(StopRequest):
         self.name, self.setup, self.bus = name, setup, bus
         self.participants, self.key_prefix = participants, participants.key_prefix
         self.others, self.speed, self.core = others, speed, core
-        self.create_service: Callable[[str], Service]  # by name, for its topics
+        self.create_service: Callable[[str], Service]  # returns a service by name, for its topics
         self._compiling = False
         self._rejected = 0
         self._next_wait_report = 0.0  # [s] of the monotonic clock

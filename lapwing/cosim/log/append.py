@@ -1,4 +1,4 @@
-"""Messages of one more topic, behind the others of a log that has its end."""
+"""Addition of a topic to a complete log, after its other messages."""
 
 import struct
 from collections.abc import Sequence
@@ -17,21 +17,21 @@ from lapwing.cosim.log.chunk import WrittenTopic, arrange, rows_of
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC, Container
 from lapwing.cosim.output_lock import lock_descriptor
 
-_FOOTER = struct.Struct("<BQQQI")  # opcode, length, where the summary begins, where its offsets do, checksum
-_DATA_END = 13  # [bytes] of the record before the summary
+_FOOTER = struct.Struct("<BQQQI")  # opcode, length, start of the summary, start of its offsets, checksum
+_DATA_END = 13  # [bytes] size of the record before the summary
 
 
 def append(path: Path, topic: str, message: Any, messages: Sequence[tuple[int, bytes]]) -> None:
-    """Add a topic that does not enter the digest; the log stays as it was where it cannot be written.
+    """Add a topic that is not part of the digest. If the log cannot be written, it stays unchanged.
 
     Args:
-        path: of the log.
-        topic: its name, which the log does not have.
+        path: path of the log.
+        topic: name of a topic that the log does not have.
         message: message class.
-        messages: time [ns] and payload, in order.
+        messages: time [ns] and payload of each message, in order.
 
     Raises:
-        ValueError: the log has no end, has the topic, or cannot be written.
+        ValueError: the log is incomplete, has the topic, or cannot be written.
     """
     if not messages:
         return
@@ -42,7 +42,7 @@ def append(path: Path, topic: str, message: Any, messages: Sequence[tuple[int, b
             lock_descriptor(file.fileno(), path)
             _append(path, file, summary, topic, message, messages)
     except (McapError, struct.error) as fault:
-        raise ValueError(f"{path}: has no end to which a topic could be added: {fault}") from None
+        raise ValueError(f"{path}: is incomplete, no topic can be added: {fault}") from None
     except OSError as fault:
         raise ValueError(f"{path}: cannot write the log: {fault.strerror or fault}") from None
 
@@ -53,9 +53,9 @@ def _append(
     file.seek(-(_FOOTER.size + len(MCAP0_MAGIC)), 2)
     start = _FOOTER.unpack(file.read(_FOOTER.size))[2] - _DATA_END
     if summary is None or start < 0:
-        raise ValueError(f"{path}: has no end to which a topic could be added")
+        raise ValueError(f"{path}: is incomplete, no topic can be added")
     if any(channel.topic == topic for channel in summary.channels.values()):
-        raise ValueError(f"{path}: has a topic {topic} already")
+        raise ValueError(f"{path}: already has a topic {topic}")
     file.seek(start)
     before = file.read()
     known = {schema.name: schema.id for schema in summary.schemas.values()}

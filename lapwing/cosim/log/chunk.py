@@ -1,4 +1,4 @@
-"""The messages of a chunk: from columns to MCAP message records in their order, and the index of them."""
+"""Messages of a chunk: conversion of columns to MCAP message records in order, and their index."""
 
 import struct
 from functools import cache
@@ -9,25 +9,25 @@ from mcap.opcode import Opcode
 
 from lapwing.messages.digest import Digest
 
-_INDEX = struct.Struct("<BQHI")  # opcode, length of what follows, channel, length of the entries
+_INDEX = struct.Struct("<BQHI")  # opcode, length of the remaining record, channel, length of the entries
 
 
 class WrittenTopic:
-    """A topic that is being written."""
+    """Topic of a log in progress."""
 
     def __init__(self, name: str, channel_id: int, deterministic: bool) -> None:
         self.name = name
         self.channel_id = channel_id
-        self.deterministic = deterministic  # whether it enters the digest
-        self.count = 0  # messages so far
+        self.deterministic = deterministic  # True if it is part of the digest
+        self.count = 0  # number of messages so far
 
 
 class Rows(NamedTuple):
-    """n messages of a topic that have the same size."""
+    """n messages of equal size of a topic."""
 
     topic: WrittenTopic
     records: np.ndarray  # MCAP message records, shape (n,); their sequence numbers are filled in later
-    order: np.ndarray  # int64, shape (n,): ascending order of the messages of a chunk
+    order: np.ndarray  # int64, shape (n,): ascending position keys within a chunk
 
 
 class Index(NamedTuple):
@@ -44,10 +44,10 @@ class Index(NamedTuple):
 
 
 class Messages(NamedTuple):
-    """The messages of a chunk as MCAP has them."""
+    """Messages of a chunk in MCAP format."""
 
     data: bytes
-    indexes: list[Index]  # one for each channel
+    indexes: list[Index]  # index of each channel
     start_ns: int
     end_ns: int
 
@@ -56,15 +56,15 @@ def rows(topic: WrittenTopic, times_ns: np.ndarray, payloads: np.ndarray, order:
     """Copy messages into MCAP message records.
 
     Args:
-        topic: theirs.
+        topic: topic of the messages.
         times_ns: simulation times [ns], shape (n,).
         payloads: uint8, shape (n, size).
-        order: shape (n,).
+        order: position keys, shape (n,).
     """
     n, size = payloads.shape
     records = np.empty(n, _record_dtype(size))
     records["opcode"] = Opcode.MESSAGE
-    records["length"] = records.itemsize - 9  # all but opcode and length itself
+    records["length"] = records.itemsize - 9  # length without opcode and length field
     records["channel"] = topic.channel_id
     records["log_time"] = records["publish_time"] = times_ns
     records["payload"] = payloads
@@ -102,10 +102,10 @@ def add_to_digest(digest: Digest, parts: list[Rows]) -> None:
 
 
 def arrange(parts: list[Rows]) -> Messages:
-    """Number the messages of each topic, and lay all of them out in ascending order.
+    """Number the messages of each topic, and arrange all messages in ascending order.
 
     Args:
-        parts: at least one message; where two have the same order, the earlier part goes first.
+        parts: at least one message; of equal position keys, the earlier part is first.
     """
     for topic, of_topic in _by_topic(parts).items():
         for part, places in zip(of_topic, _places(of_topic), strict=True):
@@ -121,7 +121,7 @@ def arrange(parts: list[Rows]) -> Messages:
     for part, places in zip(parts, all_places, strict=True):
         size = part.records.itemsize
         offsets = ends[places] - size
-        # A view of `data` with an element of this size at every byte: one assignment copies record by record.
+        # A view of `data` with an element of this size at every byte, so that one assignment copies all records.
         windows = np.ndarray((len(data) - size + 1,), f"V{size}", data, strides=(1,))
         windows[offsets] = part.records.view(f"V{size}")
         times_ns = part.records["log_time"].astype(np.int64)
@@ -151,7 +151,7 @@ def _by_topic(parts: list[Rows]) -> dict[WrittenTopic, list[Rows]]:
 
 
 def _places(parts: list[Rows]) -> list[np.ndarray]:
-    """Return the place of every message among all parts, by part."""
+    """Return the position of every message among all parts, by part."""
     order = np.concatenate([part.order for part in parts])
     places = np.empty(len(order), np.int64)
     places[np.argsort(order, kind="stable")] = np.arange(len(order))

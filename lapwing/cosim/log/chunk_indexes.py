@@ -4,7 +4,7 @@ from pathlib import Path
 from tempfile import SpooledTemporaryFile
 from typing import NamedTuple
 
-IN_MEMORY = 1 << 16  # [bytes]: some 170 chunks and as many wall times
+IN_MEMORY = 1 << 16  # [bytes] about 170 chunks and as many wall times
 
 
 class Extent(NamedTuple):
@@ -17,7 +17,7 @@ class Extent(NamedTuple):
 
 
 class ChunkIndexes:
-    """Encoded records of kind CHUNK_INDEX. A flight of days has hundreds of thousands, as objects 2 kB each.
+    """Encoded records of kind CHUNK_INDEX. A flight of days has hundreds of thousands, which take 2 kB each as objects.
 
     Attributes:
         extent: valid indexes; set it to an earlier value to remove the indexes that were added since.
@@ -29,7 +29,7 @@ class ChunkIndexes:
         self._file = SpooledTemporaryFile(IN_MEMORY, dir=str(folder), prefix="lapwing-")  # noqa: SIM115 (closed in close)
 
     def add(self, record: bytes, start_ns: int, end_ns: int) -> None:
-        """Keep the index of a chunk with messages of these times [ns].
+        """Add the index of a chunk with messages of these times [ns].
 
         Raises:
             OSError: it cannot be written; the index is then not added.

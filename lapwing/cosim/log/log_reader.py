@@ -1,4 +1,4 @@
-"""Reading a log, also one that was cut short."""
+"""Reader of logs, including truncated ones."""
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
@@ -23,7 +23,7 @@ _time, _place = itemgetter(0), itemgetter(0, 1)
 
 
 class LogReader:
-    """Reader of one log, which may lack its end; a context manager.
+    """Reader of one log, which may be truncated; a context manager.
 
     Attributes:
         metadata: content of the records `lapwing` and `lapwing_end`; empty for logs of other tools.
@@ -33,7 +33,7 @@ class LogReader:
         damaged: a line for each damaged chunk; with `skip_damaged` only.
 
     Raises:
-        ValueError: the file is missing or no MCAP file; from `messages` and `digest`, also if a chunk is damaged.
+        ValueError: the file is missing or not an MCAP file; from `messages` and `digest`, also if a chunk is damaged.
     """
 
     def __init__(self, path: str | Path, skip_damaged: bool = False) -> None:
@@ -53,7 +53,7 @@ class LogReader:
         self.complete, self.damaged = self._contents.complete, self._contents.damaged
 
     def topics(self) -> dict[str, str]:
-        """Full type name of each topic, in order of the topics' names."""
+        """Return the full type name of each topic, sorted by topic."""
         channels = sorted(self._contents.channels.values(), key=lambda channel: channel.topic)
         return {channel.topic: self._contents.schemas[channel.schema_id] for channel in channels}
 
@@ -152,7 +152,7 @@ class LogReader:
         return {topic: builder.history() for topic, builder in builders.items()}
 
     def deterministic_topics(self) -> set[str]:
-        """Return the topics that enter the digest."""
+        """Return the topics that are part of the digest."""
         return {c.topic for c in self._contents.channels.values() if c.metadata.get(DETERMINISTIC) != "false"}
 
     def digest(self, current_names: bool = False) -> str:

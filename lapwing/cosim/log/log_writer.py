@@ -15,7 +15,7 @@ from lapwing.cosim.output_lock import open_locked
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
 
-CHUNK_SIZE = 512 * 1024  # [bytes] of single messages that make a chunk
+CHUNK_SIZE = 512 * 1024  # [bytes] limit of single messages in a chunk
 FLUSH_PERIOD = 0.5  # [s] of wall time
 
 Part = tuple[str, Any, np.ndarray, np.ndarray, np.ndarray]
@@ -119,7 +119,7 @@ class LogWriter:
             self._submit(lambda declarations: self._write_tail(declarations, page), keep=True)
 
     def flush(self) -> None:
-        """Write all recorded messages to the file. `write` does it every 0.5 s; call this if there is no message."""
+        """Write all recorded messages to the file. `write` does it every 0.5 s; call this if no message follows."""
         if self._failed:
             return
         self._cut()
@@ -235,7 +235,7 @@ class LogWriter:
         start = time.monotonic()
         counts = {part.topic: part.topic.count for part in parts}
         self._container.write_provisional_chunk(declarations, arrange(parts))
-        for topic, count in counts.items():  # its messages come again
+        for topic, count in counts.items():  # its messages will be written again
             topic.count = count
         self.tail_took = time.monotonic() - start
 

@@ -70,7 +70,7 @@ class Contents:
         damaged: a line for each damaged chunk, with `skip_damaged` only.
 
     Raises:
-        ValueError: no MCAP file, or a damaged one.
+        ValueError: not an MCAP file, or damaged.
     """
 
     def __init__(self, path: Path, file: BinaryIO, skip_damaged: bool = False) -> None:
@@ -92,7 +92,7 @@ class Contents:
             self._read_declarations(skip_damaged)
 
     def read_chunk(self, offset: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
-        """Time, channel and payload of a chunk's messages of some channels, in order of writing.
+        """Yield time, channel and payload of a chunk's messages of some channels, in order of writing.
 
         Raises:
             ValueError: the chunk is damaged.
@@ -105,7 +105,7 @@ class Contents:
             stream, size = get_chunk_data_stream(chunk, validate_crc=True)
             data = stream.read(size)
             return self._messages(data, size, channels)
-        except Exception as fault:  # whatever the decompressor raises, or records that are none
+        except Exception as fault:  # any error of the decompressor, or invalid records
             raise ValueError(f"{self._path}: damaged chunk at byte {offset}: {fault}") from None
 
     def _messages(self, data: bytes, size: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
@@ -124,7 +124,7 @@ class Contents:
         return result
 
     def _scan(self) -> None:
-        """Walk over the records, noting where the chunks are without reading them."""
+        """Read all records except chunks, whose positions are stored."""
         file = self._file
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -133,7 +133,7 @@ class Contents:
         while offset + _RECORD.size <= size:
             opcode, length = _RECORD.unpack(file.read(_RECORD.size))
             if opcode == 0 or offset + _RECORD.size + length > size:
-                break  # a record that was never finished
+                break  # truncated record
             if opcode == Opcode.FOOTER:
                 self.complete = True
                 break
@@ -147,7 +147,7 @@ class Contents:
             elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
                 self.chunks[-1].channels.add(*_CHANNEL.unpack(file.read(_CHANNEL.size)))
             elif opcode == Opcode.MESSAGE:
-                raise ValueError(f"{self._path}: holds messages outside of chunks, expected a chunked log")
+                raise ValueError(f"{self._path}: has messages outside of chunks; expected a chunked log")
             elif opcode in _DECLARATIONS:
                 self._declare(opcode, file.read(length))
             offset += _RECORD.size + length

@@ -36,8 +36,8 @@ from lapwing.cosim.log.chunk_indexes import ChunkIndexes, Extent
 METADATA = "lapwing"  # name of the metadata record at the start
 METADATA_END = "lapwing_end"  # name of the metadata record at the end, with entries that were not known at the start
 DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false"
-COMPRESSION_LEVEL = 2  # zstd: level 3, its default, makes such logs larger; level 9 saves 3 % for five times the work
-SMALL = 1024  # [bytes] of messages that are not worth compressing
+COMPRESSION_LEVEL = 2  # zstd: the default level 3 gives larger logs; level 9 saves 3 % for five times the work
+SMALL = 1024  # [bytes] size below which messages are not compressed
 _CRC = 4  # [bytes] size of the footer's checksum, which does not cover these bytes
 
 
@@ -55,7 +55,7 @@ class Container:
     """Writer of a file's records and of their index. All methods may raise OSError."""
 
     def __init__(self, file: FileIO) -> None:
-        """Begin a file that is empty, unbuffered and open for writing."""
+        """Start a file that is empty, unbuffered and open for writing."""
         self._begin(file)
         self._write(MCAP0_MAGIC)
         self._write(encode(Header(profile="ros2", library="lapwing")))

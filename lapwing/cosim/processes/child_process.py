@@ -43,7 +43,7 @@ def start(name: str) -> Child:
 
 def _may_fork() -> bool:
     """Return True if a fork inherits a consistent state: no other threads, and no Zenoh session so far."""
-    from lapwing.cosim.transport.bus import in_use  # not before: a command that flies nothing does not load Zenoh
+    from lapwing.cosim.transport.bus import in_use  # imported late: a command without a flight does not load Zenoh
 
     return sys.platform == "linux" and threading.active_count() == 1 and not in_use()
 
@@ -57,7 +57,7 @@ def _fork(name: str) -> Child:
 
 @contextmanager
 def start_early(names: Iterable[str]) -> Iterator[dict[str, Child]]:
-    """Start participants, forked if possible, for `launch` to take; end those that are left."""
+    """Start participants for `launch`, forked if possible. At the end, kill those that it did not use."""
     begin = _fork if _may_fork() else start
     children = {name: begin(name) for name in names}
     try:

@@ -63,7 +63,7 @@ class Forked:
 
     def send_signal(self, number: int) -> None:
         """Send a signal, unless the child has exited."""
-        if self.poll() is None:  # its id may belong to another process after it was waited for
+        if self.poll() is None:  # after its exit code is read, its id may belong to another process
             os.kill(self.pid, number)
 
     def _look(self, options: int) -> int | None:
@@ -83,7 +83,7 @@ def _run(run: Callable[[], None], standard_input: int, output: int) -> NoReturn:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         for here, there in ((standard_input, 0), (output, 1), (output, 2)):
             os.dup2(here, there)
-        for file in map(int, os.listdir("/proc/self/fd")):  # among them the standard input of earlier children
+        for file in map(int, os.listdir("/proc/self/fd")):  # including the standard input of earlier children
             if file > 2:
                 with suppress(OSError):
                     os.close(file)

@@ -35,11 +35,11 @@ def launch(
     """Run the processes as children until the run ends. Return the final output of each optional process.
 
     Args:
-        required: names of the processes without which the run fails.
+        required: names of the processes that the run needs.
         send_spec: writes the specification of the named process, with all endpoints, to its standard input.
         publisher_ids: publisher GIDs of the run.
         observe: called about five times a second; the run is ended when it returns True.
-        optional: names of the processes without which the run continues.
+        optional: names of processes that may end without ending the run.
         external: endpoints of the required participants that are started elsewhere; all others connect to them.
         started: processes that run already (`start_early`); those that the run does not need are ended.
         services: services that publish log packets.
@@ -49,9 +49,10 @@ def launch(
         ValueError: a service rejected its configuration; the text says why.
     """
     optional, early = list(optional), started or {}
-    own = [name for name in [*optional, *required] if name not in external]  # a ground station waits for its link
+    # optional ones first: a ground station may be waiting for its link
+    own = [name for name in [*optional, *required] if name not in external]
     children: dict[str, Child] = {}
-    exited: dict[str, int] = {}  # exit codes of optional processes that did not last to the end of the run
+    exited: dict[str, int] = {}  # exit codes of optional processes that ended before the run
     with private_endpoints([MONITOR, *own]) as sockets, ExitStack() as stack:
         stack.callback(_close, children)
         endpoints = {**external, **sockets}
@@ -65,7 +66,7 @@ def launch(
         def send(name: str) -> None:
             stream = children[name].process.stdin
             assert stream is not None
-            with suppress(BrokenPipeError):  # it has exited; its output says why
+            with suppress(BrokenPipeError):  # it has exited; its output has the reason
                 send_spec(name, endpoints, stream)
 
         listen, connect = mesh(MONITOR, endpoints)
@@ -73,7 +74,8 @@ def launch(
         with ZenohBus(listen, connect, "peer", publisher_ids.gid(MONITOR), links, awaits=False) as bus:
             try:
                 monitor = RunMonitor(bus, publisher_ids, [*required, *optional, *external], services=services)
-                bus.declare_liveliness(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")  # all others wait for it
+                # all other processes wait for it
+                bus.declare_liveliness(f"{publisher_ids.key_prefix}/{ALIVE_KEY}/{MONITOR}")
                 ready = [name for name in own if name in early]
                 start_processes(ready)
                 start_processes([name for name in own if name not in ready])
@@ -108,7 +110,7 @@ def _request_end(children: Iterable[Child]) -> None:
 
 
 def _wait(children: list[Child], seconds: float) -> None:
-    """Wait until all have exited, at most `seconds` without the time in which they got no CPU."""
+    """Wait until all processes have exited, at most `seconds` plus the time that they waited for a CPU."""
     start = time.monotonic()
     starved_before = {child.process.pid: starved_time(child.process.pid) for child in children}
     while running := [child.process.pid for child in children if child.process.poll() is None]:
@@ -129,5 +131,5 @@ def _end(children: Iterable[Child]) -> None:
             child.process.kill()
             child.process.wait()
         if child.process.stdin:
-            with suppress(BrokenPipeError):  # it was killed before it had read its specification
+            with suppress(BrokenPipeError):  # killed before it had read its specification
                 child.process.stdin.close()

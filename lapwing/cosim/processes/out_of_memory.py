@@ -1,14 +1,14 @@
-"""Processes that the kernel kills for lack of memory: which of a run's processes it takes first, and if it did."""
+"""Out-of-memory kills by the kernel: choice of the first victim in a run, and number of kills."""
 
 from contextlib import suppress
 from pathlib import Path
 
-BEFORE_LAUNCHER = 500  # added to a child's badness, in thousandths of the memory: the launcher lives and names it
+BEFORE_LAUNCHER = 500  # added to a child's badness (thousandths of the memory): the launcher survives and names it
 COUNTERS = Path("/proc/vmstat")
 
 
 def prefer_as_victim() -> None:
-    """Let the kernel kill this process before the one that started it. Other systems ignore the call."""
+    """Make the kernel kill this process before its parent process. Other systems ignore the call."""
     with suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text(str(BEFORE_LAUNCHER))
 

@@ -67,10 +67,10 @@ class RunMonitor:
         self.on_batches: Callable[[list[RecordBatch]], None] | None = None  # called with all messages
         self.waiting: dict[str, str] = {}
         self.compiling = False  # a participant compiles kernels
-        self.diverged = False  # a state is invalid: the run ends, and its log has the reason
-        self.slow_disk = False  # the recorder has waited for the disk
+        self.diverged = False  # a state is invalid: the run ends with the reason in its log
+        self.slow_disk = False  # True if the recorder has waited for the disk
         self.present: set[str] = set()
-        self.gone: set[str] = set()
+        self.left: set[str] = set()  # participants that have left the run
         self.time_ns = 0  # time that all reporting services have reached
         self._times: dict[str, int] = {}
         self.start: float | None = None  # [s] of the monotonic clock, at the first log packet
@@ -90,9 +90,9 @@ class RunMonitor:
         name = key.rsplit("/", 1)[1]
         if alive:
             self.present.add(name)
-            self.gone.discard(name)
+            self.left.discard(name)
         elif name in self.present:
-            self.gone.add(name)
+            self.left.add(name)
 
     def _note_confirmation(self, key: str, alive: bool) -> None:
         if alive:
@@ -102,7 +102,8 @@ class RunMonitor:
     def poll(self, seconds: float) -> None:
         """Read the messages that arrive within `seconds`, then all that are pending.
 
-        On a busy machine the time may pass before one message is read: the process would fall ever further behind.
+        On a busy machine the time may pass before a message is read, and the process would fall further and further
+        behind.
         """
         deadline = time.monotonic() + seconds
         while (remaining := deadline - time.monotonic()) > 0:
@@ -135,7 +136,7 @@ class RunMonitor:
 
     def _read_log_progress(self, payload: bytes) -> None:
         if self._logged:
-            return  # the recorder repeats its last message: no news
+            return  # the recorder repeats its last message, which is no progress
         self.last_news = time.monotonic()
         self.slow_disk = self.slow_disk or waits_for_disk(payload)
         if not payload:
@@ -187,11 +188,11 @@ class RunMonitor:
 
     @property
     def rejected(self) -> int:
-        """Number of messages that all participants have rejected, as far as they have reported it."""
+        """Number of messages that all participants have reported as rejected."""
         return sum(self._rejected.values()) + self._bus.rejected
 
     def abort_message(self) -> str | None:
-        """Return a sentence about a run that ended early, None if it completed or diverged."""
+        """Return a description of an early end, None if the run completed or diverged."""
         if self.outcome == "" or self.diverged:
             return None
         cause = f": {self.outcome}" if self.outcome else ""
@@ -200,7 +201,7 @@ class RunMonitor:
     def stall_message(
         self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0
     ) -> str | None:
-        """Return a sentence that names the participants that block the run, None while it proceeds.
+        """Return a description of the participants that block the run, None while it proceeds.
 
         Args:
             names: participants that the run requires.

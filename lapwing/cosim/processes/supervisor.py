@@ -1,4 +1,4 @@
-"""Supervision of the processes of a run: detects the end, and names the process that fails."""
+"""Supervision of the processes of a run: detection of its end and of the process that failed."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from lapwing.cosim.run_errors import ExitCode, RunFailed
 POLL = 0.2  # [s] between two updates in flight
 FINAL_POLL_TIME = 0.05  # [s] between two updates at the end of a run
 SHUTDOWN_TIMEOUT = 10.0  # [s] from the last message of a run to the exit of its processes
-ORDERLY = (ExitCode.COMPLETED, ExitCode.CUT_SHORT, ExitCode.DIVERGED)  # exit codes of a process that was not at fault
+ORDERLY = (ExitCode.COMPLETED, ExitCode.CUT_SHORT, ExitCode.DIVERGED)  # exit codes of processes without fault
 
 
 class RunState(Enum):
@@ -127,12 +127,12 @@ class RunSupervisor:
             self.state = RunState.ENDED
 
     def _check_external(self) -> None:
-        lost = sorted(self._monitor.gone & self._external)
+        lost = sorted(self._monitor.left & self._external)
         if not lost or self.state is RunState.ENDING:
             return
-        self._monitor.poll(0.5)  # the end may arrive by another link
+        self._monitor.poll(0.5)  # the end may arrive over another link
         if not self._monitor.ended:
-            raise RunFailed(f"{', '.join(lost)}: gone {self._at()}")
+            raise RunFailed(f"{', '.join(lost)}: left the run {self._at()}")
 
     def _note_stopped(self, now: float) -> None:
         for name in self._own:
@@ -154,8 +154,8 @@ class RunSupervisor:
     def _check_shutdown(self, now: float) -> None:
         monitor = self._monitor
         silence = now - max(self._ending_since, monitor.last_news)
-        if self._is_long(silence, STALL) and self._kill_optional():  # a stalled one confirms nothing
-            monitor.last_news = now - STALL  # the others now have their time to leave
+        if self._is_long(silence, STALL) and self._kill_optional():  # a stalled process confirms nothing
+            monitor.last_news = now - STALL  # the other processes now have their time to leave
             return
         if not self._is_long(silence, SHUTDOWN_TIMEOUT):
             return
@@ -167,20 +167,20 @@ class RunSupervisor:
             raise RunFailed(message)
         running = [name for name in self._own if self._children[name].process.poll() is None]
         silent = [name for name in running if name not in monitor.confirmed] or running
-        raise RunFailed(f"{', '.join(silent)}: did not end within {SHUTDOWN_TIMEOUT:g} s of the last news")
+        raise RunFailed(f"{', '.join(silent)}: did not end within {SHUTDOWN_TIMEOUT:g} s of the last message")
 
     def _starved(self, names: Iterable[str]) -> float:
         """Return the time [s] that these processes, and this one, have waited for a processor since the last news."""
         return self._starvation.of({*names, MONITOR})
 
     def _is_long(self, silence: float, patience: float) -> bool:
-        """Return True if a silence at the end of a run exceeds `patience`, without the time that processes waited for a
-        processor, and that optional ones ran: they may have much left to handle."""
+        """Return True if a silence at the end of a run exceeds `patience` plus the time that processes waited for a
+        processor, and that optional ones ran: they may have much data left to handle."""
         excused = self._starved(self._children) + self._starvation.run_time(self._optional)
         return silence > LONGEST or silence - excused > patience
 
     def _check_outcome(self) -> None:
-        """Raise RunFailed if the run ended early. A run whose processes all completed needs no message that says so."""
+        """Raise RunFailed if the run ended early. If all processes completed, no message about the end is needed."""
         codes = {name: self._children[name].process.poll() for name in self._own}
         if self._monitor.diverged or ExitCode.DIVERGED in codes.values():
             return
@@ -221,5 +221,5 @@ def reason(code: int) -> str:
 def _is_stopped(child: ChildProcess) -> bool:
     try:
         return os.waitid(os.P_PID, child.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
-    except ChildProcessError:  # it has just ended
+    except ChildProcessError:  # it has just exited
         return False

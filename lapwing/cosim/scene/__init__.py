@@ -1,8 +1,7 @@
-"""A scene: one TOML file and all that it names, read once and turned into frozen, validated values.
+"""Scene: one TOML file and the files that it names, read once and converted to frozen, validated values.
 
-Each service declares the tables that it alone reads as `SceneTable` classes in its own `config.py`, those that several
-read are in `services/common`. They form a `Vocabulary`. A service gets its settings with
-`scene[SceneTableClass]`.
+Each service declares its tables as `SceneTable` classes; tables that several services read are in `services/common`.
+They form a `Vocabulary`. A service gets its settings with `scene[SceneTableClass]`.
 """
 
 from lapwing.cosim.scene.files import Files

@@ -1,8 +1,8 @@
-"""Files that a scene names: found by path or by name, read once, and kept for the log."""
+"""Files of a scene: located by path or name, read once, and stored for the log."""
 
 import tomllib
 from functools import lru_cache
-from os.path import isfile  # returns False for names that no file can have
+from os.path import isfile  # returns False for invalid file names
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from lapwing.dynamics.input_file import read_bytes
 
 
 class Files:
-    """Reads the files of one scene."""
+    """Reader of the files of one scene."""
 
     def __init__(self, folder: Path):
         self.folder = folder  # folder of the scene; paths are relative to it
@@ -86,12 +86,12 @@ def parse_toml(text: str, path: Path) -> dict[str, Any]:
 
 @lru_cache(maxsize=64)
 def _tables(text: str) -> dict[str, Any]:
-    """Parse a text once: the runs of a campaign have the same texts."""
+    """Parse a TOML text, with a cache: the runs of a campaign have the same texts."""
     return tomllib.loads(text)
 
 
 def deep_copy(value: Any) -> Any:
-    """Return a deep copy of tables and lists, in a third of the time of `copy.deepcopy`."""
+    """Return a deep copy of tables and lists, three times as fast as `copy.deepcopy`."""
     if isinstance(value, dict):
         return {key: deep_copy(item) for key, item in value.items()}
     return [deep_copy(item) for item in value] if isinstance(value, list) else value

@@ -64,7 +64,7 @@ def _plain(value: Any) -> Any:
 
 
 def is_below_file_name(tree: Any, key: str) -> bool:
-    """Return True if a key is below a text, which may name a file that is not read yet."""
+    """Return True if a key is inside a text value, which may name a file that is not read yet."""
     for part in key.split(".")[:-1]:
         if isinstance(tree, list):
             tree = tree[int(part)] if part.isdigit() and int(part) < len(tree) else None

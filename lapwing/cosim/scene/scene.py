@@ -178,7 +178,7 @@ class Scene:
 
     @property
     def overrides(self) -> tuple[str, ...]:
-        """KEY=VALUE, as given."""
+        """Overrides as texts KEY=VALUE."""
         return tuple(override.text for override in self.file_overrides or ())
 
     @property

@@ -26,7 +26,7 @@ os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
 
 import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
 
-INBOX = 4096  # [messages]; far more than arrive in lock step before one is read
+INBOX = 4096  # [messages] far more than arrive in lock step before one is read
 WAKE = 0.05  # [s] between two checks of the deadlines of waiting threads
 
 _opened = False
@@ -130,8 +130,11 @@ class ZenohBus:
         return self._receive(senders, Subscription(_message, dict(senders), self._count_rejected, deferred))
 
     def inbox(self, key: str, sender: bytes | None) -> Inbox:
-        """Subscribe to the sender with this GID on `key`, for messages that are read soon after they arrive: a message
-        keeps 64 kB of memory alive, and a full ring drops its oldest. None accepts the GID of the first message."""
+        """Subscribe to the sender with this GID on `key`; None accepts the GID of the first message.
+
+        For messages that are read soon after their arrival: each keeps 64 kB of memory alive, and a full ring drops the
+        oldest one.
+        """
         subscriber = self._session.declare_subscriber(key, zenoh.handlers.RingChannel(INBOX))
         self._declared.append(subscriber)
         result = Inbox(subscriber.handler.recv, _message, sender, self._waker, self._count_rejected)
@@ -146,7 +149,7 @@ class ZenohBus:
             for key, inbox in list(self._inboxes.items()):
                 if time.monotonic() >= inbox.deadline:
                     own_session = zenoh.Locality.SESSION_LOCAL
-                    with suppress(zenoh.ZError):  # the session has been closed
+                    with suppress(zenoh.ZError):  # the session is closed
                         self._session.put(key, b"", attachment=pack(0, 0, self._waker), allowed_destination=own_session)
 
     def _receive(self, keys: Iterable[str], subscription: Subscription) -> Subscription:
@@ -158,8 +161,10 @@ class ZenohBus:
         self.rejected += 1
 
     def declare_liveliness(self, key: str) -> Callable[[], None]:
-        """Declare that this participant is present, until the returned function is called. Call it after `subscribe`: a
-        participant that sees it may publish."""
+        """Declare that this participant is present, until the returned function is called.
+
+        Call it after `subscribe`: a participant that sees the declaration may publish.
+        """
         token = self._session.liveliness().declare_token(key)
         self._declared.append(token)
         return token.undeclare

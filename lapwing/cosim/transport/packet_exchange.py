@@ -18,7 +18,7 @@ from lapwing.messages.topics import Topic
 
 LOG_PERIOD = 0.1  # [s] of wall time between two log packets
 WATCH_PERIOD = 0.2  # [s] between two checks of the watchdog
-PAGE = 1024  # ticks in a log packet at most
+PAGE = 1024  # [ticks] limit of a log packet
 
 _due = python_function(due)
 
@@ -88,7 +88,7 @@ def packet_receivers(process: Participant, graph: BlockDiagram) -> list[PacketRe
 
 @dataclass
 class _StepOutlet:
-    """Step packets to the consumers with one packet schedule."""
+    """Publisher of step packets to the consumers with one packet schedule."""
 
     schedule: PacketSchedule
     codec: StepPacketCodec
@@ -104,7 +104,7 @@ class _StepOutlet:
 
 
 class _TopicPublisher:
-    """Messages on the keys of those topics that have subscribers."""
+    """Publisher of messages on the keys of topics with subscribers."""
 
     def __init__(self, process: Participant, service: Service):
         self._bus = process.bus
@@ -125,13 +125,13 @@ class _TopicPublisher:
 
 
 class PublishWatchdog:
-    """Reports from a separate thread that a publishing thread is blocked.
+    """Watchdog that reports a blocked publishing thread from a separate thread.
 
     The run monitor then names the consumer that accepts no data, and not the producer that waits for it.
     """
 
     def __init__(self, report: Callable[[], None], patience: float):
-        """Call `report` each time the work within this context has taken `patience` [s] more."""
+        """Call `report` after every `patience` [s] of work within this context."""
         self._report, self._patience = report, patience
         self._entered = self._reported = math.inf  # [s] of the monotonic clock; infinite while nothing is published
         self._closed = threading.Event()
@@ -158,7 +158,7 @@ class PublishWatchdog:
 
 
 class PacketSender:
-    """Publishes the output of a service: step packets, log packets, and topics with subscribers."""
+    """Publisher of the output of a service: step packets, log packets, and topics with subscribers."""
 
     def __init__(self, process: Participant, service: Service, graph: BlockDiagram, publishes_steps: bool = True):
         """Declare the publishers; without `publishes_steps`, an external program publishes the step packets."""
@@ -172,10 +172,10 @@ class PacketSender:
                 self._outlets.append(_StepOutlet(schedule, codec, put))
         self._put_log = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = _TopicPublisher(process, service)
-        self._logged = 0  # ticks before this one are in log packets
+        self._logged = 0  # first tick that is not in a log packet
         self._log_due = 0.0  # [s] of the monotonic clock
         self._interval_ns = process.setup.interval_ns
-        bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared while there is room
+        bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared early, before queues are full
         self._watchdog = PublishWatchdog(
             lambda: process.publish_status(WAITING_KEY, "a consumer that accepts no data"), PATIENCE
         )
@@ -212,7 +212,7 @@ class PacketSender:
     def publish_end(self, stop: int) -> None:
         """Publish an empty packet on each key: there is no output from the tick `stop` on. May be repeated.
 
-        Consumers get none if the run monitor is gone: they must detect that themselves instead of seeing a normal end.
+        Consumers get none if the run monitor has left: they must detect that themselves instead of seeing a normal end.
         """
         steps = [] if self._process.abandoned else [outlet.put for outlet in self._outlets]
         for put in (*steps, self._put_log, *self._topics.publishers.values()):

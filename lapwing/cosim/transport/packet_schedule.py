@@ -2,9 +2,10 @@
 
 A service whose inputs all have a delay of d ticks runs ahead of the others by up to d ticks, as the trajectory does. No
 service waits for its single ticks, so its packets hold d / 2 ticks. Every loop through it contains those d ticks, and
-the two packets delay a message by less, so that the lock step cannot stop.
+the two packets delay a message by less, so that the lock step cannot deadlock.
 
-A consumer that reads only ports with a period of n ticks gets a packet every n ticks, as the autopilot the battery's.
+A consumer that reads only ports with a period of n ticks gets a packet every n ticks, for example the autopilot from
+the battery.
 """
 
 import math

@@ -1,12 +1,13 @@
-"""Packets between services: step packets with the rows of a tick, and log packets of encoded messages.
+"""Packets between services: step packets with the rows of a tick, and log packets with encoded messages.
 
-A bundle is the rows of the service's ports that are due at the tick, in the order of its set-up, one after the other:
-little-endian float64, nothing between them. One of several ticks (`lapwing.cosim.transport.packet_schedule`) has,
-port by port, all rows that are
-due in them. A service without outputs in these ticks sends no packet. An empty packet is the last one.
+A step packet contains the rows of the service's ports that are due at the tick, in the order of the run configuration:
+little-endian float64 without padding. A packet of several ticks (`lapwing.cosim.transport.packet_schedule`) contains,
+port by port, all rows that are due in them. A service without outputs in these ticks sends no packet. An empty packet
+is the last one.
 
-A batch is the ticks [start, stop) of which it has all messages (two int64), then pages: length of the topic's
-name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each), the payloads.
+A log packet contains all messages of the ticks [start, stop): start and stop (int64 each), then record batches: length
+of the topic's name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each),
+the payloads.
 """
 
 import math
@@ -27,29 +28,29 @@ _TICKS = struct.Struct("<qq")
 
 
 class PacketError(ValueError):
-    """Bytes that are no bundle or batch of this run."""
+    """Bytes that are not a step packet or log packet of this run."""
 
 
 class _Rows(NamedTuple):
-    """The rows of a port that a bundle holds."""
+    """Rows of a port in a step packet."""
 
     port: str
     period: int
     number: int
-    place: slice  # among the numbers of the bundle
+    place: slice  # of the numbers of the packet
 
 
 class StepPacketCodec:
-    """The bundles of one service: which rows they hold."""
+    """Encoder and decoder of the step packets of one service."""
 
     def __init__(self, ports: Sequence[Port], ticks: int = 1):
-        """Codec of a service with these ports, in their order; a packet holds `ticks` ticks."""
+        """Create the codec of a service with these ports, in order; a packet holds `ticks` ticks."""
         self._ports = [(port.name, port.period, row_width(port.like)) for port in ports]
         self._periods = sorted({port.period for port in ports})
-        self._cycle = math.lcm(*self._periods)  # [ticks] after which bundles hold the same rows again
+        self._cycle = math.lcm(*self._periods)  # [ticks] period of the packets' contents
         self._ticks = ticks
         self._by_phase: dict[int, tuple[_Rows, ...]] = {}
-        self._known: dict[tuple[int, ...], tuple[_Rows, ...]] = {}  # by the number of rows for each period
+        self._known: dict[tuple[int, ...], tuple[_Rows, ...]] = {}  # rows by the number of rows for each period
 
     def due(self, first: int) -> bool:
         """Return True if a packet starts at the tick `first`."""
@@ -70,10 +71,10 @@ class StepPacketCodec:
         """Store the rows of the packet that starts at the tick `first` in a diagram that uses them.
 
         Raises:
-            BundleError: it has not the size that is due.
+            PacketError: the packet has an unexpected size.
         """
         if len(payload) != self.size(first):
-            raise PacketError(f"a bundle of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
+            raise PacketError(f"step packet of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
         numbers = np.frombuffer(payload, "<f8")
         for rows in self._rows(first):
             if not graph.has(rows.port):
@@ -121,7 +122,7 @@ def unpack_log_packet(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
     """Return the ticks [start, stop) of a log packet, and its record batches with payloads of shape (n, size).
 
     Raises:
-        BundleError: no batch.
+        PacketError: not a log packet.
     """
     try:
         start, stop = _TICKS.unpack_from(payload)
@@ -138,4 +139,4 @@ def unpack_log_packet(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
             pages.append(RecordBatch(topic, ticks, payloads))
         return start, stop, pages
     except (struct.error, ValueError, IndexError) as error:
-        raise PacketError(f"a batch of {len(payload)} bytes: {error}") from None
+        raise PacketError(f"log packet of {len(payload)} bytes: {error}") from None

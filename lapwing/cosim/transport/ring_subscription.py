@@ -1,6 +1,6 @@
 """Ring-buffer subscription to one sender on one key; Zenoh itself holds the messages.
 
-Zenoh's thread runs no Python for such a message and waits for no lock of Python's
+Zenoh's thread runs no Python for such a message and waits for no lock of Python
 (docs/explanation/decisions/0018-inboxes.md).
 """
 

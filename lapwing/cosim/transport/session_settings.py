@@ -36,9 +36,10 @@ CHILD_LINKS = {
     "transport/link/tx/lease": 600_000,  # [ms]
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 600_000_000,  # [us]
 }
-"""Settings of the processes of one launcher, which detects stalled ones and knows how long they waited for a CPU.
+"""Settings of the processes of one launcher.
 
-Zenoh measures by the clock only, and messages are lost when it closes a link.
+The launcher detects stalled processes and measures how long they waited for a CPU. Zenoh measures wall time only, and
+messages are lost when it closes a link.
 """
 
 _LINUX = hasattr(socket, "TCP_USER_TIMEOUT")

@@ -1,11 +1,11 @@
-"""The integrators: one file per method, found by scanning this folder; adding a method is adding a file.
+"""Integrators: one file for each method, discovered in this folder. To add a method, add a file.
 
-A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on the manifold to round-off?), a class
-`Method` that names it in compiled code, and a compiled `step(rate, p, t, x, h)` that returns the state at t + h, where
-`rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Three
-more if they apply:
-`EVALUATIONS` of the rate in a step where their number is fixed, `FLAT_ORDER`, the order without curvature where that is
-higher, and `incompatibility(p, x)` of a method that is not for every system.
+A method file has `ORDER`, `ON_MANIFOLD` (True if a step keeps manifold leaves on the manifold to round-off), a class
+`Method` that names it in compiled code, and a compiled `step(rate, p, t, x, h)` that returns the state at t + h.
+`rate(p, t, x)` returns the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p.
+
+Optional: `EVALUATIONS`, the number of rate evaluations of a step if it is fixed; `FLAT_ORDER`, the order without
+curvature if it is higher; `incompatibility(p, x)` of a method that does not support every system.
 """
 
 from types import ModuleType

@@ -14,7 +14,7 @@ BETA = 0.04  # integral gain of the controller (Hairer, Wanner: Solving ODEs II,
 def integrate_adaptive(p, x, times, tolerance, out):
     """Write the state's numbers at each of `times` (increasing, the first that of x) into the rows of `out`.
 
-    Returns (status, t, x, steps, rejected): where and why it ended (theory.md, eq. (6.17)).
+    Return (status, t, x, steps, rejected) at the end (theory.md, eq. (6.17)).
     """
     t, end = times[0], times[-1]
     f = rate(p, t, x)
@@ -29,7 +29,7 @@ def integrate_adaptive(p, x, times, tolerance, out):
         if h < 1e-14 * max(abs(t), end - times[0]) and not last_step:
             return STEP_TOO_SMALL, t, x, steps, rejected
         after, u, e, k, last = stages(rate, p, t, x, h, scale(h, f))
-        # a maximum passes over NaN, so that has to be asked for
+        # a maximum ignores NaN, which therefore needs a separate check
         ratio = error_ratio(x, e) / tolerance if finite(e) else math.inf
         if ratio > 1.0:
             rejected += 1

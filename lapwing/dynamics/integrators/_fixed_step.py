@@ -1,7 +1,7 @@
-"""Steps of any method on any system, both chosen by the type of an argument: compiled once per pair and kept on disk.
+"""Steps of any method on any system, both selected by the type of an argument, compiled once and cached on disk.
 
-Functions passed as arguments never hit numba's disk cache; a method's empty `Method` class and a system's parameter
-class do.
+Kernels with functions as arguments cannot be cached on disk; a method's empty `Method` class and a system's parameter
+class take their place.
 """
 
 import sys

@@ -1,6 +1,6 @@
 """Systems whose forces change at known times: between two of these breakpoints a system is a smooth piece.
 
-A step must end at a breakpoint, and its last stage must see the forces before it, not those from it on.
+A step must end at a breakpoint, and its last stage must use the forces before the breakpoint.
 """
 
 import math
@@ -15,16 +15,16 @@ from lapwing.kernels.codegen import generic
 BREAKPOINTS = DispatchTable()
 """The compiled `next_breakpoint(p, t)` of a system, by the NamedTuple class of its parameters; others have none."""
 
-ROUNDING = 1e-6  # of an interval: breakpoints so close to its ends are there
-BEFORE = 1.0 - 2.0**-52  # times a positive number: a double below it
+ROUNDING = 1e-6  # relative to an interval: breakpoints this close to its ends count as the ends
+BEFORE = 1.0 - 2.0**-52  # factor from a positive number to a smaller double
 
 
 class Piece(NamedTuple):
     """A system between two breakpoints."""
 
     system: Any  # parameters, a class of RATES
-    first: float  # [s] of the piece; earlier times count as this one
-    last: float  # [s] of the piece; later times count as this one
+    first: float  # [s] start of the piece; earlier times count as this one
+    last: float  # [s] end of the piece; later times count as this one
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""Runs from Python with everything checked: fixed steps of a named method, or adaptive steps to a tolerance."""
+"""Integration from Python with checked arguments: fixed steps of a named method, or adaptive steps to a tolerance."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +11,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.lie.so3 import Rotation, determinant
 from lapwing.kernels.state_tree import MANIFOLDS, flatten, normalise, unflatten
 
-UNIT_DEFECT = 1e-9  # an initial attitude or direction may be off its manifold by this much
+UNIT_DEFECT = 1e-9  # largest distance of an initial attitude or direction from its manifold
 SMALLEST_TOLERANCE = 1e-14
 
 

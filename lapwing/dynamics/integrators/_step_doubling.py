@@ -1,4 +1,4 @@
-"""Any method with its error controlled, for systems whose forces jump: each part of a step whole, and in halves.
+"""Error control of any method by step doubling, for systems with discontinuous forces.
 
 Steps end at the breakpoints of a system; contacts that begin and end shorten them.
 """
@@ -12,14 +12,14 @@ from lapwing.kernels import always_inline
 from lapwing.kernels import noinline as never_inlined
 from lapwing.kernels.state_tree import finite, relative_difference
 
-SHORTEST = 0.01  # [s] times the tolerance: a part no longer than this is not split
+SHORTEST = 0.01  # [s] relative to the tolerance: shorter substeps are not split
 
 
 class StepDoubling(NamedTuple):
-    """A method, and how far a part of a step may be off."""
+    """Method with the tolerance of a substep."""
 
     method: Any  # `Method()` of an integrator
-    tolerance: float  # relative to 1 + size
+    tolerance: float  # tolerance, relative to 1 + size
 
 
 @always_inline
@@ -30,7 +30,7 @@ def shorter(part, error, tolerance):
 
 @never_inlined
 def _once(method, p, t, x, h):
-    # called, not inlined three times, and optimised once, not again in every function above
+    # not inlined: it has three call sites, and would be optimised again in every caller
     return step(method, p, t, x, h)
 
 

@@ -1,6 +1,6 @@
 """The gyrostat paper's explicit Runge-Kutta method on a manifold, eRK4M: stages are transported back to x and combined.
 
-Called of fourth order by analogy; on a curved manifold it is of order 3, because parallel transport differs from the
+Of fourth order only by analogy: on a curved manifold it has order 3, because parallel transport differs from the
 differential of the exponential by the curvature at second order (theory.md, eq. (6.12)).
 """
 

@@ -22,12 +22,12 @@ def step(rate, p, t, x, h):
     """
     middle = t + 0.5 * h
     u = scale(h, rate(p, t, x))
-    before, rounding = math.inf, 1e-15 * largest(x)  # [of u] what large numbers that cancel in f leave
+    before, rounding = math.inf, 1e-15 * largest(x)  # relative to u: round-off of cancelling terms in f
     for _ in range(ITERATIONS):
         after = scale(h, rate(p, middle, retract(x, scale(0.5, u))))
         change, size = largest(axpy(-1.0, u, after)), largest(after)
         u = after
-        # the last digits may flicker: stop as well once the change, already small, shrinks no more
+        # the last digits may fluctuate: also stop if a small change no longer decreases
         if change <= 2e-16 * size or (change <= 1e-13 * size + rounding and change >= before):
             return retract(x, u)
         before = change

@@ -1,4 +1,4 @@
-"""The classical Runge-Kutta method in the embedding, brought back onto the manifold after every step."""
+"""The classical Runge-Kutta method in the embedding, projected onto the manifold after every step."""
 
 from lapwing.dynamics.integrators import rk4
 from lapwing.dynamics.integrators._fixed_step import method_token
@@ -13,5 +13,5 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Step of `rk4`, then the nearest point of the manifold; the projection keeps the order (theory.md, eq. (6.4))."""
+    """Take a step of `rk4` and project it onto the manifold; the projection keeps the order (theory.md, eq. (6.4))."""
     return normalise(rk4.step(rate, p, t, x, h))

@@ -1,4 +1,4 @@
-"""Dormand and Prince's method of order 8 in the embedding, brought back onto the manifold after every step.
+"""Dormand and Prince's method of order 8 in the embedding, projected onto the manifold after every step.
 
 For errors near round-off. Tableau: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.10.
 """

@@ -64,7 +64,7 @@ def rotate(q, v_body):
 
 @always_inline
 def rotate_back(q, v_world):
-    """Return the transpose(R_world_body) v_world."""
+    """Return transpose(R_world_body) v_world."""
     return rotate(conjugate(q), v_world)
 
 
@@ -72,7 +72,7 @@ def rotate_back(q, v_world):
 def exp(v):
     """Return the quaternion of the rotation vector v [rad] (theory.md, eq. (5.9))."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    if square < 2.5e-3:  # |v| < 0.05: the first dropped terms are below 1e-17
+    if square < 2.5e-3:  # |v| < 0.05: the first omitted terms are below 1e-17
         s = 0.5 + square * (-1.0 / 48.0 + square * (1.0 / 3840.0 - square / 645120.0))
         c = 1.0 + square * (-0.125 + square * (1.0 / 384.0 - square / 46080.0))
     else:
@@ -142,7 +142,7 @@ def to_roll_pitch_yaw(q):
 def retract(q, v):
     """Return q exp(v): q rotated by the rotation vector v in body coordinates [rad]."""
     r = multiply(q, exp(v))
-    # first-order normalisation, else the rounding of many equal steps adds up in the length
+    # first-order normalisation, otherwise the rounding errors of many equal steps accumulate in the length
     k = 1.5 - 0.5 * ((r[0] * r[0] + r[1] * r[1]) + (r[2] * r[2] + r[3] * r[3]))
     return Quaternion(k * r[0], k * r[1], k * r[2], k * r[3])
 

@@ -77,7 +77,7 @@ def half_angle(v):
     """Return (a/2, sin(a/2), cos(a/2)) of a = |v|, both functions to full relative accuracy.
 
     Near 2 pi the sine is as small as the distance to the pole, and the rounding of |v| alone would cost it seven digits
-    at 2 pi - 1e-6: the length is carried with twice the digits.
+    at 2 pi - 1e-6: the length is computed with twice the digits.
     """
     px, ex = _two_product(v[0], v[0])
     py, ey = _two_product(v[1], v[1])

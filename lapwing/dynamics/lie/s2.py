@@ -24,7 +24,7 @@ class Direction(NamedTuple):
 def retract(q, v):
     """Return exp(hat(v)) q: the direction rotated by the rotation vector v [rad] (theory.md, eq. (5.15))."""
     r = turn(v, q)
-    # first-order normalisation, else the rounding of many equal steps adds up in the length
+    # first-order normalisation, otherwise the rounding errors of many equal steps accumulate in the length
     return Direction(*scale(1.5 - 0.5 * dot(r, r), r))
 
 

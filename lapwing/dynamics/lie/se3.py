@@ -1,6 +1,6 @@
 """Rigid motions: position and attitude, with the twist (v_body, omega_body) as tangent.
 
-A pair (translation, rotation) of vectors stands for an element of se(3); its exponential is a screw motion.
+A pair (translation, rotation) of vectors is an element of se(3); its exponential is a screw motion.
 """
 
 from typing import NamedTuple
@@ -48,7 +48,7 @@ def compose(g, h):
 
 @always_inline
 def adjoint(g, u):
-    """Return Ad_g u: the element of se(3) on the other side of g (theory.md, eq. (5.17))."""
+    """Return Ad_g u, with g exp(u) = exp(Ad_g u) g (theory.md, eq. (5.17))."""
     rotation = rotate(g[1], u[1])
     return add(rotate(g[1], u[0]), cross(g[0], rotation)), rotation
 

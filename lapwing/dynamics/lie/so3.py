@@ -109,7 +109,7 @@ def adjoint(m, v):
 @always_inline
 def retract(m, v):
     """Return m exp(hat(v)): m rotated by v in body coordinates."""
-    # polished, else the rounding of many equal steps adds up
+    # one Newton step, otherwise the rounding errors of many equal steps accumulate
     return Rotation(*_polish(matmul(m, exp(v))))
 
 

@@ -1,7 +1,7 @@
 """The tangent bundle of the sphere: a direction q with its angular velocity omega, q . omega = 0.
 
 SE(3) acts on it transitively from the left, (C, c) (q, omega) = (C q, C omega + c x C q), so that both constraints hold
-to round-off whatever the step (theory.md, eqs. (5.22) to (5.24); the action of the cooperative load).
+to round-off with any step (theory.md, eqs. (5.22) to (5.24); the action of the cooperative load).
 """
 
 from typing import NamedTuple

@@ -1,9 +1,8 @@
-"""The fast path: one core body and four leaves hinged to it at their centres of mass, nothing assembled.
+"""Fast path: one core body and four leaves hinged to it at their centres of mass, without assembled matrices.
 
 The leaves are eliminated into the core's equations (theory.md, eqs. (8.40)-(8.45)), all four at once: every number of a
-`HingedBody` is `lanes`, a lane a leaf. What remains is one symmetric 3x3 system. All vectors are in the same axes,
-whichever
-they are. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
+`HingedBody` is a SIMD vector with one lane for each leaf. The remaining system is symmetric, 3x3. All vectors are in
+the same axes, which are arbitrary. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
 """
 
 from typing import NamedTuple
@@ -16,7 +15,7 @@ Sym3 = tuple[float, float, float, float, float, float]
 
 
 class Core(NamedTuple):
-    """The core body and what acts on it."""
+    """Core body and its loads."""
 
     mass: float  # [kg]
     inertia: Sym3  # [kg m^2]
@@ -25,16 +24,19 @@ class Core(NamedTuple):
 
 
 class HingedBody(NamedTuple):
-    """The leaves, the motion their hinges leave them, a_leaf = a + alpha x offset + drift, alpha_leaf = alpha + turn +
-    s axis, and what acts on them. One that is gone has no mass, no inertia, and nothing acts on it."""
+    """Leaves, their relative motion and their loads.
+
+    a_leaf = a + alpha x offset + drift, alpha_leaf = alpha + turn + s axis. A detached leaf has no mass, no inertia and
+    no loads.
+    """
 
     mass: float  # [kg]
     inertia: Sym3  # about its centre of mass [kg m^2]; without the axial moment if it spins freely, eq. (8.42)
     offset: Vec3  # hinge point from the core's centre of mass [m]
     axis: Vec3  # unit vector, a principal axis of the inertia
     axial: float  # moment of inertia about the axis [kg m^2], never zero
-    spins: float  # 1: s follows from `drive_torque`; 0: s = 0, the whole turn is imposed
-    drive_torque: float  # about the axis, from the core on the leaf [N m]; not read if s = 0
+    spins: float  # 1: s follows from `drive_torque`; 0: s = 0, `turn` is imposed completely
+    drive_torque: float  # [N m] about the axis, from the core on the leaf; ignored if s = 0
     drift: Vec3  # [m/s^2]
     turn: Vec3  # [rad/s^2]
     force: Vec3  # [N]
@@ -42,7 +44,7 @@ class HingedBody(NamedTuple):
 
 
 class Result(NamedTuple):
-    """Accelerations of the core (linear of its centre of mass, angular), and what the leaves do."""
+    """Accelerations of the core (of its centre of mass, angular), and motion and reactions of the leaves."""
 
     acceleration: Vec3  # [m/s^2]
     angular_acceleration: Vec3  # [rad/s^2]
@@ -50,7 +52,7 @@ class Result(NamedTuple):
     turned: Vec3  # angular acceleration of the leaves [rad/s^2]
     spin: float  # s [rad/s^2]
     reaction_force: Vec3  # from the core on the leaves [N]
-    reaction_torque: Vec3  # the same about the hinge point [N m]; along the axis: the drive torque
+    reaction_torque: Vec3  # torque about the hinge point [N m]; its component along the axis is the drive torque
 
 
 @always_inline

@@ -1,8 +1,8 @@
 """The augmented formulation: index-1 equations of motion solved for accelerations and multipliers together.
 
 M a = Q - J^T lambda, J a = gamma (theory.md, eq. (8.20)). With M = L L^T the accelerations are the shortest correction
-of the free motion, found by one pivoted QR of L^-1 J^T: redundant rows drop out, accelerations stay unique, and of all
-multipliers the shortest are given.
+of the free motion, computed by one pivoted QR of L^-1 J^T: redundant rows are dropped, accelerations stay unique, and
+the multipliers of minimum norm are returned.
 """
 
 from typing import NamedTuple
@@ -17,17 +17,17 @@ from lapwing.dynamics.multibody.system import System
 from lapwing.dynamics.vector import apply_transposed
 from lapwing.kernels import kernel, noinline
 
-RANK_TOLERANCE = 1e-9  # of a unit row: what is left of a dependent row after elimination is round-off
+RANK_TOLERANCE = 1e-9  # relative to a unit row: a dependent row leaves only round-off after elimination
 ANY = 1 << 30  # no bound on the rank
 
 
 class Solution(NamedTuple):
-    """Accelerations of the coordinates and what the constraints do to achieve them."""
+    """Accelerations of the coordinates, and the constraint multipliers."""
 
     acceleration: np.ndarray  # (n, 6)
     multipliers: np.ndarray  # (m,) minimum norm, the paper's sign: constraint force = -J^T lambda
-    rank: int  # independent rows of m
-    conflict: float  # how far dependent rows disagree [m/s^2, rad/s^2, scaled]; zero on a consistent state
+    rank: int  # number of independent rows of m
+    conflict: float  # inconsistency of dependent rows [m/s^2, rad/s^2, scaled]; zero on a consistent state
 
 
 @kernel
@@ -121,7 +121,7 @@ def constrained_acceleration(a, p, e, force, gamma, tolerance, most):
     free = force.copy().reshape(-1, 1)
     divide_root(root, rotational, free)
     y0 = free[:, 0]
-    # what the free motion L^-T y0 leaves of each row
+    # residual of each row under the free motion L^-T y0
     a0 = y0.copy()
     divide_root_transposed(root, rotational, a0)
     rest = gamma.copy()

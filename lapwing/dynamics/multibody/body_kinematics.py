@@ -1,4 +1,4 @@
-"""From coordinates to placed bodies: the one file that knows which coordinates are in use.
+"""Kinematics of the bodies from their coordinates; the only module that depends on the kind of coordinates.
 
 A configuration is an array (n, 6) of positions [m] and XYZ Euler angles [rad], or (n, 7) of positions and unit
 quaternions (w, x, y, z). Its velocity is an array (n, 6): the coordinates' rates for Euler angles,
@@ -23,7 +23,7 @@ class BodyKinematics(NamedTuple):
     velocity: np.ndarray  # (n + 1, 3) [m/s], world
     omega: np.ndarray  # (n + 1, 3) [rad/s], body
     rate_matrix: np.ndarray  # (n, 9) omega_body = rate_matrix @ velocity[3:]; the identity for quaternions
-    bias: np.ndarray  # (n, 3) the rest of the angular acceleration [rad/s^2], body; zero for quaternions
+    bias: np.ndarray  # (n, 3) remaining angular acceleration [rad/s^2], body; zero for quaternions
     singular: int  # body whose Euler angles are singular, -1 if none
 
 

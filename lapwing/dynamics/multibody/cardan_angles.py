@@ -6,7 +6,7 @@ Angles are (roll, pitch, yaw) [rad]; A takes body coordinates to world; matrices
 from lapwing.dynamics.vector import add, apply, apply_transposed, cross, matmul, transpose
 from lapwing.kernels import always_inline, math
 
-SINGULAR = 1e-6  # |cos(pitch)| below which the angles are called singular: their rates lose six of sixteen digits
+SINGULAR = 1e-6  # |cos(pitch)| below which the angles count as singular: their rates lose six of sixteen digits
 
 
 @always_inline

@@ -1,8 +1,8 @@
 """Equations of the joints and drives: residuals, Jacobian and quadratic velocity vector.
 
 Rows are the holonomic equations of all joints (five each), then the nonholonomic ones of all drives (three each).
-Columns are the bodies' twists (velocity_world, omega_body), six a body, the ground's last; the Jacobian is kept
-transposed so that the solver runs along memory.
+Columns are the bodies' twists (velocity_world, omega_body), six for each body, the ground last; the Jacobian is stored
+transposed, so that the solver runs along memory.
 """
 
 from typing import NamedTuple
@@ -19,7 +19,7 @@ class Equations(NamedTuple):
 
     jacobian_t: np.ndarray  # (6 (n + 1), m)
     residual: np.ndarray  # (5 k,) of the holonomic rows on position level [m, -]
-    target: np.ndarray  # (m,) right-hand side on velocity level: zero but for the drives [rad/s]
+    target: np.ndarray  # (m,) right-hand side on velocity level [rad/s], zero except for drives
     gamma: np.ndarray  # (m,) quadratic velocity vector
 
 
@@ -56,7 +56,7 @@ def _revolute(a, p, k, out):
         v_quadratic = apply(Ri, cross(wi, cross(wi, v_body)))
         out.residual[r + 3 + row] = dot(v, v3)
         out.gamma[r + 3 + row] = -dot(v3, v_quadratic) - 2.0 * dot(v_rate, v3_rate) - dot(v, v3_quadratic)
-        # d(v . v3)/dt = omega_i . (v x v3) - omega_j . (v x v3), each in its own body's axes
+        # d(v . v3)/dt = omega_i . (v x v3) - omega_j . (v x v3), each in the axes of its body
         normal = cross(v, v3)
         di, dj = apply_transposed(Ri, normal), apply_transposed(Rj, normal)
         for c in range(3):

@@ -1,6 +1,6 @@
-"""The five-body delivery drone in least coordinates, for the plant: chassis pose and four propeller angles.
+"""Five-body delivery drone in minimal coordinates, for the plant: chassis pose and four propeller angles.
 
-No constraint can drift; the multibody system is solved on the fast path at every call. Built from numbers passed in.
+No constraint can drift; the multibody system is solved on the fast path at every call. All numbers are arguments.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ Four = tuple[float, ...]
 
 
 class Drone(NamedTuple):
-    """Mass properties; the chassis carries the payload. Propeller k turns about z, its centre of mass at hubs[k]."""
+    """Mass properties; the chassis includes the payload. Propeller k turns about z; its centre of mass is hubs[k]."""
 
     mass: float  # chassis [kg]
     inertia: Vec3  # chassis about its centre of mass, principal moments along the body axes [kg m^2]
@@ -30,20 +30,20 @@ class Drone(NamedTuple):
 
 
 class DroneState(NamedTuple):
-    """A state tree for `lapwing.dynamics.integrators`."""
+    """State tree for `lapwing.dynamics.integrators`."""
 
-    position_world: Vec3  # of the chassis' centre of mass [m]
+    position_world: Vec3  # [m] centre of mass of the chassis
     attitude: Quaternion
     velocity_world: Vec3  # [m/s]
     omega_body: Vec3  # [rad/s]
-    angles: Four  # of the propellers about z relative to the chassis [rad]
+    angles: Four  # [rad] angles of the propellers about z, relative to the chassis
     speeds: Four  # [rad/s]
 
 
 class Loads(NamedTuple):
     """External loads and motor torques; thrust and aerodynamic torque act on the propellers."""
 
-    force_world: Vec3  # at the chassis' centre of mass, gravity not included [N]
+    force_world: Vec3  # [N] at the chassis' centre of mass, without gravity
     torque_body: Vec3  # on the chassis [N m]
     thrust: Four  # along body z at each hub [N]
     aerodynamic_torque: Four  # about body z on each propeller, against its turning [N m]
@@ -54,12 +54,12 @@ class Loads(NamedTuple):
 class Accelerations(NamedTuple):
     """Accelerations, and the reactions between chassis and propellers."""
 
-    acceleration_world: Vec3  # of the chassis' centre of mass [m/s^2]
+    acceleration_world: Vec3  # [m/s^2] centre of mass of the chassis
     angular_acceleration_body: Vec3  # [rad/s^2]
-    spin_acceleration: Four  # of the propellers relative to the chassis [rad/s^2]
+    spin_acceleration: Four  # [rad/s^2] propellers relative to the chassis
     drive_torque: Four  # chassis -> propeller about z [N m]
     reaction_force_body: tuple[Vec3, ...]  # chassis -> propeller [N]
-    reaction_torque_body: tuple[Vec3, ...]  # the same about the hub [N m], its z the drive torque
+    reaction_torque_body: tuple[Vec3, ...]  # [N m] torque about the hub; its z component is the drive torque
 
 
 class Flight(NamedTuple):
@@ -90,7 +90,7 @@ def delivery_drone(
         driven: "torque" (10 degrees of freedom) or "speed" (6).
 
     Raises:
-        ValueError: a mass or moment that is not positive, signs that are not +1 or -1, an unknown drive.
+        ValueError: a mass or moment that is not positive, signs other than +1 and -1, or an unknown drive.
     """
     positive = {
         "central_frame": (central_frame,), "propeller": (propeller,), "arm_length": (arm_length,),

@@ -1,9 +1,8 @@
-"""The delivery drone's five bodies, each with its own pose, on the fast path: redundant coordinates on SE(3).
+"""Five bodies of the delivery drone, each with its own pose, on the fast path: redundant coordinates on SE(3).
 
-State trees for `lapwing.dynamics.integrators`; constraints hold through the accelerations (index 1) and drift as
-they would in
-the general engine, unless `hold` brings them back after a step. A hinge holds a leaf's centre of mass on a chassis
-point; both its axes are z.
+State trees for `lapwing.dynamics.integrators`. Constraints are enforced by the accelerations (index 1) and drift as in
+the general engine, unless `five_body_stabilisation` corrects them after a step. A hinge fixes a leaf's centre of mass
+at a chassis point; both its axes are z.
 """
 
 from collections.abc import Sequence
@@ -36,7 +35,7 @@ UP: Vec3 = (0.0, 0.0, 1.0)
 
 
 class BodyState(NamedTuple):
-    """One body: state of its centre of mass and its attitude."""
+    """State of one body: its centre of mass and its attitude."""
 
     position_world: Vec3  # [m]
     attitude: Quaternion
@@ -62,16 +61,16 @@ NO_WRENCH = Wrench(ZERO, ZERO)
 
 
 class Rotor(NamedTuple):
-    """A propeller, its hinge and its drive."""
+    """Propeller with its hinge and drive."""
 
     mass: float  # [kg]
     inertia: Vec3  # principal moments, z along the hinge [kg m^2]
     offset: Vec3  # hinge in chassis coordinates [m]
     spins: float  # 1: torque-driven (10 degrees of freedom), 0: imposed speed (6)
     drive: float  # torque from the chassis [N m] if it spins, else imposed acceleration [rad/s^2]
-    speed: float  # imposed speed relative to the chassis at t = 0 [rad/s]; not read if it spins
+    speed: float  # imposed speed relative to the chassis at t = 0 [rad/s]; ignored if it spins
     wrench: Wrench
-    held: float  # 1; 0: torn off, a body by itself
+    held: float  # 1; 0: torn off, a free body
 
 
 class Machine(NamedTuple):
@@ -95,7 +94,7 @@ def column(R, k):
 def from_chassis(chassis, leaf):
     """Return rotation matrices from the leaves' axes to the chassis' axes.
 
-    They are orthogonal even if the stages of a step have attitudes that are not quite of unit length.
+    They are orthogonal even if the attitudes in the stages of a step are not exactly of unit length.
     """
     q = quaternion.multiply(quaternion.conjugate(chassis.attitude), leaf.attitude)
     k = 2.0 / ((q[0] * q[0] + q[1] * q[1]) + (q[2] * q[2] + q[3] * q[3]))
@@ -176,7 +175,7 @@ def rate(p, t, x):
     s, R0, C = solve(p, t, x)
     r, b = interleave(p.rotors), interleave(x.propellers)
     acceleration = apply(R0, s.acceleration)
-    # one that was torn off flies by itself
+    # a torn-off propeller is a free body
     free = add(p.gravity, scale(1.0 / r.mass, r.wrench.force_world))
     spun = subtract(r.wrench.torque_body, cross(b.omega_body, multiply(r.inertia, b.omega_body)))
     turned = select_vector(r.held, apply_transposed(C, s.turned), divide(spun, r.inertia))

@@ -1,4 +1,4 @@
-"""Keeping the five bodies together on the fast path: projection, coordinate partitioning, and the constraint defect."""
+"""Stabilisation of the five bodies on the fast path: projection, coordinate partitioning, and constraint defect."""
 
 from lapwing.dynamics.integrators import step
 from lapwing.dynamics.lie import quaternion
@@ -21,7 +21,7 @@ def _gap(chassis, R0, offset, x):
 
 @always_inline
 def _idle_leaves(r, spins, C, drift, turn, force, torque):
-    """Return leaves with idle drives, under momenta or no loads."""
+    """Return leaves with idle drives, with momenta in place of loads, or without loads."""
     mass, moments, rest = r.held * r.mass, scale(r.held, r.inertia), 0.0 * r.mass
     return HingedBody(
         mass,
@@ -126,7 +126,7 @@ def partition(p, t, x):
     R0, r, b = quaternion.rotation_matrix(c.attitude), interleave(p.rotors), interleave(x.propellers)
     relative = quaternion.multiply(quaternion.conjugate(c.attitude), b.attitude)
     axis = column(quaternion.rotation_matrix(relative), 2)
-    # the shortest turn that takes a leaf's axis onto the chassis' z: about axis x z
+    # the shortest rotation of a leaf's axis to the chassis' z, about axis x z
     swing = quaternion.Quaternion(1.0 + axis[2], axis[1], -axis[0], 0.0 * axis[0])
     relative = _unit(quaternion.multiply(swing, relative))
     core_rate = quaternion.rotate_back(relative, c.omega_body)

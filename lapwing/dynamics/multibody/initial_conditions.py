@@ -1,4 +1,4 @@
-"""Initial states that meet the constraints: made so, or refused with the violated rows named."""
+"""Consistent initial states: correction of a state, or an error that names the violated rows."""
 
 import numpy as np
 
@@ -6,7 +6,7 @@ from lapwing.dynamics.multibody.augmented import ANY, as_float_arrays, refuse_si
 from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import project, rows
 
-CONSISTENT = 1e-9  # [m, -, m/s, rad/s]
+CONSISTENT = 1e-9  # [m, -, m/s, rad/s] largest defect of a consistent state
 NEAR = 0.2  # largest position defect that is corrected: beyond it, another assembly of the mechanism may be found
 
 

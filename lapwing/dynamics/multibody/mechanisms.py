@@ -37,7 +37,7 @@ def four_bars(n: int = 2, speed: float = 1.0) -> tuple[System, np.ndarray, np.nd
 
     Bodies: cranks 0..n, then couplers. Whenever the cranks lie flat, the mechanism has n + 1 degrees of freedom.
     """
-    thin = 1e-4  # transverse moment of a rod about its own axis [kg m^2]: no rod turns about it
+    thin = 1e-4  # [kg m^2] moment of a rod about its axis, about which no rod turns
     rod = 1.0 / 12.0
     bodies = [Body(f"crank {k}", 1.0, (thin, rod, rod)) for k in range(n + 1)]
     bodies += [Body(f"coupler {k}", 1.0, (thin, rod, rod)) for k in range(n)]
@@ -58,7 +58,7 @@ def four_bars(n: int = 2, speed: float = 1.0) -> tuple[System, np.ndarray, np.nd
 def bricard() -> tuple[System, np.ndarray, np.ndarray]:
     """Return A04: five rods of 1 kg and 1 m, 0.1 m square, along the edges of a cube, and six hinges; at rest.
 
-    Counting equations leaves no freedom, but one of them is redundant, so it moves.
+    The number of equations leaves no degree of freedom, but one equation is redundant, so the mechanism moves.
     """
     corners = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], float)
     axes = [(0.0, 1.0, 0.0), Z, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), Z, (1.0, 0.0, 0.0)]

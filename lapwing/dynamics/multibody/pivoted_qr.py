@@ -1,4 +1,4 @@
-"""Householder QR with column pivoting of a rank-deficient wide matrix, and the two solutions taken from it.
+"""Householder QR with column pivoting of a rank-deficient wide matrix, and its two solutions.
 
 For B of shape (n, m) of rank r, B P = Q [R11 R12; 0 0]. Columns are scaled to unit length first, so that one tolerance
 fits rows of metres and of radians. Loops run along rows: memory order, vectorised without reordering any sum.
@@ -11,11 +11,11 @@ import numpy as np
 from lapwing.kernels import always_inline, kernel, noinline
 from lapwing.kernels.simd import load, splat, store
 
-BLOCK = 16  # numbers that a vectorised loop takes at once; rows are padded with empty columns to a multiple of it
+BLOCK = 16  # width of a vectorised loop; rows are padded with empty columns to a multiple of it
 
 
 class Factor(NamedTuple):
-    """The factorisation."""
+    """Pivoted QR factorisation of B."""
 
     upper: np.ndarray  # (n, at least m): R
     reflection: np.ndarray  # (n, n): row k is the k-th vector of Householder, 1 at k, zero before it
@@ -39,7 +39,7 @@ def _lengths(b, k, out):
 def _reflect(b, v, beta, k):
     """Reflect the columns of b from row k down; earlier columns are zero there."""
     n, width = b.shape
-    # a row touches two bodies only: most of v is zero at first
+    # a row involves two bodies only: most of v is zero at first
     for j in range(k // BLOCK * BLOCK, width, BLOCK):
         w0 = w1 = w2 = w3 = splat(0.0)
         for i in range(k, n):
@@ -75,7 +75,7 @@ def factor(matrix, tolerance, most):
     for j in range(m):
         longest = max(longest, left[j])
     for j in range(m):
-        # a column of nothing but round-off is empty: scaled up, it would look independent
+        # a column of round-off counts as empty: scaled, it would look independent
         empty = left[j] <= tolerance * tolerance * longest
         scale[j] = 0.0 if empty else 1.0 / np.sqrt(left[j])
         left[j] = 0.0 if empty else 1.0
@@ -85,7 +85,7 @@ def factor(matrix, tolerance, most):
     rank = 0
     for k in range(min(min(n, m), most)):
         pivot = k + np.argmax(left[k:m])
-        if left[pivot] < 1e-8:  # the running lengths have lost their digits
+        if left[pivot] < 1e-8:  # the updated lengths have lost their digits
             _lengths(b, k, left)
             pivot = k + np.argmax(left[k:m])
             if left[pivot] <= tolerance * tolerance:

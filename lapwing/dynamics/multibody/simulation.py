@@ -1,7 +1,7 @@
 """Motion of a general system in time: the classical Runge-Kutta method on the index-1 equations, and a stabilisation.
 
-The state is an array of any number of bodies in either coordinates, so it does not use the
-state trees of `lapwing.dynamics.integrators`; five bodies on the fast path do (see `five_bodies`).
+The state is an array of any number of bodies in either coordinates, so it does not use the state trees of
+`lapwing.dynamics.integrators`, which the five bodies on the fast path use (see `five_bodies`).
 """
 
 from typing import NamedTuple
@@ -89,8 +89,8 @@ def simulate(
 
     Args:
         system: from `system.assemble`.
-        configuration: (n, 6) Euler or (n, 7) quaternion coordinates; velocity: (n, 6); see `placement`.
-        step: step size [s]; steps: how many.
+        configuration: (n, 6) Euler or (n, 7) quaternion coordinates; velocity: (n, 6); see `body_kinematics`.
+        step: step size [s]; steps: number of steps.
         stabilisation: "none", "baumgarte", "partitioning" or "projection".
         wrench: (n, 6) constant external load, see `augmented.accelerations`.
         drive: (d, 2) imposed speed at t = 0 [rad/s] and constant rate [rad/s^2].
@@ -98,7 +98,7 @@ def simulate(
         rate: Baumgarte's feedback rate [1/s], critically damped.
 
     The rank of the constraints at the start bounds it for the whole motion: off the constraints, round-off would make
-    redundant rows independent and lock the mechanism. So do not start in a singular position.
+    redundant rows independent and lock the mechanism. Therefore do not start in a singular position.
 
     Raises:
         ValueError: bad shapes or numbers, an unknown stabilisation, Euler angles that reached a pitch of 90 degrees.
@@ -116,7 +116,7 @@ def simulate(
         np.zeros(records), np.zeros(records),
     )  # fmt: skip
     a, bounds = system.arrays, ranks(system.arrays, configuration, velocity, drive)
-    # a loop in Python: compiling it costs more than any motion of a general system
+    # a Python loop: its compilation would take longer than any motion of a general system
     last = (records - 1) * record_every
     for i in range(last + 1):
         now = _drive_at(drive, i * step)

@@ -1,6 +1,6 @@
-"""Bringing a state back onto its constraints, on position and on velocity level (theory.md, section 8.6).
+"""Projection of a state onto its constraints, on position and velocity level (theory.md, section 8.6).
 
-`project` moves every body by the shortest way in the metric of the masses. `partition` keeps the independent
+`project` applies the smallest correction in the metric of the masses. `partition` keeps the independent
 coordinates and velocities that the integration produced and solves for the dependent ones: the paper's
 generalised coordinate partitioning. Baumgarte's feedback is `augmented.baumgarte_gamma`.
 """
@@ -85,7 +85,7 @@ def project(a, configuration, velocity, drive, ranks):
 
 @kernel
 def _dependent(f, width):
-    """Return a mask of the dependent coordinates: the columns of J that its factorisation found independent."""
+    """Return a mask of the dependent coordinates: the columns of J that are independent in its factorisation."""
     mask = np.zeros(width, np.bool_)
     for k in range(f.rank):
         mask[f.order[k]] = True

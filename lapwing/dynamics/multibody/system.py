@@ -28,7 +28,7 @@ class Body:
 class Revolute:
     """A hinge between bodies i and j (theory.md, eq. (8.10)): five holonomic equations.
 
-    Points [m] and axes (any length) are in the body's own coordinates, shape (3,); of the ground: in the world frame.
+    Points [m] and axes (any length) are in the body's own coordinates, shape (3,); for the ground: in the world frame.
     """
 
     name: str
@@ -42,8 +42,10 @@ class Revolute:
 
 @dataclass(frozen=True)
 class DrivingConstraint:
-    """An imposed angular velocity of body i relative to body j about an axis fixed in body j (theory.md, eq. (8.15)):
-    three nonholonomic equations."""
+    """Imposed angular velocity of body i relative to body j about an axis fixed in body j.
+
+    Three nonholonomic equations (theory.md, eq. (8.15)).
+    """
 
     name: str
     body_i: int
@@ -66,7 +68,7 @@ class Arrays(NamedTuple):
 
 @dataclass(frozen=True)
 class System:
-    """A checked mechanism: what it was made of (for names) and its arrays (for kernels)."""
+    """Checked mechanism: its parts (for names) and its arrays (for kernels)."""
 
     bodies: tuple[Body, ...]
     joints: tuple[Revolute, ...]
@@ -108,10 +110,11 @@ def assemble(
     drives: Iterable[DrivingConstraint] = (),
     gravity: ArrayLike = (0.0, 0.0, -9.81),
 ) -> System:
-    """Check the parts and pack them; gravity in the world frame [m/s^2], shape (3,).
+    """Check the parts and pack them; `gravity` is in the world frame [m/s^2], shape (3,).
 
     Raises:
-        ValueError: a mass or inertia that no rigid body has, an axis without direction, an unknown body, a twin name.
+        ValueError: a mass or inertia that no rigid body has, an axis without direction, an unknown body, or a duplicate
+            name.
     """
     bodies, joints, drives = tuple(bodies), tuple(joints), tuple(drives)
     for body in bodies:

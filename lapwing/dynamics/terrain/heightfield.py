@@ -1,4 +1,4 @@
-"""A relief: a height over each point of the horizontal plane, and bodies with level tops that stand on it."""
+"""Relief: a height over each point of the horizontal plane, and obstacles with level tops."""
 
 from typing import NamedTuple
 
@@ -12,25 +12,25 @@ UP = (-0.0, -0.0, 1.0)  # normal of level ground
 class Relief(NamedTuple):
     """Ground that is not level."""
 
-    slope: tuple[float, float]  # rise of the plane along world x and y
+    slope: tuple[float, float]  # slope of the plane along world x and y
     bump_height: float  # [m] A of bumps A sin(k x) sin(k y)
     bump_wavenumber: float  # [rad/m] k
     base: float  # [m] height at home without bumps and grid
     grid: np.ndarray  # (rows along y, columns along x) heights [m]; (0, 0): none
     corner: tuple[float, float]  # [m] world x and y of grid[0, 0]
-    spacing: float  # [m] of the grid
+    spacing: float  # [m] spacing of the grid
     boxes: np.ndarray  # (n, 7) x, y of the centre, cosine and sine of the heading, half length and width, z of the top
     cylinders: np.ndarray  # (n, 4) x, y of the axis, radius, z of the top
-    summit: float  # [m] nothing of the ground is higher over the plane through the origin with that slope
+    summit: float  # [m] largest height of the terrain above the plane through the origin with that slope
 
 
 @kernel
 def _between(t, x, y):
-    """Return (height, slope along x, slope along y) of the grid, bilinear; beyond its edge as at the edge."""
+    """Return (height, slope along x, slope along y) of the grid, bilinear, with constant extrapolation."""
     rows, columns = t.grid.shape
     u, v = (x - t.corner[0]) / t.spacing, (y - t.corner[1]) / t.spacing
     inside_x, inside_y = 0.0 <= u <= columns - 1.0, 0.0 <= v <= rows - 1.0
-    u, v = min(max(0.0, u), columns - 1.0), min(max(0.0, v), rows - 1.0)  # in this order NaN becomes 0
+    u, v = min(max(0.0, u), columns - 1.0), min(max(0.0, v), rows - 1.0)  # this order of arguments maps NaN to 0
     i, j = min(int(v), rows - 2), min(int(u), columns - 2)
     q, p = v - i, u - j
     a, b, c, d = t.grid[i, j], t.grid[i, j + 1], t.grid[i + 1, j], t.grid[i + 1, j + 1]
@@ -147,6 +147,6 @@ def ray(t, origin, direction, longest):
     return after if after <= longest else math.inf
 
 
-FINEST = 0.02  # [m] a ray may pass over what is narrower
-CAUTION = 0.25  # of the gap under a ray that it goes on by
+FINEST = 0.02  # [m] a ray may miss narrower objects
+CAUTION = 0.25  # step of the march relative to the gap under the ray
 HALVINGS = 50

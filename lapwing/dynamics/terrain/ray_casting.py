@@ -6,8 +6,8 @@ from lapwing.dynamics.terrain.heightfield import Relief, field
 from lapwing.dynamics.terrain.terrain_queries import Level
 from lapwing.kernels import kernel, math
 
-FINEST = 0.02  # [m] least step of a march over bumps or a grid
-HALVINGS = 24  # from the step to below a micrometre
+FINEST = 0.02  # [m] smallest step of a march over bumps or a grid
+HALVINGS = 24  # number of bisections, from the step to below 1 um
 
 
 def as_relief(terrain: Level | Relief) -> Relief:
@@ -19,7 +19,7 @@ def as_relief(terrain: Level | Relief) -> Relief:
 
 
 def steepness(terrain: Relief) -> float:
-    """Return a bound of the ground's slope [m/m] without its obstacles, by which a march passes over nothing."""
+    """Return a bound of the slope [m/m] of the ground without obstacles, so that a march misses nothing."""
     steep = math.hypot(*terrain.slope) + abs(terrain.bump_height) * terrain.bump_wavenumber * math.sqrt(2.0)
     if terrain.grid.size:
         along, across = (float(np.abs(np.diff(terrain.grid, axis=k)).max()) / terrain.spacing for k in (1, 0))
@@ -39,9 +39,9 @@ def _to_plane(t, o, d):
 
 @kernel
 def _to_field(t, o, d, steep, longest):
-    """Return the distance to bumps or a grid by a march within the bound of the slope, and bisection."""
+    """Return the distance to bumps or a grid by a march with the bound of the slope, and bisection."""
     before, after = 0.0, 0.0
-    closing = steep * math.sqrt(d[0] * d[0] + d[1] * d[1]) - d[2]  # greatest decrease of the gap by distance
+    closing = steep * math.sqrt(d[0] * d[0] + d[1] * d[1]) - d[2]  # largest decrease of the gap per distance
     while True:
         gap = o[2] + after * d[2] - field(t, o[0] + after * d[0], o[1] + after * d[1])[0]
         if gap <= 0.0:

@@ -1,4 +1,4 @@
-"""From a description of the ground to what kernels are given."""
+"""Conversion of a description of the ground to the data of kernels."""
 
 from collections.abc import Sequence
 
@@ -9,7 +9,7 @@ from lapwing.dynamics.terrain.heightfield import Relief, field
 from lapwing.dynamics.terrain.terrain_queries import LEVEL, Level
 from lapwing.kernels import math
 
-FAR = 1e5  # [m] how far a step goes on where nothing ends it
+FAR = 1e5  # [m] extent of the last step
 STEEPEST = 1.0  # tangent of 45 degrees
 
 Box = tuple[float, float, float, float, float, float]  # x, y of the centre, length, width, heading [rad], z of the top
@@ -33,7 +33,7 @@ def relief(
     Args:
         slope: rise along world x and y.
         bump_height: A of bumps A sin(k x) sin(k y).
-        bump_length: their wavelength 2 pi / k.
+        bump_length: wavelength 2 pi / k of the bumps.
         steps: (distance from home, rise), with ascending distances above 0.
         step_heading: direction of the steps [rad], 0 along x.
         boxes: boxes on the ground.

@@ -15,7 +15,7 @@ LEVEL = Level()
 
 
 def upright(terrain: Any) -> Vec3:
-    """Return the vector whose product with a position [m] is the height above the plane of the slope, along world z."""
+    """Return the vector whose product with a position [m] is the height along world z above the plane of the slope."""
     return UP if isinstance(terrain, Level) else (-terrain.slope[0], -terrain.slope[1], 1.0)
 
 

@@ -1,1 +1,1 @@
-"""Equations of motion of each vehicle, and airframe files."""
+"""Equations of motion of the vehicles, and airframe files."""

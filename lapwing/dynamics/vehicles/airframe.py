@@ -1,4 +1,4 @@
-"""An airframe as its TOML file describes it: the numbers that belong to the vehicle whatever the scene."""
+"""Airframe from its TOML file: the numbers of a vehicle that do not depend on the scene."""
 
 import math
 import tomllib
@@ -26,13 +26,13 @@ from lapwing.dynamics.vehicles.airframe_tables import (
 )
 from lapwing.kernels.math import dist
 
-LEAST_GYRATION = 0.02  # radius of gyration over the distance to the rotors; real vehicles have 0.3 to 0.6
+LEAST_GYRATION = 0.02  # limits of the radius of gyration over the distance to the rotors; real vehicles have 0.3 to 0.6
 
 
 class Airframe(Section):
-    """A multirotor; the parts that it does not have are None, and so are closed to the effects that need them."""
+    """Multirotor airframe; missing parts are None, and effects that need them are rejected."""
 
-    mesh: str | None = None  # STL, OBJ or glTF file beside this one, in metres: how the vehicle is shown
+    mesh: str | None = None  # STL, OBJ or glTF file in metres next to this one, for the 3D view
     mass: Mass
     rotors: RotorPlacement
     motor: Motor
@@ -64,13 +64,13 @@ class Airframe(Section):
 
     @property
     def motor_current_limit(self) -> float:
-        """[A] of one motor: what its controller keeps, or its share of what the battery's C rating allows."""
+        """Current limit of one motor [A]: that of its controller, or its share of the battery's C rating."""
         pack = self.battery.current_limit if self.battery else math.inf
         return min(self.motor.current_limit, pack / len(self.rotors.position))
 
     @property
     def loaded(self) -> "Airframe":
-        """Return the airframe with the box of [payload] in its mass (theory.md, eq. (2.41))."""
+        """Return the airframe with the box of [payload] included in its mass (theory.md, eq. (2.41))."""
         box, own = self.payload, self.mass
         if box is None or own.payload:
             return self
@@ -112,7 +112,7 @@ def load_airframe(path: str | Path) -> Airframe:
     """Read an airframe from a TOML file.
 
     Raises:
-        ValueError: one line that names the file, the key and what was expected.
+        ValueError: one line with the file, the key and the expected value.
     """
     path = Path(path)
     try:

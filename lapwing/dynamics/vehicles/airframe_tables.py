@@ -1,4 +1,4 @@
-"""The tables of an airframe's file: mass, rotors, propeller, motor, battery, contact, drag, published figures."""
+"""Tables of an airframe file: mass, rotors, propeller, motor, battery, contact, drag, published figures."""
 
 from typing import Annotated, Literal
 
@@ -15,11 +15,11 @@ NotNegative = Annotated[float, Ge(0)]
 Triple = tuple[float, float, float]
 PositiveTriple = tuple[Positive, Positive, Positive]
 
-SHORTEST_AXIS = 1e-6  # below which a direction is none
+SHORTEST_AXIS = 1e-6  # smallest length of a direction
 
 
 class Section(BaseModel):
-    """A table of the file: no unknown keys, numbers finite."""
+    """Table of an airframe file, without unknown keys and with finite numbers."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
@@ -27,14 +27,14 @@ class Section(BaseModel):
 class Mass(Section):
     """Mass properties with payload, about the centre of mass and along the body axes (theory.md, eq. (1.6a)).
 
-    Where the payload has a table of its own, these are the vehicle's without it.
+    With a separate payload table, these are the properties of the vehicle without payload.
     """
 
-    total: Positive  # [kg]
+    total: Positive  # [kg] total
     payload: NotNegative  # [kg] part of the total
     inertia: PositiveTriple  # [kg m^2] diagonal of the inertia matrix
     products: Triple = (0.0, 0.0, 0.0)  # [kg m^2] its elements xy, xz and yz, as in URDF; minus the integrals of xy dm
-    centre: Triple = (0.0, 0.0, 0.0)  # [m] centre of mass, from where the positions of the airframe are measured
+    centre: Triple = (0.0, 0.0, 0.0)  # [m] centre of mass in the coordinates of the airframe's positions
 
     @model_validator(mode="after")
     def _physical(self) -> "Mass":
@@ -59,15 +59,15 @@ class Mass(Section):
 
 
 class CarriedBox(Section):
-    """A payload with a place: a uniform box, beside the mass properties of the vehicle without it."""
+    """Payload as a uniform box, in addition to the mass properties of the vehicle without it."""
 
     mass: Positive  # [kg]
-    position: Triple  # [m] of its centre, body
-    size: PositiveTriple  # [m] along body x, y, z
+    position: Triple  # [m] position of its centre, body
+    size: PositiveTriple  # [m] size along body x, y, z
 
     @property
     def inertia(self) -> np.ndarray:
-        """[kg m^2] about its centre, shape (3, 3)."""
+        """Inertia [kg m^2] about its centre, shape (3, 3)."""
         square = np.square(self.size)
         return self.mass / 12.0 * np.diag(square.sum() - square)
 
@@ -77,10 +77,10 @@ class RotorPlacement(Section):
 
     position: Annotated[tuple[Triple, ...], Len(3)]  # [m] body
     spin_direction: tuple[Literal["cw", "ccw"], ...]  # of each rotor seen from above: clockwise or counter-clockwise
-    axis: tuple[Triple, ...] = ()  # direction of each rotor's thrust in the body, of any length; body z if left out
+    axis: tuple[Triple, ...] = ()  # direction of each rotor's thrust in the body, of any length; default: body z
     inertia: Positive  # [kg m^2] of one rotor about its axis
-    mass: Positive | None = None  # [kg] of one rotor, part of the total; for models that give it a body of its own
-    blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same
+    mass: Positive | None = None  # [kg] mass of one rotor, part of the total; for models with separate rotor bodies
+    blade_inertia: tuple[Positive, Positive] | None = None  # [kg m^2] along its blade and across, for the same models
 
     @model_validator(mode="after")
     def _one_direction_each(self) -> "RotorPlacement":
@@ -102,12 +102,12 @@ class RotorPlacement(Section):
 
     @property
     def reaction_sign(self) -> tuple[float, ...]:
-        """Sign of each rotor's reaction torque on the body about its axis, opposite to the rotor's own turning."""
+        """Sign of each rotor's reaction torque on the body about its axis, opposite to the rotor's rotation."""
         return tuple(1.0 if spin == "cw" else -1.0 for spin in self.spin_direction)
 
     @property
     def tilted_axis(self) -> tuple[Triple, ...]:
-        """Unit vector in the body along which each rotor pushes; () where that is body z for all of them."""
+        """Unit vector of each rotor's thrust in the body; () if it is body z for all rotors."""
         if not any(x or y for x, y, _ in self.axis):
             return ()
         lengths = (math.hypot(*axis) for axis in self.axis)
@@ -118,18 +118,18 @@ class Propeller(Section):
     """Geometry and blade-element constants of theory.md, eq. (1.9) to (1.11)."""
 
     diameter: Annotated[float, Ge(1e-3), Le(100)]  # [m] D
-    pitch: Annotated[float, Ge(1e-6), Le(100)]  # [m] way of a turn without slip
-    blades: Annotated[int, Gt(0)]  # how many
-    aspect_ratio: Annotated[float, Ge(1e-3), Le(1e3)]  # A, of the blades
+    pitch: Annotated[float, Ge(1e-6), Le(100)]  # [m] advance per turn without slip
+    blades: Annotated[int, Gt(0)]  # number of blades
+    aspect_ratio: Annotated[float, Ge(1e-3), Le(1e3)]  # A, of a blade
     downwash_factor: Annotated[float, Gt(0), Le(1)]  # epsilon
     lift_correction: Annotated[float, Gt(0), Le(1)]  # lambda
-    radius_weight: Annotated[float, Gt(0), Le(1)]  # zeta, of the section taken for the blade, over the radius
+    radius_weight: Annotated[float, Gt(0), Le(1)]  # zeta, radius of the blade section over the rotor radius
     oswald_factor: Annotated[float, Gt(0), Le(1)]  # e
     zero_lift_drag: NotNegative  # C_fD
     zero_lift_angle: float  # [rad] alpha_0
     lift_curve_slope: Annotated[float, Ge(1e-3), Le(1e3)]  # [1/rad] K_0
     # of [effects.dynamic_inflow]; 1.15 is usual (Leishman)
-    induced_power_factor: Annotated[float, Ge(1), Le(2)] = 1.0  # kappa: induced power in hover over the ideal
+    induced_power_factor: Annotated[float, Ge(1), Le(2)] = 1.0  # kappa, induced power in hover over the ideal one
 
 
 class Motor(Section):
@@ -137,53 +137,53 @@ class Motor(Section):
 
     speed_constant: Positive  # [rpm/V] KV of the motor shaft (deliberately not SI: how motors are sold)
     gear_ratio: Positive  # propeller speed over motor speed
-    no_load_current: NotNegative  # [A] I_0, without load
+    no_load_current: NotNegative  # [A] I_0, current without load
     resistance: Positive  # [ohm] of the winding
-    time_constant: Annotated[float, Ge(1e-6)]  # [s] of rotor speed after a step of voltage
-    max_voltage: Positive  # [V] that the controller can ask for
+    time_constant: Annotated[float, Ge(1e-6)]  # [s] of the rotor speed after a voltage step
+    max_voltage: Positive  # [V] largest output of the speed controller
     esc_current: Positive  # [A] limit of the speed controller
     esc_resistance: NotNegative = 0.0  # [ohm] of the speed controller and its leads
     esc_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # power of the motor and resistances over that of the battery
-    peak_current: Positive | None = None  # [A] of the motor, which the controller keeps; none if left out
-    peak_power: Positive | None = None  # [W] taken by the motor, which the controller keeps; none if left out
-    belt_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # torque that reaches the rotor over that of belt and motor
-    inertia: NotNegative = 0.0  # [kg m^2] of the motor's own rotor about its axis
+    peak_current: Positive | None = None  # [A] current limit of the motor, enforced by the controller; default: none
+    peak_power: Positive | None = None  # [W] power limit of the motor, enforced by the controller; default: none
+    belt_efficiency: Annotated[float, Gt(0), Le(1)] = 1.0  # torque at the rotor over the torque of motor and belt
+    inertia: NotNegative = 0.0  # [kg m^2] of the motor's rotor about its axis
 
     @property
     def current_limit(self) -> float:
-        """[A] that neither controller nor motor exceeds."""
+        """Current limit of controller and motor [A]."""
         return min(self.esc_current, self.peak_current or math.inf)
 
     @property
     def power_limit(self) -> float:
-        """[W] that the motor takes at the most."""
+        """Power limit of the motor [W]."""
         return self.peak_power or math.inf
 
     @property
     def rotor_constant(self) -> float:
-        """[N m/A] = [V s/rad] of motor and belt, at the rotor (theory.md, eq. (1.12))."""
+        """Motor constant [N m/A] = [V s/rad] of motor and belt, at the rotor (theory.md, eq. (1.12))."""
         return 30.0 / (math.pi * self.speed_constant * self.gear_ratio)
 
 
 class Battery(Section):
     """Lithium-polymer battery."""
 
-    cells: Annotated[int, Gt(0)]  # in series
+    cells: Annotated[int, Gt(0)]  # number of cells in series
     capacity: Positive  # [A s]
     c_rating: Positive  # [1/h] maximum current over capacity in A h
     cell_resistance: NotNegative  # [ohm] of one cell
 
     @property
     def current_limit(self) -> float:
-        """[A] that its C rating allows."""
+        """Current limit of the C rating [A]."""
         return self.c_rating * self.capacity / 3600.0
 
 
 class Contact(Section):
-    """Points that may touch the ground."""
+    """Points of the vehicle that can touch the ground."""
 
     feet: Annotated[tuple[Triple, ...], Len(1)]  # [m] body
-    hull: tuple[Triple, ...] = ()  # [m] body: what touches if the vehicle falls over
+    hull: tuple[Triple, ...] = ()  # [m] body: points that touch the ground if the vehicle falls over
 
 
 class Drag(Section):
@@ -193,16 +193,16 @@ class Drag(Section):
 
 
 class PublishedFigure(Section):
-    """A figure from the literature, and why the one computed here may differ."""
+    """Published figure, and the reason why the computed one may differ."""
 
     value: Positive  # in SI units
-    reason: str = ""  # why the one computed here may differ
+    reason: str = ""  # reason why the computed one may differ
 
 
 class Published(Section):
     """Published performance of this vehicle; not used in computations."""
 
-    source: str  # where the figures are from
+    source: str  # source of the figures
     hover_time: PublishedFigure | None = None  # [s]
     maximum_payload: PublishedFigure | None = None  # [kg]
     maximum_range: PublishedFigure | None = None  # [m]

@@ -23,7 +23,7 @@ class FormationControl(NamedTuple):
     attitude_gain: float  # [N m], before the scaling by epsilon^2
     attitude_rate_gain: float  # [N m s], before the scaling by epsilon
     epsilon: float
-    path: tuple[Vec3, Vec3, Vec3]  # desired load position is path[0] + path[1] t + path[2] t^2 [m]
+    path: tuple[Vec3, Vec3, Vec3]  # [m] desired load position is path[0] + path[1] t + path[2] t^2
     direction: tuple[Vec3, ...]  # desired unit link directions, quadrotor to load
 
 
@@ -33,7 +33,7 @@ def formation_control(p, t, x):
     desired, slope = forces.desired_specific_force(p, t, x, (0.0, 0.0, 0.0))
     s, s_rate = forces.shares(p, x, desired, slope)
     thrust = map_index(forces.quad_thrust, x.link, p, x, desired, slope, s, s_rate)
-    # these thrusts give the accelerations, and those the rates of the wanted forces
+    # the thrusts give the accelerations, and these the rates of the desired forces
     force = map_index(formation.thrust_world, x.link, x, thrust)
     specific = load_acceleration(p, x, force)
     desired, slope = forces.desired_specific_force(p, t, x, add(specific, (0.0, 0.0, -p.gravity)))

@@ -22,10 +22,10 @@ from lapwing.dynamics.vector import (
 from lapwing.dynamics.vehicles.cooperative_load import add_outer, link_acceleration, solve_symmetric
 from lapwing.kernels import always_inline, kernel
 
-UPRIGHT_SHARE = 0.3  # of its weight that a quadrotor's attitude always aims to carry
+UPRIGHT_SHARE = 0.3  # smallest vertical force of the desired attitude, relative to a quadrotor's weight
 NOTHING = (0.0, 0.0, 0.0)
 FORWARD = (1.0, 0.0, 0.0)  # heading of all quadrotors
-SHARE_DAMPING = 0.03  # keeps the shares bounded where the links do not span space (theory.md, eq. (7.23))
+SHARE_DAMPING = 0.03  # keeps the shares bounded if the links do not span space (theory.md, eq. (7.23))
 
 
 @always_inline
@@ -65,7 +65,7 @@ def shares(p, x, desired, slope):
     for i in range(len(x.link)):
         matrix = add_outer(matrix, 1.0, x.link[i].direction)
     s, s_rate = _solve_damped(matrix, x, scale(p.load_mass, desired), scale(p.load_mass, slope))
-    # once more on what the damping left out: its effect falls to second order
+    # second pass on the residual of the damping, whose effect becomes of second order
     rest, rest_rate = _solve_damped(matrix, x, scale(SHARE_DAMPING, s), scale(SHARE_DAMPING, s_rate))
     return add(s, rest), add(s_rate, rest_rate)
 
@@ -78,10 +78,10 @@ def desired_force(p, x, desired, slope, s, s_rate, omega_rate, i):
     m, inertia = p.quad_mass[i], p.quad_mass[i] * p.link_length[i]
     parallel = dot(q, s) + inertia * dot(omega, omega) + m * dot(q, desired)
     swing = add(scale(-c.link_direction_gain, cross(c.direction[i], q)), scale(-c.link_rate_gain, omega))
-    # the part normal to the link turns it as wanted: omega' = q x (v' - a_g) / L - q x u / (m L)
+    # the part normal to the link gives the desired link rotation: omega' = q x (v' - a_g) / L - q x u / (m L)
     lever = subtract(scale(m, cross(q, desired)), scale(inertia, swing))
     force = add(scale(parallel, q), cross(lever, q))
-    # the same, differentiated
+    # derivative of the same terms
     q_rate = cross(omega, q)
     parallel_rate = dot(q_rate, s) + dot(q, s_rate) + 2.0 * inertia * dot(omega, omega_rate)
     parallel_rate += m * (dot(q_rate, desired) + dot(q, slope))
@@ -139,7 +139,7 @@ def moment(p, x, force, force_rate, i):
 @always_inline
 def quad_thrust(p, x, desired, slope, s, s_rate, i):
     """Return the thrust [N] of quadrotor i: the part of its desired force along its axis."""
-    # a force does not depend on the accelerations, only its derivative does
+    # forces do not depend on the accelerations, their derivatives do
     force, _ = desired_force(p, x, desired, slope, s, s_rate, NOTHING, i)
     m = rotation_matrix(x.attitude[i])
     return dot(force, (m[2], m[5], m[8]))

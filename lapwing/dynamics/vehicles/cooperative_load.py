@@ -1,7 +1,7 @@
 """N quadrotors carrying a point mass by rigid massless links, on R^6 x (TSO(3))^N x (TS^2)^N, N >= 2.
 
 The model of Lee, Sreenath and Kumar (CDC 2013) in ENU: a link's direction points from its quadrotor to the load. The
-equations are theory.md, eqs. (7.17) to (7.21); the constraints are part of the state space and cannot be broken.
+equations are theory.md, eqs. (7.17) to (7.21); the constraints are part of the state space and cannot drift.
 """
 
 from typing import Any, NamedTuple
@@ -15,14 +15,14 @@ from lapwing.kernels.codegen import map_index, overload_for
 
 
 class LiftCommand(NamedTuple):
-    """Thrust and moment of each quadrotor; the plant holds them between messages."""
+    """Thrust and moment of each quadrotor; the plant holds them between updates."""
 
     thrust: tuple[float, ...]  # [N] along body z
     moment_body: tuple[Vec3, ...]  # [N m]
 
 
 class CooperativeLoadParameters(NamedTuple):
-    """Tuples have one entry for each quadrotor."""
+    """Parameters of the formation; tuples have one entry for each quadrotor."""
 
     quad_mass: tuple[float, ...]  # [kg]
     quad_inertia: tuple[Vec3, ...]  # [kg m^2] principal moments
@@ -48,7 +48,7 @@ class CooperativeLoadParameters(NamedTuple):
 
 
 class CooperativeLoadState(NamedTuple):
-    """World frame ENU."""
+    """State of load, quadrotors and links; world frame ENU."""
 
     load_position: Vec3  # [m]
     load_velocity: Vec3  # [m/s]
@@ -62,7 +62,7 @@ COMMANDS = DispatchTable()
 
 
 def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> LiftCommand:
-    """Return the LiftCommand at time t, received or from the control law of `p.drive`."""
+    """Return the LiftCommand at time t: `p.drive` itself, or the output of its control law."""
     return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
 
 

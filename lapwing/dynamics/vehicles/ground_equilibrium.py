@@ -17,16 +17,16 @@ from lapwing.dynamics.vector import apply as compiled_apply
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
 from lapwing.kernels import math, python_function
 
-ITERATIONS = 50  # the feet move sideways as the vehicle tilts; on a plane three are enough
-CONVERGED = 1e-12  # change of the slope between two iterations
-BALANCED, TOLERATED = 1e-12, 1e-8  # force that is not balanced, over the weight: sought, and found at least
-NUDGE = 1e-8  # [m] for slopes of the forces
+ITERATIONS = 50  # number of iterations: the feet move sideways as the vehicle tilts; on a plane three are enough
+CONVERGED = 1e-12  # change of the slope between two iterations at convergence
+BALANCED, TOLERATED = 1e-12, 1e-8  # residual force over the weight: desired, and required
+NUDGE = 1e-8  # [m] step of numerical derivatives of the forces
 NO_SLOPE = (0.0, 0.0)
 
 Pose = tuple[Vec3, Quaternion]  # position of the centre of mass [m] in the world, attitude
 Place = tuple[float, float]  # world x and y [m]
 
-# thousands of calls, each cheaper than handing its arguments to machine code
+# thousands of calls, each faster than passing its arguments to compiled code
 apply = python_function(compiled_apply)
 from_matrix, rotation_matrix = python_function(quaternion.from_matrix), python_function(quaternion.rotation_matrix)
 
@@ -49,7 +49,7 @@ def resting_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: P
     for _ in range(ITERATIONS):
         R_world_body = _attitude_on_plane(slope)
         arms = [apply(R_world_body, foot) for foot in feet]
-        lifts = [surface(terrain, x0 + x, y0 + y)[0] - z for x, y, z in arms]  # [m] at which that foot touches
+        lifts = [surface(terrain, x0 + x, y0 + y)[0] - z for x, y, z in arms]  # [m] height at which that foot touches
         change = _support_plane([(x, y, lift) for (x, y, _), lift in zip(arms, lifts, strict=True)]) or NO_SLOPE
         if math.hypot(*change) < CONVERGED:
             break
@@ -83,7 +83,7 @@ def _balance(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pos
     """Return the nearby pose in which springs and weight [N] balance, by Newton's method; `pose` if there is none."""
     R = rotation_matrix(attitude)
     x = np.array([position[2], R[6] / R[0], R[7] / R[4] - R[6] * R[1] / (R[0] * R[4])])  # height, slopes of the body
-    x[0] -= 1.0 / e.inverse_width + weight / (len(e.feet) * e.stiffness)  # every spring beyond its onset
+    x[0] -= 1.0 / e.inverse_width + weight / (len(e.feet) * e.stiffness)  # every spring loaded
     place = position[:2]
     residual = _springs(e, weight, x, place)
     left = _norm(residual)
@@ -93,7 +93,7 @@ def _balance(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pos
         growth = np.array([_springs(e, weight, x + change, place) - residual for change in NUDGE * np.eye(3)]).T / NUDGE
         try:
             step = small_matrices.solve(growth, -residual[:, None])[:, 0]
-        except small_matrices.SingularMatrixError:  # fewer than three feet press
+        except small_matrices.SingularMatrixError:  # fewer than three feet are loaded
             return position, attitude
         shares = [math.ldexp(1.0, -k) for k in range(20)]
         for trial in (x + share * step for share in shares):
@@ -101,7 +101,7 @@ def _balance(e: Any, weight: float, position: Vec3, attitude: Quaternion) -> Pos
             if (nearer := _norm(result)) < left:
                 break
         else:
-            break  # as near as numbers allow
+            break  # limited by round-off
         x, residual, left = trial, result, nearer
     if not left < TOLERATED * weight:
         return position, attitude
@@ -117,7 +117,7 @@ def _springs(e: Any, weight: float, x: np.ndarray, place: Place) -> np.ndarray:
     """
     height, *slope = x.tolist()
     R_world_body = _attitude_on_plane(slope)
-    force, x_moment, y_moment = -weight, 0.0, 0.0  # one by one: arrays of three numbers take longer
+    force, x_moment, y_moment = -weight, 0.0, 0.0  # scalars: arrays of three numbers are slower
     for foot in e.feet:
         arm = apply(R_world_body, foot)
         depth, normal = _depth(e, arm, (*place, height))
@@ -156,7 +156,7 @@ def _deflections(e: Any, position: Vec3, attitude: Quaternion) -> tuple[Vec3, ..
             continue
         if math.hypot(nx, ny) > e.static * nz:
             return None
-        # straight up is: press along the normal, and across it press (z / n_z - n)
+        # a vertical force has the normal part `press` and the tangential part press (z / n_z - n)
         pull = _press(e, depth) / e.tangential_stiffness
         result.append((pull * nx, pull * ny, pull * (nz - 1.0 / nz)))
     return tuple(result)

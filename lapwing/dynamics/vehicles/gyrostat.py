@@ -1,7 +1,7 @@
 """Gyrostat satellite: a rigid platform with three rotors along its principal axes, the third spinning unevenly.
 
 Lagrange-d'Alembert on SO(3) gives theory.md, eq. (7.7); after Ge and Lin, J. Sound Vib. 251 (2002) 519, whose numbers
-have minutes for seconds. Rotors at rest, no damping, no feedback: the three simpler cases, with zeros for numbers.
+use minutes in place of seconds. Zero parameters give the simpler cases: rotors at rest, no damping, no feedback.
 """
 
 from typing import NamedTuple
@@ -15,17 +15,17 @@ from lapwing.kernels import always_inline, math
 
 
 class GyrostatParameters(NamedTuple):
-    """Blocked rotors: rotor_momentum zero; spinning: damping zero; friction: gains zero; feedback: all given."""
+    """Blocked rotors have zero rotor_momentum, spinning ones zero damping, rotors with friction zero gains."""
 
     inertia: Vec3  # [kg m^2] platform with rotors
-    rotor_momentum: Vec3  # [kg m^2/s] of the rotors, the third its mean
-    forcing_amplitude: float  # of the third rotor's speed, relative
+    rotor_momentum: Vec3  # [kg m^2/s] of the rotors, for the third its mean
+    forcing_amplitude: float  # relative amplitude of the third rotor's speed
     forcing_frequency: float  # [rad/s]
     damping: float  # [N m s] about z
     linear_gain: Vec3  # [N m s]
     cubic_gain: Vec3  # [N m s^3]
     desired_rate: float  # [rad/s] about each axis
-    attitude_gain: float  # [N m] of the control towards `target`; zero without
+    attitude_gain: float  # [N m] gain of the control towards `target`; 0: no control
     rate_gain: float  # [N m s] of that control
     target: Quaternion  # attitude to reach
 
@@ -62,7 +62,7 @@ def rate(p, t, x):
     torque = add(cross(add(multiply_each(p.inertia, o), h), o), scale(-1.0, h_rate))
     torque = add(torque, (0.0, 0.0, -p.damping * o[2]))
     if p.attitude_gain != 0.0:
-        # the controller knows the rotors and takes their torque out
+        # the controller compensates the torque of the rotors
         torque = add(torque, add(attitude_torque(p, x), add(cross(o, h), h_rate)))
     inverse = (1.0 / p.inertia[0], 1.0 / p.inertia[1], 1.0 / p.inertia[2])
     return RigidBody(o, multiply_each(inverse, add(torque, feedback)))

@@ -14,10 +14,10 @@ def power(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = No
 
 
 def power_fault(airframe: Airframe, rotor: Rotor, density: float = DENSITY) -> str:
-    """Return a description if the rotors take less shaft power in hover than ideal ones; "" otherwise.
+    """Return a description if the rotors need less shaft power in hover than ideal ones; "" otherwise.
 
-    An ideal rotor takes the power T^(3/2) / sqrt(2 rho A) of momentum theory. Without a propeller, the largest disk is
-    assumed that leaves the nearest other hub free, so the true limit is higher.
+    An ideal rotor needs the power T^(3/2) / sqrt(2 rho A) of momentum theory. Without a propeller, the largest disk up
+    to the nearest other hub is assumed, so the true limit is higher.
     """
     hover, (_, k_torque) = trim(airframe, 0.0, density, rotor=rotor), rotor.constants(density)
     hubs = [(x, y, 0.0) for x, y, _ in airframe.rotors.position]
@@ -36,10 +36,10 @@ def current(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = 
 
 
 def battery_current(airframe: Airframe, watts: float) -> float:
-    """Return the current [A] at which the battery at nominal charge gives a power, `watts` [W].
+    """Return the current [A] at which the battery at nominal charge delivers the power `watts` [W].
 
     Raises:
-        ValueError: there is no battery, or its resistance does not let it give that power.
+        ValueError: there is no battery, or its resistance does not permit that power.
     """
     if (battery := airframe.battery) is None:
         raise ValueError("the vehicle has no [battery]")
@@ -67,6 +67,6 @@ def esc_margin(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None
 
 def battery_margin(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """Return the share of the battery's current limit (C rating) that is free in hover; negative beyond it."""
-    drawn = current(airframe, density, rotor)
-    assert airframe.battery is not None  # else `current` raises
-    return 1.0 - drawn / airframe.battery.current_limit
+    load = current(airframe, density, rotor)
+    assert airframe.battery is not None  # otherwise `current` raises an error
+    return 1.0 - load / airframe.battery.current_limit

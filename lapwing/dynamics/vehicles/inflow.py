@@ -8,8 +8,8 @@ from lapwing.kernels import always_inline, kernel
 # induced velocity in hover; the fourth, published as -0.655, meets the windmill brake state without a jump
 DESCENT = (-1.125, -1.372, -1.718)
 WINDMILL = -2.0  # climb over the induced velocity in hover, below which a rotor is in the windmill brake state
-NEWTON_STEPS = 12  # from ten hover velocities across to a rounding
-WAKE_STEPS = 8  # from no wake to a rounding
+NEWTON_STEPS = 12  # iterations from ten hover velocities across to round-off
+WAKE_STEPS = 8  # iterations from no wake to round-off
 
 
 @always_inline
@@ -36,7 +36,7 @@ def induced_velocity(climb, across, kappa):
 
     Args:
         climb: air speed along the axis, against the rotor's flow, over the ideal induced velocity in hover.
-        across: air speed across the axis, over the same; not negative.
+        across: air speed across the axis, over the same velocity; not negative.
         kappa: induced velocity in hover over the ideal one; 1 for an ideal rotor.
     """
     # Glauert: v sqrt(across^2 + (climb + v)^2) = 1, its largest root from above
@@ -47,7 +47,7 @@ def induced_velocity(climb, across, kappa):
         square = across * across + through * through
         v -= (v * v * square - 1.0) / (2.0 * v * (square + v * through))
     v *= kappa
-    # what the ring of vortices adds in descent is blown away by a wind across as fast as the flow in hover
+    # a transverse wind as fast as the induced flow in hover removes the effect of the vortex ring in descent
     return v if climb >= 0.0 else v * (1.0 + max(1.0 - across, 0.0) * (axial(climb, kappa) / (kappa * upper) - 1.0))
 
 
@@ -62,11 +62,11 @@ def thrust_in_wake(pitch, wash):
         wash: induced velocity of the upper rotor over the lower one's in isolated hover.
     """
     if wash >= pitch:
-        return 0.0  # the wake is as fast as the blades
+        return 0.0  # the wake is as fast as the blade advance
     slope, square = pitch - 1.0, wash * wash
     cube = square * wash
     t = 1.0
-    for _ in range(WAKE_STEPS):  # of Newton's method, from above
+    for _ in range(WAKE_STEPS):  # Newton's method, from above
         through, sum_ = pitch - slope * t, t + square
         value = t * through * through + cube * through - sum_ * sum_
         growth = through * through - 2.0 * slope * t * through - slope * cube - 2.0 * sum_

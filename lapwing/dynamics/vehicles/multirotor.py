@@ -1,7 +1,7 @@
-"""The plant: one rigid body with rotors, driven by motor voltages, under the effects that its scene names.
+"""Multirotor plant: one rigid body with rotors, driven by motor voltages, under the effects of its scene.
 
-All functions are pure. The equations are in `multirotor_equations`, their steps in `multirotor_steps`;
-`multirotor_multibody` has five bodies in the place of one, under the same effects, `advance` and `observe`.
+All functions are pure. The equations are in `multirotor_equations`, their steps in `multirotor_stepper`;
+`multirotor_multibody` has five bodies in place of one, with the same effects, `advance` and `observe`.
 """
 
 import math
@@ -30,22 +30,22 @@ from lapwing.kernels.codegen import map_tuple
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-CONTACT_TOLERANCE = 1e-6  # error of a part of a step in contact where nobody says otherwise
+CONTACT_TOLERANCE = 1e-6  # default error of a substep in contact
 
 
 class MultirotorObservation(NamedTuple):
     """Quantities derived from a state."""
 
-    acceleration_world: Vec3  # [m/s^2] of the motion's position
+    acceleration_world: Vec3  # [m/s^2] acceleration of the motion's position
     angular_acceleration_body: Vec3  # [rad/s^2]
     thrust: PerRotor  # [N]
-    torque: PerRotor  # [N m] of the air against each rotor
+    torque: PerRotor  # [N m] aerodynamic torque against each rotor
     rotor_acceleration: PerRotor  # [rad/s^2]
     motor_voltage: PerRotor  # [V]
     motor_current: PerRotor  # [A]
-    motor_power: PerRotor  # [W] taken by each motor and its controller
+    motor_power: PerRotor  # [W] power of each motor and its controller
     air_density: float  # [kg/m^3]
-    wind_world: Vec3  # [m/s] of the air and of winds that are forces only
+    wind_world: Vec3  # [m/s] wind, including winds that act as forces only
     mass: float  # [kg]
     in_contact: bool
     battery: tuple[float, float, float, float]  # charge, voltage [V], current [A], temperature [K]; NaN: not modelled
@@ -111,7 +111,7 @@ def parameters(airframe: "Airframe", effects: tuple = ()) -> MultirotorParameter
         engine.rotor_constant, 1.0 / engine.rotor_constant, 1.0 / engine.time_constant,
         engine.max_voltage, engine.no_load_current, axis=rotors.tilted_axis,
     )  # fmt: skip
-    if airframe.payload:  # of the class of the mass properties once it is released, which has more numbers
+    if airframe.payload:  # has the class of the mass properties after the release, which has more numbers
         body: AnyMassProperties = offset_body(mass.total, mass.matrix, np.zeros(3))
     else:
         body = body_of(mass.total, mass.inertia, mass.products)

@@ -1,9 +1,8 @@
-"""The equations of motion of a multirotor under the effects that its scene names.
+"""Equations of motion of a multirotor under the effects of its scene.
 
-Here stand only the kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
-every force is an effect (lapwing/dynamics/effects). All functions are pure. What stands for the motion in the
-state is a form
-(`FORMS`): here one rigid body; other modules add theirs, under the same effects and with the same steps.
+This module has only kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
+every force is an effect (lapwing/dynamics/effects). All functions are pure. The representation of the motion in the
+state is a form (`FORMS`): here one rigid body; other modules add forms with the same effects and steps.
 """
 
 from collections.abc import Callable
@@ -27,11 +26,11 @@ from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import generic, map_tuple
 
-STANDARD_DENSITY = 1.225  # [kg/m^3] where no effect says otherwise: 15 degC, 1 atm
+STANDARD_DENSITY = 1.225  # [kg/m^3] default without an effect: 15 degC, 1 atm
 
 
 class RotorLayout(NamedTuple):
-    """The rotors and their motors, as far as the bare plant needs them."""
+    """Rotors and motors, as far as the plant without effects needs them."""
 
     x_body: PerRotor  # [m]
     y_body: PerRotor  # [m]
@@ -43,24 +42,24 @@ class RotorLayout(NamedTuple):
     lag_rate: float  # [1/s]
     max_voltage: float  # [V]
     no_load_current: float  # [A]
-    bodies: Any = ()  # what a form with several bodies needs to know of them
-    axis: tuple[Vec3, ...] = ()  # unit vector of each rotor in the body, along which it pushes; () where that is body z
+    bodies: Any = ()  # data of forms with several bodies
+    axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust in the body; () if it is body z
 
 
 class MultirotorParameters(NamedTuple):
-    """A vehicle in a scene."""
+    """Parameters of a vehicle in a scene."""
 
     body: AnyMassProperties
     layout: RotorLayout
     effects: tuple  # parameter NamedTuples of the active effects, sorted by name
-    tolerance: float  # error of a part of a step while the vehicle is in contact, relative to 1 + size
+    tolerance: float  # error of a substep while the vehicle is in contact, relative to 1 + size
 
 
 class MultirotorState(NamedTuple):
-    """All that the plant remembers from one exchange to the next."""
+    """Plant state from one communication step to the next."""
 
-    motion: Any  # of a class in FORMS: Motion, or several bodies
-    memory: tuple  # one tuple for each effect
+    motion: Any  # an instance of a class in FORMS: Motion, or several bodies
+    memory: tuple  # memory of each effect
 
 
 @always_inline
@@ -69,11 +68,11 @@ def _never(layout, x, h):
 
 
 class StateForm(NamedTuple):
-    """The compiled functions of a class that stands for the motion in the state."""
+    """Compiled functions of a class that represents the motion in the state."""
 
     motion: Callable  # (layout, x) -> Motion that effects read
     rate: Callable  # (drive, t, x) -> tangent of x
-    project: Callable  # (drive, x) -> x after a step, brought back onto its constraints
+    project: Callable  # (drive, x) -> x after a step, projected onto its constraints
     accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
     switches: Callable = _never  # (layout, x, h) -> True if a force of the form can begin or end within h [s]
 
@@ -124,7 +123,7 @@ def evaluate(drive, t, motion):
     p, memory = drive.parameters, drive.memory
     layout, speed = p.layout, motion.rotor_speed
     s = inputs(drive, t, motion)
-    # adding to -0.0 changes no number, so the compiler drops it
+    # -0.0 is neutral in addition, so the compiler removes it
     one, zero = map_tuple(_constant, 1.0, speed, speed), map_tuple(_constant, -0.0, speed, speed)
     factors = hooks.all_load_factors(p.effects, memory, s, Factors(one, one))
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))

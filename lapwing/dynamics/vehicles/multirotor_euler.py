@@ -1,7 +1,7 @@
-"""The multirotor's five bodies in XYZ Euler angles on the general engine, which factorises every constraint row.
+"""Five bodies of the multirotor in XYZ Euler angles on the general engine, which factorises every constraint row.
 
-A form of `multirotor`'s state: slower than `multirotor_multibody`, which it is compared with, and not for a body that
-pitches through 90 degrees: there its pitch becomes infinite, which `singular` finds.
+A form of `multirotor`'s state, for comparison with `multirotor_multibody`. It is slower, and does not support a pitch
+of 90 degrees: there the tangent becomes infinite, which `singular` detects.
 """
 
 from typing import NamedTuple
@@ -20,11 +20,11 @@ from lapwing.dynamics.vehicles import multirotor_multibody_equations as on_se3
 from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorParameters, MultirotorState, StateForm
 from lapwing.kernels import always_inline, kernel, math, noinline
 
-NEAR = 0.02  # cosine of a pitch from which on the angles are not used: a degree from their pole
+NEAR = 0.02  # cosine of the pitch below which the angles are not used: 1 degree from the singularity
 
 
 class EulerBody(NamedTuple):
-    """One body: its coordinates and their rates."""
+    """State of one body: its coordinates and their rates."""
 
     position_world: Vec3  # [m] of the centre of mass
     angles: Vec3  # roll, pitch, yaw [rad]
@@ -33,7 +33,7 @@ class EulerBody(NamedTuple):
 
 
 class FiveEulerBodies(NamedTuple):
-    """Chassis and propellers."""
+    """State of chassis and propellers."""
 
     body: tuple[EulerBody, EulerBody, EulerBody, EulerBody, EulerBody]
 
@@ -133,13 +133,13 @@ def _wrenches(p):
 @kernel
 def _ranks(a):
     """Return the ranks of the hinges' rows and of all rows: two of a drive's three rows are its hinge's."""
-    held = 5 * len(a.joint_bodies)
-    return held, held + len(a.drive_bodies)
+    hinge_rows = 5 * len(a.joint_bodies)
+    return hinge_rows, hinge_rows + len(a.drive_bodies)
 
 
 @always_inline
 def _upright(b):
-    """Return True if a pitch is not at 90 degrees; it passes there continuously, so no step skips it."""
+    """Return True if a pitch is not at 90 degrees; it changes continuously, so no step skips it."""
     return math.cos(b.angles[1]) > NEAR
 
 
@@ -241,8 +241,8 @@ def _assemble(p: MultirotorParameters) -> MultirotorParameters:
     bodies = p.layout.bodies
     drone = bodies.drone
     system = drone_system(drone, tuple(spins == 0.0 for spins in drone.spins))
-    for k, held in enumerate(drone.held):
-        system = system if held else system.without(f"hinge {k + 1}")
+    for k, is_attached in enumerate(drone.held):
+        system = system if is_attached else system.without(f"hinge {k + 1}")
     return p._replace(layout=p.layout._replace(bodies=bodies._replace(arrays=system.arrays)))
 
 

@@ -1,7 +1,6 @@
-"""The multirotor as five bodies: chassis and four propellers that turn on hinges, under the effects of its scene.
+"""Multirotor of five bodies: chassis and four propellers on hinges, under the effects of its scene.
 
-What is known of them, what may become of a propeller, and their first state; `multirotor_multibody_equations` has how
-they move.
+Parameters, propeller failures and initial state; the equations of motion are in `multirotor_multibody_equations`.
 """
 
 from typing import TYPE_CHECKING
@@ -20,11 +19,11 @@ from lapwing.dynamics.vehicles.multirotor_multibody_equations import Assembly
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-FEEDBACK = 50.0  # [1/s] of Baumgarte's stabilisation
-BECOMES = {  # what may become of a propeller: (spins, powered, held)
-    "locked": (0.0, 0.0, 1.0),  # its speed relative to the chassis is zero from now on
-    "free": (1.0, 0.0, 1.0),  # its motor gives no torque any more, the air brakes it
-    "torn_off": (1.0, 0.0, 0.0),  # its hinge and its drive are gone: gravity alone acts on it, no ground stops it
+FEEDBACK = 50.0  # [1/s] rate of Baumgarte's stabilisation
+BECOMES = {  # failures of a propeller: (spins, powered, held)
+    "locked": (0.0, 0.0, 1.0),  # its speed relative to the chassis becomes zero
+    "free": (1.0, 0.0, 1.0),  # its motor has no torque, the air brakes it
+    "torn_off": (1.0, 0.0, 0.0),  # without hinge and drive: only gravity acts on it, and no ground stops it
 }
 STABILISATIONS = {
     "none": five_body_stabilisation.NONE, "partitioning": five_body_stabilisation.PARTITION, "projection":
@@ -36,7 +35,7 @@ def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
     """Return the five bodies of an airframe; its inertia is the frame's, its mass includes the propellers.
 
     Raises:
-        ValueError: "key: message"; not four rotors, no data of a single one, tilted ones, or products of inertia.
+        ValueError: "key: message"; not four rotors, no data of a single rotor, tilted rotors, or products of inertia.
     """
     rotors = airframe.rotors
     if len(rotors.position) != 4 or rotors.mass is None or rotors.blade_inertia is None:
@@ -59,7 +58,7 @@ def parameters(
     """Return the plant's parameters. See `multirotor.parameters`.
 
     Args:
-        airframe: airframe with four rotors and the data of a single one.
+        airframe: airframe with four rotors and the data of a single rotor.
         effects: from `lapwing.dynamics.effects.from_scene`; `gyroscopic_torque` is left out, since bodies include it.
         drive: "torque" (the motors' torque turns the propellers) or "speed" (their acceleration is imposed).
         stabilisation: one of STABILISATIONS.
@@ -74,7 +73,7 @@ def parameters(
 
 
 def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> MultirotorParameters:
-    """Return the parameters after propeller k (0 to 3) failed as BECOMES names; see `apply_constraint_impulse`."""
+    """Return the parameters after a failure in BECOMES of propeller k (0 to 3); see `apply_constraint_impulse`."""
 
     def replace_entry(values: PerRotor, value: float) -> PerRotor:
         return (*values[:k], value, *values[k + 1 :])

@@ -1,8 +1,8 @@
-"""The equations of motion of a multirotor of five bodies, and the forces in its hinges.
+"""Equations of motion of a multirotor of five bodies, and the forces in its hinges.
 
-A form of the multirotor's state: each body has its own pose on SE(3), the arrow structure is eliminated (theory.md,
-eqs. (8.40)-(8.46)). What `gyroscopic_torque` and mass properties averaged over a turn stand for in the reduced model
-follows here from the bodies themselves.
+A form of the multirotor's state: each body has its own pose on SE(3), and the arrowhead structure is eliminated
+(theory.md, eqs. (8.40)-(8.46)). The bodies include `gyroscopic_torque`, and mass properties that the reduced model
+averages over a turn.
 """
 
 from typing import Any, NamedTuple
@@ -22,10 +22,10 @@ from lapwing.kernels.codegen import map_tuple
 
 
 class Assembly(NamedTuple):
-    """The bodies, how they are driven and held together."""
+    """Parameters of the bodies, their drives and constraints."""
 
     drone: Drone
-    hold: int  # of lapwing.dynamics.multibody.five_body_stabilisation, after every step
+    hold: int  # stabilisation of lapwing.dynamics.multibody.five_body_stabilisation after every step
     feedback: float  # [1/s]
     powered: PerRotor  # 0: the motor gives no torque; with an imposed speed, that speed is zero
     arrays: Any  # system.Arrays of the general engine; () on the fast path
@@ -37,12 +37,12 @@ class AppliedLoads(NamedTuple):
     gravity_world: Vec3  # [m/s^2]
     force_world: Vec3  # [N] on the chassis, weight and thrust not included
     torque_body: Vec3  # [N m] on the chassis
-    rotor: tuple  # (thrust [N], torque [N m], acceleration [rad/s^2]) of each rotor, as the reduced model has them
+    rotor: tuple  # (thrust [N], torque [N m], acceleration [rad/s^2]) of each rotor, as in the reduced model
 
 
 @always_inline
 def _rotor_speed(chassis_rate, sign, propeller):
-    # a rotor that pushes the body to +z turns about -z itself
+    # a rotor whose torque on the body is about +z turns about -z
     return sign * (chassis_rate - propeller.omega_body[2])
 
 
@@ -66,7 +66,7 @@ def applied_loads(drive, t, motion):
     s, rotors, force, torque = evaluate(drive, t, motion)
     R, layout = s.R_world_body, s.layout
     field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
-    known = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
+    applied = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
     arms = (
         total(map_tuple(product, 0.0, layout.y_body, rotors.thrust)),
         -total(map_tuple(product, 0.0, layout.x_body, rotors.thrust)),
@@ -74,7 +74,7 @@ def applied_loads(drive, t, motion):
     )
     loads = map_tuple(pair, 0.0, rotors.thrust, rotors.torque)
     parts = map_tuple(_triple, rotors.acceleration, loads, (0, 1, 2, 3))
-    return s, AppliedLoads(field, subtract(force, known), subtract(torque, arms), parts)
+    return s, AppliedLoads(field, subtract(force, applied), subtract(torque, arms), parts)
 
 
 @always_inline
@@ -90,7 +90,7 @@ def _rotor(k, layout, R, motion, part):
 
 @always_inline
 def machine(drive, t, motion):
-    """Return `five_bodies.Machine` at a time, with the state's speeds as imposed ones."""
+    """Return `five_bodies.Machine` at a time, with the speeds of the state as imposed speeds."""
     s, a = applied_loads(drive, t, motion)
     layout, R, part = s.layout, s.R_world_body, a.rotor
     rotors = (
@@ -113,7 +113,7 @@ def _still(k, layout, motion):
 
 @always_inline
 def without_loads(drive, motion):
-    """Return the machine without loads, as projection needs it."""
+    """Return the machine without loads, for projection."""
     layout = drive.parameters.layout
     rotors = (
         _still(0, layout, motion),

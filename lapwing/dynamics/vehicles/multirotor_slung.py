@@ -1,9 +1,9 @@
-"""A multirotor that carries a point mass on a massless cable, under the effects of its scene (theory.md, section 1.5).
+"""Multirotor with a point mass on a massless cable, under the effects of its scene (theory.md, section 1.5).
 
-A form of `multirotor`'s state. The cable is a spring with a damper that can pull and not push. What it pulls with when
-it comes taut is bounded by its stiffness, where a rigid cable would need an impulse. A cable of steel or aramid is
-elastic, too; the price is a step that its frequency allows. While the cable can come taut or slack, or the load touches
-the ground, steps are under error control as in ground contact.
+A form of `multirotor`'s state. The cable is a spring with a damper that can only pull. The force when it becomes taut
+is bounded by its stiffness, while a rigid cable would need an impulse. Cables of steel or aramid are elastic, too;
+their frequency limits the step. While the cable can become taut or slack, or the load touches the ground, steps are
+under error control as in ground contact.
 """
 
 import math
@@ -28,25 +28,25 @@ from lapwing.kernels import always_inline, kernel
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-GROUND_FREQUENCY, GROUND_DAMPING = 100.0, 0.7  # [rad/s], ratio of the load on the ground
-CLEARANCE = 1e-3  # [m] over the ground of a load that does not touch it within a step
-SLIDING, FRICTION = 0.05, 0.6  # [m/s] from which on the load slides with the whole coefficient of friction
+GROUND_FREQUENCY, GROUND_DAMPING = 100.0, 0.7  # [rad/s] frequency and damping ratio of the load on the ground
+CLEARANCE = 1e-3  # [m] height above the ground beyond which a load does not touch it within a step
+SLIDING, FRICTION = 0.05, 0.6  # [m/s] speed above which friction has its full coefficient
 
 
 class Sling(NamedTuple):
-    """The cable and what hangs on it."""
+    """Cable and load."""
 
     load_mass: float  # [kg]
-    length: float  # [m] of the cable without tension
+    length: float  # [m] length of the cable without tension
     stiffness: float  # [N/m]
     damping: float  # [N s/m]
-    hook_body: Vec3  # [m] where it is fastened
+    hook_body: Vec3  # [m] attachment of the cable, body
     drag_area: float  # [m^2] of the load, drag coefficient times area
-    terrain: Any  # the ground under the load
+    terrain: Any  # terrain under the load
 
 
 class SlungMotion(NamedTuple):
-    """The vehicle and the load; world frame ENU."""
+    """State of vehicle and load; world frame ENU."""
 
     vehicle: Motion
     load_position: Vec3  # [m]

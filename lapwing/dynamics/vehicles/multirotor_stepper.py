@@ -1,4 +1,4 @@
-"""The steps of a multirotor's communication step: in the air, and under error control in contact."""
+"""Integrator steps of a multirotor's communication step, with error control in contact."""
 
 import math
 import sys
@@ -21,8 +21,8 @@ from lapwing.kernels import noinline as never_inlined
 from lapwing.kernels.codegen import generic, map_tuple
 from lapwing.kernels.state_tree import axpy, finite, normalise, relative_difference
 
-BREAK_ROUNDING = 1e-6  # of a communication step: breakpoints so close to its ends are there
-FASTEST_LAG = 1.0  # lag rate times step up to which no step is split: every explicit method is stable to 2
+BREAK_ROUNDING = 1e-6  # relative to a communication step: breakpoints this close to its ends count as the ends
+FASTEST_LAG = 1.0  # largest product of lag rate and step without substeps: every explicit method is stable up to 2
 
 
 @generic(inline=True)
@@ -30,7 +30,7 @@ def _step(method, drive, t, x, h):
     one_step = sys.modules[method.instance_class.__module__].step
     form = FORMS[x.instance_class]
     its_rate, project = form.rate, form.project
-    # inlined into `advance`, so that what a whole interval has in common is computed once
+    # inlined into `advance`, so that constants of an interval are computed once
     return lambda method, drive, t, x, h: project(drive, one_step(its_rate, drive, t, x, h))
 
 
@@ -41,7 +41,7 @@ def _form_switches(layout, x, h):
 
 @always_inline
 def switches(drive, t, x, h):
-    """Return True if the loads can jump or have a kink within h [s] of t [s], at a moment that depends on the state."""
+    """Return True if the loads can have a state-dependent jump or kink within h [s] after t [s]."""
     p, seen = drive.parameters, motion_of(drive.parameters.layout, x)
     return _form_switches(p.layout, x, h) or hooks.all_switches(p.effects, drive.memory, inputs(drive, t, seen), h)
 
@@ -61,9 +61,9 @@ def _airborne(p, body, memory, voltage):
 
 
 class AwakeState(NamedTuple):
-    """The motion with those memories of effects that have a rate: a form while a stiff effect is awake."""
+    """Motion with the memories of effects that have a rate: a form while a stiff effect is awake."""
 
-    motion: Any  # of another class in FORMS
+    motion: Any  # an instance of another class in FORMS
     memory: tuple
 
 
@@ -93,8 +93,8 @@ def _with_memories(drive, x):
 def _awake_rate(drive, t, x):
     p, body, memory, voltage = _with_memories(drive, x)
     effects, rates = hooks.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
-    known = MultirotorParameters(p.body, p.layout, effects, p.tolerance)
-    return AwakeState(_rate_of_form(MultirotorDrive(known, body, memory, voltage), t, x.motion), rates)
+    parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance)
+    return AwakeState(_rate_of_form(MultirotorDrive(parameters, body, memory, voltage), t, x.motion), rates)
 
 
 @always_inline
@@ -140,7 +140,7 @@ def _stiff_steps(method, drive, t, x, h, end):
         size = left if last else part
         half = 0.5 * size
         y, whole, start, length = x, x, t, size
-        for k in range(3):  # one call in the code: passing arguments to three took a sixth of the time
+        for k in range(3):  # one call site: passing arguments at three took 1/6 of the time
             y = _step(method, drive, start, y, length)
             if k == 0:
                 y, whole, length = x, y, half
@@ -183,7 +183,7 @@ def airborne_step(method, drive, t, x, h):
 
 @always_inline
 def next_break(p, memory, start, interval, end, h):
-    """Return the first breakpoint [s] after `start` and before `end`, both of which it is not near; infinity if none.
+    """Return the first breakpoint [s] between `start` and `end` that is not close to either; infinity if there is none.
 
     `interval` [s] is the communication step, h [s] the longest step.
     """

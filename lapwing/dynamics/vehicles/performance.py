@@ -3,7 +3,7 @@
 Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)), and the thrust of
 equal rotors with axial inflow (eq. (2.5)); the motors' voltage and current follow from the torque (theory.md, section
 1.4). For tilted rotors the sum of their thrusts and their mean axial inflow count; for coaxial rotors the loss of the
-lower ones (eq. (2.44)), all of them at one speed.
+lower ones (eq. (2.44)), with all rotors at one speed.
 """
 
 import math
@@ -27,22 +27,22 @@ from lapwing.dynamics.vehicles.propeller import (
 GRAVITY = 9.80665  # [m/s^2]
 DENSITY = 1.225  # [kg/m^3]
 CELL_VOLTAGE = 3.7  # [V] nominal
-ITERATIONS = 100  # of the rotor speed; each takes off a tenth and more of what is left
+ITERATIONS = 100  # iterations of the rotor speed; each reduces the error by at least 10 %
 
 
 class Trim(NamedTuple):
     """Steady level flight."""
 
     tilt: float  # [rad] from the vertical
-    thrust: float  # [N] of a rotor that stands in nobody's wake
+    thrust: float  # [N] of a rotor outside of wakes
     rotor_speed: float  # [rad/s]
-    voltage: float  # [V] of the motor that turns hardest
-    current: float  # [A] of the same
+    voltage: float  # [V] of the fastest motor
+    current: float  # [A] of the fastest motor
     power: float  # [W] of all motors
 
 
 class Gain(NamedTuple):
-    """Thrust and torque that a rotor in a wake has more than a free one at the same speed."""
+    """Thrust and torque of a rotor in a wake relative to a free one at the same speed."""
 
     thrust: float  # [N]
     torque: float  # [N m]
@@ -51,13 +51,13 @@ class Gain(NamedTuple):
 class Rotor(NamedTuple):
     """Thrust and torque of a rotor over the square of its speed, and their dependence on axial inflow."""
 
-    thrust: float  # [N s^2/rad^2], at a density of 1 kg/m^3 where it goes with the density
-    torque: float  # [N m s^2/rad^2], the same
+    thrust: float  # [N s^2/rad^2] at a density of 1 kg/m^3, if it is proportional to the density
+    torque: float  # [N m s^2/rad^2] at the same density
     with_density: bool = True
-    pitch: float = math.inf  # [m] way of a turn without slip; inf: inflow changes nothing
-    parts: tuple[float, float] = (1.0, 0.0)  # of the torque: profile and induced
-    drag: float = 0.0  # [m^3/rad] across the axis, over density, rotor speed and velocity
-    wash: CoaxialInterference | None = None  # what those lose that stand in the wake of others
+    pitch: float = math.inf  # [m] advance per turn without slip; inf: no effect of inflow
+    parts: tuple[float, float] = (1.0, 0.0)  # shares of the torque: profile and induced
+    drag: float = 0.0  # [m^3/rad] drag across the axis, over density, rotor speed and velocity
+    wash: CoaxialInterference | None = None  # loss of rotors in the wake of others
 
     def constants(self, density: float) -> tuple[float, float]:
         """Return thrust and torque over the square of the speed at a density [kg/m^3]."""
@@ -117,7 +117,7 @@ def trim(
     k_thrust, k_torque = rotor.constants(density)
     lift = _lift(airframe)
     omega = math.sqrt(weight / (lift * k_thrust))
-    for _ in range(ITERATIONS):  # the rotors' drag goes with their speed
+    for _ in range(ITERATIONS):  # the rotors' drag is proportional to their speed
         before, across = omega, pressure * ahead + count * density * rotor.drag * omega * speed
 
         def forces(tilt: float, across: float = across) -> tuple[float, float]:
@@ -154,7 +154,7 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
         ValueError: the current without load alone exceeds a limit.
     """
     rotor, motor, count = rotor or rotor_of(airframe), airframe.motor, len(airframe.rotors.position)
-    gains = rotor.gains(count, density, 1.0)  # in proportion to the square of the speed
+    gains = rotor.gains(count, density, 1.0)  # proportional to the square of the speed
     k_thrust, k_torque = rotor.constants(density)
     k_thrust += sum(gain.thrust for gain in gains) / count
     k_torque += max(gain.torque for gain in gains)

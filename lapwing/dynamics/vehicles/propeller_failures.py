@@ -16,11 +16,11 @@ from lapwing.kernels.codegen import generic
 
 
 class Failure(NamedTuple):
-    """Failure of a propeller: the vehicle that it leaves behind, and its time."""
+    """Failure of a propeller: its time, and the vehicle after it."""
 
     time: float  # [s]; a time before the communication step is its start
-    vehicle: MultirotorParameters  # from then on
-    impulse: bool  # the new constraints do not hold at that time: hinge impulses satisfy them
+    vehicle: MultirotorParameters  # parameters after the failure
+    impulse: bool  # True if the new constraints are violated at that time: hinge impulses satisfy them
 
 
 @generic()

@@ -1,4 +1,4 @@
-"""The OS4 quadrotor on SO(3): rotor 1 on +x, 2 on +y, 3 on -x, 4 on -y; 1 and 3 turn clockwise seen from above.
+"""OS4 quadrotor on SO(3): rotor 1 on +x, 2 on +y, 3 on -x, 4 on -y; 1 and 3 turn clockwise seen from above.
 
 Lagrange-d'Alembert gives theory.md, eqs. (7.11) to (7.14), with the gyroscopic term of the residual rotor speed. Rotors
 keep their speed, or follow their motors' voltages if there are motors.
@@ -24,7 +24,7 @@ class Os4Motors(NamedTuple):
 
 
 class Os4Parameters(NamedTuple):
-    """SI units; x, y, z along the body axes."""
+    """Parameters of the OS4; SI units, x, y, z along the body axes."""
 
     mass: float  # [kg]
     inertia: Vec3  # [kg m^2]
@@ -38,7 +38,7 @@ class Os4Parameters(NamedTuple):
 
 
 class Os4State(NamedTuple):
-    """World frame ENU; the tangent has omega_body in the place of the attitude."""
+    """State of the OS4; world frame ENU. The tangent has omega_body in place of the attitude."""
 
     position_world: Vec3  # [m]
     attitude: Quaternion

@@ -1,4 +1,4 @@
-"""Quadrotors and the load that they have let go: free bodies (theory.md, eq. (7.29))."""
+"""Quadrotors and a released load as free bodies (theory.md, eq. (7.29))."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from lapwing.kernels.codegen import map_index
 
 
 class ReleasedLoadParameters(NamedTuple):
-    """Tuples have one entry for each quadrotor."""
+    """Parameters of the bodies; tuples have one entry for each quadrotor."""
 
     quad_mass: tuple[float, ...]  # [kg]
     quad_inertia: tuple[Vec3, ...]  # [kg m^2] principal moments
@@ -21,7 +21,7 @@ class ReleasedLoadParameters(NamedTuple):
 
 
 class ReleasedLoadState(NamedTuple):
-    """World frame ENU."""
+    """State of quadrotors and load; world frame ENU."""
 
     load_position: Vec3  # [m]
     load_velocity: Vec3  # [m/s]

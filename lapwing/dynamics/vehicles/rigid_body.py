@@ -1,4 +1,4 @@
-"""The free rigid body: Euler's equations about principal axes (theory.md, eq. (7.1))."""
+"""Free rigid body: Euler's equations about principal axes (theory.md, eq. (7.1))."""
 
 from typing import NamedTuple
 
@@ -9,20 +9,20 @@ from lapwing.kernels import always_inline
 
 
 class RigidBody(NamedTuple):
-    """State of anything that only turns."""
+    """State of a rotating body."""
 
     attitude: Quaternion
     omega_body: Vec3  # [rad/s]
 
 
 class FreeBodyParameters(NamedTuple):
-    """No torque at all."""
+    """Parameters of a torque-free body."""
 
     inertia: Vec3  # [kg m^2] principal moments
 
     @property
     def torque_without_rate(self) -> bool:
-        """There is none."""
+        """Return the torque, which is zero."""
         return True
 
 

@@ -1,4 +1,4 @@
-"""The crate that unloads itself: a pack on driven rollers, a door on a spring, the ground.
+"""Self-unloading crate: a pack on driven rollers, a door on a spring, the ground.
 
 The pack is a rigid box with six degrees of freedom, the door turns about its lower edge (theory.md, chapter 9). The
 hinge is the origin of the crate's frame: x outward along the tilted floor, y along the hinge, z away from the floor.
@@ -14,33 +14,33 @@ from lapwing.dynamics.vehicles.unloading_contact_points import CORNERS, ROLLERS,
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_index
 
-LIFT_SPEED, GRIP = 0.5, 0.02  # [m/s] at which somebody takes the pack up, [s] in which he gets it moving
+LIFT_SPEED, GRIP = 0.5, 0.02  # [m/s] speed at which the pack is lifted, [s] acceleration time of the lift
 Surface = tuple[float, float, float, float]  # stiffness [N/m], damping [N s/m], static and dynamic friction
 
 
 class UnloadingParameters(NamedTuple):
-    """SI units."""
+    """Parameters of crate and pack; SI units."""
 
     pack_mass: float  # [kg]
-    pack_half: Vec3  # [m] half its length, width, height
+    pack_half: Vec3  # [m] half length, width and height of the pack
     pack_inertia: Vec3  # [kg m^2]
-    tilt: float  # [rad] of the crate's floor, down towards the door
-    floor_height: float  # [m] of the hinge over the ground
+    tilt: float  # [rad] tilt of the crate's floor, down towards the door
+    floor_height: float  # [m] height of the hinge above the ground
     depth: float  # [m] from the hinge to the rear wall
-    half_width: float  # [m] between the middle and a side wall
+    half_width: float  # [m] from the centre plane to a side wall
     roller_radius: float  # [m]
-    roller_spacing: float  # [m] between two axes; the first is half of it behind the hinge
-    roller_speed: float  # [rad/s] at the end of the ramp
-    ramp_start: float  # [s] when the rollers start and the door is unlocked
+    roller_spacing: float  # [m] distance of two axes; the first axis is half of it behind the hinge
+    roller_speed: float  # [rad/s] roller speed at the end of the ramp
+    ramp_start: float  # [s] time at which the rollers start and the door is unlocked
     ramp_duration: float  # [s]
     door_length: float  # [m]
     door_mass: float  # [kg]
     door_spring: float  # [N m/rad]
-    door_preload: float  # [rad] that the spring is wound up when the door is shut
+    door_preload: float  # [rad] preload of the spring with the door shut
     door_damping: float  # [N m s/rad]
     door_lock: float  # [N m/rad] of the lock and of the stop
-    edge_radius: float  # [m] of the hinge's and the door's edges
-    pickup: float  # [s] when somebody takes the pack away
+    edge_radius: float  # [m] radius of the hinge's and the door's edges
+    pickup: float  # [s] time at which the pack is lifted
     gravity: float  # [m/s^2]
     on_rollers: Surface
     on_door: Surface
@@ -48,10 +48,10 @@ class UnloadingParameters(NamedTuple):
 
 
 class UnloadingState(NamedTuple):
-    """World frame; z = 0 is the ground, y the direction of the hinge."""
+    """State of pack and door; world frame, z = 0 is the ground, y the direction of the hinge."""
 
-    position_world: Vec3  # [m] of the pack's middle
-    attitude: Quaternion  # of the pack
+    position_world: Vec3  # [m] centre of the pack
+    attitude: Quaternion  # attitude of the pack
     velocity_world: Vec3  # [m/s]
     omega_body: Vec3  # [rad/s]
     door: tuple[float, float]  # angle from shut [rad], rate [rad/s]
@@ -62,7 +62,7 @@ class UnloadingState(NamedTuple):
 
 @always_inline
 def _wrench(touches, x):
-    """Return the sum of the forces [N] and of their torques about the pack's middle [N m], world frame."""
+    """Return the sum of the forces [N] and of their torques about the pack's centre [N m], world frame."""
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for one in touches:
         force = add(force, one.force)
@@ -81,7 +81,7 @@ def door_acceleration(p, t, x, f, on_pack):
     angle, rate = x.door
     push = 0.0
     for one in on_pack:
-        # virtual work of the reaction at its place: the door's material there moves along inward x lever
+        # virtual work of the reaction at its point, where the door's material moves along inward x lever
         push += dot(one.force, cross(Y, subtract(one.place, f.hinge)))
     weight = 0.5 * p.door_mass * p.gravity * p.door_length * f.inward[2]
     spring = -p.door_spring * (angle + p.door_preload) - p.door_damping * rate
@@ -132,7 +132,7 @@ RATES[UnloadingParameters] = rate
 
 @always_inline
 def _next_breakpoint(p, t):
-    """Return the next time [s] at which the rollers start or reach their speed, or the pack is taken up."""
+    """Return the next time [s] at which the rollers start or reach their speed, or the pack is lifted."""
     first = math.inf
     for time in (p.ramp_start, p.ramp_start + p.ramp_duration, p.pickup):
         if t < time < first:
@@ -178,7 +178,8 @@ def forces_on_pack(p, t, x):
 def energy(p, t, x):
     """Return kinetic and potential energy [J] of pack, door, its spring and the springs of ground and rollers.
 
-    Bristles, the door's stop and its edge on the ground are excluded: it is an energy while the door touches neither.
+    Bristles, the door's stop and its edge on the ground are excluded: the sum is the energy while the door touches
+    neither.
     """
     f = frames(p, t, x)
     o, v = x.omega_body, x.velocity_world

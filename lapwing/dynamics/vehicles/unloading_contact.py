@@ -1,7 +1,7 @@
-"""The law of contact between the pack and what it touches: one-sided, damped, with friction that sticks.
+"""Contact law of the pack: one-sided, damped, with static friction.
 
-The normal force is that of a spring and a damper which never pull; friction is the model of Canudas de Wit, Olsson,
-Astrom and Lischinsky (IEEE Trans. Autom. Control 40 (1995) 419), whose bristles carry a standing load without creep
+The normal force is that of a spring and a damper that never pull; friction is the model of Canudas de Wit, Olsson,
+Astrom and Lischinsky (IEEE Trans. Autom. Control 40 (1995) 419), whose bristles carry a load at rest without creep
 (theory.md, eqs. (9.4) to (9.6)).
 """
 
@@ -10,10 +10,10 @@ from typing import NamedTuple
 from lapwing.dynamics.vector import Vec3, add, dot, norm, scale, subtract
 from lapwing.kernels import always_inline, math
 
-STRIBECK_SPEED = 0.01  # [m/s] where friction falls from static to dynamic
+STRIBECK_SPEED = 0.01  # [m/s] transition from static to dynamic friction
 BRISTLE = 5.0e3  # [1/m] stiffness over the normal force: bristles bend 0.1 mm before they slide
-BRISTLE_DAMPING = 45.0  # [s/m] over the normal force: critical for a body that stands by its weight
-FASTEST = 4000.0  # [1/s] at which bristles follow; beyond the slip speed of this, friction is that of sliding
+BRISTLE_DAMPING = 45.0  # [s/m] damping over the normal force: critical for a body at rest under its weight
+FASTEST = 4000.0  # [1/s] rate of the bristles; above the corresponding slip speed, friction is sliding friction
 
 
 class Touch(NamedTuple):

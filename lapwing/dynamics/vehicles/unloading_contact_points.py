@@ -12,7 +12,7 @@ from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_index
 
 ROLLERS, CORNERS = 4, 8
-SIDES = (-0.8, 0.8)  # where along the pack's width it rests on a roller or an edge, of half its width
+SIDES = (-0.8, 0.8)  # lateral position of the contacts with a roller or an edge, relative to half the pack's width
 Y = (0.0, 1.0, 0.0)
 SIGNS = tuple((float(a), float(b), float(c)) for a in (-1, 1) for b in (-1, 1) for c in (-1, 1))
 
@@ -25,7 +25,7 @@ class Frames(NamedTuple):
     forward: Vec3  # x of the crate in the world
     upward: Vec3  # z of the crate in the world
     hinge: Vec3  # [m] world frame
-    along_door: Vec3  # from the hinge outward in the door
+    along_door: Vec3  # outward from the hinge in the door
     inward: Vec3  # normal of the door's inner face
     rolling: float  # [rad/s]
 
@@ -66,7 +66,7 @@ def bar(p, x, f, surface, centre, radius, rolling, velocity, bristle):
     normal = apply(f.pack, scale(1.0 / max(distance, 1e-12), gap))
     place = add(x.position_world, apply(f.pack, nearest))
     own = add(velocity, scale(rolling, cross(Y, subtract(place, centre))))
-    # an axis inside of the pack has no nearest face: the pack would be through
+    # an axis inside the pack has no nearest face: the pack would have passed through
     depth = radius - distance if distance > 0.0 else 0.0
     return touch(surface, depth, normal, place, subtract(material_velocity(x, f, place), own), bristle)
 
@@ -103,7 +103,7 @@ def door_touch(p, x, f, i):
     place = corner(p, x, f, i)
     lever = subtract(place, f.hinge)
     reach, behind = dot(lever, f.along_door), -dot(lever, f.inward)
-    # a corner further behind than this has come around the door, not through it
+    # a corner further behind has passed around the door, not through it
     inside = 0.0 < reach < p.door_length and behind < 0.02
     own = add(scale(-x.door[1] * reach, f.inward), scale(-x.door[1] * behind, f.along_door))
     relative = subtract(material_velocity(x, f, place), own)
@@ -133,7 +133,7 @@ def wall_touch(p, x, f, i):
 
 
 class Contacts(NamedTuple):
-    """Every contact of the pack."""
+    """All contacts of the pack."""
 
     rollers: tuple[Touch, ...]
     door: tuple[Touch, ...]

@@ -11,9 +11,9 @@ typedef struct {
 
 static void report(void *instance_, int status, const char *category, const char *message) {
     instance *self = instance_;
-    const callbacks *given = self->logger;
-    if (given && given->logger && (self->logging || status >= ERROR))
-        given->logger(given->environment, self->name, status, category, "%s", message);
+    const callbacks *functions = self->logger;
+    if (functions && functions->logger && (self->logging || status >= ERROR))
+        functions->logger(functions->environment, self->name, status, category, "%s", message);
 }
 
 API const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -25,17 +25,17 @@ API int fmi2SetDebugLogging(void *self, int on, size_t count, const char *const 
     return OK;
 }
 
-API void *fmi2Instantiate(const char *name, int type, const char *token, const char *resources, const callbacks *given,
-                          int visible, int logging) {
+API void *fmi2Instantiate(const char *name, int type, const char *token, const char *resources,
+                          const callbacks *functions, int visible, int logging) {
     (void)resources, (void)visible;
     instance *self = type == 1 ? new_instance(name, token) : NULL;
     if (!self) {
-        if (given && given->logger)
-            given->logger(given->environment, name, ERROR, "logStatusError",
-                          "wrong GUID or type; this FMU is for co-simulation");
+        if (functions && functions->logger)
+            functions->logger(functions->environment, name, ERROR, "logStatusError",
+                              "wrong GUID or type; this FMU is for co-simulation");
         return NULL;
     }
-    self->logger = (void *)given, self->logging = logging;
+    self->logger = (void *)functions, self->logging = logging;
     return self;
 }
 

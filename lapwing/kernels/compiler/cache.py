@@ -22,7 +22,7 @@ class Statistics(NamedTuple):
     """Number of kernel versions that this process has compiled and loaded."""
 
     compiled: int
-    loaded: int  # from disk, with all kernels that they call
+    loaded: int  # number loaded from disk, with all kernels that they call
 
 
 _HASH_SECRET = b"_numba_hashsecret_"  # in the machine code of kernels that hash texts
@@ -43,7 +43,7 @@ def on_compile(listener: Callable[[str], None]) -> None:
 
 
 class KernelCache(_Cache):
-    """Store of one kernel's machine code below `_files.root()`; it stores nothing where it cannot write."""
+    """Store of one kernel's machine code below `_files.root()`; it stores nothing if it cannot write."""
 
     def __init__(self, dispatcher: Dispatcher):
         self._dispatcher = dispatcher
@@ -108,7 +108,7 @@ class KernelCache(_Cache):
             return None
         if _HASH_SECRET in content:  # numba defines these symbols with its implementations
             target_context.refresh()
-        with contextlib.suppress(Exception):  # any error here is repaired by compiling again
+        with contextlib.suppress(Exception):  # any error here only leads to a new compilation
             stored, payload = pickle.loads(content)
             result = self._rebuild(target_context, payload)
             if stored == current and result.signature.args == sigutils.normalize_signature(sig)[0]:

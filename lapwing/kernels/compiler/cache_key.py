@@ -1,4 +1,4 @@
-"""Key of a compiled version of a kernel: text that is equal in every process.
+"""Key of a compiled version of a kernel: a text that is equal in every process.
 
 The key consists of the types of the arguments; of every function that the kernel can reach through names, closures and
 tables (`DispatchTable`), with the constants that they take from their modules; and of all sources that can be in it.
@@ -45,7 +45,8 @@ class Part(NamedTuple):
     text: str
     functions: tuple[FunctionType, ...]
     modules: frozenset[str]
-    seen: tuple[tuple[dict, str, Any], ...]  # (namespace, name, value)
+
+    references: tuple[tuple[dict, str, Any], ...]  # (namespace, name, value)
 
 
 class _Writer:
@@ -54,8 +55,8 @@ class _Writer:
     def __init__(self) -> None:
         self.functions: list[FunctionType] = []
         self.modules: set[str] = set()
-        self.seen: list[tuple[dict, str, Any]] = []
-        self.mutable = False  # whether a value may have changed although it is the same object
+        self.references: list[tuple[dict, str, Any]] = []
+        self.mutable = False  # True if a value may have changed although it is the same object
 
     def value(self, value: Any) -> str:
         """Return the text of a constant, a class, a numba type or a function.
@@ -110,7 +111,7 @@ class _Writer:
     def of_global(self, path: str, namespace: dict, name: str, names: set[str], defined: bool) -> str:
         """Return the text of a global name; `defined`: the source of the module defines it."""
         value = namespace[name]
-        self.seen.append((namespace, name, value))
+        self.references.append((namespace, name, value))
         if isinstance(value, ModuleType):
             if value.__name__.partition(".")[0] in VERSIONED:
                 return value.__name__
@@ -148,7 +149,7 @@ def _part(function: FunctionType) -> Part:
         _parts.clear()
         _entered = DispatchTable.entered
     part = _parts.get(function)
-    if part and all(namespace.get(name) is value for namespace, name, value in part.seen):
+    if part and all(namespace.get(name) is value for namespace, name, value in part.references):
         return part
     writer = _Writer()
     writer.modules.add(function.__module__)
@@ -165,7 +166,7 @@ def _part(function: FunctionType) -> Part:
         *map(writer.value, inside),
         *(writer.of_global(name, namespace, name, names, defined) for name in sorted(names) if name in namespace),
     ]
-    part = Part("\n".join(lines), tuple(writer.functions), frozenset(writer.modules), tuple(writer.seen))
+    part = Part("\n".join(lines), tuple(writer.functions), frozenset(writer.modules), tuple(writer.references))
     if not writer.mutable:
         _parts[function] = part
     return part

@@ -1,7 +1,7 @@
 """Decorators of compiled functions.
 
-With a version of numba or llvmlite that is not known to work with the compile pipeline, numba's own passes compile: the
-decorators then differ in compile time only, not in results.
+With a version of numba or llvmlite that is not known to work with the compile pipeline, numba's own passes are used:
+only the compile time differs, not the results.
 """
 
 from collections.abc import Callable
@@ -45,15 +45,15 @@ def python_function(function: F) -> F:
     a process a quarter of a second.
     """
     python: Any = getattr(function, "py_func", function)
-    known = python.__globals__
+    names = python.__globals__
     called = {
-        name: python_function(known[name])
+        name: python_function(names[name])
         for name in python.__code__.co_names
-        if isinstance(known.get(name), _Dispatcher)
+        if isinstance(names.get(name), _Dispatcher)
     }
     if not called:
         return python
-    return FunctionType(python.__code__, {**known, **called}, python.__name__, python.__defaults__, python.__closure__)  # type: ignore[return-value]
+    return FunctionType(python.__code__, {**names, **called}, python.__name__, python.__defaults__, python.__closure__)  # type: ignore[return-value]
 
 
 def kernel(function: F) -> F:

@@ -12,7 +12,7 @@ class DispatchTable(UserDict[type, Any]):
     class of an argument's type in every table, and the entries become part of the kernel's key.
     """
 
-    tables: "dict[str, DispatchTable]" = {}  # noqa: RUF012 (all there are, by the module that made them and a number in it)
+    tables: "dict[str, DispatchTable]" = {}  # noqa: RUF012 (all tables, by the module that created them and a number in it)
     entered = 0  # number of writes to all tables
 
     def __init__(self) -> None:

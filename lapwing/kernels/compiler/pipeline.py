@@ -1,7 +1,7 @@
 """Compile pipeline: functions compiled for other kernels are optimised but get no machine code.
 
 numba makes machine code and two wrappers, for calls from Python and C, of every function. A kernel calls hundreds that
-end up inlined in it, so that most of the compile time went there. Here such a function is an `InnerLibrary`: optimised
+end up inlined in it, which would take most of the compile time. Here such a function is an `InnerLibrary`: optimised
 LLVM code linked into its caller, with arguments passed by value (`call_convention`). The machine code of the outermost
 kernel is as fast with or without (docs/appendix/benchmark_history.md, "Compile time").
 """

@@ -47,12 +47,12 @@ def reduce_argument(x):
 
 @kernel
 def reduce_large_argument(x):
-    """Return the same as `reduce_argument`, for a magnitude of at least 2**15 (Payne and Hanek)."""
+    """Return k and r + r_low as `reduce_argument` does, for a magnitude of at least 2**15 (Payne and Hanek)."""
     if x - x != 0.0:
         return 0, x - x, 0.0
     magnitude = bits(x) & MAGNITUDE
     mantissa, exponent = (magnitude & MANTISSA) | (MANTISSA + 1), (magnitude >> 52) - 1075
-    start = (exponent + 72) // 24  # the first limb whose product is not a multiple of whole turns
+    start = (exponent + 72) // 24  # first limb whose product is not a multiple of whole turns
     shift = exponent + 72 - 24 * start
     c = (mantissa & _LIMB) << shift
     m0, c = c & _LIMB, c >> 24

@@ -13,7 +13,7 @@ from lapwing.kernels.math.reduction import reduce_argument
 
 _S3, _S5, _S7 = SINE
 _C4, _C6, _C8 = COSINE
-_sines = table("sines", SINES)  # of each direction: upper and lower part of the sine, of the cosine
+_sines = table("sines", SINES)  # for each direction: upper and lower part of the sine, of the cosine
 
 
 @always_inline

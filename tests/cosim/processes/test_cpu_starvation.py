@@ -69,7 +69,7 @@ def test_exited_process_has_no_waiting_time():
 
 def test_starvation_counts_from_last_message(monkeypatch):
     times = {1: 5.0, 2: 7.0}
-    monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.waited", times.__getitem__)
+    monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.starved_time", times.__getitem__)
     starvation, pids = Starvation(), {"plant": 1, "sensors": 2}
     starvation.look(pids, 0.0)
     assert starvation.of(pids) == 0.0

@@ -178,7 +178,7 @@ def test_optional_process_may_finish_while_there_are_news(run):
     assert run.state is RunState.ENDING
 
 
-@pytest.mark.parametrize("measure", ["waited", "ran"])
+@pytest.mark.parametrize("measure", ["starved_time", "cpu_time"])
 def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
     run = Run(monkeypatch)
     run.processes["mavlink"].pid = 1 << 29
@@ -199,7 +199,7 @@ def test_time_that_launcher_waits_for_processor_is_no_stall(monkeypatch):
     run = Run(monkeypatch)
     own = os.getpid()
     monkeypatch.setattr(
-        "lapwing.cosim.processes.cpu_starvation.waited", lambda pid: 0.9 * run.now if pid == own else 0.0
+        "lapwing.cosim.processes.cpu_starvation.starved_time", lambda pid: 0.9 * run.now if pid == own else 0.0
     )
     run.start().update_for(15.0)
     assert run.state is RunState.RUNNING
@@ -220,7 +220,7 @@ def test_process_that_does_not_exit_is_named(run):
     run.monitor.ended, run.monitor.outcome = True, ""
     run.exit("plant", "sensors")
     run.update_for(SHUTDOWN_TIMEOUT)
-    with fails("recorder: did not end within 10 s of the last news"):
+    with fails("recorder: did not end within 10 s of the last message"):
         run.update_for(1.0)
 
 
@@ -250,6 +250,6 @@ def test_divergence_is_orderly_end(run):
 
 def test_lost_external_service_is_named(monkeypatch):
     run = Run(monkeypatch, external=["sensors"]).start()
-    run.monitor.gone = {"sensors"}
-    with fails("sensors: gone at t = 0.000 s"):
+    run.monitor.left = {"sensors"}
+    with fails("sensors: left the run at t = 0.000 s"):
         run.update()

@@ -112,13 +112,13 @@ def test_packet_of_several_ticks_equals_single_packets(ticks):
 
 @pytest.mark.parametrize("size", [0, 64, 72, 81])
 def test_packet_of_several_ticks_with_wrong_size_is_rejected(size):
-    with pytest.raises(PacketError, match=rf"^a bundle of {size} bytes at tick 4, expected 80$"):
+    with pytest.raises(PacketError, match=rf"^step packet of {size} bytes at tick 4, expected 80$"):
         StepPacketCodec(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
 
 
 @pytest.mark.parametrize("size", [0, 8, 15, 17, 24, 40, 48])
 def test_packet_with_wrong_size_is_rejected(size):
-    with pytest.raises(PacketError, match=rf"^a bundle of {size} bytes at tick 5, expected 32$"):
+    with pytest.raises(PacketError, match=rf"^step packet of {size} bytes at tick 5, expected 32$"):
         StepPacketCodec(PORTS).unpack(bytes(size), graph("pair", "slow"), 5)
 
 
@@ -154,10 +154,10 @@ WHOLE = pack_log_packet([page(TRUTH, 7, 20, 256), page(OPERATOR, 9, 1, 3)], 0, 2
 
 @given(st.integers(0, len(WHOLE) - 1).filter(lambda n: n not in (16, 16 + 10 + 20 * (8 + 256))))
 def test_truncated_log_packet_is_rejected(size):
-    with pytest.raises(PacketError, match=rf"^a batch of {size} bytes: "):
+    with pytest.raises(PacketError, match=rf"^log packet of {size} bytes: "):
         unpack_log_packet(WHOLE[:size])
 
 
 def test_log_packet_with_unknown_topic_is_rejected():
-    with pytest.raises(PacketError, match=r"^a batch of "):
+    with pytest.raises(PacketError, match=r"^log packet of "):
         unpack_log_packet(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])

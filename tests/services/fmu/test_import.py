@@ -107,7 +107,7 @@ def test_changed_fmu_is_rejected_by_resimulation(folder: Path, tmp_path: Path) -
     write_small_fmu(tmp_path / "small.fmu", unit_u="V")
     done = run_command("resimulate", str(log), "--allow-code")
     assert done.returncode != 0
-    assert "the file differs from the one that was resolved" in done.stderr
+    assert "the file has changed since the start of the run" in done.stderr
 
 
 @pytest.mark.long
@@ -180,7 +180,7 @@ def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
         ({"start": 'gain = "a"'}, "services.motor.start.gain: expected a number, got the text 'a' for the type Real"),
         (
             {"inputs": 'u = "actuators.motor_voltage.0"', "outputs": '"truth.position_world.2" = "y"'},
-            "a loop without delay",
+            "an algebraic loop",
         ),
     ],
 )
@@ -326,7 +326,7 @@ def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> Non
         return
     assert done.returncode == 2
     keys, names = "services.second.delay, services.first.delay", "first_fmu, second_fmu"
-    assert f"{keys}: an algebraic loop, a loop without delay, through {names}; expected delay = 1" in done.stderr
+    assert f"{keys}: an algebraic loop through {names}; expected delay = 1" in done.stderr
     assert done.stderr.count("\n") == 1
 
 
@@ -334,8 +334,8 @@ def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> Non
     ("line", "message"),
     [
         ('interface = "model_exchange"', "has no model_exchange, but co_simulation"),
-        ('integrator = "rk4"', "services.motor.integrator: the FMU integrates by itself"),
-        ("accuracy = 1e-6", "services.motor.accuracy: the FMU integrates by itself"),
+        ('integrator = "rk4"', "services.motor.integrator: the FMU has its own integrator"),
+        ("accuracy = 1e-6", "services.motor.accuracy: the FMU has its own integrator"),
     ],
 )
 def test_option_of_other_interface_is_rejected(folder: Path, line: str, message: str) -> None:

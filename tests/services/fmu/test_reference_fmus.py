@@ -140,7 +140,7 @@ def test_fmu_that_ends_simulation_is_named() -> None:
         fmu.initialise()
         counts = [fmu.advance(0.2 * k)[0] for k in range(1, 46)]
         assert counts[-1] == 10.0
-        with pytest.raises(HostError, match=r"asked to end the simulation \(t = 9 s\)"):
+        with pytest.raises(HostError, match=r"requested the end of the simulation \(t = 9 s\)"):
             fmu.advance(9.2)
 
 

@@ -140,4 +140,4 @@ def test_clock_with_ticks_of_its_own_is_no_input(tmp_path: Path) -> None:
         [sys.executable, "-m", "lapwing", "check", str(scene)], capture_output=True, text=True, check=False
     )
     assert done.returncode == 2
-    assert "services.clocks.inputs.periodic: periodic is a clock with ticks of its own; expected a" in done.stderr
+    assert "services.clocks.inputs.periodic: periodic is a clock with its own ticks; expected a" in done.stderr
