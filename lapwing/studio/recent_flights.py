@@ -13,7 +13,7 @@ from lapwing.studies.flight_data import SHOWN
 from lapwing.studies.metrics import unmet_criteria
 from lapwing.studies.report import write
 from lapwing.studies.report.key_numbers import TROUBLE, KeyNumber, key_numbers
-from lapwing.studies.report.page import LOOKS
+from lapwing.studies.report.page import CSS_CLASSES
 from lapwing.studio.path_picture import Picture, picture
 
 FOLDER = Path("recordings")  # where `lapwing run` writes logs
@@ -115,7 +115,7 @@ def _summary(path: Path) -> FlightSummary:
     except ValueError as error:
         reason = str(error).removeprefix(f"{path}: ")
         return FlightSummary(path.name, path.stem, "", recorded, "bad", "", "", (), (), 0, 0.0, None, {}, reason)
-    worst = max(flights, key=lambda flight: flight.outcome.kind not in LOOKS)
+    worst = max(flights, key=lambda flight: flight.outcome.kind not in CSS_CLASSES)
     unmet = [text for flight in flights for text in unmet_criteria(flight)]
     outcome = "; not met: ".join([str(worst.outcome), *dict.fromkeys(unmet)])
     run = worst.origin.scene.get("run", {})
@@ -124,7 +124,7 @@ def _summary(path: Path) -> FlightSummary:
         worst.metadata.get("scene") or path.stem,
         str(run.get("title", "")),
         recorded,
-        "bad" if unmet else LOOKS.get(worst.outcome.kind, "bad"),
+        "bad" if unmet else CSS_CLASSES.get(worst.outcome.kind, "bad"),
         f"{worst.vehicle}: {outcome}" if len(flights) > 1 else outcome,
         worst.outcome.kind,
         tuple(flight.vehicle for flight in flights),

@@ -26,11 +26,11 @@ def steps():
         before = graph.tick
         graph.advance(min(graph.tick + 30, setup.last_tick + 1))
         pages = list(graph.record_batches(before, graph.tick))
-        live.take(held + [page for page in pages if page.topic.name.endswith("ground_truth")])
+        live.add(held + [page for page in pages if page.topic.name.endswith("ground_truth")])
         held = [page for page in pages if not page.topic.name.endswith("ground_truth")]  # come later
         if (step := live.step((before - 1) * setup.interval_ns)) is not None:
             result.append(step)
-    live.take(held)
+    live.add(held)
     return [*result, live.step(setup.last_tick * setup.interval_ns)]
 
 

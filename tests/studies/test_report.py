@@ -524,7 +524,7 @@ def test_truncated_log_gives_report_too(log, tmp_path):
     cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     page = Page(report(cut))
     assert page.after("landed") == "no"
-    assert page.after("digest") == "none: the log has no end"
+    assert page.after("digest") == "none: the log is incomplete"
     assert 0.0 < float(page.after("duration").removesuffix(" s")) < SECONDS
     assert page.after("x [m]") == "0.1000"
     assert "position" in page.plots
@@ -536,7 +536,7 @@ def test_missing_data_is_reported(tmp_path):
     assert set(page.plots) == {"mission_map", "timeline", "position", "attitude", "path", "air"}
     assert "Left out: the vehicle has no motors." in text
     assert "Left out: the estimate states no uncertainty (it is the truth)." in text
-    assert "No reference in this log" in text
+    assert "The log has no reference" in text
 
 
 def test_single_sample_is_enough(tmp_path):

@@ -40,7 +40,7 @@ def started(path, **changes):
 def flown(tmp_path_factory):
     """A campaign that was flown in one go, in this process; and its digest."""
     folder, first = started(tmp_path_factory.mktemp("campaign") / "one")
-    campaign(folder, first, workers.here)
+    campaign(folder, first, workers.run_here)
     return folder, folder.finish(csv=True)
 
 
@@ -67,7 +67,7 @@ def test_run_draws_flies_and_is_row(flown):
 
 def test_stop_keeps_complete_shards_for_any_workers(flown, tmp_path):
     folder, first = started(tmp_path / "c")
-    campaign(folder, first, workers.here, part=range(0, len(folder.shards), 2))
+    campaign(folder, first, workers.run_here, part=range(0, len(folder.shards), 2))
     (tmp_path / "c" / "shards" / ".00001.csv.77").write_text("half written")
     assert len(folder.missing()) == len(folder.shards) // 2
     seen = []
@@ -171,9 +171,9 @@ def test_campaign_ends_at_interval_width_with_any_worker(tmp_path):
     counts = []
 
     def backwards(call, tasks):
-        yield from reversed(list(workers.here(call, tasks)))
+        yield from reversed(list(workers.run_here(call, tasks)))
 
-    for fliers in (workers.here, backwards):
+    for fliers in (workers.run_here, backwards):
         folder, first = started(tmp_path / fliers.__name__)
         counts.append(campaign(folder, first, fliers, until=0.2))
         assert counts[-1].failure.half_width <= 0.2
@@ -187,7 +187,7 @@ def test_runs_beyond_interval_width_are_kept(tmp_path):
         yield from ()
 
     folder, first = started(tmp_path / "all")
-    whole = campaign(folder, first, workers.here)
+    whole = campaign(folder, first, workers.run_here)
     digest = folder.finish()
     enough = campaign(folder, first, nobody, until=0.2)
     assert enough.runs < RUNS
@@ -263,7 +263,7 @@ def test_report_json_and_run_flown_again_to_bit(flown, tmp_path, monkeypatch):
 def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     folder, _ = flown
     other, first = started(tmp_path / "heavier", overrides=(*SHORT, "autopilot.gains=paper"))
-    campaign(other, first, workers.here)
+    campaign(other, first, workers.run_here)
     code, output = lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
     assert "the campaigns differ in: overrides\n" in output
@@ -280,7 +280,7 @@ def test_two_campaigns_are_compared_run_by_run(flown, tmp_path):
     assert alone < 0.5 * Results(folder)["energy"].std()  # the masses drawn are the same in both
     assert lapwing("compare", folder.path, tmp_path)[0] == 2
     others, first = started(tmp_path / "laid_out", design="lhs")
-    campaign(others, first, workers.here)
+    campaign(others, first, workers.run_here)
     drawn = [f"{key} (drawn otherwise)" for key in sorted(VARY)]
     assert compare(folder.path, others.path).differing == ["design", *drawn]
 
