@@ -271,7 +271,7 @@ def test_motors_at_limit_are_marked(log):
     flown = FlightData.read(log)
     flown.origin.scene["airframe"] = {"motor": {"max_voltage": 34.0}}
     marks, output = motors.limits(flown)
-    assert "limit of its voltage (0 or 34 V) in the air, in all for " in output
+    assert "voltage limit (0 or 34 V) in the air, in total for " in output
     stretch = marks[-1]
     assert stretch.name == "at a limit"
     assert np.isnan(stretch.x[2::3]).all()
@@ -534,8 +534,8 @@ def test_missing_data_is_reported(tmp_path):
     page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
     assert set(page.plots) == {"mission_map", "timeline", "position", "attitude", "path", "air"}
-    assert "Left out: the vehicle has no motors." in text
-    assert "Left out: the estimate states no uncertainty (it is the truth)." in text
+    assert "Not shown: the vehicle has no motors." in text
+    assert "Not shown: the estimate has no standard deviations (it is the truth)." in text
     assert "The log has no reference" in text
 
 

@@ -75,9 +75,9 @@ def test_rotors_turn_in_their_own_direction():
     assert moved.bodies[0].rotors[0].angle == pytest.approx(-T)
     (body,) = sample(values, moved, np.array([1.0])).bodies
     scene = Recorder()
-    Rotors(scene, "/body", moved.bodies[0].rotors, "#0072B2", 0.1).turn(body.angles[0])
+    Rotors(scene, "/body", moved.bodies[0].rotors, "#0072B2", 0.1).set_angles(body.angles[0])
     tips = scene.nodes["/body/blades"].vertices.reshape(4, -1, 3)[:, :2].mean(axis=1) - np.array(HUBS)
-    step = 2.0 * np.pi / sampling.TURNS
+    step = 2.0 * np.pi / sampling.ANGLES
     for (x, y, _), sign in zip(tips, (-1.0, 1.0, -1.0, 1.0), strict=True):
         assert np.hypot(x, y) == pytest.approx(0.95 * 0.25, abs=1e-3)
         assert np.arctan2(y, x) == pytest.approx(sign, abs=step)
@@ -85,7 +85,7 @@ def test_rotors_turn_in_their_own_direction():
 
 def test_thrust_arrows_stand_on_hubs_and_have_their_lengths():
     rotors, scene = motion(flight()).bodies[0].rotors, Recorder()
-    Rotors(scene, "/body", rotors, "#0072B2", 0.1).push(np.array([1.0, 2.0, 0.0, -3.0]))
+    Rotors(scene, "/body", rotors, "#0072B2", 0.1).set_thrusts(np.array([1.0, 2.0, 0.0, -3.0]))
     arrows = scene.nodes["/body/thrusts"].vertices.reshape(4, -1, 3)
     assert np.ptp(arrows[:, :, 2], axis=1) == pytest.approx([0.1, 0.2, 0.0, 0.3])
     assert arrows[3, :, 2].min() == pytest.approx(-0.3)

@@ -65,8 +65,8 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
         sections=section_iterator,
         open=OPEN,
         seconds=3600 if long(flights) else 1,
-        space=_view3d_page(flights, names) if view3d else "",
-        no_space="" if view3d else _view3d_hint(flights),
+        view3d=_view3d_page(flights, names) if view3d else "",
+        no_view3d="" if view3d else _view3d_hint(flights),
     )
 
 

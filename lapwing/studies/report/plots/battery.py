@@ -31,4 +31,4 @@ def draw(flight: FlightData) -> Plot:
         Panel((Line(t, use.voltage * use.current),), "power [W]"),
         Panel((Line(t, use.energy_drawn),), "energy drawn [W h]"),
     )
-    return Plot(caption=f"The pack under load. {use}", **column(panels, 1.35, **over(flight)))
+    return Plot(caption=f"Battery pack under load. {use}", **column(panels, 1.35, **over(flight)))
