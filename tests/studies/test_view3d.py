@@ -1,4 +1,4 @@
-"""Flights in space: solids, poses, the recorded page, and its player in a browser."""
+"""3D view: solids, poses, recorded page, and its player in a browser."""
 
 import copy
 import json
@@ -90,7 +90,7 @@ def test_thrust_arrows_stand_on_hubs_and_have_their_lengths():
     assert np.ptp(arrows[:, :, 2], axis=1) == pytest.approx([0.1, 0.2, 0.0, 0.3])
     assert arrows[3, :, 2].min() == pytest.approx(-0.3)
     assert arrows[:, -1, :2] == pytest.approx(np.array(HUBS)[:, :2])
-    assert np.ptp(arrows[2], axis=0) == pytest.approx(0.0)  # nothing is seen of an arrow without length
+    assert np.ptp(arrows[2], axis=0) == pytest.approx(0.0)  # an arrow of zero length is invisible
 
 
 def test_coloured_mesh_is_read_with_its_shape_and_colours(tmp_path):
@@ -210,7 +210,7 @@ def test_contact_forces_are_drawn_at_their_points():
 )
 def test_drawn_beam_starts_at_sensor_and_ends_at_surface(name, table, origin, direction):
     ranges = np.where(T < 2.0, 1.5, np.inf)
-    airframe = AIRFRAME | {"mass": {"centre": [0.05, -0.02, 0.01]}}  # sensors have their places about it
+    airframe = AIRFRAME | {"mass": {"centre": [0.05, -0.02, 0.01]}}  # positions of sensors are relative to it
     whole = flight(scene={"airframe": airframe, "sensors": {name: table}})
     reading = TopicView(np.arange(TICKS) * 10**7, {"range": ranges, "field_of_view": np.full(TICKS, 0.5)})
     values = FlightData({**{key: whole.topic(key) for key in whole.topics}, name: reading}, whole.origin)
@@ -240,9 +240,11 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     recorder = Recorder()
     add_surroundings(recorder, flight(scene=scene))
     (node,) = (node for node in recorder.nodes.values() if node.kind == "add_mesh_simple")
-    assert node.cast_shadow is False  # on itself, as a pattern
+    assert node.cast_shadow is False  # shadows on itself
     vertices = node.arguments[0]
-    assert vertices[np.argmax(vertices[:, 2])] == pytest.approx([0.0, 0.0, 0.0], abs=0.01)  # heights are from home's
+    assert vertices[np.argmax(vertices[:, 2])] == pytest.approx(
+        [0.0, 0.0, 0.0], abs=0.01
+    )  # heights are relative to home
     assert vertices[:, 2].min() == pytest.approx(-2.0)
     lines = recorder.nodes["/surroundings/lines"].arguments[0]
     rows = {tuple(row) for row in np.asarray(vertices, np.float32)[:, :2].tolist()}
@@ -489,9 +491,9 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
         )
         assert browser.errors == []
     assert calls < 80
-    assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # what has been flown
-    assert 1 <= names < 8  # those behind others are hidden
-    assert frames <= seconds + 1.0  # viser's own one a second
+    assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # part up to the current time
+    assert 1 <= names < 8  # covered labels are hidden
+    assert frames <= seconds + 1.0  # including one per second by viser
     assert after > 0
 
 

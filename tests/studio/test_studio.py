@@ -126,7 +126,7 @@ def test_preview_names_command_python_and_faults(studio):
     assert answer["faults"] == {"run.duration": "expected a number above 0 and at most 1e+06 [s], got -1.0"}
 
 
-def test_faulty_form_is_shown_again_with_its_fault(studio):
+def test_faulty_form_is_returned_with_fault(studio):
     status, text, _ = studio.request("scenes/hover/run", {**QUICK, "run.seed": "-3"})
     assert status == 422
     assert 'value="-3"' in text
