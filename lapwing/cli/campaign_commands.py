@@ -175,7 +175,7 @@ def _workers(screen: "Console", cluster: str | None, number: int) -> "Workers":
         from lapwing.studies.campaign.cluster import dask
 
         return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
-    return workers.here if number <= 1 else workers.processes(number)
+    return workers.run_here if number <= 1 else workers.processes(number)
 
 
 def _fly(

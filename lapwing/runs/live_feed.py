@@ -47,4 +47,4 @@ class LiveFeed:
 
     def _take(self, pages: list[RecordBatch]) -> None:
         for flight in self._flights:
-            flight.take(pages)
+            flight.add(pages)

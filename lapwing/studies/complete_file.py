@@ -1,4 +1,4 @@
-"""Files that are replaced as a whole: a reader, or an interrupted write, never meets half a file."""
+"""Atomic replacement of files: neither a reader nor an interrupted write leaves a partial file."""
 
 import os
 import platform
@@ -9,7 +9,7 @@ from pathlib import Path
 
 @contextmanager
 def complete_file(path: Path) -> Iterator[Path]:
-    """Yield a temporary file beside `path`, which replaces it at the end if no exception is raised."""
+    """Yield a temporary path in the folder of `path`; its file replaces `path` at the end if no exception is raised."""
     new = path.with_name(f".{path.name}.{platform.node()}.{os.getpid()}")  # several machines may share the folder
     try:
         yield new

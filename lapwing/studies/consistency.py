@@ -9,23 +9,23 @@ import numpy as np
 
 from lapwing.studies.flight_data import FlightData
 
-STATES = 24  # error states of the estimator
-JOINT = 9  # attitude, velocity and position, of which the truth is known
-SURE = 0.95  # of every bound
+STATES = 24  # number of error states of the estimator
+JOINT = 9  # number of states with a true value: attitude, velocity, position
+CONFIDENCE = 0.95  # level of all bounds
 SOURCES = {"gps": (1, 3), "gps_velocity": (2, 3), "barometer": (3, 1), "sonar": (4, 1), "magnetometer": (5, 1)}
-"""Place in `nis` and dimension of each source."""
+"""Index in `nis` and dimension of each source."""
 TOPIC = "estimate/covariance"
 
 
 def bounds(dimension: int, runs: int) -> tuple[float, float]:
     """Return the two-sided 95 % bounds of the mean of normalised squared errors over independent runs."""
-    low, high = [chi_square_quantile(0.5 + 0.5 * sign * SURE, dimension * runs) / runs for sign in (-1.0, 1.0)]
+    low, high = [chi_square_quantile(0.5 + 0.5 * sign * CONFIDENCE, dimension * runs) / runs for sign in (-1.0, 1.0)]
     return low, high
 
 
 def chi_square_quantile(probability: float, degrees: int) -> float:
-    """Return the quantile of the chi-square distribution with these degrees of freedom."""
-    from scipy.special import gammaincinv  # here: `lapwing run` imports this module before it flies
+    """Return the quantile at `probability` of the chi-square distribution with `degrees` of freedom."""
+    from scipy.special import gammaincinv  # imported here to keep the start of `lapwing run` short
 
     return 2.0 * float(gammaincinv(0.5 * degrees, probability))
 
@@ -49,34 +49,37 @@ def nees(error: np.ndarray, covariance: np.ndarray) -> np.ndarray:
 
 
 def consistency(flight: FlightData) -> dict[str, float]:
-    """Return `nees`, the share `within_95.nees` and `nis.SOURCE` of a flight while armed; {} without a covariance.
+    """Return `nees`, the share `within_95.nees` and `nis.SOURCE` of a flight while armed, or {} without a covariance.
 
-    `nees` is the mean over time, 9 if the estimate is consistent; `nis.SOURCE` the mean per dimension, 1 if so.
+    `nees` is the mean over time, 9 for a consistent estimate; `nis.SOURCE` is the mean per dimension, ideally 1.
     """
     if not flight.has(TOPIC) or not len(flight.topic(TOPIC)) or not flight.armed.any():
         return {}
     reported, truth, estimate = flight.topic(TOPIC), flight.truth, flight.estimate
-    places = [_places(view.times, reported.times) for view in (truth, estimate)]
+    indices = [_matching_indices(view.times, reported.times) for view in (truth, estimate)]
     n = len(flight.armed)
-    there = (places[0] >= 0) & (places[1] >= 0) & (places[0] < n) & (np.asarray(reported.covariance)[:, 0] > 0.0)
-    there[there] &= flight.armed[places[0][there]]
-    if not there.any():
+    valid = (indices[0] >= 0) & (indices[1] >= 0) & (indices[0] < n) & (np.asarray(reported.covariance)[:, 0] > 0.0)
+    valid[valid] &= flight.armed[indices[0][valid]]
+    if not valid.any():
         return {}
-    t, e = places[0][there], places[1][there]
-    turned = _rotation_vector(truth.orientation[t], estimate.orientation[e])
-    moved = [truth.velocity[t] - estimate.velocity[e], truth.position[t] - estimate.position[e]]
-    value = nees(np.hstack([turned, *moved]), joint_covariance(reported.covariance[there]))
-    result = {"nees": float(value.mean()), "within_95.nees": float(np.mean(value < chi_square_quantile(SURE, JOINT)))}
+    t, e = indices[0][valid], indices[1][valid]
+    attitude_error = _rotation_vector(truth.orientation[t], estimate.orientation[e])
+    translation_errors = [truth.velocity[t] - estimate.velocity[e], truth.position[t] - estimate.position[e]]
+    value = nees(np.hstack([attitude_error, *translation_errors]), joint_covariance(reported.covariance[valid]))
+    result = {
+        "nees": float(value.mean()),
+        "within_95.nees": float(np.mean(value < chi_square_quantile(CONFIDENCE, JOINT))),
+    }
     result["nis_samples"] = float(len(value))
-    for source, (place, dimension) in SOURCES.items():
-        innovations = reported.nis[there, place]
-        known = innovations[innovations > 0.0]
-        result[f"nis.{source}"] = float(known.mean()) / dimension if len(known) else math.nan
+    for source, (column, dimension) in SOURCES.items():
+        nis = reported.nis[valid, column]
+        nis = nis[nis > 0.0]  # 0: the source has not been fused
+        result[f"nis.{source}"] = float(nis.mean()) / dimension if len(nis) else math.nan
     return result
 
 
-def _places(times: np.ndarray, desired: np.ndarray) -> np.ndarray:
-    """Return the index of each wanted time [s] among ascending times, -1 where it is missing."""
+def _matching_indices(times: np.ndarray, desired: np.ndarray) -> np.ndarray:
+    """Return the index of each `desired` time [s], shape (n,), in the ascending `times`, or -1 if it is missing."""
     if not len(times):
         return np.full(len(desired), -1)
     nearest = np.minimum(np.searchsorted(times, desired - 1e-6), len(times) - 1)

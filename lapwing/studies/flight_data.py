@@ -1,4 +1,4 @@
-"""A flight, recorded or flown in memory: what every topic said by time, and its figures of merit."""
+"""Data of a flight, recorded or simulated in memory: topics over time, and metrics."""
 
 from collections.abc import Collection, Mapping
 from functools import cached_property
@@ -41,30 +41,30 @@ from lapwing.studies.port_columns import columns_of
 from lapwing.studies.topic_view import TopicView
 
 AXES = tuple(tracking.AXES)
-IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # of which a vehicle is drawn as it moves
-OF_OTHERS = (*IN_SPACE, STATUS)  # from which the other vehicles of a fleet are drawn, and their outcomes made
+IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # topics for drawing a vehicle in 3D
+FLEET_TOPICS = (*IN_SPACE, STATUS)  # topics of the other vehicles of a fleet: for drawing, and for their outcomes
 
-# Topics from which outcome, events, metrics and report are made.
+# Topics for outcome, events, metrics and report.
 SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS, custom_sensor(ports.IMU_SELECTION))
 
 
 class FlightData(FlightTopics):
     """Recorded topics of a flight, and the metrics derived from them.
 
-    `flight.truth.position` is an array by time, `flight.truth.times` its times; `flight.topic(NAME)` is any topic.
+    The first axis of `flight.truth.position` is time, at `flight.truth.times`; `flight.topic(NAME)` is any topic.
 
     Attributes:
-        origin: where it comes from, with the log's metadata.
-        vehicle: name.
-        name: of the flight in a comparison; "" for that of its log.
-        fleet: what is true of every vehicle that flew, "ground_truth" by name; this one among them.
-        others: the other vehicles that flew, each a flight with what is shown of it in space.
-        failure: why it ended before its time; "" where it did not, or where a log does not say.
-        diverged: whether that is a state that was no longer finite.
+        origin: log or run configuration, with the log's metadata.
+        vehicle: name of the vehicle.
+        name: name of the flight in a comparison; "": the name of its log.
+        fleet: "ground_truth" of every vehicle by name, including this one.
+        others: flights of the other vehicles, with the topics for drawing and outcome.
+        failure: reason of an early end; "" without one, or if the log has none.
+        diverged: True if that reason is a non-finite state.
     """
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin, failure: str = "", diverged: bool = False):
-        """Create a flight from topics by their name without the vehicle's: "ground_truth", "gps/fix", "clock"."""
+        """Create a flight from topics by name without that of the vehicle: "ground_truth", "gps/fix", "clock"."""
         super().__init__(topics, origin)
         self.failure, self.diverged = failure, diverged
         self.name = ""
@@ -81,17 +81,17 @@ class FlightData(FlightTopics):
             only: topics to read; None: all.
 
         Raises:
-            ValueError: the file is missing or no MCAP log, has no flight, or a damaged message.
+            ValueError: the file is missing or not an MCAP log, it has no flight, or a message is damaged.
         """
         with LogReader(path) as log:
-            known = [name for name, kind in log.topics().items() if kind in TYPES]
-            fleet = _vehicles(known, log.metadata)
-            named = vehicle or next(iter(fleet), None)
-            if named is None or named not in fleet:
-                raise ValueError(f"{path}: no flight in this log (no topic /{named or 'NAME'}/ground_truth)")
-            others = {topic.key(name) for name in fleet for topic in OF_OTHERS}
-            own = [name for name in known if name.startswith(f"/{named}/") or "/" not in name[1:] or name in others]
-            return cls._of_log(log, str(path), log.histories(_select_names(own, only, fleet)), named, fleet)
+            names = [name for name, kind in log.topics().items() if kind in TYPES]
+            fleet = _vehicles(names, log.metadata)
+            selected = vehicle or next(iter(fleet), None)
+            if selected is None or selected not in fleet:
+                raise ValueError(f"{path}: no flight in this log (no topic /{selected or 'NAME'}/ground_truth)")
+            others = {topic.key(name) for name in fleet for topic in FLEET_TOPICS}
+            own = [name for name in names if name.startswith(f"/{selected}/") or "/" not in name[1:] or name in others]
+            return cls._of_log(log, str(path), log.histories(_select_names(own, only, fleet)), selected, fleet)
 
     @classmethod
     def read_all(cls, path: str | Path, only: Collection[Topic] | None = None) -> list[Self]:
@@ -105,11 +105,11 @@ class FlightData(FlightTopics):
             ValueError: see `read`.
         """
         with LogReader(path) as log:
-            known = [name for name, kind in log.topics().items() if kind in TYPES]
-            fleet = _vehicles(known, log.metadata)
+            names = [name for name, kind in log.topics().items() if kind in TYPES]
+            fleet = _vehicles(names, log.metadata)
             if not fleet:
                 raise ValueError(f"{path}: no flight in this log (no topic /NAME/ground_truth)")
-            histories = log.histories(_select_names(known, only, fleet))
+            histories = log.histories(_select_names(names, only, fleet))
             return [cls._of_log(log, str(path), histories, name, fleet) for name in fleet]
 
     @classmethod
@@ -121,7 +121,7 @@ class FlightData(FlightTopics):
             return cls(views, Origin.of_log(source, name, log.metadata, log.attachments), failure, diverged)
 
         result: Self = of(vehicle, [key for key in histories if key.startswith(f"/{vehicle}/") or "/" not in key[1:]])
-        shown = {name: [key for topic in OF_OTHERS if (key := topic.key(name)) in histories] for name in fleet}
+        shown = {name: [key for topic in FLEET_TOPICS if (key := topic.key(name)) in histories] for name in fleet}
         result.others = tuple(of(name, shown[name]) for name in fleet if name != vehicle)
         truths = {other.vehicle: other.truth for other in result.others}
         result.fleet = {name: truths.get(name, result.truth) for name in fleet}
@@ -139,8 +139,8 @@ class FlightData(FlightTopics):
             failure: reason of an early end.
             diverged: True if the reason is a non-finite state.
         """
-        text = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
-        return cls(text, Origin.of_setup(graph.setup), failure, diverged)
+        views = {_short(topic): TopicView(times_ns, columns) for topic, times_ns, columns in columns_of(graph, only)}
+        return cls(views, Origin.of_setup(graph.setup), failure, diverged)
 
     @classmethod
     def of_each(
@@ -149,10 +149,12 @@ class FlightData(FlightTopics):
         """Return the flights of all vehicles of a run. See `of` for arguments."""
         if graph.setup.vehicle:
             return [cls.of(graph, only, failure, diverged)]
-        text = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
+        all_views = [(topic, TopicView(times_ns, columns)) for topic, times_ns, columns in columns_of(graph, only)]
         result = []
         for own in members(graph.setup):
-            views = {_short(template_topic(topic)): view for topic, view in text if topic.vehicle in ("", own.vehicle)}
+            views = {
+                _short(template_topic(topic)): view for topic, view in all_views if topic.vehicle in ("", own.vehicle)
+            }
             result.append(cls(views, Origin.of_setup(own), failure, diverged))
         truths = {flight.vehicle: flight.truth for flight in result if flight.has("ground_truth")}
         for flight in result:
@@ -160,15 +162,15 @@ class FlightData(FlightTopics):
         return result
 
     def __repr__(self) -> str:
-        text = str(self.outcome) if len(self.truth) else "nothing was flown"
+        text = str(self.outcome) if len(self.truth) else "no ground truth"
         return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {text}>"
 
     @cached_property
     def reference(self) -> np.ndarray:
         """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "ground_truth", shape (n, 6).
 
-        The references of x, y, z and yaw are the setpoints, those of roll and pitch what the inner loops follow.
-        The run may have ended between two topics: n is the count of the shortest. Without a reference it is 0.
+        The references of x, y, z and yaw are the setpoints; those of roll and pitch are the references of the inner
+        loops. The run may have ended between two topics: n is the length of the shortest, 0 without a reference.
         """
         if not self._tracked:
             return np.empty((0, len(AXES)))
@@ -177,7 +179,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def _tracked(self) -> int:
-        """The count of times of `reference`."""
+        """Number of times of `reference`."""
         if not (self.has("setpoint") and self.has("actuators")):
             return 0
         return min(len(self.truth), len(self.setpoint), len(self.actuators))
@@ -209,7 +211,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def reach(self) -> tuple[float, float]:
-        """Greatest distance from the reference, and how far beyond its extremes [m]; for a flight with a reference."""
+        """Largest distance from the reference, and overshoot beyond its extremes [m], for a flight with a reference."""
         n = self._tracked
         return tracking.reach(self.setpoint.position[:n], self.truth.position[:n], self.armed)
 
@@ -220,7 +222,7 @@ class FlightData(FlightTopics):
 
     @property
     def energy(self) -> float:
-        """Electrical energy that the motors have taken [J]."""
+        """Electrical energy consumed by the motors [J]."""
         return tracking.total(self.truth.motor_power) * self.setup.interval
 
     @cached_property
@@ -230,7 +232,7 @@ class FlightData(FlightTopics):
 
     @cached_property
     def mission(self) -> Mission | None:
-        """Mission of the vehicle; None without one, or where a log has no run configuration that can be read."""
+        """Mission of the vehicle; None without one, or without a readable run configuration."""
         try:
             return mission_of(self.setup, self.truth.position[0])
         except ValueError:
@@ -239,8 +241,8 @@ class FlightData(FlightTopics):
     @cached_property
     def outcome(self) -> FlightOutcome:
         """End of the flight; see `FlightOutcome` for its kinds."""
-        no_end = self.origin.recorded and not self.digest
-        failure = self.failure or ("the log has no end" if no_end else "")
+        is_incomplete = self.origin.recorded and not self.digest
+        failure = self.failure or ("the log is incomplete" if is_incomplete else "")
         status = self.status if self.has("status") else None
         return classify(self.truth, status, failure, self.diverged, None if status is None else self.mission)
 
@@ -248,16 +250,14 @@ class FlightData(FlightTopics):
     def events(self) -> list[Event]:
         """Events in order of time."""
         if self.has("events"):
-            text = self.topic("events")
-            return [Event(*event) for event in zip(text.times.tolist(), text.name, text.msg, strict=True)]
+            recorded = self.topic("events")
+            return [Event(*event) for event in zip(recorded.times.tolist(), recorded.name, recorded.msg, strict=True)]
         status, setpoint = (self.topic(name) if self.has(name) else None for name in ("status", "setpoint"))
         result = events(self.truth, status, setpoint, self.armed, self.origin.scene)
         if self.has(IMU_SELECTION):
             result = in_order([*result, *imu_failures(self.topic(IMU_SELECTION))])
         load = self.origin.scene.get("cooperative_load")
-        if (
-            load and self.has("body_states") and self.has("rotor_wrench")
-        ):  # no autopilot: there are no other kinds of events
+        if load and self.has("body_states") and self.has("rotor_wrench"):  # no autopilot, so no other kinds of events
             result += slack(self.topic("body_states"), self.topic("rotor_wrench"), load)
         return result
 
@@ -276,10 +276,10 @@ def _select_names(names: list[str], only: Collection[Topic] | None, fleet: list[
 
 
 def _vehicles(topics: Collection[str], metadata: Mapping[str, str]) -> list[str]:
-    """Return the vehicles whose truth is among the topics of a log, in the order of its scene."""
+    """Return the vehicles with ground truth among the topics of a log, in the order of its scene."""
     result = [name.split("/")[1] for name in topics if name.endswith("/ground_truth")]
-    text = metadata.get("vehicle", "").split(", ")
-    return sorted(result, key=lambda name: text.index(name) if name in text else len(text))
+    order = metadata.get("vehicle", "").split(", ")
+    return sorted(result, key=lambda name: order.index(name) if name in order else len(order))
 
 
 def _short(topic: Topic) -> str:

@@ -15,12 +15,12 @@ from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
 BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
-IMU_SELECTION = f"custom_sensor/{ports.IMU_SELECTION}"  # topic of the vote: unit in use, bits of failed ones
-ORDER = tuple(KINDS)  # at the same time
+IMU_SELECTION = f"custom_sensor/{ports.IMU_SELECTION}"  # topic of the vote: unit in use, bit mask of failed units
+ORDER = tuple(KINDS)  # order of simultaneous events
 
 
 class Event(NamedTuple):
-    """One event."""
+    """An event of a flight."""
 
     time: float  # [s]
     kind: str  # one of lapwing.services.common.event_kinds.KINDS
@@ -34,8 +34,8 @@ def events(
 
     Args:
         truth: true state.
-        status: autopilot status; None without an autopilot: then only planned faults are listed.
-        setpoint: setpoint that was followed, if any.
+        status: autopilot status; None without an autopilot, which leaves the planned faults and the phases.
+        setpoint: setpoint of the autopilot, if any.
         armed: True where the motors are armed, at the first n times of `truth`, shape (n,).
         scene: tables of the scene.
     """
@@ -51,7 +51,9 @@ def events(
     if setpoint is not None and len(setpoint):
         phases = changes(setpoint.times, setpoint.phase)
         result += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
-    result = [event._replace(time=round(event.time, 9)) for event in result]  # nanoseconds, as the log counts
+    result = [
+        event._replace(time=round(event.time, 9)) for event in result
+    ]  # to nanoseconds, the resolution of the log
     return in_order(result)
 
 
@@ -61,7 +63,7 @@ def in_order(events: Iterable[Event]) -> list[Event]:
 
 
 def slack(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) -> list[Event]:
-    """Return the times at which a rigid link pushes, where a cable would be slack.
+    """Return an event for each interval in which a rigid link is in compression, where a cable would be slack.
 
     Args:
         bodies: poses of the load and the quadrotors.
@@ -103,33 +105,33 @@ def changes(t: np.ndarray, values: np.ndarray) -> Iterator[tuple[float, Any]]:
 
 def _status_events(status: TopicView) -> Iterator[Event]:
     """Yield the events in the autopilot status."""
-    t, known = status.times, set(status.fields)
-    if "armed" in known:
+    t, fields = status.times, set(status.fields)
+    if "armed" in fields:
         for time, armed in list(changes(t, status.armed)):
             if armed or time > t[0]:
                 yield Event(time, "arming", "armed" if armed else "disarmed")
-    if "mode" in known:
+    if "mode" in fields:
         yield from (Event(time, "mode", str(mode)) for time, mode in changes(t, status.mode) if mode)
-    if {"failsafe", "text"} <= known:
+    if {"failsafe", "text"} <= fields:
         before = ""
         for time, reason in changes(t, np.where(status.failsafe, status.text.astype(object), "")):
             if reason or before:
                 yield Event(time, "failsafe", str(reason) or f"{before}: over")
             before = reason
-    if "failed_motor" in known:
+    if "failed_motor" in fields:
         yield from (
             Event(time, "fault", f"motor {k} noticed to have failed")
             for time, k in changes(t, status.failed_motor)
             if k
         )
-    if "battery_warning" in known:
+    if "battery_warning" in fields:
         for time, level in changes(t, status.battery_warning):
             if level:
                 yield Event(time, "battery", BATTERY[min(int(level), len(BATTERY) - 1)])
 
 
 def imu_failures(selection: TopicView) -> list[Event]:
-    """Return the failures of redundant IMUs that the autopilot's vote noticed, and the unit in use instead."""
+    """Return the failures of redundant IMUs detected by the autopilot's vote, with the unit in use afterwards."""
     used, failed = np.asarray(selection["values"]).T.astype(int)
     unit_at, before, result = dict(zip(selection.times.tolist(), used, strict=True)), 0, []
     for time, bits in changes(selection.times, failed):

@@ -13,12 +13,12 @@ from lapwing.cosim.diagram.multi_vehicle import member
 
 
 class Origin:
-    """A log, or a set-up that was flown in memory.
+    """Origin of a flight: a log, or a run configuration simulated in memory.
 
     Attributes:
-        source: the log's path or the scene's name, for messages to people.
-        vehicle: name.
-        recorded: whether it is a log.
+        source: the log's path or the scene's name, for messages to the user.
+        vehicle: name of the vehicle.
+        recorded: True for a log.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class Origin:
         """Run configuration of the flight.
 
         Raises:
-            ValueError: the log carries no set-up, or one that this version cannot read.
+            ValueError: the log has no run configuration, or one that this version cannot read.
         """
         if self._setup is not None:
             return self._setup
@@ -60,14 +60,14 @@ class Origin:
 
     @cached_property
     def scene(self) -> dict[str, Any]:
-        """The tables of the scene with all that its files say; empty where the log carries none.
+        """Tables of the scene, including those of its files; empty if the log has none.
 
         Raises:
             ValueError: they cannot be read.
         """
         if self._setup is not None:
             return self._setup.resolved
-        try:  # the tables alone: they can be read even when classes of the set-up have changed
+        try:  # only the tables: they stay readable when classes of the run configuration change
             tree = json.loads(self._attachments.get(provenance.SETUP_FILE, b"{}")).get("resolved", {})
             result = present_tables(from_json(json.dumps(tree)))
         except ValueError as fault:
@@ -81,7 +81,7 @@ class Origin:
 
     @cached_property
     def metadata(self) -> dict[str, str]:
-        """Scene, seed, mode, version, digest and more, as a log has them."""
+        """Metadata as in a log: scene, seed, mode, version, digest and more."""
         return provenance.metadata(self._setup, "memory") if self._setup is not None else dict(self._metadata)
 
     def _unreadable(self, fault: ValueError) -> ValueError:

@@ -14,15 +14,15 @@ from lapwing.studies.topic_view import TopicView
 
 
 class FlightTopics:
-    """The topics of one vehicle's flight, by their names without the vehicle's.
+    """Topics of one vehicle's flight, by name without that of the vehicle.
 
     Attributes:
-        origin: where the flight comes from, with the log's metadata.
-        vehicle: name.
+        origin: log or run configuration, with the log's metadata.
+        vehicle: name of the vehicle.
     """
 
     def __init__(self, topics: Mapping[str, TopicView], origin: Origin):
-        """Create from topics by their name without the vehicle's: "ground_truth", "gps/fix", "clock"."""
+        """Create from topics by name without that of the vehicle: "ground_truth", "gps/fix", "clock"."""
         self.origin, self.vehicle = origin, origin.vehicle
         self._topics = dict(topics)
 
@@ -31,7 +31,7 @@ class FlightTopics:
         """Run configuration of the flight.
 
         Raises:
-            ValueError: the log carries no set-up, or one that this version cannot read.
+            ValueError: the log has no run configuration, or one that this version cannot read.
         """
         return self.origin.setup
 
@@ -42,7 +42,7 @@ class FlightTopics:
 
     @cached_property
     def digest(self) -> str:
-        """Digest over the deterministic messages: as the log states it ("": it has no end), or of the topics here."""
+        """Digest of the deterministic messages: that of the log ("" if its end is missing), or of the topics."""
         if self.origin.recorded:
             return self.metadata.get("digest", "")
         digest = Digest()
@@ -55,7 +55,7 @@ class FlightTopics:
 
     @property
     def truth(self) -> TopicView:
-        """The true state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
+        """True state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
         return self.topic("ground_truth")
 
     @property
@@ -80,17 +80,17 @@ class FlightTopics:
 
     @property
     def topics(self) -> list[str]:
-        """The names of all topics."""
+        """Names of all topics."""
         return sorted(self._topics)
 
     def topic(self, name: str) -> TopicView:
-        """Return a topic by its name without the vehicle's, for example "gps/fix".
+        """Return a topic by name without that of the vehicle, for example "gps/fix".
 
         Raises:
-            ValueError: it does not exist; names those that do.
+            ValueError: the topic does not exist; the message lists the topics.
         """
         if name not in self._topics:
-            raise ValueError(f"{self.origin.source}: has no topic {name}; it has {', '.join(self.topics)}")
+            raise ValueError(f"{self.origin.source}: no topic {name}; expected one of {', '.join(self.topics)}")
         return self._topics[name]
 
     def has(self, topic: str) -> bool:
@@ -120,7 +120,7 @@ class FlightTopics:
 
 
 def topic_of(name: str) -> Topic:
-    """Return the topic of a name without the vehicle's. Raise ValueError if there is none."""
+    """Return the topic of a name without that of the vehicle. Raise ValueError if there is none."""
     try:
         return topic_named(f"{{vehicle}}/{name}")
     except ValueError:

@@ -6,11 +6,11 @@ import numpy as np
 
 from lapwing.studies.topic_view import TopicView
 
-BOUNCE = 0.5  # [s] without contact that still belong to the same touch
+BOUNCE = 0.5  # [s] shorter gaps between contacts do not separate two touches
 
 
 class Touch(NamedTuple):
-    """A stretch on the ground, its bounces included."""
+    """An interval on the ground, including bounces."""
 
     start: int  # row of the truth with the first contact
     stop: int  # row after the last contact
@@ -18,7 +18,7 @@ class Touch(NamedTuple):
 
 
 def ground_contacts(truth: TopicView) -> list[Touch]:
-    """Return all intervals on the ground in order; none for a plant without contact information."""
+    """Return all intervals on the ground in order; empty for a plant without contact information."""
     contact = truth.ground_contact
     changed = (np.flatnonzero(contact[1:] != contact[:-1]) + 1).tolist()
     edges = [0] * bool(contact[0]) + changed + [len(contact)] * bool(contact[-1]) if len(contact) else []

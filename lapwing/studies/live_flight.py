@@ -14,40 +14,40 @@ from lapwing.studies.flight_events import Event
 from lapwing.studies.flight_provenance import Origin
 from lapwing.studies.topic_view import TopicView
 
-TAKEN = (*IN_SPACE, STATUS, ESTIMATE, LASER_SCAN, POINT_CLOUD, DEPTH_IMAGE)
+TOPICS = (*IN_SPACE, STATUS, ESTIMATE, LASER_SCAN, POINT_CLOUD, DEPTH_IMAGE)
 
 
 class LiveFlight:
-    """Takes the messages of a run as its services hand them over, in whatever order they come."""
+    """Buffer of a run's messages, which the services may deliver in any order."""
 
     def __init__(self, setup: RunConfig):
-        """Create from the run configuration before the run; of a fleet that of one vehicle
-        (`lapwing.cosim.diagram.multi_vehicle.members`)."""
+        """Create from the run configuration of one vehicle before the run (see
+        `lapwing.cosim.diagram.multi_vehicle.members` for a fleet)."""
         self._setup, self.vehicle = setup, setup.vehicle
-        self._said: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TAKEN}  # time [ns], payload
+        self._pending: dict[Topic, list[tuple[int, bytes]]] = {topic: [] for topic in TOPICS}  # time [ns], payload
 
-    def take(self, pages: Iterable[RecordBatch]) -> None:
-        """Add log packets of a service."""
+    def add(self, pages: Iterable[RecordBatch]) -> None:
+        """Add record batches of a service."""
         interval = self._setup.interval_ns
         for page in pages:
             topic = template_topic(page.topic)
-            if topic in self._said and page.topic.vehicle in ("", self._setup.vehicle):
+            if topic in self._pending and page.topic.vehicle in ("", self._setup.vehicle):
                 rows = zip(page.ticks, page.payloads, strict=True)
-                self._said[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
+                self._pending[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
 
     def step(self, until_ns: int) -> FlightData | None:
-        """Return the new samples up to an instant, starting with the newest sample before them.
+        """Return the new samples up to `until_ns` [ns], and before them the newest of the previous step.
 
-        None without new ground truth.
+        Return None without new ground truth.
         """
         views: dict[str, TopicView] = {}
-        for topic, text in self._said.items():
-            now = [message for message in text if message[0] <= until_ns]
+        for topic, messages in self._pending.items():
+            now = [message for message in messages if message[0] <= until_ns]
             if now:
                 times, payloads = zip(*now, strict=True)
                 columns = history(topic.message, payloads)
                 views[topic.name.removeprefix("{vehicle}/")] = TopicView(np.array(times, np.int64), columns)
-                del text[: len(now) - 1]  # the newest begins the next step
+                del messages[: len(now) - 1]  # the newest is the first of the next step
         if "ground_truth" not in views or len(views["ground_truth"]) < 2:
             return None
         return FlightData(views, Origin.of_setup(self._setup))

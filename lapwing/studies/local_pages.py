@@ -1,4 +1,4 @@
-"""Access rule of pages that are served on this machine: secret path, Host and Origin."""
+"""Access control of pages served on this machine: secret path, Host and Origin."""
 
 import http
 import secrets
@@ -16,12 +16,12 @@ def hosts(port: int) -> set[str]:
 def refusal(
     path: str, host: str | None, origins: Collection[str], token: str, known: Collection[str]
 ) -> http.HTTPStatus | None:
-    """Return the status with which a request is rejected, or None if it may pass.
+    """Return the status with which a request is rejected, or None if it is accepted.
 
     Args:
-        path: of the request, with the secret as its first part.
-        host: header Host, None without one.
-        origins: all headers Origin.
+        path: path of the request, whose first part is the secret.
+        host: value of the header Host; None without one.
+        origins: values of all headers Origin.
         token: the secret; "" rejects every path.
         known: accepted hosts with their port.
     """

@@ -21,28 +21,27 @@ SIGMAS = 3.0  # standard deviations of the estimate
 
 METRICS: dict[str, str] = {
     "outcome": "",  # landed, completed, landed elsewhere, ended in failsafe, timed out, aborted, crashed, diverged
-    "outcome_text": "",  # with the circumstances
-    "time": "s",  # of the last touch-down, of the crash, or of the end
+    "outcome_text": "",  # outcome with the circumstances
+    "time": "s",  # time of the last touch-down, of the crash, or of the end
     "duration": "s",
     "target_distance": "m",  # horizontal distance from the mission's target at the end
     "failsafe_time": "s",  # start of the failsafe in which the flight ended
-    **{f"rmse.{axis}": unit for axis, unit in AXES.items()},  # of the reference against the truth
-    **{f"rmse_estimate.{axis}": unit for axis, unit in AXES.items()},  # of the reference against the estimate
-    "max_distance": "m",  # from the reference
-    "overshoot": "m",  # beyond the least and greatest of the reference along x, y or z
-    "max_tilt": "rad",  # from the vertical
+    **{f"rmse.{axis}": unit for axis, unit in AXES.items()},  # error of the truth from the reference
+    **{f"rmse_estimate.{axis}": unit for axis, unit in AXES.items()},  # error of the estimate from the reference
+    "max_distance": "m",  # largest distance from the reference
+    "overshoot": "m",  # beyond the extremes of the reference along x, y or z
+    "max_tilt": "rad",  # largest angle from the vertical
     "saturation": "",  # share of the time in the air with a motor at a limit of its voltage
-    "energy": "J",  # electrical
-    "touchdown.x": "m",  # at the last touch-down
+    "energy": "J",  # electrical energy
+    "touchdown.x": "m",  # position and tilt at the last touch-down
     "touchdown.y": "m",
     "touchdown.tilt": "rad",
     "touchdown.speed": "m/s",  # downwards, at the hardest touch
-    **{
-        f"within_3sigma.{axis}": "" for axis in "xyz"
-    },  # share of the time with the truth within 3 sigma of the estimate
+    # share of the time with the truth within 3 sigma of the estimate
+    **{f"within_3sigma.{axis}": "" for axis in "xyz"},
     "nees": "",  # mean over time of the joint normalised error squared of attitude, velocity, position; 9 if consistent
-    "within_95.nees": "",  # share of the time with it below the 95 % quantile of its distribution
-    **{f"nis.{source}": "" for source in SOURCES},  # mean normalised innovation squared by dimension; 1 if consistent
+    "within_95.nees": "",  # share of the time with this error below its 95 % quantile
+    **{f"nis.{source}": "" for source in SOURCES},  # mean normalised innovation squared per dimension; 1 if consistent
     "nis_samples": "",  # number of samples of each of these means
 }
 """Name and unit of every metric, in the order of the columns of a campaign's table."""
@@ -55,8 +54,8 @@ def check_success(scene: Scene) -> None:
 
 
 def unmet_criteria(flight: FlightData) -> list[str]:
-    """Return the expressions of `success.require` that do not hold, without the default one."""
-    with suppress(ValueError):  # no run configuration, or one of another version
+    """Return the expressions of `success.require` that do not hold, except the default one."""
+    with suppress(ValueError):  # the log has no run configuration, or one of another version
         criteria = Success.model_validate(flight.origin.scene.get(Success.TABLE, {}))
         own = [text for text in criteria.require if text not in Success().require]
         return Success(require=tuple(own)).unmet(metrics(flight)) if own else []
@@ -64,7 +63,7 @@ def unmet_criteria(flight: FlightData) -> list[str]:
 
 
 def metrics(flight: FlightData) -> dict[str, Any]:
-    """Return the metrics of a flight by name; NaN for those that it does not have."""
+    """Return the metrics of a flight by name; NaN for those that cannot be computed."""
     truth, outcome, armed = flight.truth, flight.outcome, flight.armed
     n, t = len(armed), truth.times
     result: dict[str, Any] = dict.fromkeys(METRICS, math.nan)
@@ -93,8 +92,8 @@ def metrics(flight: FlightData) -> dict[str, Any]:
 
 
 def compile_ahead() -> None:
-    """Compile the functions that compute metrics; they are the same for every flight."""
-    rows, armed = np.zeros((2, 4)), np.ones(2, bool)  # of a single row numpy does not say how it lies
+    """Compile the functions that compute metrics, which are the same for every flight."""
+    rows, armed = np.zeros((2, 4)), np.ones(2, bool)  # two rows: numpy does not define the layout of one
     errors(np.zeros((2, 6)), rows, rows, armed)
     rmse(Reference(rows, rows, rows[:, 0]), rows, roll_pitch_yaw(rows), armed)
     reach(rows, rows, armed)
@@ -104,12 +103,12 @@ def compile_ahead() -> None:
 
 
 def _tilt(cosine: float) -> float:
-    """Return the angle [rad] of a cosine that rounding may have brought beyond 1."""
+    """Return the angle [rad] of a cosine that may exceed 1 by rounding."""
     return float(np.arccos(np.clip(cosine, -1.0, 1.0)))
 
 
 def _of_estimate(flight: FlightData, armed: np.ndarray) -> dict[str, float]:
-    """Return the metrics that need an estimate at every tick; {} without."""
+    """Return the metrics that need an estimate at every tick, or {} without one."""
     n = len(armed)
     if not flight.has("estimate") or len(flight.estimate) < n:
         return {}

@@ -1,4 +1,4 @@
-"""Mission of a flight: the scene's trajectory or a flight plan, and where it ends."""
+"""Mission of a flight: the scene's trajectory or a flight plan, and its target."""
 
 from typing import Any, NamedTuple
 
@@ -12,11 +12,13 @@ from lapwing.studies.topic_view import TopicView
 
 
 class Mission(NamedTuple):
-    """Target of a mission, and whether the run can reach its end."""
+    """Target and end of a mission."""
 
-    target: tuple[float, float, float] | None  # [m] world, of its end; None if unknown before the flight
-    final_phase: str | None = None  # of a trajectory that ends in the air; None for missions that end with a landing
-    is_longer: bool = False  # the run ends before its trajectory
+    target: tuple[float, float, float] | None  # [m] world, position at the end; None if unknown before the flight
+    final_phase: str | None = (
+        None  # last phase of a trajectory that ends in the air; None for missions that end with a landing
+    )
+    is_longer: bool = False  # True if the run ends before the trajectory
 
     def completion(self, status: TopicView) -> str:
         """Return the reason why a flight that has not landed is complete; "" if it is not."""
@@ -29,7 +31,7 @@ class Mission(NamedTuple):
 
 
 def mission_of(setup: RunConfig, start: np.ndarray) -> Mission | None:
-    """Return the mission of a run configuration of one vehicle; None if it has none.
+    """Return the mission of one vehicle's run configuration, or None without one.
 
     Args:
         setup: run configuration.
@@ -72,12 +74,12 @@ def _plan_items(autopilot: Any) -> tuple[Any, ...]:
 
 
 def _plan_target(items: tuple[Any, ...], start: np.ndarray) -> tuple[float, float, float] | None:
-    """Return the place of the last item that has one: the start for "return"."""
+    """Return the position of the last item with one [m], world; that of "return" is the start."""
     for item in reversed(items):
         if item.action == "return":
             x, y, z = map(float, start)
             return x, y, z
-        place = (float(item.position.x), float(item.position.y), float(item.position.z))
-        if item.action in ("waypoint", "loiter_time", "land", "takeoff") and np.isfinite(place[:2]).all():
-            return place
+        position = (float(item.position.x), float(item.position.y), float(item.position.z))
+        if item.action in ("waypoint", "loiter_time", "land", "takeoff") and np.isfinite(position[:2]).all():
+            return position
     return None

@@ -1,4 +1,4 @@
-"""Validity warnings: vortex ring state, motor currents that no model limits, the edge of the terrain grid."""
+"""Validity warnings: vortex ring state, unlimited motor currents, the edge of the terrain grid."""
 
 from typing import Any, NamedTuple
 
@@ -7,9 +7,9 @@ import numpy as np
 from lapwing.studies.saturation import intervals
 from lapwing.studies.topic_view import TopicView
 
-SHORTEST = 0.5  # [s] in all; less is not reported, except of currents
-# Vortex ring state, in units of the induced velocity in hover: descent between these, slower across than this (after
-# Leishman, Principles of Helicopter Aerodynamics, section 2.13)
+SHORTEST = 0.5  # [s] total time below which a warning is suppressed, except for currents
+# Vortex ring state, in units of the induced velocity in hover: range of the descent rate, and largest speed across the
+# rotor axis (after Leishman, Principles of Helicopter Aerodynamics, section 2.13)
 SLOWEST_DESCENT, FASTEST_DESCENT, FASTEST_ACROSS = 0.5, 1.5, 1.0
 
 
@@ -42,7 +42,7 @@ def validity_warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityW
 
 
 def _unlimited_current(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:
-    """Return the warning on winding currents above the motor's printed peak, which only `dc_motor` keeps."""
+    """Return the warning on winding currents above the motor's rated peak, which only `dc_motor` limits."""
     motor = _table(scene, "airframe", "motor")
     limit = motor.get("peak_current")
     if limit is None:
@@ -68,7 +68,7 @@ def winding_current(truth: TopicView, motor: dict[str, Any]) -> np.ndarray:
 def _warning(
     truth: TopicView, where: np.ndarray, name: str, consequence: str, shortest: float = SHORTEST
 ) -> list[ValidityWarning]:
-    """Return the warning on the times at which something holds, or none if they are shorter than `shortest` [s]."""
+    """Return a warning on the times of `where`, or [] if they last less than `shortest` [s] in total."""
     step = np.diff(truth.times, append=truth.times[-1])
     seconds, flight = float(step[where].sum()), float(step[~truth.ground_contact].sum())
     if seconds < shortest or not where.any():
@@ -81,7 +81,7 @@ def _warning(
 
 
 def in_vortex_ring(truth: TopicView, diameter: float) -> np.ndarray:
-    """Return True where the rotors descend into their own flow, shape (n,).
+    """Return True where the rotors descend into their own wake, shape (n,).
 
     Args:
         truth: true state, n messages.

@@ -1,4 +1,4 @@
-"""Outcome of a flight: the only place that decides whether it landed, crashed, timed out or ended otherwise."""
+"""Outcome of a flight: the classification as landed, crashed, timed out and so on."""
 
 import math
 from typing import Literal, NamedTuple, get_args
@@ -15,24 +15,24 @@ Kind = Literal[
 KINDS = get_args(Kind)  # from best to worst
 LANDED = ("landed", "landed elsewhere", "ended in failsafe")  # kinds of a vehicle at rest on its feet
 
-HARD = 2.0  # [m/s] downwards at a touch: a crash
+HARD = 2.0  # [m/s] downward speed at a touch above which it is a crash
 UPSIDE = 0.0  # cosine of the tilt below which the vehicle has turned over: a crash
-SLOW = 0.5  # [m/s] a vehicle that has landed moves less
-UPRIGHT = math.cos(math.radians(30.0))  # and is tilted less
-RESTING = 0.1  # [m] from the initial height, for plants without contact information
-LANDING_RADIUS = 5.0  # [m] horizontally from the target of the mission, for satellite navigation without corrections
+SLOW = 0.5  # [m/s] largest speed of a vehicle at rest
+UPRIGHT = math.cos(math.radians(30.0))  # cosine of the largest tilt of a vehicle at rest
+RESTING = 0.1  # [m] largest difference from the initial height at rest, for plants without contact information
+LANDING_RADIUS = 5.0  # [m] horizontal distance from the mission's target: uncorrected satellite navigation
 
 
 class FlightOutcome(NamedTuple):
     """Outcome of a flight: kind, time and place.
 
     - "landed": the mission is finished; the vehicle is upright and at rest within 5 m of the mission's target.
-    - "completed": the flight reached its end without a landing to make: no autopilot, no mission, a trajectory that
+    - "completed": the flight reached its end and no landing is required: no autopilot, no mission, a trajectory that
       ends in the air, or a run that ends before its trajectory.
     - "landed elsewhere": as "landed", but farther from the target.
     - "ended in failsafe": a failsafe ended the mission and the vehicle landed.
     - "timed out": the mission was not finished, or the vehicle never left the ground.
-    - "aborted": something else ended the run early.
+    - "aborted": another failure ended the run early.
     - "crashed": the vehicle turned over, hit the ground at more than 2 m/s, or was not at rest on its feet after the
       mission.
     - "diverged": a state was not finite.
@@ -70,7 +70,7 @@ def classify(
         truth: true state; at least one message.
         status: autopilot status; None without an autopilot.
         failure: reason of an early end; "" without one.
-        diverged: True if a state was not finite.
+        diverged: True if a state is non-finite.
         mission: mission of the autopilot; None without one.
     """
     end, cosine = float(truth.times[-1]), truth.tilt_cosine
@@ -105,7 +105,7 @@ def classify(
         return outcome("timed out", end, "never took off" + _failsafe_text(failsafe), failsafe)
     if fault := _not_resting(truth, status, cosine):
         return outcome("crashed", end, fault, failsafe)
-    # the last touch before the motors went off; a plant without contact information has none
+    # the last touch before the motors stopped; without contact information, the end
     time = float(truth.times[contacts[-1].start]) if contacts else end
     how = [f"upright on its feet, touched down at {contacts[-1].speed:.2f} m/s"] if contacts else []
     if failsafe:
@@ -125,13 +125,13 @@ def mission_finished(status: TopicView) -> bool:
         return True
     if "mode" not in status.fields:
         return False
-    # along the scene's own trajectory a stop on the ground is a part of the mission; its mode is "mission"
+    # a stop on the ground along the scene's trajectory is a part of the mission, in the mode "mission"
     at_rest = status.landed[-1] and not status.armed[-1] and status.mode[-1] == "hold"
     return bool(at_rest and status.armed.any())
 
 
 def _last_failsafe(status: TopicView) -> tuple[float, str] | None:
-    """Return start [s] and reason of the failsafe in force when the motors were last armed; None without one."""
+    """Return start [s] and reason of the failsafe active when the motors were last armed, or None without one."""
     if not {"failsafe", "text", "armed"} <= set(status.fields):
         return None
     armed = np.flatnonzero(status.armed)
@@ -143,7 +143,7 @@ def _last_failsafe(status: TopicView) -> tuple[float, str] | None:
 
 
 def _accident(truth: TopicView, cosine: np.ndarray, contacts: list[Touch]) -> tuple[float, str] | None:
-    """Return the time of the first accident and a list of all; None without one."""
+    """Return the time [s] of the first accident and a text that lists all, or None without one."""
     accidents = []
     turned_over = np.flatnonzero(cosine < UPSIDE)
     if len(turned_over):

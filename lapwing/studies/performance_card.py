@@ -1,4 +1,4 @@
-"""The performance card of a vehicle: what its models give, beside what others state (theory.md, chapter 2)."""
+"""Performance card of a vehicle: computed from its models, next to published values (theory.md, chapter 2)."""
 
 import math
 import tomllib
@@ -24,14 +24,14 @@ from lapwing.studies.json_file import write_json  # noqa: F401 (part of the inte
 
 
 class Row(NamedTuple):
-    """One figure of the card, in the unit that it is shown in."""
+    """One figure of the card, in its display unit."""
 
     name: str
     unit: str
-    computed: float | None  # None: the vehicle lacks what it needs
+    computed: float | None  # None: the vehicle lacks a required parameter
     published: float | None
     source: str
-    reason: str  # why the two differ, or why nothing is computed
+    reason: str  # reason of the difference, or of the missing computed value
 
 
 def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Rotor) -> float:
@@ -47,15 +47,15 @@ def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Ro
     else:
         x, y, _ = zip(*rotors.position, strict=True)
         B = effectiveness(x, y, reaction)
-    _, *lost = tables(B)
-    if not lost:
+    _, *loss_tables = tables(B)
+    if not loss_tables:
         raise ValueError(f"the {count} rotors cannot lose one")
-    most = performance.maximum_thrust(airframe, rotor=rotor) / B[0].sum()  # [N] of a rotor
-    lifts = (most / max(collective for collective, *_ in shares) for shares in lost)
+    most = performance.maximum_thrust(airframe, rotor=rotor) / B[0].sum()  # [N] maximum thrust of a rotor
+    lifts = (most / max(collective for collective, *_ in shares) for shares in loss_tables)
     return float(virtual_control_effectiveness(B)[0] * min(lifts)) / (airframe.mass.total * performance.GRAVITY)
 
 
-# name of the figure, and of what is published of it: (what computes it, unit shown, SI units in one of it)
+# figure, also the name of its published value: (function, display unit, display unit in SI units)
 _SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
     "thrust over weight": (performance.thrust_over_weight, "-", 1.0),
     "the same without a rotor": (thrust_over_weight_without_a_rotor, "-", 1.0),
@@ -72,8 +72,8 @@ _SHOWN: dict[str, tuple[Callable[..., Any], str, float]] = {
     "maximum tilt": (performance.maximum_tilt, "deg", math.pi / 180.0),
     "maximum speed": (performance.maximum_speed, "m/s", 1.0),
 }
-# figures that are false if the rotors take too little power
-_OF_POWER = {
+# figures that are wrong if the rotors draw too little power
+_POWER_FIGURES = {
     "hover power",
     "hover current",
     "motor current in hover",
@@ -88,7 +88,7 @@ def card(subject: Path) -> list[Row]:
     """Return the performance of a vehicle.
 
     Args:
-        subject: airframe file, or scene with the vehicle.
+        subject: airframe file, or scene of the vehicle.
 
     Raises:
         ValueError: the file is neither, or the rotor thrust is undefined.
@@ -99,12 +99,12 @@ def card(subject: Path) -> list[Row]:
         stated = getattr(vehicle.published, name.replace(" ", "_"), None)
         computed, reason = None, stated.reason if stated else ""
         try:
-            if fault and name in _OF_POWER:
+            if fault and name in _POWER_FIGURES:
                 raise ValueError(fault)
             value = figure(vehicle, rotor=rotor)
             computed = (value[0] if isinstance(value, tuple) else value) / size
-        except ValueError as lacking:
-            reason = str(lacking)
+        except ValueError as error:
+            reason = str(error)
         rows.append(
             Row(
                 name,
@@ -123,12 +123,12 @@ def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
         tables = tomllib.loads(read_text(subject))
     except (OSError, ValueError):
         tables = {}
-    if "rotors" in tables:  # what no scene has
-        alone = load_airframe(subject).loaded
+    if "rotors" in tables:  # an airframe file: scenes have no such table
+        loaded = load_airframe(subject).loaded
         try:
-            return alone, performance.rotor_of(alone)
-        except ValueError as lacking:
-            raise ValueError(f"{subject}: {lacking}") from None
+            return loaded, performance.rotor_of(loaded)
+        except ValueError as error:
+            raise ValueError(f"{subject}: {error}") from None
     scene = load(subject)
     frame, rotor = airframe(scene), rotor_constants(scene)
     return frame, performance.rotor_of(frame) if rotor.with_density else performance.Rotor(*rotor)
@@ -143,7 +143,7 @@ def show(console: Console, rows: list[Row]) -> None:
     if source:
         table.add_column(source, justify="right")
     if any(row.reason for row in rows):
-        table.add_column("why they differ" if source else "why not")
+        table.add_column("reason for difference" if source else "reason")
     for row in rows:
         cells = [f"{row.name} [{row.unit}]", _number(row.computed)]
         if source:
@@ -153,7 +153,7 @@ def show(console: Console, rows: list[Row]) -> None:
 
 
 def _number(value: float | None) -> str:
-    """Return three significant digits, without an exponent up to a million; "" for None."""
+    """Return a text of three significant digits, without an exponent below a million; "" for None."""
     if value is None:
         return ""
     return f"{value:.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.3g}"

@@ -8,26 +8,26 @@ import numpy as np
 from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.studies.flight_data import FlightData
 
-ACTIONS = ("waypoint", "loiter_time", "land", "takeoff")  # items with a place
+ACTIONS = ("waypoint", "loiter_time", "land", "takeoff")  # items with a position
 
 
 class FenceShape(NamedTuple):
-    """Outline of an area of the fence."""
+    """Outline of a fence area."""
 
     stay_in: bool  # False: the vehicle must stay out
     corners: np.ndarray  # [m] world x and y, shape (k, 2), not closed
 
 
 def waypoints(flight: FlightData) -> np.ndarray:
-    """Return the places of the mission of the plan in order [m], world, shape (n, 3)."""
+    """Return the positions of the plan's mission items in order [m], world, shape (n, 3)."""
     items = _uploads(flight, "mission_upload")
-    places = [(i.position.x, i.position.y, i.position.z) for i in items if i.action in ACTIONS]
-    points = np.array(places, float).reshape(-1, 3)
+    positions = [(i.position.x, i.position.y, i.position.z) for i in items if i.action in ACTIONS]
+    points = np.array(positions, float).reshape(-1, 3)
     return points[np.isfinite(points).all(axis=1)]
 
 
 def fence_shapes(flight: FlightData) -> Iterator[FenceShape]:
-    """Yield the areas of the fence of the plan, circles as polygons; nothing if the fence is invalid."""
+    """Yield the areas of the plan's fence, circles as polygons; nothing if the fence is invalid."""
     try:
         shapes = Fence(_uploads(flight, "fence_upload")).shapes
     except ValueError:
@@ -42,7 +42,7 @@ def fence_shapes(flight: FlightData) -> Iterator[FenceShape]:
 
 
 def _uploads(flight: FlightData, kind: str) -> tuple[Any, ...]:
-    """Return the items of the last upload of a kind in the plan of a flight; empty without one."""
+    """Return the items of the last upload of a kind in the flight's plan; empty without one."""
     try:
         plan = getattr(flight.setup.services["autopilot"].parameters, "plan", ())
     except (KeyError, ValueError):

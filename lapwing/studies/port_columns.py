@@ -1,4 +1,4 @@
-"""The messages of a topic as columns, straight from the rows of its port, as far as these have them."""
+"""Messages of a topic as columns, directly from the rows of its port where these contain the fields."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
@@ -20,7 +20,7 @@ def columns_of(
 
     Args:
         graph: block diagram with the full history of these topics.
-        only: topics of every vehicle; None: all recorded ones.
+        only: topics to yield, of every vehicle; None: all recorded ones.
     """
     interval = graph.setup.interval_ns
     for service in graph.services:
@@ -36,9 +36,9 @@ def columns_of(
 
 
 class PortColumns(Mapping[str, Any]):
-    """Columns of a topic with the interface of `TopicColumns`; messages are encoded only when needed.
+    """Columns of a topic with the interface of `TopicColumns`; messages are encoded only on demand.
 
-    Encoding takes half as long as flying, and studies of many flights need only numbers that the samples hold.
+    Encoding takes half as long as the simulation, and studies of many flights only need numbers of the samples.
     """
 
     def __init__(self, graph: BlockDiagram, wire: TopicEncoder):
@@ -55,22 +55,21 @@ class PortColumns(Mapping[str, Any]):
 
     @cached_property
     def _names(self) -> dict[str, None]:
-        """Return the fields of every message that do not depend on its texts."""
+        """Names of the fields that all messages have, whatever their texts."""
         keys = _distinct(self._texts) if self._texts else [()]
         shapes = [_shapes(self._wire.topic.message, self._wire.sample(*key).encode()) for key in keys]
         return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))
 
     @cached_property
     def messages(self) -> TopicColumns:
-        """The encoded messages."""
+        """Encoded messages."""
         port = self._graph.ports[self._wire.port]
         pages = list(encode(self._wire, port, self._graph.setup, self.ticks, self._rows))
-        places = [np.searchsorted(self.ticks, page.ticks) for page in pages]
-        parts = [(place, page.payloads) for place, page in zip(places, pages, strict=True)]
+        parts = [(np.searchsorted(self.ticks, page.ticks), page.payloads) for page in pages]
         return history_of_pages(self._wire.topic.message, parts)
 
     def payloads(self) -> list[bytes]:
-        """Return the messages in order, as CDR."""
+        """Return the CDR of the messages in order."""
         return self.messages.payloads()
 
     def __getitem__(self, name: str) -> Any:
@@ -97,7 +96,7 @@ class PortColumns(Mapping[str, Any]):
 
 @lru_cache(maxsize=256)
 def _shapes(message: Any, payload: bytes) -> dict[str, tuple[Any, tuple[int, ...]]]:
-    """Return type and shape of each field of a message, without its time; shared by the flights of a campaign."""
+    """Return dtype and shape, without the time axis, of each field of a message; cached across flights."""
     result = {name: np.asarray(column) for name, column in history(message, [payload]).items()}
     return {name: (column.dtype, column.shape[1:]) for name, column in result.items()}
 
@@ -108,6 +107,6 @@ def _distinct(texts: Sequence[np.ndarray]) -> list[tuple[int, ...]]:
     changed[0] = True
     for column in texts:
         changed[1:] |= column[1:] != column[:-1]
-    at = np.flatnonzero(changed)
-    keys = np.stack([np.asarray(column[at], np.int64) for column in texts], axis=1)
+    rows = np.flatnonzero(changed)
+    keys = np.stack([np.asarray(column[rows], np.int64) for column in texts], axis=1)
     return list(dict.fromkeys(map(tuple, keys.tolist())))

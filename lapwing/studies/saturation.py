@@ -1,4 +1,4 @@
-"""Motor saturation: motors at a limit of their voltage in the air."""
+"""Motor saturation: motors at a voltage limit in the air."""
 
 import functools
 from typing import Any, NamedTuple
@@ -9,17 +9,17 @@ from lapwing.kernels import kernel
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.tracking import plain, strided_view
 
-NEAR = 1e-6  # of the maximum voltage: nearer to a limit is at it
+NEAR = 1e-6  # distance from a limit that counts as at it, relative to the maximum voltage
 GAP = 1.0  # [s] shorter gaps do not separate two intervals
 
 
 class Saturation(NamedTuple):
-    """Motors at a limit of their voltage while the vehicle flies."""
+    """Motors at a voltage limit while the vehicle is in the air."""
 
-    low: np.ndarray  # at no voltage, shape (n, motors) of bool
-    high: np.ndarray  # at the highest
-    step: np.ndarray  # [s] of each row, shape (n,)
-    flying: np.ndarray  # armed and off the ground, shape (n,) of bool
+    low: np.ndarray  # True at 0 V, shape (n, motors)
+    high: np.ndarray  # True at the maximum voltage, shape (n, motors)
+    step: np.ndarray  # [s] duration of each row, shape (n,)
+    flying: np.ndarray  # True if armed and off the ground, shape (n,)
 
     @property
     def any(self) -> np.ndarray:
@@ -33,17 +33,17 @@ class Saturation(NamedTuple):
         return float(self.step[self.any].sum())
 
     def share(self, seconds: float) -> float:
-        """Return a time [s] as a share of the time in the air."""
+        """Return a duration [s] as a share of the time in the air."""
         return seconds / max(float(self.step[self.flying].sum()), 1e-9)
 
 
 def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturation:
-    """Return the motors at 0 or at the `highest` voltage [V] while the vehicle flies.
+    """Return the motors at 0 V or at the `highest` voltage while the vehicle is in the air.
 
     Args:
-        truth: of n or more messages.
-        armed: shape (n,) of bool.
-        highest: of each motor.
+        truth: true state, n or more messages.
+        armed: True where the motors are armed, shape (n,).
+        highest: maximum voltage of a motor [V].
     """
     n = len(armed)
     voltage, t = truth.motor_voltage[:n], truth.times[:n]
@@ -53,7 +53,7 @@ def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturatio
 
 
 def limits(voltage: np.ndarray, flying: np.ndarray, highest: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the motors at 0 and those at the `highest` voltage [V], shapes (n, motors), in rows that are `flying`."""
+    """Return True for the motors at 0 V and at the `highest` voltage [V], shapes (n, motors), where `flying`, (n,)."""
     low, high = np.empty(voltage.shape, bool), np.empty(voltage.shape, bool)
     _limits(low, high, strided_view(voltage), plain(flying, bool), NEAR * highest, (1.0 - NEAR) * highest)
     return low, high
@@ -68,7 +68,7 @@ def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: 
 
 
 def intervals(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:
-    """Return the rows (first, stop) of the intervals in which something holds; short gaps are closed."""
+    """Return the rows (first, stop) of the intervals where `where` is True; gaps shorter than GAP are closed."""
     edges = np.diff(where.astype(np.int8), prepend=0, append=0)
     merged: list[tuple[int, int]] = []
     for start, stop in zip(np.flatnonzero(edges == 1).tolist(), np.flatnonzero(edges == -1).tolist(), strict=True):

@@ -1,4 +1,4 @@
-"""Least separation of the vehicles of a fleet."""
+"""Minimum separation of the vehicles of a fleet."""
 
 from collections.abc import Iterator, Mapping
 from itertools import combinations
@@ -10,7 +10,7 @@ from lapwing.studies.topic_view import TopicView
 
 
 class Separation(NamedTuple):
-    """The least distance between the centres of mass of two vehicles, and when."""
+    """Minimum distance between the centres of mass of two vehicles, and its time."""
 
     distance: float  # [m]
     time: float  # [s]

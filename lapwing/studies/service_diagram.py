@@ -1,4 +1,4 @@
-"""A picture of the services of a run, what they hand to one another, and who listens."""
+"""Diagram of the services of a run, their connections, and the auxiliary processes."""
 
 import math
 from pathlib import Path
@@ -13,15 +13,15 @@ from lapwing.services.process_table import MAVLINK, PROCESSES, ProcessEntry
 from lapwing.studies.report.style import DPI, FLOWN
 
 GREY, PALE = "#666666", "#F4F6F8"
-WIDE, HIGH = 6.6, 3.9  # from service to service
-HALF = (1.05, 0.8)  # width and height of half a service
-LOW, NARROW = 0.35, 0.95  # height and width of half a process that listens
-OUTER = 0.9  # that the row of these is wider at each end than the services' middles
-APART = 0.32  # between the arrows of two services
+DISTANCE_X, DISTANCE_Y = 6.6, 3.9  # between the centres of services
+HALF = (1.05, 0.8)  # half the width and height of a service
+LISTENER_HALF_WIDTH, LISTENER_HALF_HEIGHT = 0.95, 0.35  # of an auxiliary process
+OVERHANG = 0.9  # of the row of auxiliary processes beyond the centres of the outer services
+ARROW_DISTANCE = 0.32  # between the arrows of two services
 PLACES = {"plant": (0, 1), "sensors": (1, 1), "trajectory": (0, 0), "autopilot": (1, 0), "formation": (1, 0)}
-TAKEN = {"recorder": "every recorded topic", MAVLINK: "telemetry"}  # by those who do not listen to every topic
+LISTENER_INPUTS = {"recorder": "every recorded topic", MAVLINK: "telemetry"}  # otherwise: every topic
 STATION, LINK = "ground station", "MAVLink 2"
-TOP, BOTTOM, LAST, ASIDE = -1.15, -3.0, -5.0, 0.7  # rows below the services; arrows beside the middle
+TOP, BOTTOM, LAST, ASIDE = -1.15, -3.0, -5.0, 0.7  # y of the rows below the services; x of arrows off the centre
 NOTE = "* input delay of one or more ticks\nsolid: lock step; dashed: started by an option"
 
 Point = tuple[float, float]
@@ -38,7 +38,7 @@ class Arrow(NamedTuple):
 
 
 def ports_by_pair(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
-    """Return the ports of each pair (producer, consumer); "*" marks delayed ones."""
+    """Return the names of the ports of each pair (producer, consumer), with "*" if the input is delayed."""
     result: dict[tuple[str, str], list[str]] = {}
     producers = setup.producers
     for name, service in setup.services.items():
@@ -50,49 +50,55 @@ def ports_by_pair(setup: RunConfig) -> dict[tuple[str, str], list[str]]:
 
 
 def listeners(setup: RunConfig) -> list[ProcessEntry]:
-    """Return the auxiliary processes; the MAVLink link if there is an autopilot."""
+    """Return the auxiliary processes; the MAVLink link only with an autopilot."""
     return [p for p in PROCESSES if not p.lock_step and (not p.resolves or p.name in setup.auxiliary)]
 
 
 def places(setup: RunConfig) -> dict[str, Point]:
     """Return the centre of each service."""
-    return {name: (WIDE * x, HIGH * y) for name in setup.services for x, y in [PLACES.get(name, (0.5, 0.5))]}
+    return {
+        name: (DISTANCE_X * x, DISTANCE_Y * y) for name in setup.services for x, y in [PLACES.get(name, (0.5, 0.5))]
+    }
 
 
 def arrows(setup: RunConfig) -> list[Arrow]:
-    """Return an arrow per topic between services, and those of auxiliary processes."""
+    """Return an arrow for each port between services, and the arrows of auxiliary processes."""
     at, pairs, result = places(setup), ports_by_pair(setup), []
     for one, other in dict.fromkeys((min(pair), max(pair)) for pair in pairs):
         ways = [(one, other, text) for text in pairs.get((one, other), ())]
         ways += [(other, one, text) for text in pairs.get((other, one), ())]
         for k, (producer, consumer, text) in enumerate(ways):
-            offset = APART * (k - 0.5 * (len(ways) - 1))
+            offset = ARROW_DISTANCE * (k - 0.5 * (len(ways) - 1))
             result.append(Arrow(*_beside(at[producer], at[consumer], offset if producer == one else -offset), text))
     for entry, (x, y) in _listening(setup).items():
         steers = entry.name == MAVLINK
-        left, label = x - ASIDE * steers, TAKEN.get(entry.name, "every topic")
-        result.append(Arrow((left, TOP), (left, y + LOW), label, GREY))
+        left, label = x - ASIDE * steers, LISTENER_INPUTS.get(entry.name, "every topic")
+        result.append(Arrow((left, TOP), (left, y + LISTENER_HALF_HEIGHT), label, GREY))
         if steers:
-            result.append(Arrow((x + ASIDE, y + LOW), (x + ASIDE, TOP), "commands", GREY))
-            result.append(Arrow((x, y - LOW), (x, LAST + LOW), LINK, GREY, both_ways=True))
+            result.append(Arrow((x + ASIDE, y + LISTENER_HALF_HEIGHT), (x + ASIDE, TOP), "commands", GREY))
+            result.append(
+                Arrow((x, y - LISTENER_HALF_HEIGHT), (x, LAST + LISTENER_HALF_HEIGHT), LINK, GREY, both_ways=True)
+            )
     return result
 
 
 def draw(setup: RunConfig, path: Path) -> None:
-    """Write the picture of a run in the format of the file's ending."""
+    """Write the diagram of a run in the format of the file name's extension."""
     figure = Figure(figsize=(9.4, 9.0))
     axes = figure.add_subplot(aspect="equal")
-    axes.set(xlim=(-1.9, WIDE + 1.9), ylim=(LAST - 1.3, HIGH + 1.4))
+    axes.set(xlim=(-1.9, DISTANCE_X + 1.9), ylim=(LAST - 1.3, DISTANCE_Y + 1.4))
     axes.axis("off")
     axes.set_title(f"{setup.scene}: {setup.rate} Hz, {setup.coupling}")
-    area = FancyBboxPatch((-1.4, TOP + 0.1), WIDE + 2.8, HIGH + 2.2, "round,pad=0.1", fc=PALE, ec="none")
+    area = FancyBboxPatch((-1.4, TOP + 0.1), DISTANCE_X + 2.8, DISTANCE_Y + 2.2, "round,pad=0.1", fc=PALE, ec="none")
     axes.add_patch(area)
     for name, place in places(setup).items():
         _box(axes, place, name, FLOWN, HALF)
     for entry, place in _listening(setup).items():
-        _box(axes, place, entry.name, GREY, (NARROW, LOW), "--" if entry.optional else "-")
+        _box(
+            axes, place, entry.name, GREY, (LISTENER_HALF_WIDTH, LISTENER_HALF_HEIGHT), "--" if entry.optional else "-"
+        )
         if entry.name == MAVLINK:
-            _box(axes, (place[0], LAST), STATION, GREY, (1.4, LOW), ":")
+            _box(axes, (place[0], LAST), STATION, GREY, (1.4, LISTENER_HALF_HEIGHT), ":")
     for arrow in arrows(setup):
         _arrow(axes, arrow)
     axes.text(-1.4, LAST - 0.9, NOTE, ha="left", va="center", fontsize=8, color=GREY)
@@ -101,8 +107,8 @@ def draw(setup: RunConfig, path: Path) -> None:
 
 def _listening(setup: RunConfig) -> dict[ProcessEntry, Point]:
     beside = listeners(setup)
-    step = (WIDE + 2.0 * OUTER) / max(len(beside) - 1, 1)
-    return {entry: (step * k - OUTER, BOTTOM) for k, entry in enumerate(beside)}
+    step = (DISTANCE_X + 2.0 * OVERHANG) / max(len(beside) - 1, 1)
+    return {entry: (step * k - OVERHANG, BOTTOM) for k, entry in enumerate(beside)}
 
 
 def _beside(start: Point, end: Point, offset: float) -> tuple[Point, Point]:
@@ -114,14 +120,14 @@ def _beside(start: Point, end: Point, offset: float) -> tuple[Point, Point]:
 
 
 def _edge(middle: Point, at: Point, way: Point) -> Point:
-    """Return the point at which a line from `at`, relative to the middle of a service, leaves it along `way`."""
+    """Return the point where a line from `at`, relative to the centre of a service, leaves its box along `way`."""
     shares = [(half * math.copysign(1.0, d) - p) / d for half, p, d in zip(HALF, at, way, strict=True) if abs(d) > 1e-9]
     share = min(shares)
     return middle[0] + at[0] + share * way[0], middle[1] + at[1] + share * way[1]
 
 
 def _arrow(axes: Axes, arrow: Arrow) -> None:
-    """Draw an arrow with its text, along it in the lock step."""
+    """Draw an arrow with its text, which is parallel to it between services."""
     looks = {"arrowstyle": "<|-|>" if arrow.both_ways else "-|>", "color": arrow.colour, "lw": 1.4}
     axes.annotate("", arrow.end, arrow.start, arrowprops={**looks, "shrinkA": 0, "shrinkB": 0})
     (x0, y0), (x1, y1) = arrow.start, arrow.end

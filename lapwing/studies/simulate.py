@@ -1,4 +1,4 @@
-"""Flies a scene in this process, in memory and compiled, as fast as it goes."""
+"""Simulation of a scene in this process, in memory and compiled, at full speed."""
 
 from collections.abc import Callable, Collection, Mapping
 from types import MappingProxyType
@@ -19,7 +19,7 @@ from lapwing.studies.flight_data import FlightData
 F = TypeVar("F", bound=FlightData)
 
 LOOK = 250  # [ticks] between two calls of an observer
-PAGE = 64  # [ticks] of ports without requested history; the commander looks back less
+PAGE = 64  # [ticks] history of ports whose full history is not requested; more than the commander needs
 
 
 def fly(
@@ -30,15 +30,15 @@ def fly(
     rows: dict[str, np.ndarray] | None = None,
     observe: Callable[[int], None] | None = None,
 ) -> F:
-    """Fly to the end, or until a state is not sound: its outcome is then "diverged".
+    """Simulate a run to its end, or until a state is non-finite, which gives the outcome "diverged".
 
     Args:
-        run: what to fly.
-        only: the topics wanted, None for all that are recorded; the fewer, the less memory and time.
+        run: run configuration or scene.
+        only: topics to keep; None: all recorded ones. Fewer topics take less memory and time.
         operator: returns the commands received until a tick.
-        kind: the class of the flight, where more is to be had of it.
-        rows: memory of the flight, for many that are looked at one after the other: the next one writes over it.
-        observe: called with the tick that is reached: when everything is compiled, and then every LOOK ticks.
+        kind: class of the result, a subclass of `FlightData`.
+        rows: buffers of the topics, reused and overwritten by the next flight of a series.
+        observe: called with the current tick after the compilation, and then every LOOK ticks.
     """
     return kind.of(*_fly(run, only, operator, rows, observe))
 

@@ -17,7 +17,7 @@ class Push(NamedTuple):
 
     start: float  # [s] time at which the tension vanishes
     stop: float  # [s]
-    most: float  # [N]
+    most: float  # [N] largest compression
 
 
 def tension(position: np.ndarray, velocity: np.ndarray, force: np.ndarray, load: Mapping[str, Any]) -> np.ndarray:
@@ -50,7 +50,7 @@ def link_tension(bodies: TopicView, lift: TopicView, load: Mapping[str, Any]) ->
 
 
 def pushes(t: np.ndarray, tension: np.ndarray) -> list[Push]:
-    """Return the intervals in which one link pushes; their start is interpolated linearly.
+    """Return the intervals in which a link pushes; their start is interpolated linearly.
 
     Args:
         t: times [s], shape (n,).

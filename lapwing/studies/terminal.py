@@ -4,9 +4,9 @@ from rich.console import Console
 
 
 def console(width: int | None = None) -> Console:
-    """Return a terminal without rich's markup, in which "[min]" would be a style.
+    """Return a console without rich's markup, which would read "[min]" as a style.
 
     Args:
-        width: in letters; None: the terminal's, 80 without one.
+        width: width in characters; None: that of the terminal, or 80.
     """
     return Console(width=width, markup=False, highlight=False)

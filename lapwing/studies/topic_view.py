@@ -1,4 +1,4 @@
-"""The messages of one topic of a flight as arrays by time."""
+"""Messages of one topic of a flight as arrays over time."""
 
 from collections.abc import Iterator, Mapping
 from functools import cached_property
@@ -10,7 +10,7 @@ from lapwing.studies import tracking
 
 
 class TopicView:
-    """The n messages of a topic: every field of the message is an attribute, an array whose first axis is time.
+    """View of the n messages of a topic: every field is an attribute, an array whose first axis is time.
 
     `truth.velocity` has shape (n, 3), `actuators.motor_voltage` (n, 4), `setpoint.yaw` (n,), `setpoint.phase` (n,) of
     str. `view["pose.position.x"]` is any field by its dotted name. Where the message has a pose, or one for each of k
@@ -20,10 +20,10 @@ class TopicView:
     def __init__(self, times_ns: np.ndarray, columns: Mapping[str, Any]):
         """Create from simulation times [ns], int64, shape (n,), and columns by dotted field name."""
         self._times_ns, self._columns = times_ns, columns
-        self._texts: dict[str, np.ndarray] = {}  # read once: each is made text by text
+        self._texts: dict[str, np.ndarray] = {}  # cache of text fields, which are slow to decode
 
     def payloads(self) -> Iterator[tuple[int, bytes]]:
-        """Yield time [ns] and CDR of each message, for columns made from messages."""
+        """Yield time [ns] and CDR of each message."""
         return zip(self._times_ns.tolist(), self._columns.payloads(), strict=True)  # type: ignore[attr-defined]
 
     @cached_property
@@ -33,18 +33,18 @@ class TopicView:
 
     @cached_property
     def stamps(self) -> np.ndarray:
-        """Header stamps [s], shape (n,): when what the messages say was true."""
+        """Header stamps [s], shape (n,): times at which the content of the messages is valid."""
         seconds, rest = self["header.stamp.sec"].astype(np.int64), self["header.stamp.nanosec"]
         return (seconds * 1_000_000_000 + rest) * 1e-9
 
     @property
     def position(self) -> np.ndarray:
-        """The field `position`, or that of the pose [m], world, shape (n, 3)."""
+        """Field `position`, or position of the pose [m], world, shape (n, 3)."""
         return self._of_pose("position", slice(0, 3))
 
     @property
     def orientation(self) -> np.ndarray:
-        """The field `orientation`, or that of the pose: unit quaternions x, y, z, w, shape (n, 4)."""
+        """Field `orientation`, or orientation of the pose: unit quaternions x, y, z, w, shape (n, 4)."""
         return self._of_pose("orientation", slice(3, 7))
 
     @cached_property
@@ -60,7 +60,7 @@ class TopicView:
 
     @property
     def fields(self) -> list[str]:
-        """The dotted names of all fields that every message has."""
+        """Dotted names of the fields that all messages have."""
         return list(self._columns)
 
     def flat(self) -> dict[str, np.ndarray]:
@@ -78,7 +78,7 @@ class TopicView:
         """Return a field by its dotted name; str, or tuples of str, as objects.
 
         Raises:
-            KeyError: there is no such field, or not in every message.
+            KeyError: not all messages have this field.
         """
         if name in self._texts:
             return self._texts[name]
@@ -112,5 +112,5 @@ class TopicView:
             if candidate in self._columns:
                 return self[candidate]
         if "pose" not in self._columns:
-            raise AttributeError(name)  # `__getattr__` says what there is
+            raise AttributeError(name)
         return self["pose"][..., part]

@@ -8,7 +8,7 @@ import numpy as np
 from lapwing.kernels import always_inline, kernel
 
 TURN = 2.0 * np.pi
-AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # and their units
+AXES = {"x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad"}  # units by axis
 
 DEGREE = np.pi / 180.0  # [rad]
 
@@ -23,7 +23,7 @@ def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
     result, cosines = np.empty((3, len(xyzw))), np.empty((2, len(xyzw)))
     _sines(result, cosines, plain(np.transpose(xyzw)))
     roll, pitch, yaw = result
-    np.arctan2(roll, cosines[0], out=roll)  # numpy takes vectors of angles at once, compiled code takes one
+    np.arctan2(roll, cosines[0], out=roll)  # numpy evaluates angles in SIMD vectors, compiled code one by one
     np.arcsin(pitch, out=pitch)
     np.arctan2(yaw, cosines[1], out=yaw)
     if not (np.abs(np.diff(yaw)) < np.pi).all():
@@ -43,13 +43,13 @@ def _sines(out: Any, cosines: Any, xyzw: Any) -> None:
 
 
 def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, armed: np.ndarray) -> np.ndarray:
-    """Return the reference minus truth of each axis [m], [rad], shape (k, 6), of the k rows with the motors armed.
+    """Return reference minus truth of each axis [m], [rad], shape (k, 6), in the k rows with armed motors.
 
     Args:
         reference: x, y, z [m], roll, pitch, yaw [rad], shape (n, 6).
         position: x, y, z [m], shape (n, 3).
         attitude: roll, pitch, yaw [rad], shape (n, 3).
-        armed: shape (n,) of bool.
+        armed: True where the motors are armed, shape (n,).
     """
     result = np.empty((np.count_nonzero(armed), len(AXES)))
     _errors(result, plain(reference), plain(position), plain(attitude), plain(armed, bool))
@@ -57,13 +57,13 @@ def errors(reference: np.ndarray, position: np.ndarray, attitude: np.ndarray, ar
 
 
 def plain(values: np.ndarray, kind: type = float) -> np.ndarray:
-    """Return the array contiguous, so that one compiled version serves all; a copy if it is not."""
+    """Return a contiguous array, copied if necessary, so that one compiled version serves all inputs."""
     return np.require(values, kind, ("C", "W"))
 
 
 def strided_view(values: np.ndarray) -> np.ndarray:
-    """Return a read-only view with gaps between rows, as rows of ports have them, so that one
-    compiled version serves all; a copy where they lie otherwise."""
+    """Return a read-only view with strides like those of port rows, copied if necessary, so that one compiled version
+    serves all inputs."""
     result = np.asarray(values, float)
     if result.flags.contiguous or not result.flags.aligned:
         result = np.empty((*result.shape, 2))[..., 0]
@@ -126,8 +126,14 @@ def _mean_squares(
 
 
 def reach(desired: np.ndarray, position: np.ndarray, armed: np.ndarray) -> tuple[float, float]:
-    """Return the largest distance of armed positions from their reference [m], and the overshoot beyond the
-    extremes of those along any axis [m], below 0 where they never come as far. Shapes (n, 3), (n, 3), (n,)."""
+    """Return the largest distance of the position from its reference while armed [m], and the largest overshoot beyond
+    the extremes of the reference along any axis [m], negative if none is reached.
+
+    Args:
+        desired: reference [m], shape (n, 3).
+        position: position [m], shape (n, 3).
+        armed: True where the motors are armed, shape (n,).
+    """
     return _reach(strided_view(desired), strided_view(position), plain(armed, bool))
 
 
@@ -144,27 +150,27 @@ def _reach(desired: Any, position: Any, armed: Any) -> tuple[float, float]:
             along_x = _extend(along_x, position[row, 0], desired[row, 0])
             along_y = _extend(along_y, position[row, 1], desired[row, 1])
             along_z = _extend(along_z, position[row, 2], desired[row, 2])
-    if squares != squares:  # what a comparison would leave out
+    if squares != squares:  # NaN, which comparisons skip
         return np.nan, np.nan
     return np.sqrt(away), _greater(_beyond(along_x), _greater(_beyond(along_y), _beyond(along_z)))
 
 
-Extremes = tuple[float, float, float, float]  # greatest x and -x that was flown; that was wanted
+Extremes = tuple[float, float, float, float]  # greatest x and -x of the position; of the reference
 
 
 @always_inline
-def _extend(known: Extremes, actual: float, desired: float) -> Extremes:
+def _extend(extremes: Extremes, actual: float, desired: float) -> Extremes:
     """Return the extremes extended by another x."""
     return (
-        _greater(known[0], actual), _greater(known[1], -actual),
-        _greater(known[2], desired), _greater(known[3], -desired),
+        _greater(extremes[0], actual), _greater(extremes[1], -actual),
+        _greater(extremes[2], desired), _greater(extremes[3], -desired),
     )  # fmt: skip
 
 
 @always_inline
-def _beyond(known: Extremes) -> float:
-    """Return the overshoot of the flown positions beyond the reference."""
-    return _greater(known[0] - known[2], known[1] - known[3])
+def _beyond(extremes: Extremes) -> float:
+    """Return the overshoot of the positions beyond the reference."""
+    return _greater(extremes[0] - extremes[2], extremes[1] - extremes[3])
 
 
 @always_inline

@@ -1,4 +1,4 @@
-"""Worker processes of a study, which end with the process that they work for, however that ends."""
+"""Worker processes of a study, which always end with their parent process."""
 
 import multiprocessing
 import os
@@ -16,18 +16,18 @@ from typing import Any
 
 from lapwing.cosim.run_errors import RunFailed
 
-# What clears away the semaphores of a process that was killed says so otherwise
-SILENT = "ignore::UserWarning:multiprocessing.resource_tracker"
+# Suppresses the warning of the resource tracker when it removes semaphores of a killed process
+NO_TRACKER_WARNING = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 
 @contextmanager
 def workers(number: int) -> Iterator[ProcessPoolExecutor]:
-    """Yield a pool of processes that end with the block, at once on an error, and with this process.
+    """Yield a pool of processes that end with the block, immediately on an error, or with this process.
 
     Raises:
         ValueError: inter-process communication is not available.
     """
-    # spawned: a fork of a process with threads may hang, and would hold the other end of the pipe
+    # spawned: a fork of a process with threads may hang, and would inherit the other end of the pipe
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
     with ours, _pool(number, context, theirs) as pool:
@@ -40,24 +40,24 @@ def workers(number: int) -> Iterator[ProcessPoolExecutor]:
             pool.shutdown(cancel_futures=True)
 
 
-def here(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
-    """Yield the results of call(*task) in this process, each with the index of its task."""
-    for place, task in enumerate(tasks):
-        yield place, call(*task)
+def run_here(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
+    """Yield the index of each task and the result of call(*task), computed in this process."""
+    for index, task in enumerate(tasks):
+        yield index, call(*task)
 
 
 def processes(count: int) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
-    """Run calls in `count` processes and yield each result when it is ready; the processes end with the loop."""
+    """Return a function like `run_here` that uses `count` processes and yields results as they complete."""
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
         with workers(count) as pool:
-            places = {pool.submit(call, *task): place for place, task in enumerate(tasks)}
+            indices = {pool.submit(call, *task): index for index, task in enumerate(tasks)}
             try:
-                for future in as_completed(list(places)):
-                    yield places.pop(future), future.result()
+                for future in as_completed(list(indices)):
+                    yield indices.pop(future), future.result()
             except BrokenProcessPool:
-                message = "a worker process has ended before its time, perhaps for want of memory"
-                raise RunFailed(f"{message}; the same command goes on where it stopped") from None
+                message = "a worker process has ended unexpectedly, perhaps out of memory"
+                raise RunFailed(f"{message}; run the same command again to continue") from None
 
     return run
 
@@ -69,9 +69,9 @@ def cores() -> int:
 
 def _pool(number: int, context: SpawnContext, parent: Connection) -> ProcessPoolExecutor:
     try:
-        sys.warnoptions.append(SILENT)
+        sys.warnoptions.append(NO_TRACKER_WARNING)
         resource_tracker.ensure_running()
-        sys.warnoptions.remove(SILENT)
+        sys.warnoptions.remove(NO_TRACKER_WARNING)
         return ProcessPoolExecutor(number, context, _end_with, (parent,))
     except OSError as fault:
         reason = (fault.strerror or str(fault)).lower()
@@ -79,11 +79,11 @@ def _pool(number: int, context: SpawnContext, parent: Connection) -> ProcessPool
 
 
 def _end_with(parent: Connection) -> None:
-    """Let this process end as soon as the other end of the pipe is closed, by whom or by what death ever."""
+    """End this process when the other end of the pipe is closed, including by the death of the parent."""
 
     def watch() -> None:
         parent.poll(None)
         os._exit(1)
 
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's, who closes the pipe
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the parent, which closes the pipe
     threading.Thread(target=watch, daemon=True).start()

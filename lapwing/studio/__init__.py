@@ -1,6 +1,6 @@
-"""Local web page to pick a scene, change it in a form, fly it, watch it and compare flights.
+"""Local web page to select a scene, edit it in a form, run it, watch it and compare flights.
 
-starlette and uvicorn are imported only by `lapwing studio`; they come with the extra `studio`.
+starlette and uvicorn are optional dependencies, the extra `studio`, imported by `lapwing studio` only.
 """
 
 import importlib.util

@@ -11,32 +11,32 @@ from lapwing.cosim.scene.load import SCENE_FILE
 from lapwing.file_schemas.annotations import Schema
 
 FIRST = ("run", "vehicle", "trajectory", "effects", "sensors", "environment", "autopilot", "solver", "communication")
-OWN = ("airframe", "mavlink")  # tables that each of several vehicles has its own of
-OPEN = ("run", "vehicle", "effects", "trajectory")  # tables whose fields are visible at first
-LEFT_OUT = ("published", "services", "meshes", "ros2")  # tables that are not of a flight's behaviour, or large
-FIXED = ("run.title", "run.real_time_factor", "vehicle.name")  # not worth a change, or chosen beside the form
-ADDED = ("effects", "sensors")  # tables to which the form can add others
-MOST_ITEMS = 40  # of a list of tables, with fields of their own
-LONGEST = 2000  # letters of a value that can be changed in a form
+PER_VEHICLE = ("airframe", "mavlink")  # tables of the single vehicles of a fleet
+OPEN = ("run", "vehicle", "effects", "trajectory")  # tables that are initially open
+HIDDEN = ("published", "services", "meshes", "ros2")  # tables without influence on the flight, or too large
+FIXED = ("run.title", "run.real_time_factor", "vehicle.name")  # keys that the form does not change
+EXTENSIBLE = ("effects", "sensors")  # tables to which the form can add tables
+MOST_ITEMS = 40  # largest number of elements with fields in a list of tables
+LONGEST = 2000  # largest number of characters of a value in the form
 _UNIT = re.compile(r"\[([^\]]*)\]\s*")
 
 
 class Field(NamedTuple):
-    """A key that can be changed."""
+    """An editable key of a scene."""
 
-    key: str  # dotted, as for --set
+    key: str  # dotted key, as in --set
     label: str
-    text: str  # of its value as in TOML, a plain text without quotes; "" if it is unset
+    text: str  # value as TOML, or a text without quotes; "" if unset
     kind: str  # "number", "integer", "text", "choice" or "toml"
     unit: str = ""
     meaning: str = ""
-    bounds: str = ""  # for people: "0 to 1"
+    bounds: str = ""  # range as text, e.g. "0 to 1"
     choices: tuple[str, ...] = ()
     default: str = ""
 
 
 class Group(NamedTuple):
-    """A table of a scene: its fields, and the tables within it."""
+    """A table of a scene: its fields and its subtables."""
 
     key: str
     label: str
@@ -46,27 +46,27 @@ class Group(NamedTuple):
     open: bool = False
 
     def all_fields(self) -> Iterator[Field]:
-        """Yield the fields of this table and of those within it."""
+        """Yield the fields of this table and of its subtables."""
         yield from self.fields
         for group in self.groups:
             yield from group.all_fields()
 
 
 def form(scene: Scene, schema: Schema) -> list[Group]:
-    """Return the tables of a scene as groups of fields, the important ones first."""
+    """Return the tables of a scene as groups of fields, the most important ones first."""
     written = tomllib.loads(scene.sources[SCENE_FILE].decode())
-    for override in scene.file_overrides or ():  # added tables are those of overrides
+    for override in scene.file_overrides or ():  # overrides may add tables
         if isinstance(override.value, dict) and not override.value:
             _table_at(written, override.key)
     resolved = scene.resolved
     member = resolved["vehicle"][0] if scene.vehicles else {}
     tables = {**{name: table for name, table in member.items() if name != "vehicle"}, **resolved}
-    names = [name for name in (*FIRST, *sorted(set(tables) - set(FIRST))) if name in tables and name not in LEFT_OUT]
+    names = [name for name in (*FIRST, *sorted(set(tables) - set(FIRST))) if name in tables and name not in HIDDEN]
     reader = _Reader(schema)
     groups = []
     for name in names:
         part = schema["properties"].get(name)
-        if part is None or (scene.vehicles and name in OWN):
+        if part is None or (scene.vehicles and name in PER_VEHICLE):
             continue
         value = written[name] if name == "vehicle" and scene.vehicles else tables[name]
         group = reader.group(name, name, part, written.get(name), value)
@@ -77,22 +77,22 @@ def form(scene: Scene, schema: Schema) -> list[Group]:
 
 def additions(scene: Scene, schema: Schema) -> list[tuple[str, str]]:
     """Return key and meaning of the tables that can be added: effects and sensors that the scene lacks."""
-    known = [vehicle.resolved for vehicle in scene.vehicles or (scene,)]
+    present = [vehicle.resolved for vehicle in scene.vehicles or (scene,)]
     return [
         (f"{name}.{key}", str(part.get("description", "")))
-        for name in ADDED
+        for name in EXTENSIBLE
         for key, part in schema["properties"][name]["properties"].items()
-        if not any(key in tree.get(name, {}) for tree in known)
+        if not any(key in tree.get(name, {}) for tree in present)
     ]
 
 
 def plain(value: Any) -> str:
-    """Return the text of a value in a form: TOML, but a text without quotes."""
+    """Return the text of a value in a form: TOML, or a text without quotes."""
     return value if isinstance(value, str) else toml(value)
 
 
 def toml(value: Any) -> str:
-    """Return a value as TOML on one line. Raise ValueError if it has none."""
+    """Return a value as TOML on one line. Raise ValueError for other types."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
@@ -116,13 +116,13 @@ def _table_at(tree: dict[str, Any], key: str) -> None:
 
 
 class _Reader:
-    """Walks schema and values together."""
+    """Parallel traversal of schema and values."""
 
     def __init__(self, schema: Schema):
         self._schema = schema
 
     def group(self, key: str, label: str, part: Schema, written: Any, value: Any) -> Group:
-        """Return a table; `written` is its content in the scene file, `value` with all defaults."""
+        """Return a table; `written` is its content in the scene file, `value` includes all defaults."""
         part = self._alternative(part, value if isinstance(value, dict | list) else written)
         fields: list[Field] = []
         groups: list[Group] = []
@@ -135,10 +135,10 @@ class _Reader:
                 shown = _own_values(full, own)
                 groups.append(self.group(f"{key}.{k}", f"{label} {name}", items, own, shown))
             return Group(key, label, meaning, (), tuple(groups))
-        known = part.get("properties", {})
+        properties = part.get("properties", {})
         written, value = written if isinstance(written, dict) else {}, value if isinstance(value, dict) else {}
-        for name in [*known, *(name for name in {**value, **written} if name not in known)]:
-            below, inner = f"{key}.{name}", known.get(name, {})
+        for name in [*properties, *(name for name in {**value, **written} if name not in properties)]:
+            below, inner = f"{key}.{name}", properties.get(name, {})
             own, full = written.get(name), value.get(name)
             if _is_tables(own) or isinstance(own, dict) or (own is None and isinstance(full, dict)):
                 group = self.group(below, name, inner, own, full)
@@ -149,7 +149,7 @@ class _Reader:
         return Group(key, label, meaning, tuple(fields), tuple(groups))
 
     def _alternative(self, part: Schema, value: Any) -> Schema:
-        """Return the part of the schema that fits a value, with references resolved."""
+        """Return the schema's alternative that fits a value, with references resolved."""
         if "$ref" in part:
             target: Any = self._schema
             for name in part["$ref"].removeprefix("#/").split("/"):
@@ -167,7 +167,7 @@ class _Reader:
             return []
         part = self._alternative(part, value)
         if key in FIXED or len(part.get("enum", ())) == 1 or (value is None and part.get("type") == "object"):
-            return []  # nothing to choose; a table that is not there
+            return []  # no choice, or a missing table
         description = str(part.get("description", ""))
         unit = match[1].replace("^2", "²").replace("^3", "³") if (match := _UNIT.match(description)) else ""
         meaning = _UNIT.sub("", description, count=1) if match else description
@@ -186,7 +186,7 @@ class _Reader:
 
 
 def _bounds(part: Schema) -> str:
-    """Return the range of a number, or of the numbers of a list, for people."""
+    """Return the range of a number, or of the numbers of a list, as text."""
     items = part.get("items", {})
     part = items if isinstance(items, dict) and part.get("type") == "array" else part
     low, above = part.get("minimum"), part.get("exclusiveMinimum")
@@ -211,7 +211,7 @@ def _is_tables(value: Any) -> bool:
 
 
 def _own_values(full: Any, own: dict[str, Any]) -> dict[str, Any]:
-    """Return the resolved values of a table; where the file has a table and the resolved a list of one, that."""
+    """Return the resolved values of a table; a list of one table counts as the table if the file has a table."""
     if not isinstance(full, dict):
         return {}
     return {

@@ -1,4 +1,4 @@
-"""Pages of the studio: addresses, and what each shows."""
+"""Pages of the studio and their routes."""
 
 import shlex
 from collections.abc import Callable, Iterable, Mapping
@@ -28,8 +28,8 @@ from lapwing.studio.scene_forms import form_changes, load_named, posted_form, sc
 
 HERE = Path(__file__).parent
 STATIC = {"studio.js": "text/javascript", "studio.css": "text/css"}
-MOST_COMPARED = 4  # flights side by side
-REPORT_POLICY = (  # a report may run its own scripts, but is an origin of its own and reaches nothing
+MOST_COMPARED = 4  # largest number of flights in a comparison
+REPORT_POLICY = (  # a report runs its scripts in a sandbox with a separate origin and no network
     "sandbox allow-scripts allow-downloads; default-src data: blob: 'unsafe-inline' 'unsafe-eval'; "
     "frame-ancestors 'self'; form-action 'none'; base-uri 'none'"
 )
@@ -43,7 +43,7 @@ _TEMPLATES = Environment(
 
 
 class Pages:
-    """The pages; each method answers one address."""
+    """Pages of the studio; each public method handles a route."""
 
     def __init__(self, token: str, runs: StudioRuns, flights: RecentFlights):
         """Create the pages below the secret path."""
@@ -79,7 +79,7 @@ class Pages:
         return self._page("fault.html", 404, message=f"{error.args[0]}: no such scene, run or flight")
 
     def static(self, request: Request) -> Response:
-        """Answer with a script or style of this package."""
+        """Return a script or style sheet of this package."""
         name = request.path_params["name"]
         if name not in STATIC:
             raise HTTPException(404)
@@ -87,7 +87,7 @@ class Pages:
         return Response(text, media_type=STATIC[name])
 
     def home(self, request: Request) -> Response:
-        """List scenes and recent flights, those that match `q` if it is given."""
+        """List scenes and recent flights, or those that match the query `q`."""
         query = request.query_params.get("q", "")
         words = query.lower().split()
         scenes = []
@@ -101,7 +101,7 @@ class Pages:
         return self._page("home.html", query=query, scenes=scenes, flights=self._flights.search(query))
 
     def card(self, request: Request) -> Response:
-        """Answer with the part of a page that shows a flight."""
+        """Return the HTML fragment of a flight."""
         return self._page("card.html", flight=self._flights.summary(request.path_params["name"]))
 
     def scene(self, request: Request) -> Response:
@@ -126,11 +126,11 @@ class Pages:
         except SceneError as fault:
             return self._page("fault.html", 422, message=str(fault))
         texts = dict(posted or {})
-        known = {field.key: field for group in form(base, schema()) for field in group.all_fields()}
+        fields = {field.key: field for group in form(base, schema()) for field in group.all_fields()}
         for text in sets:
             key, _, value = text.partition("=")
-            if key in known:
-                texts[key] = value[1:-1] if known[key].kind in ("text", "choice") and value[:1] == '"' else value
+            if key in fields:
+                texts[key] = value[1:-1] if fields[key].kind in ("text", "choice") and value[:1] == '"' else value
             else:
                 error = error or f"{text}: cannot be changed in this form; use lapwing run {name} --set"
         return self._page(
@@ -151,7 +151,7 @@ class Pages:
         )
 
     async def preview(self, request: Request) -> Response:
-        """Answer with the command line, the Python and the faults of a posted form, as JSON."""
+        """Return the command line, the Python code and the faults of a posted form as JSON."""
         name, posted, added = await posted_form(request)
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
         return JSONResponse(
@@ -182,27 +182,27 @@ class Pages:
         return await run_in_threadpool(self._form, name, (), added, {"view": "no", **posted}, faults, error, 422)
 
     def run(self, request: Request) -> Response:
-        """Show a run: live while it goes on, then its result."""
+        """Show a run: live while it is running, then its result."""
         run = self._runs.all[request.path_params["number"]]
         log = run.log if not run.running else None
         names = self._flights.names()
         summary = self._flights.summary(log.name) if log and log.name in names else None
         others = [name for name in names if summary is None or name != summary.name]
-        again = [("set", c.override) for c in run.changed if c.value != {}]
-        again += [("add", c.key) for c in run.changed if c.value == {}]
+        query = [("set", c.override) for c in run.changed if c.value != {}]
+        query += [("add", c.key) for c in run.changed if c.value == {}]
         return self._page(
             "run.html",
             run=run,
             flight=summary,
             previous=others[0] if others else "",
-            again=urlencode(again),
+            change_query=urlencode(query),
             command=shell_command(run.command),
             python=python(run.scene, run.changed),
             duration=load_named(run.scene, run.changed)[Run].duration if run.running else 0.0,
         )
 
     def state(self, request: Request) -> Response:
-        """Answer with the state of a run as JSON."""
+        """Return the state of a run as JSON."""
         return JSONResponse(self._runs.all[request.path_params["number"]].state())
 
     def stop(self, request: Request) -> Response:
@@ -216,17 +216,19 @@ class Pages:
         name = request.path_params["name"]
         path = self._flights.path(name)
         code = f"import lapwing\n\nflight = lapwing.read_log({str(path)!r})\nprint(flight.outcome)\n"
-        return self._page("flight_page.html", flight=self._flights.summary(name), command=_report_of(path), python=code)
+        return self._page(
+            "flight_page.html", flight=self._flights.summary(name), command=_report_command(path), python=code
+        )
 
     def report(self, request: Request) -> Response:
-        """Answer with the report of a flight."""
+        """Return the report of a flight."""
         return self._report(request.path_params["name"])
 
     def compare(self, request: Request) -> Response:
         """Show flights side by side."""
         names = list(dict.fromkeys(request.query_params.getlist("flight")))
         if not 2 <= len(names) <= MOST_COMPARED:
-            raise HTTPException(422, f"{len(names)} flights are chosen; choose 2 to {MOST_COMPARED} to compare")
+            raise HTTPException(422, f"{len(names)} flights are selected; select 2 to {MOST_COMPARED} to compare")
         flights = [self._flights.summary(name) for name in names]
         paths = [self._flights.path(name) for name in names]
         labels = list(dict.fromkeys(number.label for flight in flights for number in flight.numbers))
@@ -237,11 +239,11 @@ class Pages:
             rows=rows,
             differing=differences(flights[0].tree, flights[1].tree) if len(names) == 2 else {},
             pair=urlencode([("flight", name) for name in names[:2]]) if len(names) == 2 else "",
-            command=_report_of(*paths) if len(names) == 2 else "",
+            command=_report_command(*paths) if len(names) == 2 else "",
         )
 
     def compare_report(self, request: Request) -> Response:
-        """Answer with the report of two flights laid over each other."""
+        """Return the report of an overlay of two flights."""
         names = request.query_params.getlist("flight")
         if len(names) != 2:
             raise HTTPException(422, f"{len(names)} flights; expected two")
@@ -255,5 +257,5 @@ class Pages:
         return FileResponse(path, media_type="text/html", headers={"Content-Security-Policy": REPORT_POLICY})
 
 
-def _report_of(*paths: Path) -> str:
+def _report_command(*paths: Path) -> str:
     return shlex.join(["lapwing", "report", *map(str, paths)])

@@ -1,4 +1,4 @@
-"""Small picture of flown paths: seen from the side and above, with their shadows on the ground."""
+"""Small oblique view of paths with their shadows on the ground."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -8,9 +8,9 @@ import numpy as np
 from lapwing.studies.report.style import COLOURS, FLOWN
 
 WIDTH, HEIGHT, MARGIN = 240.0, 150.0, 14.0  # [pixel]
-POINTS = 160  # of a path
-SMALLEST = 0.5  # [m] extent of a path at least: a hover is no jitter
-TURN, ABOVE = np.radians(35.0), np.radians(28.0)  # of the viewer about z, and over the horizon
+POINTS = 160  # largest number of points of a path
+SMALLEST = 0.5  # [m] minimum extent of the view, so that a hover does not show noise
+AZIMUTH, ELEVATION = np.radians(35.0), np.radians(28.0)  # [rad] direction of the viewer
 
 
 Point = tuple[float, float]
@@ -29,7 +29,7 @@ class PathLine(NamedTuple):
 
 
 class Picture(NamedTuple):
-    """All paths of a flight, and a square on the ground."""
+    """All paths of a flight, and a grid on the ground."""
 
     width: float
     height: float
@@ -38,7 +38,7 @@ class Picture(NamedTuple):
 
 
 def picture(positions: Sequence[np.ndarray]) -> Picture:
-    """Return the picture of paths, each of shape (n, 3) [m], world."""
+    """Return the picture of paths [m], world, each of shape (n, 3)."""
     shown = [path[np.unique(np.linspace(0, len(path) - 1, POINTS).round().astype(int))] for path in positions]
     points = np.concatenate(shown)
     points = points[np.isfinite(points).all(axis=1)]
@@ -54,15 +54,15 @@ def picture(positions: Sequence[np.ndarray]) -> Picture:
     scale = float(min((WIDTH - 2 * MARGIN) / (most[0] - least[0]), (HEIGHT - 2 * MARGIN) / (most[1] - least[1])))
     shift = np.array([0.5 * WIDTH, 0.5 * HEIGHT]) - scale * 0.5 * (least + most)
 
-    def at(places: np.ndarray) -> np.ndarray:
-        return np.round(scale * _project(places) + shift, 1)
+    def to_pixels(positions: np.ndarray) -> np.ndarray:
+        return np.round(scale * _project(positions) + shift, 1)
 
     lines = []
     for k, path in enumerate(shown):
         path = path[np.isfinite(path).all(axis=1)]
         if not len(path):
             continue
-        air, ground = at(path), at(np.column_stack([path[:, :2], np.full(len(path), floor)]))
+        air, ground = to_pixels(path), to_pixels(np.column_stack([path[:, :2], np.full(len(path), floor)]))
         rows = np.linspace(0, len(path) - 1, 12).round().astype(int)
         drops = tuple(_stroke(air[row], ground[row]) for row in rows)
         colour = COLOURS[k % len(COLOURS)] if len(shown) > 1 else FLOWN
@@ -70,18 +70,18 @@ def picture(positions: Sequence[np.ndarray]) -> Picture:
         lines.append(PathLine(colour, _text(air), _text(ground), drops, whole[:2], whole[2:]))
     grid = []
     for share in np.linspace(-1.0, 1.0, 6):
-        for one in (((share, -1.0), (share, 1.0)), ((-1.0, share), (1.0, share))):
-            ends = at(np.array([(centre[0] + half * a, centre[1] + half * b, floor) for a, b in one]))
+        for line in (((share, -1.0), (share, 1.0)), ((-1.0, share), (1.0, share))):
+            ends = to_pixels(np.array([(centre[0] + half * a, centre[1] + half * b, floor) for a, b in line]))
             grid.append(_stroke(ends[0], ends[1]))
     return Picture(WIDTH, HEIGHT, tuple(lines), tuple(grid))
 
 
 def _project(points: np.ndarray) -> np.ndarray:
-    """Return the picture's x to the right and y downwards of points, without scale."""
+    """Return unscaled image coordinates, x to the right and y downwards, shape (n, 2), of points (n, 3)."""
     x, y, z = points.T
-    right = np.cos(TURN) * x + np.sin(TURN) * y
-    away = -np.sin(TURN) * x + np.cos(TURN) * y
-    return np.column_stack([right, -(np.sin(ABOVE) * away + np.cos(ABOVE) * z)])
+    right = np.cos(AZIMUTH) * x + np.sin(AZIMUTH) * y
+    away = -np.sin(AZIMUTH) * x + np.cos(AZIMUTH) * y
+    return np.column_stack([right, -(np.sin(ELEVATION) * away + np.cos(ELEVATION) * z)])
 
 
 def _stroke(start: np.ndarray, end: np.ndarray) -> Stroke:

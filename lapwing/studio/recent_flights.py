@@ -13,30 +13,30 @@ from lapwing.studies.flight_data import SHOWN
 from lapwing.studies.metrics import unmet_criteria
 from lapwing.studies.report import write
 from lapwing.studies.report.key_numbers import TROUBLE, KeyNumber, key_numbers
-from lapwing.studies.report.page import LOOKS
+from lapwing.studies.report.page import CSS_CLASSES
 from lapwing.studio.path_picture import Picture, picture
 
 FOLDER = Path("recordings")  # where `lapwing run` writes logs
-MOST = 200  # logs that are listed, the newest
+MOST = 200  # largest number of listed logs, the newest ones
 
 
 class FlightSummary(NamedTuple):
-    """A log as the page lists it."""
+    """Entry of a log in the list of flights."""
 
-    name: str  # of the file
+    name: str  # name of the file
     scene: str
     title: str
     recorded: str  # local date and time
-    looks: str  # "good" or "bad"
+    css_class: str  # "good" or "bad"
     outcome: str
-    kind: str  # of the outcome
+    kind: str  # kind of the outcome
     vehicles: tuple[str, ...]
     numbers: tuple[KeyNumber, ...]
-    trouble: int  # events that went wrong
+    trouble: int  # number of adverse events
     duration: float  # [s]
     picture: Picture | None
-    tree: dict[str, Any]  # the scene with all defaults
-    error: str = ""  # why the log cannot be read
+    tree: dict[str, Any]  # tables of the scene with all defaults
+    error: str = ""  # reason why the log cannot be read
 
     def matches(self, words: Sequence[str]) -> bool:
         """Return True if every word, in lower case, occurs in the name, title, outcome or a vehicle's name."""
@@ -45,16 +45,16 @@ class FlightSummary(NamedTuple):
 
 
 class RecentFlights:
-    """Summaries and reports of the logs of a folder, kept while the logs do not change."""
+    """Summaries and reports of the logs of a folder, cached until a log changes."""
 
     def __init__(self, reports: Path, folder: Path = FOLDER):
-        """Use a folder of logs; `reports` takes pages that are written on demand."""
+        """Use a folder of logs; `reports` is the folder of report pages, written on demand."""
         self._folder, self._reports = folder, reports
-        self._known: dict[tuple[str, int], FlightSummary] = {}
+        self._cache: dict[tuple[str, int], FlightSummary] = {}
         self._lock = threading.Lock()
 
     def names(self) -> list[str]:
-        """Return the file names of the logs, the newest first; without one that is being written."""
+        """Return the file names of the logs, the newest first, without those that are being written."""
         paths = [path for path in self._folder.glob("*.mcap") if path.is_file()] if self._folder.is_dir() else []
         dated = [
             (modified, path.name) for path in paths if (modified := _modification_time(path)) and not is_locked(path)
@@ -62,22 +62,22 @@ class RecentFlights:
         return [name for _, name in sorted(dated, reverse=True)[:MOST]]
 
     def path(self, name: str) -> Path:
-        """Return the path of a log of the folder. Raise KeyError for any other name."""
+        """Return the path of a log of the folder. Raise KeyError for other names."""
         if name not in self.names():
             raise KeyError(name)
         return self._folder / name
 
     def summary(self, name: str) -> FlightSummary:
-        """Return the summary of a log. Raise KeyError if there is none of this name."""
+        """Return the summary of a log. Raise KeyError if the log does not exist."""
         path = self.path(name)
         key = (name, _modification_time(path))
         with self._lock:
-            if key not in self._known:
-                self._known[key] = _summary(path)
-            return self._known[key]
+            if key not in self._cache:
+                self._cache[key] = _summary(path)
+            return self._cache[key]
 
     def read_all(self) -> None:
-        """Read the summaries of all logs, the newest first; logs that vanish meanwhile are passed over."""
+        """Read the summaries of all logs, the newest first, without logs that are deleted meanwhile."""
         for name in self.names():
             with suppress(KeyError):
                 self.summary(name)
@@ -88,7 +88,7 @@ class RecentFlights:
         return [name for name in self.names() if not words or self.summary(name).matches(words)]
 
     def report(self, *names: str) -> Path:
-        """Return the report of one log, or of two laid over each other. Raise KeyError or ValueError."""
+        """Return the report of one log, or of an overlay of two. Raise KeyError or ValueError."""
         paths = [self.path(name) for name in names]
         stamp = "_".join(str(_modification_time(path)) for path in paths)
         target = self._reports / f"{'_'.join(path.stem for path in paths)[:120]}_{stamp}.html"
@@ -99,7 +99,7 @@ class RecentFlights:
 
 
 def _modification_time(path: Path) -> int:
-    """Return the time of the last write [ns], 0 if the file is gone."""
+    """Return the time of the last write [ns], or 0 if the file does not exist."""
     try:
         return path.stat().st_mtime_ns
     except OSError:
@@ -115,7 +115,7 @@ def _summary(path: Path) -> FlightSummary:
     except ValueError as error:
         reason = str(error).removeprefix(f"{path}: ")
         return FlightSummary(path.name, path.stem, "", recorded, "bad", "", "", (), (), 0, 0.0, None, {}, reason)
-    worst = max(flights, key=lambda flight: flight.outcome.kind not in LOOKS)
+    worst = max(flights, key=lambda flight: flight.outcome.kind not in CSS_CLASSES)
     unmet = [text for flight in flights for text in unmet_criteria(flight)]
     outcome = "; not met: ".join([str(worst.outcome), *dict.fromkeys(unmet)])
     run = worst.origin.scene.get("run", {})
@@ -124,7 +124,7 @@ def _summary(path: Path) -> FlightSummary:
         worst.metadata.get("scene") or path.stem,
         str(run.get("title", "")),
         recorded,
-        "bad" if unmet else LOOKS.get(worst.outcome.kind, "bad"),
+        "bad" if unmet else CSS_CLASSES.get(worst.outcome.kind, "bad"),
         f"{worst.vehicle}: {outcome}" if len(flights) > 1 else outcome,
         worst.outcome.kind,
         tuple(flight.vehicle for flight in flights),

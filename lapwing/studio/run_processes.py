@@ -1,4 +1,4 @@
-"""Runs that the page has started: the process of `lapwing run`, its output and its result."""
+"""Runs of the studio: processes of `lapwing run`, their output and results."""
 
 import json
 import os
@@ -16,8 +16,8 @@ from typing import Any
 
 from lapwing.studio.scene_changes import Change, command_line
 
-LINES = 400  # of the output that are kept
-PATIENCE = 10.0  # [s] that a run has to end after SIGINT
+LINES = 400  # stored lines of the output
+END_TIMEOUT = 10.0  # [s] from SIGINT to SIGKILL
 _LIVE = re.compile(r"live: (http://127\.0\.0\.1:\d+/[\w-]+/)$")
 _TIME = re.compile(r"t =\s*([\d.]+) s\s+([\d.]+)x")
 
@@ -26,11 +26,15 @@ class StudioRun:
     """One run of a scene with changes."""
 
     def __init__(self, number: int, scene: str, changed: Sequence[Change], speed: str, view: bool, folder: Path):
-        """Start `lapwing run`; `folder` takes its JSON result."""
+        """Start `lapwing run`; `folder` is that of its JSON result."""
         self.number, self.scene, self.changed, self.speed, self.view = number, scene, tuple(changed), speed, view
         self.command = command_line(scene, changed, speed, view)
         self.lines: list[str] = []
-        self.live, self.sim_time, self.rate = "", 0.0, 0.0  # address of the 3D view; [s]; simulated over wall time
+        self.live, self.sim_time, self.rate = (
+            "",
+            0.0,
+            0.0,
+        )  # address of the 3D view; [s]; simulation time over wall time
         self.result: dict[str, Any] = {}
         self.code: int | None = None
         self._json, self._stopped = folder / f"{number}.json", False
@@ -42,7 +46,7 @@ class StudioRun:
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
-            # The page shows the view, so no other window opens; lines come as they are printed.
+            # BROWSER=true opens no window, since the page shows the view; the output is unbuffered
             env=os.environ | {"BROWSER": "true", "COLUMNS": "100", "PYTHONUNBUFFERED": "1"},
             start_new_session=True,  # Ctrl-C ends the page, which ends the run
         )
@@ -60,18 +64,18 @@ class StudioRun:
             else:
                 self.lines = [*self.lines[-LINES:], line]
         code = self._process.wait()
-        with suppress(OSError, ValueError):  # a run that failed has no result
+        with suppress(OSError, ValueError):  # a failed run has no result
             self.result = json.loads(self._json.read_text(encoding="utf-8"))
         self.live, self.code = "", code
 
     @property
     def running(self) -> bool:
-        """True until the process has ended and its result is known."""
+        """True until the process has ended and its result has been read."""
         return self.code is None
 
     @property
     def log(self) -> Path | None:
-        """Path of the log, None if there is none."""
+        """Path of the log; None without one."""
         return Path(self.result["log"]) if "log" in self.result else None
 
     @property
@@ -81,14 +85,14 @@ class StudioRun:
 
     @property
     def error(self) -> str:
-        """The last line of the output of a run that failed without a result; "" otherwise."""
+        """Last line of the output of a run that failed without a result; "" otherwise."""
         if self.running or not self.code or self.result:
             return ""
         last = next((line for line in reversed(self.lines) if line.strip()), "")
         return last.removeprefix("lapwing: ") or f"ended with exit code {self.code}"
 
     def state(self) -> dict[str, Any]:
-        """Return what the page polls."""
+        """Return the state that the page polls."""
         return {
             "running": self.running,
             "live": self.live,
@@ -107,16 +111,16 @@ class StudioRun:
         """Interrupt the run and wait; kill its processes if it does not end."""
         self.stop()
         try:
-            self._process.wait(PATIENCE)
+            self._process.wait(END_TIMEOUT)
         except subprocess.TimeoutExpired:
             with suppress(ProcessLookupError):
                 os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
-        self._reader.join(PATIENCE)
+        self._reader.join(END_TIMEOUT)
 
 
 class StudioRuns:
-    """All runs of a page, one at a time; a context manager that ends the last."""
+    """Runs of the studio, one at a time; a context manager that ends the current run."""
 
     def __init__(self) -> None:
         """Create a folder for results."""
@@ -126,19 +130,19 @@ class StudioRuns:
 
     @property
     def folder(self) -> Path:
-        """Folder for files of this page, deleted at its end."""
+        """Folder for temporary files, deleted at the end."""
         return Path(self._folder.name)
 
     @property
     def current(self) -> StudioRun | None:
-        """The run that is under way, None without one."""
+        """Current run; None without one."""
         return next((run for run in self.all.values() if run.running), None)
 
     def start(self, scene: str, changed: Sequence[Change], speed: str, view: bool) -> StudioRun:
-        """Start a run. Raise ValueError if another is under way."""
+        """Start a run. Raise ValueError if another one is running."""
         with self._lock:
             if (other := self.current) is not None:
-                raise ValueError(f"run {other.number} of {other.scene} is under way; stop it first")
+                raise ValueError(f"run {other.number} of {other.scene} is still running; stop it first")
             number = next(self._numbers)
             self.all[number] = StudioRun(number, scene, changed, speed, view, self.folder)
             return self.all[number]

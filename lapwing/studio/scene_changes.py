@@ -1,4 +1,4 @@
-"""Changes of a scene in the form: overrides, and the command line and Python that fly the same."""
+"""Changes of a scene in the form: overrides, and the equivalent command line and Python code."""
 
 import re
 import shlex
@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from lapwing.studio.form_fields import Field, toml
 
-SPEEDS = ("1", "2", "5", "10", "max")  # of a run
+SPEEDS = ("1", "2", "5", "10", "max")  # selectable values of --speed
 
 
 class Change(NamedTuple):
@@ -19,14 +19,14 @@ class Change(NamedTuple):
 
     @property
     def override(self) -> str:
-        """KEY=VALUE, as --set takes it."""
+        """Override KEY=VALUE, as for --set."""
         text = toml(self.value)
         if (
             isinstance(self.value, str)
             and re.fullmatch(r"[A-Za-z_][\w./:+-]*", self.value)
             and not _is_word(text[1:-1])
         ):
-            text = self.value  # a bare word counts as a text
+            text = self.value  # a bare word is a text
         return f"{self.key}={text}"
 
 
@@ -36,9 +36,9 @@ def changes(
     """Return the changes of a posted form, and the faults by key.
 
     Args:
-        fields: of the scene as it was shown.
-        posted: texts by key.
-        added: keys of tables that the scene did not have.
+        fields: fields of the form.
+        posted: posted texts by key.
+        added: keys of added tables.
     """
     result = [Change(key, {}) for key in added]
     faults: dict[str, str] = {}
@@ -54,7 +54,7 @@ def changes(
 
 
 def command_line(scene: str, changed: Iterable[Change], speed: str, view: bool) -> list[str]:
-    """Return the words of the command that flies a scene with these changes."""
+    """Return the words of the command that runs a scene with these changes."""
     words = ["lapwing", "run", scene]
     for change in changed:
         words += ["--set", change.override]
@@ -62,24 +62,24 @@ def command_line(scene: str, changed: Iterable[Change], speed: str, view: bool) 
 
 
 def shell_command(words: Iterable[str]) -> str:
-    """Return a command as it is typed in a shell."""
+    """Return a command as text for a shell."""
     return shlex.join(words)
 
 
 def python(scene: str, changed: Iterable[Change]) -> str:
-    """Return the Python that flies a scene with these changes."""
+    """Return Python code that runs a scene with these changes."""
     lines = [f"    {change.key!r}: {change.value!r},\n" for change in changed]
     overrides = ", {\n" + "".join(lines) + "}" if lines else ""
     return f"import lapwing\n\nflight = lapwing.fly({scene!r}{overrides})\nprint(flight.outcome)\nflight.report()\n"
 
 
 def _value(field: Field, text: str) -> Any:
-    """Return the value of a text in the form. Raise ValueError if it is not of the field's kind."""
+    """Return the value of a text in the form. Raise ValueError if it does not fit the field's kind."""
     if field.kind == "text" or (field.kind == "choice" and not _is_word(text)):
         return text
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
-    except (ValueError, RecursionError):  # no TOML, or more than one value
+    except (ValueError, RecursionError):  # invalid TOML, or more than one value
         expected = {"number": "a number", "integer": "a whole number"}.get(field.kind, "a TOML value, e.g. [1.0, 2.0]")
         raise ValueError(f"got {text[:60]}; expected {expected}") from None
     if field.kind == "integer" and type(value) is not int:
@@ -92,5 +92,5 @@ def _value(field: Field, text: str) -> Any:
 
 
 def _is_word(text: str) -> bool:
-    """Return True if a bare word is a TOML value that is not a text."""
+    """Return True if a bare word is a TOML value other than a text."""
     return text in ("true", "false", "inf", "nan")

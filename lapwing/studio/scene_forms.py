@@ -1,4 +1,4 @@
-"""Scenes by the names in addresses, and forms that were posted."""
+"""Scenes by their names in addresses, and posted forms."""
 
 from collections.abc import Iterable, Mapping
 from functools import cache
@@ -16,17 +16,17 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.studio.form_fields import form
 from lapwing.studio.scene_changes import Change, changes
 
-MOST_FIELDS = 5000  # of a posted form
+MOST_FIELDS = 5000  # largest number of fields of a posted form
 
 
 @cache
 def schema() -> Schema:
-    """Return the schema of scenes; it takes a second to make."""
+    """Return the schema of scenes, cached because it takes a second to build."""
     return scene_schema()
 
 
 def scene_files() -> dict[str, Path]:
-    """Return the scenes by the name that `lapwing run` takes: those that ship, then those of this folder."""
+    """Return the paths of scenes by name: those in the working directory, and the included ones."""
     shipped = {path.stem: path for path in sorted(SHIPPED.glob("*.toml"))}
     own = {}
     for path in sorted(Path().glob("*.toml")):
@@ -67,14 +67,14 @@ async def posted_form(request: Request) -> tuple[str, dict[str, str], tuple[str,
 def form_changes(
     name: str, posted: Mapping[str, str], added: tuple[str, ...]
 ) -> tuple[list[Change], dict[str, str], str]:
-    """Return changes, faults by key, and a fault of the whole form; without faults the changed scene is valid."""
+    """Return changes, faults by key, and a fault of the form; without faults the changed scene is valid."""
     try:
         fields = {f.key: f for group in form(load_named(name, tables(added)), schema()) for f in group.all_fields()}
     except SceneError as error:
         return [], {}, str(error)
     changed, faults = changes(fields.values(), posted, added)
     remaining, message = changed, ""
-    while True:  # without each fault in turn, so that all are named at once
+    while True:  # removes each faulty change, to find all faults
         try:
             resolve(load_named(name, remaining))
             return changed, faults, message

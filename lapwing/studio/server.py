@@ -1,4 +1,4 @@
-"""The server of the studio: a secret address on this machine, until it is interrupted."""
+"""Server of the studio at a secret address on this machine."""
 
 import asyncio
 import secrets
@@ -13,12 +13,12 @@ from lapwing.studio.recent_flights import RecentFlights
 from lapwing.studio.run_processes import StudioRuns
 
 
-def serve(port: int, say: Callable[[str], None]) -> None:
-    """Serve the page until SIGINT or SIGTERM; runs under way end with it.
+def serve(port: int, report: Callable[[str], None]) -> None:
+    """Serve the page until SIGINT or SIGTERM, which also end the current run.
 
     Args:
-        port: 0 for any that is free.
-        say: prints the address.
+        port: TCP port; 0: any free one.
+        report: called with the line with the address.
 
     Raises:
         ValueError: the extra `studio` is missing, or the port is in use.
@@ -39,8 +39,8 @@ def serve(port: int, say: Callable[[str], None]) -> None:
         options = {"log_level": "critical", "lifespan": "off", "server_header": False, "ws": "none"}
         server = uvicorn.Server(uvicorn.Config(guarded, **options))  # type: ignore[arg-type]
         address = f"http://{ADDRESS}:{number}/{token}/"
-        say(f"studio: {address}")
-        for prepare in (schema, flights.read_all):  # so that the first form and all cards come at once
+        report(f"studio: {address}")
+        for prepare in (schema, flights.read_all):  # to show the first form and all cards without delay
             threading.Thread(target=prepare, daemon=True).start()
         webbrowser.open(address)
         asyncio.run(server.serve(sockets=[listener]))

@@ -26,7 +26,7 @@ def _killed(code: int, said: str) -> bool:
 
 
 def _lost(code: int, said: str) -> bool:
-    line = r"lapwing: a worker process has ended before its time.*; the same command goes on where it stopped\n"
+    line = r"lapwing: a worker process has ended unexpectedly.*; run the same command again to continue\n"
     return code == 1 and re.fullmatch(line, said) is not None
 
 

@@ -16,17 +16,17 @@ FULL_SCALE, BATTERY = 65535.0, 4.3  # of the CSV files
 
 
 def simulated(plant: PlantRows, seconds: float, seeds: list[int], noise: float = 1.0) -> list[Recording]:
-    """Fly seeds side by side: a simple attitude and height controller with random setpoints holds them in the air.
+    """Simulate flights in parallel with a simple attitude and height controller and random setpoints.
 
     Args:
-        plant: with one parameter set.
-        seconds: of flight.
-        seeds: of setpoints and noise, one for each flight.
+        plant: plant with one parameter set.
+        seconds: duration of the flights [s].
+        seeds: seeds of setpoints and noise, one for each flight.
         noise: factor of the sensor noise.
     """
     n, ticks = len(seeds), round(seconds / INTERVAL)
     draws = [np.random.default_rng(seed) for seed in seeds]
-    hold = 30  # ticks of a setpoint
+    hold = 30  # duration of a setpoint [ticks]
     tilt = np.stack([d.uniform(-0.35, 0.35, (ticks // hold + 1, 3)) for d in draws])
     tilt[..., 2] *= 0.5
     blocks = plant.start(np.zeros(n, int))
@@ -67,7 +67,7 @@ def _recorded(name: str, states: np.ndarray, volts: np.ndarray, draw: np.random.
 
 
 def write_csv(path: Path, flight: Recording) -> Path:
-    """Write the columns of NanoBench that the shipped mapping reads."""
+    """Write a CSV file with the columns of the mapping `nanobench`."""
     w, x, y, z = flight.attitude.T
     columns = {
         "t": 1000.0 + flight.interval * np.arange(len(flight)),
@@ -84,7 +84,7 @@ def write_csv(path: Path, flight: Recording) -> Path:
 
 
 def real_flights(folder: str) -> Path:
-    """Return the folder of recorded flights, or skip the test that asks for it."""
+    """Return the folder of recorded flights, or skip the test."""
     base = Path(os.environ.get("LAPWING_FLIGHTS", Path(__file__).parents[3] / "shared" / "data"))
     if not (base / folder).is_dir():
         pytest.skip(f"no recorded flights at {base / folder}; set LAPWING_FLIGHTS")

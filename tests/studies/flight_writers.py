@@ -82,7 +82,7 @@ def write_text(path, flight):
     lines += [f"FMT, {n}, 50, {name}, {c}, {fields}" for name, (n, c, fields) in DATAFLASH.items()]
     for name, values in dataflash_rows(flight):
         texts = [v.decode() if isinstance(v, bytes) else str(v) for v in values]
-        if name == "GPS":  # text logs have degrees
+        if name == "GPS":  # angles in text logs are in degrees
             texts[4:6] = (f"{v * 1e-7:.7f}" for v in values[4:6])
         lines.append(", ".join([name, *texts]))
     path.write_text("\n".join(lines) + "\n")
@@ -141,41 +141,47 @@ def write_rosbag(path, flight):
             "actuator_msgs/msg/Actuators",
         )
     )
-    made = types.types
+    message_types = types.types
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         kinds = {"/odom": "nav_msgs/msg/Odometry", "/imu": "sensor_msgs/msg/Imu",
                  "/motors": "actuator_msgs/msg/Actuators", "/battery": "sensor_msgs/msg/BatteryState",
                  "/note": "std_msgs/msg/String"}  # fmt: skip
         connections = {topic: writer.add_connection(topic, kind, typestore=types) for topic, kind in kinds.items()}
-        vector, quaternion = made["geometry_msgs/msg/Vector3"], made["geometry_msgs/msg/Quaternion"]
+        vector, quaternion = message_types["geometry_msgs/msg/Vector3"], message_types["geometry_msgs/msg/Quaternion"]
         body = Rotation.from_quat(flight.attitude[:, [1, 2, 3, 0]]).inv().apply(flight.velocity)
         nine, many = np.zeros(9), np.zeros(36)
         empty, cells = np.zeros(0), np.zeros(0, np.float32)
         for k in range(len(flight)):
             ns = 1_700_000_000_000_000_000 + round(k * INTERVAL * 1e9)
-            header = made["std_msgs/msg/Header"](made["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9), "map")
-            w, x, y, z = flight.attitude[k]
-            pose = made["geometry_msgs/msg/Pose"](
-                made["geometry_msgs/msg/Point"](*flight.position[k]), quaternion(x, y, z, w)
+            header = message_types["std_msgs/msg/Header"](
+                message_types["builtin_interfaces/msg/Time"](ns // 10**9, ns % 10**9), "map"
             )
-            twist = made["geometry_msgs/msg/Twist"](vector(*body[k]), vector(0.0, 0.0, 0.0))
-            odometry = made["nav_msgs/msg/Odometry"](
-                header, "base", made["geometry_msgs/msg/PoseWithCovariance"](pose, many),
-                made["geometry_msgs/msg/TwistWithCovariance"](twist, many),
+            w, x, y, z = flight.attitude[k]
+            pose = message_types["geometry_msgs/msg/Pose"](
+                message_types["geometry_msgs/msg/Point"](*flight.position[k]), quaternion(x, y, z, w)
+            )
+            twist = message_types["geometry_msgs/msg/Twist"](vector(*body[k]), vector(0.0, 0.0, 0.0))
+            odometry = message_types["nav_msgs/msg/Odometry"](
+                header, "base", message_types["geometry_msgs/msg/PoseWithCovariance"](pose, many),
+                message_types["geometry_msgs/msg/TwistWithCovariance"](twist, many),
             )  # fmt: skip
             rates, force = vector(*flight.omega[k]), vector(*flight.specific_force[k])
-            imu = made["sensor_msgs/msg/Imu"](header, quaternion(0.0, 0.0, 0.0, 1.0), nine, rates, nine, force, nine)
-            motors = made["actuator_msgs/msg/Actuators"](header, empty, empty, flight.motor_voltage[k] / BATTERY)
-            battery = made["sensor_msgs/msg/BatteryState"](
+            imu = message_types["sensor_msgs/msg/Imu"](
+                header, quaternion(0.0, 0.0, 0.0, 1.0), nine, rates, nine, force, nine
+            )
+            motors = message_types["actuator_msgs/msg/Actuators"](
+                header, empty, empty, flight.motor_voltage[k] / BATTERY
+            )
+            battery = message_types["sensor_msgs/msg/BatteryState"](
                 header, BATTERY, 20.0, -2.0, 0.0, 0.0, 0.0, 0.5, 0, 0, 0, True, cells, cells, "", "",
             )  # fmt: skip
             for topic, message in {"/odom": odometry, "/imu": imu, "/motors": motors, "/battery": battery}.items():
                 writer.write(connections[topic], ns, types.serialize_cdr(message, kinds[topic]))
-        note = types.serialize_cdr(made["std_msgs/msg/String"]("hello"), kinds["/note"])
+        note = types.serialize_cdr(message_types["std_msgs/msg/String"]("hello"), kinds["/note"])
         writer.write(connections["/note"], ns, note)
 
 
-ULOG = {  # topic: fields beside the time stamp, of PX4 1.14
+ULOG = {  # fields by topic besides the time stamp, PX4 1.14
     "vehicle_attitude": "float[4] q;",
     "vehicle_local_position": "float x;float y;float z;float vx;float vy;float vz;",
     "sensor_combined": "float[3] gyro_rad;float[3] accelerometer_m_s2;",

@@ -1,4 +1,4 @@
-"""A flight to be drawn in space, and a scene that keeps what is drawn."""
+"""Synthetic flight for the 3D view, and a fake viser scene."""
 
 import numpy as np
 import synthetic_flights
@@ -22,7 +22,7 @@ READY = """
 
 
 def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
-    """Up at 1 m/s, rotors at 1 rad/s, wind of 3 m/s along x."""
+    """Return a climb at 1 m/s with rotors at 1 rad/s and wind of 3 m/s along x."""
     t = np.arange(ticks) / RATE
     truth = {
         "pose.position": np.column_stack([0.0 * t, 0.0 * t, t]),
@@ -42,7 +42,7 @@ def flight(model="rigid_body", ticks=TICKS, scene=None, **topics):
 
 
 class Recorder:
-    """A viser scene that keeps what is added."""
+    """Fake viser scene that stores the added nodes."""
 
     def __init__(self):
         self.nodes = {}

@@ -1,4 +1,4 @@
-"""Pictures of pages in light, dark and on a phone, small enough to keep: python -m tests.studies.page_looks."""
+"""Small pictures of pages, light, dark and on a phone, for the repository: python -m tests.studies.page_looks."""
 
 import io
 import sys
@@ -12,9 +12,9 @@ from PIL import Image
 from lapwing.studies.report import write
 from lapwing.studies.view3d.headless import Browser
 
-KEPT = Path(__file__).parent / "page_looks"
-LOOKS = {"light": (1280, 900), "dark": (1280, 900), "phone": (390, 844)}  # size of the window [pixel]
-SMALL = 16  # pixels of the page for one that is kept: text becomes a grey, places and colours stay
+REFERENCES = Path(__file__).parent / "page_looks"
+WINDOWS = {"light": (1280, 900), "dark": (1280, 900), "phone": (390, 844)}  # size of the window [pixel]
+SMALL = 16  # downsampling factor: text becomes grey, positions and colours remain
 TICKS, RATE = 400, 100
 MOTORS = ("rotor_speed", "motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque")
 DRAWN = """
@@ -30,7 +30,7 @@ return [document.documentElement.scrollWidth, innerWidth];
 
 
 def flight():
-    """A square corner of 4 s, with a setpoint beside it."""
+    """Return a flight of 4 s around a corner, with a setpoint."""
     t = np.arange(TICKS) / RATE
     place = np.column_stack([np.minimum(t, 2.0), np.maximum(t - 2.0, 0.0), 1.0 + 0.0 * t])
     truth = {
@@ -52,7 +52,7 @@ def pictures():
     """Yield each look, its picture in few pixels, shape (rows, columns, 3), and widths of page and window."""
     with tempfile.TemporaryDirectory() as folder:
         page = write(flight(), Path(folder, "flight.html"))
-        for look, size in LOOKS.items():
+        for look, size in WINDOWS.items():
             with Browser("data:text/html,empty", size=size) as browser:
                 scheme = {"name": "prefers-color-scheme", "value": "dark" if look == "dark" else "light"}
                 browser.call("Emulation.setEmulatedMedia", features=[scheme])
@@ -62,13 +62,13 @@ def pictures():
             yield look, np.asarray(image.resize((size[0] // SMALL, size[1] // SMALL), Image.Resampling.BOX)), widths
 
 
-def kept(look):
-    """The picture that is kept."""
-    return np.asarray(Image.open(KEPT / f"{look}.png").convert("RGB"))
+def reference_picture(look):
+    """Return the reference picture, shape (rows, columns, 3)."""
+    return np.asarray(Image.open(REFERENCES / f"{look}.png").convert("RGB"))
 
 
 if __name__ == "__main__":
     sys.path.insert(0, str(Path(__file__).parent))
-    KEPT.mkdir(exist_ok=True)
+    REFERENCES.mkdir(exist_ok=True)
     for name, pixels, _ in pictures():
-        Image.fromarray(pixels).save(KEPT / f"{name}.png")
+        Image.fromarray(pixels).save(REFERENCES / f"{name}.png")

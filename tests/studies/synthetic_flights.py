@@ -1,4 +1,4 @@
-"""Flights made up from columns, whose figures are known."""
+"""Synthetic flights from columns, with known metrics."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ def setup(ticks, rate=100, **resolved):
 
 
 def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
-    """A flight of so many ticks; of each topic the columns by dotted name, a value standing for one at every tick."""
+    """Return a flight of a number of ticks, from columns of topics by dotted name; single values are repeated."""
     views = {}
     for name, columns in topics.items():
         rows = {}
@@ -27,7 +27,7 @@ def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
 
 
 def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):
-    """A flight along x [m], level unless an attitude is given, that takes so much power [W]."""
+    """Return a flight along x [m] with a power [W], by default level."""
     x = np.asarray(x, float)
     truth = {
         "pose.position": np.column_stack([x, 0.0 * x, 0.0 * x]),
@@ -38,7 +38,7 @@ def moved(x, power=100.0, failure="", rate=2, turned=LEVEL):
 
 
 def differences(a, b, topics):
-    """Topic and field of every column that is not the same to the bit in two flights."""
+    """Return topic and field of all columns that are not bit-for-bit identical in two flights."""
     result = []
     for topic in topics:
         one, other = a.topic(topic), b.topic(topic)

@@ -39,7 +39,7 @@ def flight(charge=True, **effect):
 
 def test_constant_current_draws_power_times_time():
     use = battery_use(flight())
-    assert use.drawn[-1] == pytest.approx(CURRENT * VOLTAGE * HOURS)
+    assert use.energy_drawn[-1] == pytest.approx(CURRENT * VOLTAGE * HOURS)
     assert use.charge_left == pytest.approx(0.5 - CURRENT * HOURS / CAPACITY)
     assert use.energy_left == pytest.approx(use.charge_left * CAPACITY * CELLS * 3.7)
 
@@ -58,7 +58,7 @@ def test_plot_has_every_quantity_in_order():
 
 def test_unmodelled_battery_is_left_out():
     assert battery_use(flight(charge=False)) is None
-    with pytest.raises(NotRecordedError, match="models no battery"):
+    with pytest.raises(NotRecordedError, match="has no battery model"):
         battery.draw(flight(charge=False))
 
 

@@ -1,4 +1,4 @@
-"""One type for a flight, whether it was recorded or flown in memory."""
+"""Flight data from logs and from simulations in memory."""
 
 import pickle
 
@@ -55,7 +55,7 @@ def test_log_and_memory_flight_are_equal(recorded, in_memory):
 def test_only_requested_topics_are_kept(run):
     result = fly(run, (TRUTH, SETPOINT))
     assert result.topics == ["ground_truth", "setpoint"]
-    with pytest.raises(ValueError, match="hover: has no topic status; it has ground_truth, setpoint"):
+    with pytest.raises(ValueError, match="hover: no topic status; expected one of ground_truth, setpoint"):
         result.status  # noqa: B018
 
 
@@ -70,7 +70,7 @@ def test_only_requested_ports_have_full_history(run):
     assert graph.rows("setpoint", np.array([0])).tolist() == graph.rows("setpoint", np.array([128])).tolist()  # a ring
 
 
-def test_flight_goes_from_process_to_process(run):
+def test_flight_can_be_pickled(run):
     result = fly(run, (TRUTH,))
     again = pickle.loads(pickle.dumps(result))
     assert np.array_equal(again.truth.position, result.truth.position)
@@ -84,7 +84,7 @@ def test_failure_is_reported():
 
 
 def ended(**truth):
-    """A flight whose autopilot says that it has landed."""
+    """Return a flight whose autopilot reports a landing."""
     columns = {
         "pose.position": np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 2.0), 10),
         "pose.orientation": synthetic_flights.LEVEL,
@@ -101,7 +101,7 @@ def test_landed_means_upright_slow_and_in_contact():
     assert not ended(**{"pose.orientation": (np.sin(half), 0.0, 0.0, np.cos(half))}).landed
     assert not ended(velocity=(0.4, 0.4, 0.0)).landed
     assert not ended(ground_contact=False).landed
-    stood = np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 0.36), 10)  # a plant that tells of no contact
+    stood = np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 0.36), 10)  # a plant without contact information
     assert ended(**{"ground_contact": False, "pose.position": stood}).landed
 
 
@@ -114,5 +114,5 @@ def test_landed_needs_autopilots_word():
 
 
 def test_flight_lands(in_memory):
-    assert not in_memory.landed  # two seconds are not enough
+    assert not in_memory.landed  # two seconds are too short
     assert fly(load(SCENE)).landed

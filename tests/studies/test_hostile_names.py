@@ -116,7 +116,7 @@ def test_pages_escape_names(written):
 def test_templates_mark_no_name_as_safe():
     folder = headless.Path(report.__file__).parent
     safe = {name for path in folder.glob("*.html") for name in re.findall(r"(\w+) \| safe", path.read_text("utf-8"))}
-    assert safe == {"library", "code", "space"}
+    assert safe == {"library", "code", "view3d"}
 
 
 def test_plots_escape_names():

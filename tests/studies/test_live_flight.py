@@ -21,16 +21,16 @@ def steps():
     """Return the first seconds of a mission whose services hand over at different times."""
     setup = resolve(load("hover", {"run.duration": 4.0}))
     graph = BlockDiagram(setup, create_all(setup), PAGE)
-    live, result, held = LiveFlight(setup), [], []
+    live, result, delayed = LiveFlight(setup), [], []
     while not graph.ended:
         before = graph.tick
         graph.advance(min(graph.tick + 30, setup.last_tick + 1))
         pages = list(graph.record_batches(before, graph.tick))
-        live.take(held + [page for page in pages if page.topic.name.endswith("ground_truth")])
-        held = [page for page in pages if not page.topic.name.endswith("ground_truth")]  # come later
+        live.add(delayed + [page for page in pages if page.topic.name.endswith("ground_truth")])
+        delayed = [page for page in pages if not page.topic.name.endswith("ground_truth")]  # delivered later
         if (step := live.step((before - 1) * setup.interval_ns)) is not None:
             result.append(step)
-    live.take(held)
+    live.add(delayed)
     return [*result, live.step(setup.last_tick * setup.interval_ns)]
 
 

@@ -1,4 +1,4 @@
-"""Figures of flights made up, whose answers are known; and what a scene calls a success."""
+"""Metrics of synthetic flights with known values, and success criteria of scenes."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 def flown(failure="", diverged=False, finished=True, setpoint=None, truth=None, estimate=None, armed=True):
-    """A flight at 100 Hz: columns of some topics besides what stands still."""
+    """Return a flight at 100 Hz at rest, except for some columns of topics."""
     pose = {"pose.position": ZERO, "pose.orientation": synthetic_flights.LEVEL}
     still = {**pose, "velocity": ZERO, "motor_power": (100.0,), "ground_contact": False, "motor_voltage": (20.0,)}
     return synthetic_flights.flight(
@@ -46,7 +46,7 @@ def test_errors_of_known_offsets():
     assert [f[f"rmse.{axis}"] for axis in AXES] == pytest.approx([0.1, 0.0, 0.2, 0.0, 0.0, 0.1])
     assert [f[f"rmse_estimate.{axis}"] for axis in AXES] == pytest.approx([0.0, 0.3, 0.2, 0.0, 0.0, 0.2])
     assert f["max_distance"] == pytest.approx(np.hypot(0.1, 0.2))
-    assert f["overshoot"] == pytest.approx(0.2)  # above the reference; it never came as far along x
+    assert f["overshoot"] == pytest.approx(0.2)  # above the reference; not exceeded along x
     assert [f[f"within_3sigma.{axis}"] for axis in "xyz"] == [1.0] * 3
     assert f["energy"] == pytest.approx(400.0)
     assert (f["outcome"], f["saturation"], f["max_tilt"]) == ("landed", 0.0, 0.0)
@@ -143,52 +143,54 @@ def test_default_success_requires_completed_mission():
 
 
 @pytest.fixture
-def made():
-    """Reference, position, attitude and what is armed of 300 times, all over the place."""
+def data():
+    """Return random reference, position, attitude and armed flags at 300 times."""
     random = np.random.default_rng(7)
-    expected, flown, armed = random.normal(size=(300, 6)), random.normal(size=(300, 6)), random.random(300) > 0.4
-    return Reference(expected[:, :3], 4.0 * expected[:, 3:5], 4.0 * expected[:, 5]), flown[:, :3], flown[:, 3:], armed
+    expected, actual, armed = random.normal(size=(300, 6)), random.normal(size=(300, 6)), random.random(300) > 0.4
+    return Reference(expected[:, :3], 4.0 * expected[:, 3:5], 4.0 * expected[:, 5]), actual[:, :3], actual[:, 3:], armed
 
 
-def test_single_pass_statistics_equal_numpy(made):
-    (position, roll_pitch, yaw), flown, attitude, armed = made
-    errors = np.column_stack([position - flown, np.angle(np.exp(1j * (np.column_stack([roll_pitch, yaw]) - attitude)))])
+def test_single_pass_statistics_equal_numpy(data):
+    (position, roll_pitch, yaw), actual, attitude, armed = data
+    errors = np.column_stack(
+        [position - actual, np.angle(np.exp(1j * (np.column_stack([roll_pitch, yaw]) - attitude)))]
+    )
     expected = np.sqrt((errors[armed] ** 2).mean(axis=0))
-    assert list(rmse(*made).values()) == pytest.approx(expected, rel=1e-12)
-    distance, farthest = reach(position, flown, armed)
-    required, flown = position[armed], flown[armed]
-    beyond = np.concatenate([flown.max(axis=0) - required.max(axis=0), required.min(axis=0) - flown.min(axis=0)])
-    assert distance == pytest.approx(np.linalg.norm(required - flown, axis=1).max(), rel=1e-12)
+    assert list(rmse(*data).values()) == pytest.approx(expected, rel=1e-12)
+    distance, farthest = reach(position, actual, armed)
+    required, actual = position[armed], actual[armed]
+    beyond = np.concatenate([actual.max(axis=0) - required.max(axis=0), required.min(axis=0) - actual.min(axis=0)])
+    assert distance == pytest.approx(np.linalg.norm(required - actual, axis=1).max(), rel=1e-12)
     assert farthest == beyond.max()
 
 
-def test_missing_number_stays_none(made):
-    _, flown, _, armed = made
-    assert np.isnan(list(rmse(*made[:3], np.zeros(300, bool)).values())).all()
-    flown[np.flatnonzero(armed)[7], 1] = np.nan
-    result = rmse(*made)
-    assert np.isnan([*reach(made[0].position, flown, armed), result["y"]]).all()
+def test_nan_propagates_to_statistics(data):
+    _, actual, _, armed = data
+    assert np.isnan(list(rmse(*data[:3], np.zeros(300, bool)).values())).all()
+    actual[np.flatnonzero(armed)[7], 1] = np.nan
+    result = rmse(*data)
+    assert np.isnan([*reach(data[0].position, actual, armed), result["y"]]).all()
     assert np.isfinite([result[axis] for axis in ("x", "z", "roll", "pitch", "yaw")]).all()
 
 
-@pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
-def test_layout_of_numbers_is_no_matter(made, laid):
-    values = laid(made[1])
+@pytest.mark.parametrize("layout", [np.ascontiguousarray, np.asfortranarray, lambda a: np.repeat(a, 2, axis=1)[:, ::2]])
+def test_statistics_do_not_depend_on_memory_layout(data, layout):
+    values = layout(data[1])
     assert np.array_equal(strided_view(values), values)
     assert total(values) == pytest.approx(values.sum(), rel=1e-12)
-    assert rmse(made[0], values, *made[2:]) == rmse(*made)
-    assert reach(made[0].position, values, made[3]) == reach(made[0].position, *made[1::2])
+    assert rmse(data[0], values, *data[2:]) == rmse(*data)
+    assert reach(data[0].position, values, data[3]) == reach(data[0].position, *data[1::2])
 
 
-@pytest.mark.parametrize("laid", [np.ascontiguousarray, np.asfortranarray])
-def test_roll_pitch_yaw_make_rotation_again(laid):
+@pytest.mark.parametrize("layout", [np.ascontiguousarray, np.asfortranarray])
+def test_roll_pitch_yaw_invert_quaternion(layout):
     angles = np.random.default_rng(3).uniform((-3.0, -1.5, -3.0), (3.0, 1.5, 3.0), (50, 3))
     roll, pitch, yaw = np.cos(angles.T / 2) + 1j * np.sin(angles.T / 2)
     w = roll.real * pitch.real * yaw.real + roll.imag * pitch.imag * yaw.imag
     x = roll.imag * pitch.real * yaw.real - roll.real * pitch.imag * yaw.imag
     y = roll.real * pitch.imag * yaw.real + roll.imag * pitch.real * yaw.imag
     z = roll.real * pitch.real * yaw.imag - roll.imag * pitch.imag * yaw.real
-    result = roll_pitch_yaw(laid(np.column_stack([x, y, z, w])))
+    result = roll_pitch_yaw(layout(np.column_stack([x, y, z, w])))
     assert np.allclose(np.exp(1j * result), np.exp(1j * angles), rtol=0.0, atol=1e-12)
     assert (np.abs(np.diff(result[:, 2])) <= np.pi).all()
 

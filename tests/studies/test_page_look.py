@@ -58,7 +58,7 @@ def test_colours_differ_without_red_green_vision(kind, scheme):
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_report_looks_as_kept_in_light_dark_and_on_phone():
     for look, pixels, (page, window) in page_looks.pictures():
-        difference = np.abs(pixels.astype(float) - page_looks.kept(look))
+        difference = np.abs(pixels.astype(float) - page_looks.reference_picture(look))
         assert difference.mean() < MEAN, look
         assert np.quantile(difference.mean(axis=2), 0.99) < WORST, look
         assert page <= window, look

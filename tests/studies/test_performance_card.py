@@ -1,4 +1,4 @@
-"""The performance card: figures of the models beside the published ones."""
+"""Performance card: computed and published figures."""
 
 import json
 import math
@@ -47,7 +47,7 @@ def test_default_models_come_near_paper():
     assert 1.1 < ceiling.computed / ceiling.published < 1.2
 
 
-def test_every_published_figure_says_why_it_may_differ():
+def test_published_figures_have_reason_for_difference():
     assert all(row.reason for row in card(VEHICLE) if row.published is not None)
 
 
@@ -105,9 +105,9 @@ def scene_with_constants(tmp_path, vehicle):
 @pytest.mark.parametrize("tables", [("propeller",), ()], ids=["without a propeller", "with both"])
 def test_card_and_autopilot_go_by_rotors_that_are_in_force(tmp_path, tables):
     scene = scene_with_constants(tmp_path, airframe_without(tmp_path, *tables))
-    known = known_airframe(load(scene))
-    assert known.motor.thrust_coefficient == 4.0e-4
-    assert known.torque_per_thrust == pytest.approx(2.0e-5 / 4.0e-4)
+    nominal = known_airframe(load(scene))
+    assert nominal.motor.thrust_coefficient == 4.0e-4
+    assert nominal.torque_per_thrust == pytest.approx(2.0e-5 / 4.0e-4)
     assert resolve(load(scene)).vehicle == "drone1"
     rows = {row.name: row for row in card(scene)}
     weight = load_airframe(VEHICLE).mass.total * performance.GRAVITY
@@ -130,16 +130,16 @@ def test_airframe_without_rotor_model_is_rejected(tmp_path):
 def test_hexacopter_without_rotor_equals_linear_programming():
     """All thrusts up to the highest, torques of roll, pitch and yaw 0: the autopilot's least squares come near it."""
     rows = {row.name: row for row in card(ROOT / "lapwing/scenes/vehicles/hexacopter.toml")}
-    known = known_airframe(load("hexacopter"))
-    B, whole = rotor_effectiveness(known), rows["thrust over weight"].computed
+    nominal = known_airframe(load("hexacopter"))
+    B, whole = rotor_effectiveness(nominal), rows["thrust over weight"].computed
     bounds, most = [(0.0, 1.0)] * 6, []
-    for k, shares in enumerate(law_shares(known)[1:]):
+    for k, shares in enumerate(law_shares(nominal)[1:]):
         torques = B[1:] if any(share[3] for share in shares) else B[1:3]
         free = [(0.0, 0.0) if j == k else bound for j, bound in enumerate(bounds)]
         most.append(-linprog(-B[0], A_eq=torques, b_eq=np.zeros(len(torques)), bounds=free).fun / 6.0)
     result = rows["the same without a rotor"].computed
     assert 0.75 * min(most) * whole < result <= min(most) * whole * (1.0 + 1e-9)
-    assert result > 1.0  # it flies on
+    assert result > 1.0  # still controllable
 
 
 def test_four_rotors_cannot_lose_one():

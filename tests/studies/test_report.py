@@ -1,4 +1,4 @@
-"""The report against a flight made by formula: its figures are known without the code under test."""
+"""Report of a synthetic flight with analytically known figures."""
 
 import base64
 import gzip
@@ -63,7 +63,7 @@ METADATA = {
 
 
 def rotation(roll, pitch, yaw):
-    """Quaternion of yaw, then pitch, then roll about the turned axes, from the textbook's formula."""
+    """Quaternion of yaw, then pitch, then roll about the rotated axes, from a textbook formula."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
     return Quaternion(
         x=sr * cp * cy - cr * sp * sy,
@@ -155,12 +155,12 @@ class Page(HTMLParser):
             self.texts.append(data.strip())
 
     def after(self, text):
-        """The text that follows `text`: a table's value after its name."""
+        """Return the text after `text`, such as a table's value after its name."""
         return self.texts[self.texts.index(text) + 1]
 
 
 def report(log):
-    """The report of a log, written beside it."""
+    """Write the report of a log in its folder and return its path."""
     return write(FlightData.read(log), log.with_suffix(".html"))
 
 
@@ -170,7 +170,7 @@ def page(log):
 
 
 def values(array):
-    """The numbers of an array as page.js reads it."""
+    """Return the numbers of an array as page.js decodes them."""
     if isinstance(array, list):
         return np.array(array, float)
     if "bdata" in array:
@@ -191,10 +191,10 @@ def test_every_plot_is_on_page_in_its_order(page):
 
 def test_plot_contains_flight_data(log, page):
     x = page.plots["position"]["data"][0]
-    flown = FlightData.read(log)
+    flight = FlightData.read(log)
     assert x["name"] == "flown"
-    assert values(x["x"]) == pytest.approx(flown.truth.times, abs=SECONDS / 65534)
-    assert values(x["y"]) == pytest.approx(flown.truth.position[:, 0], abs=2.0 / 65534)
+    assert values(x["x"]) == pytest.approx(flight.truth.times, abs=SECONDS / 65534)
+    assert values(x["y"]) == pytest.approx(flight.truth.position[:, 0], abs=2.0 / 65534)
 
 
 def test_axes_over_time_are_linked_and_say_their_unit(page):
@@ -268,14 +268,14 @@ def test_timeline_lists_service_event_and_time(page):
 
 
 def test_motors_at_limit_are_marked(log):
-    flown = FlightData.read(log)
-    flown.origin.scene["airframe"] = {"motor": {"max_voltage": 34.0}}
-    marks, output = motors.limits(flown)
-    assert "limit of its voltage (0 or 34 V) in the air, in all for " in output
+    flight = FlightData.read(log)
+    flight.origin.scene["airframe"] = {"motor": {"max_voltage": 34.0}}
+    marks, output = motors.limits(flight)
+    assert "voltage limit (0 or 34 V) in the air, in total for " in output
     stretch = marks[-1]
     assert stretch.name == "at a limit"
     assert np.isnan(stretch.x[2::3]).all()
-    # 0.1 (300 + 50 sin t) > 34 from arcsin 0.8, before it is armed, to pi less that
+    # 0.1 (300 + 50 sin t) > 34 from arcsin 0.8 (not yet armed) to pi - arcsin 0.8
     assert stretch.x[:2] == pytest.approx((1.0, math.pi - math.asin(0.8)), abs=1.0 / RATE)
 
 
@@ -357,7 +357,7 @@ def test_turbulence_is_drawn_as_mean_and_range():
     assert bands[0].high == pytest.approx(wind[:, 0].reshape(10, 250).max(axis=1))
 
 
-def test_script_alone_is_taken_of_package_that_was_slimmed(tmp_path, monkeypatch):
+def test_script_is_found_in_package_without_other_files(tmp_path, monkeypatch):
     script = tmp_path / "plotly" / "package_data" / "plotly.min.js"
     monkeypatch.setattr(sys, "path", [str(tmp_path)])
     with pytest.raises(ValueError, match="pip install plotly"):
@@ -377,19 +377,21 @@ def test_two_flights_lie_over_each_other(log, tmp_path):
     other = record(tmp_path / "weak.mcap", messages(rotors=0))
     page = Page(write([FlightData.read(log), FlightData.read(other)], tmp_path / "both.html"))
     names = [trace["name"] for trace in page.plots["position"]["data"]]
-    assert names == ["flown", "reference", "", "± RMSE", "± RMSE"] * 3  # the same flight: nothing to tell apart
+    assert names == ["flown", "reference", "", "± RMSE", "± RMSE"] * 3  # equal flights
     assert any("Of circle alone (weak: the vehicle has no motors)." in text for text in page.texts)
     assert any(text.startswith("weak: Landed") for text in page.texts)
 
 
 def test_differences_of_two_flights_have_names(log, tmp_path):
-    other = record(tmp_path / "moved.mcap", messages(east=1.0))  # it followed the same reference
+    other = record(tmp_path / "moved.mcap", messages(east=1.0))  # same reference
     one, two = (position.draw(FlightData.read(path)) for path in (log, other))
     both = overlay(one, two, ("a", "b"))
     assert [mark.name for mark in both.panels[0].marks] == ["flown, a", "reference", "flown, b"]
     assert both.panels[1].title == "RMSE 0.1000 m / 0.9000 m"
     assert "Above the panels: a / b." in both.caption
-    same = next(panel for panel in both.panels if panel.y_label == "y [m]").marks  # the legend has each name by flight
+    same = next(
+        panel for panel in both.panels if panel.y_label == "y [m]"
+    ).marks  # the legend has the name of each flight
     assert [mark.name for mark in same] == ["flown, a", "reference", "flown, b"]
     names = {mark.name for panel in both.panels for mark in panel.marks}
     assert names == {"flown, a", "flown, b", "reference", "± RMSE, a", "± RMSE, b", ""}
@@ -449,7 +451,7 @@ def test_browser_draws_page_without_complaint(log, tmp_path):
     page = report(log)
     text = page.read_text(encoding="utf-8")
     listen = 'window.addEventListener("error", (e) => document.body.setAttribute("complaint", e.message));'
-    page = tmp_path / "told.html"
+    page = tmp_path / "page.html"
     text = text.replace("<details>", "<details open>")
     page.write_text(text.replace("<body>", f"<body><script>{listen}</script>", 1), encoding="utf-8")
     quiet = ("--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path / 'profile'}")
@@ -467,17 +469,17 @@ def test_errors_are_offsets_that_were_flown(log, page):
         assert FlightData.read(log).rmse[axis] == pytest.approx(abs(offset), rel=1e-9)
         assert FlightData.read(log).errors[axis] == pytest.approx(offset, rel=1e-9)  # also its sign
     assert page.after(page.after("x [m]")) == "0.2373"
-    assert page.after(page.after("y [m]")) != "0.2700"  # nothing published for y in this scene
+    assert page.after(page.after("y [m]")) != "0.2700"  # no published value for y in this scene
 
 
 def test_summary_equals_log(log, page):
-    flown = FlightData.read(log)
-    assert page.after("digest") == flown.digest
+    flight = FlightData.read(log)
+    assert page.after("digest") == flight.digest
     assert page.after("duration") == "6.00 s"
     assert page.after("landed") == "yes"
     assert page.after("seed") == "7"
     assert page.after("solver") == "rk4, step 0.001 s"
-    assert any("a circle <by> formula" in text for text in page.texts)  # escaped, not swallowed as an element
+    assert any("a circle <by> formula" in text for text in page.texts)  # escaped, not parsed as an element
 
 
 def test_armed_samples_alone_count(log):
@@ -490,10 +492,10 @@ def test_phases_follow_one_another(log):
 
 
 def test_coefficients_are_those_of_propeller(log):
-    flown = FlightData.read(log)
-    speed = flown.truth.rotor_speed[:, 0]
-    assert propulsion.coefficient(speed, flown.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
-    assert propulsion.coefficient(speed, flown.truth.rotor_torque[:, 0], 2) == pytest.approx(TORQUE)
+    flight = FlightData.read(log)
+    speed = flight.truth.rotor_speed[:, 0]
+    assert propulsion.coefficient(speed, flight.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
+    assert propulsion.coefficient(speed, flight.truth.rotor_torque[:, 0], 2) == pytest.approx(TORQUE)
 
 
 def test_estimate_errors_and_refusals(log):
@@ -524,7 +526,7 @@ def test_truncated_log_gives_report_too(log, tmp_path):
     cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     page = Page(report(cut))
     assert page.after("landed") == "no"
-    assert page.after("digest") == "none: the log has no end"
+    assert page.after("digest") == "none: the log is incomplete"
     assert 0.0 < float(page.after("duration").removesuffix(" s")) < SECONDS
     assert page.after("x [m]") == "0.1000"
     assert "position" in page.plots
@@ -534,9 +536,9 @@ def test_missing_data_is_reported(tmp_path):
     page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
     assert set(page.plots) == {"mission_map", "timeline", "position", "attitude", "path", "air"}
-    assert "Left out: the vehicle has no motors." in text
-    assert "Left out: the estimate states no uncertainty (it is the truth)." in text
-    assert "No reference in this log" in text
+    assert "Not shown: the vehicle has no motors." in text
+    assert "Not shown: the estimate has no standard deviations (it is the truth)." in text
+    assert "The log has no reference" in text
 
 
 def test_single_sample_is_enough(tmp_path):

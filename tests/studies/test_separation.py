@@ -7,7 +7,7 @@ from lapwing.studies.separation import least_over_time, nearest
 
 
 class Truth:
-    """A straight path."""
+    """Return a straight path."""
 
     def __init__(self, start, velocity, n=11):
         self.times = np.arange(n) * 0.1
@@ -17,11 +17,11 @@ class Truth:
         return len(self.times)
 
 
-def test_two_that_pass_one_another_are_nearest_side_by_side():
+def test_passing_vehicles_are_nearest_side_by_side():
     truths = {
         "a": Truth((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
         "b": Truth((1.0, 3.0, 0.0), (0.0, 0.0, 0.0)),
-        "far": Truth((0.0, 90.0, 0.0), (0.0, 0.0, 0.0), n=6),  # tells of itself for a shorter time
+        "far": Truth((0.0, 90.0, 0.0), (0.0, 0.0, 0.0), n=6),  # shorter log
     }
     result = nearest(truths)
     assert (result.vehicles, result.distance, result.time) == (("a", "b"), pytest.approx(3.0), pytest.approx(0.5))

@@ -1,4 +1,4 @@
-"""The picture of the services, from the set-up alone."""
+"""Diagram of the services from a run configuration."""
 
 import pytest
 
@@ -21,7 +21,7 @@ def test_diagram_shows_ports(mission):
 
 def test_diagram_shows_listeners(mission):
     assert [p.name for p in service_diagram.listeners(mission)] == ["recorder", "router", "mavlink", "foxglove", "ros2"]
-    load_only = resolve(load("cooperative_load"))  # nobody steers: nothing for a ground station
+    load_only = resolve(load("cooperative_load"))  # no autopilot: no ground station
     assert [p.name for p in service_diagram.listeners(load_only)] == ["recorder", "router", "foxglove", "ros2"]
 
 
@@ -31,7 +31,7 @@ def test_every_topic_has_its_arrow(mission):
     handed = [text for texts in service_diagram.ports_by_pair(mission).values() for text in texts]
     beside = ["every recorded topic", *["every topic"] * 3, "telemetry", "commands", "MAVLink 2"]
     assert sorted(reported) == sorted([*handed, *beside])
-    assert len({(arrow.start, arrow.end) for arrow in result}) == len(result)  # none lies on another
+    assert len({(arrow.start, arrow.end) for arrow in result}) == len(result)  # no overlap
     link = result[reported.index("MAVLink 2")]
     assert link.both_ways
     assert "MAVLink 2" not in [arrow.text for arrow in service_diagram.arrows(resolve(load("cooperative_load")))]

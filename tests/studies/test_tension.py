@@ -1,4 +1,4 @@
-"""Tension of the links of a load: Lagrange multipliers of free particles, a hover, and what is told of a push."""
+"""Tension of the links of a load: Lagrange multipliers of free particles, a hover, and events of pushes."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_tension_is_that_of_lagrange_multipliers():
 
 
 def flight(thrust):
-    """Links straight down, both quadrotors level: each carries half of the load where the thrust is theirs and its."""
+    """Return a flight with vertical links and level quadrotors, which each carry half of the load in hover."""
     place = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.6], [0.0, 0.0, 0.8]])
     bodies = {"pose": np.broadcast_to(np.hstack([place, np.tile(synthetic_flights.LEVEL, (3, 1))]), (100, 3, 7))}
     bodies["velocity"] = np.zeros((100, 3, 3))
@@ -50,7 +50,7 @@ def flight(thrust):
 
 
 def hover(t):
-    """Thrusts [N] at times t [s], (n, 2): each carries half of the load until 0.5 s, then link 2 is pushed down."""
+    """Return thrusts [N] at times t [s], shape (n, 2): hover until 0.5 s, then link 2 is in compression."""
     own = np.array([0.7, 0.9]) * 9.81
     return np.where(t[:, None] < 0.5, own + 0.2 * 9.81, own * [1.6, 0.0])
 

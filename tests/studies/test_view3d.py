@@ -1,4 +1,4 @@
-"""Flights in space: solids, poses, the recorded page, and its player in a browser."""
+"""3D view: solids, poses, recorded page, and its player in a browser."""
 
 import copy
 import json
@@ -75,9 +75,9 @@ def test_rotors_turn_in_their_own_direction():
     assert moved.bodies[0].rotors[0].angle == pytest.approx(-T)
     (body,) = sample(values, moved, np.array([1.0])).bodies
     scene = Recorder()
-    Rotors(scene, "/body", moved.bodies[0].rotors, "#0072B2", 0.1).turn(body.angles[0])
+    Rotors(scene, "/body", moved.bodies[0].rotors, "#0072B2", 0.1).set_angles(body.angles[0])
     tips = scene.nodes["/body/blades"].vertices.reshape(4, -1, 3)[:, :2].mean(axis=1) - np.array(HUBS)
-    step = 2.0 * np.pi / sampling.TURNS
+    step = 2.0 * np.pi / sampling.ANGLES
     for (x, y, _), sign in zip(tips, (-1.0, 1.0, -1.0, 1.0), strict=True):
         assert np.hypot(x, y) == pytest.approx(0.95 * 0.25, abs=1e-3)
         assert np.arctan2(y, x) == pytest.approx(sign, abs=step)
@@ -85,12 +85,12 @@ def test_rotors_turn_in_their_own_direction():
 
 def test_thrust_arrows_stand_on_hubs_and_have_their_lengths():
     rotors, scene = motion(flight()).bodies[0].rotors, Recorder()
-    Rotors(scene, "/body", rotors, "#0072B2", 0.1).push(np.array([1.0, 2.0, 0.0, -3.0]))
+    Rotors(scene, "/body", rotors, "#0072B2", 0.1).set_thrusts(np.array([1.0, 2.0, 0.0, -3.0]))
     arrows = scene.nodes["/body/thrusts"].vertices.reshape(4, -1, 3)
     assert np.ptp(arrows[:, :, 2], axis=1) == pytest.approx([0.1, 0.2, 0.0, 0.3])
     assert arrows[3, :, 2].min() == pytest.approx(-0.3)
     assert arrows[:, -1, :2] == pytest.approx(np.array(HUBS)[:, :2])
-    assert np.ptp(arrows[2], axis=0) == pytest.approx(0.0)  # nothing is seen of an arrow without length
+    assert np.ptp(arrows[2], axis=0) == pytest.approx(0.0)  # an arrow of zero length is invisible
 
 
 def test_coloured_mesh_is_read_with_its_shape_and_colours(tmp_path):
@@ -210,7 +210,7 @@ def test_contact_forces_are_drawn_at_their_points():
 )
 def test_drawn_beam_starts_at_sensor_and_ends_at_surface(name, table, origin, direction):
     ranges = np.where(T < 2.0, 1.5, np.inf)
-    airframe = AIRFRAME | {"mass": {"centre": [0.05, -0.02, 0.01]}}  # sensors have their places about it
+    airframe = AIRFRAME | {"mass": {"centre": [0.05, -0.02, 0.01]}}  # positions of sensors are relative to it
     whole = flight(scene={"airframe": airframe, "sensors": {name: table}})
     reading = TopicView(np.arange(TICKS) * 10**7, {"range": ranges, "field_of_view": np.full(TICKS, 0.5)})
     values = FlightData({**{key: whole.topic(key) for key in whole.topics}, name: reading}, whole.origin)
@@ -240,9 +240,11 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     recorder = Recorder()
     add_surroundings(recorder, flight(scene=scene))
     (node,) = (node for node in recorder.nodes.values() if node.kind == "add_mesh_simple")
-    assert node.cast_shadow is False  # on itself, as a pattern
+    assert node.cast_shadow is False  # shadows on itself
     vertices = node.arguments[0]
-    assert vertices[np.argmax(vertices[:, 2])] == pytest.approx([0.0, 0.0, 0.0], abs=0.01)  # heights are from home's
+    assert vertices[np.argmax(vertices[:, 2])] == pytest.approx(
+        [0.0, 0.0, 0.0], abs=0.01
+    )  # heights are relative to home
     assert vertices[:, 2].min() == pytest.approx(-2.0)
     lines = recorder.nodes["/surroundings/lines"].arguments[0]
     rows = {tuple(row) for row in np.asarray(vertices, np.float32)[:, :2].tolist()}
@@ -489,9 +491,9 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
         )
         assert browser.errors == []
     assert calls < 80
-    assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # what has been flown
-    assert 1 <= names < 8  # those behind others are hidden
-    assert frames <= seconds + 1.0  # viser's own one a second
+    assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # part up to the current time
+    assert 1 <= names < 8  # covered labels are hidden
+    assert frames <= seconds + 1.0  # including one per second by viser
     assert after > 0
 
 

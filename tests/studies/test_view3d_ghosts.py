@@ -12,7 +12,7 @@ from lapwing.studies.view3d.solids import join_meshes
 from lapwing.studies.view3d.stage import Vehicle
 
 TIMES = np.array([0.0, 1.0, 2.0, 3.0])
-PATH = np.column_stack([0.0 * T, 0.0 * T, T])  # of the flight
+PATH = np.column_stack([0.0 * T, 0.0 * T, T])  # [s] times of the flight
 AHEAD, ASIDE = PATH + np.array([5.0, 0.0, 0.0]), PATH + np.array([0.0, 3.0, 0.0])
 
 
@@ -67,8 +67,8 @@ def test_ghost_is_one_mesh_in_shape_of_vehicle():
     assert [name for name in scene.nodes if "/reference/" in name] == ["/0 drone1/reference/body"]
 
 
-def test_ghost_fades_out_where_it_would_cover_body():
-    size = 0.7  # [m] of the vehicle, about
+def test_ghost_fades_out_close_to_body():
+    size = 0.7  # [m] approximate size of the vehicle
     away = np.interp(T, [0.0, 1.0, 2.0, 3.0], [0.0, 0.3 * HIDDEN * size, 0.5 * (HIDDEN + FULL) * size, 2.0])
     _, _, result = shown(PATH, PATH + np.column_stack([away, 0.0 * T, 0.0 * T]))
     ghosts = [ghosts["estimate"] for ghosts in result]

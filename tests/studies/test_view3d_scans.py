@@ -1,4 +1,4 @@
-"""Points of scanning lidars and depth cameras in the 3D view, of flights among surfaces that are known."""
+"""Point clouds of lidars and depth cameras in the 3D view, near known surfaces."""
 
 import subprocess
 import sys
@@ -40,9 +40,9 @@ def log(request, tmp_path_factory):
 
 
 def distance(points):
-    """[m] from the nearest surface: ground, or a wall of the box, shape (n,)."""
+    """Return the distance [m] to the nearest surface, ground or a wall of the box, shape (n,)."""
     x, y, z = points.T
-    beyond = np.maximum(np.abs(x - 6.0) - 1.0, np.abs(y) - 2.0)  # of the box from above, negative within
+    beyond = np.maximum(np.abs(x - 6.0) - 1.0, np.abs(y) - 2.0)  # distance from the box in plan view, negative inside
     return np.minimum(np.abs(z), np.where(z > 0.0, np.abs(beyond), np.inf))
 
 

@@ -1,4 +1,4 @@
-"""Worker processes end with the process that they fly for, however that ends."""
+"""Worker processes always end with their parent process."""
 
 import errno
 import os

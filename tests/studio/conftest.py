@@ -1,4 +1,4 @@
-"""A running `lapwing studio` in a folder of its own."""
+"""Fixture of a running `lapwing studio` in a temporary folder."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-PATIENCE = 300.0  # [s] for what a loaded machine does in the end
+TIMEOUT = 300.0  # [s] generous, for a loaded machine
 ROOT = Path(__file__).parents[2]
 
 
@@ -23,7 +23,7 @@ class NoRedirect(urllib.request.HTTPRedirectHandler):
 
 
 class Studio:
-    """The command as a process, and an HTTP client."""
+    """Process of the command, with an HTTP client."""
 
     def __init__(self, folder, *options):
         environment = os.environ | {"PYTHONPATH": str(ROOT), "BROWSER": "true", "PYTHONUNBUFFERED": "1"}
@@ -36,14 +36,14 @@ class Studio:
         self._opener = urllib.request.build_opener(NoRedirect)
 
     def request(self, path, data=None, **headers):
-        """Status, text and headers of an answer."""
+        """Return status, text and headers of a response."""
         url = path if path.startswith("http") else self.address + path
         if isinstance(data, dict | list):
             data = urllib.parse.urlencode(data).encode()
             headers = {"Origin": self.origin, **headers}
         request = urllib.request.Request(url, data, {k.replace("_", "-"): v for k, v in headers.items()})
         try:
-            with self._opener.open(request, timeout=PATIENCE) as answer:
+            with self._opener.open(request, timeout=TIMEOUT) as answer:
                 return answer.status, answer.read().decode(), answer.headers
         except urllib.error.HTTPError as error:
             return error.code, error.read().decode(), error.headers
@@ -54,8 +54,8 @@ class Studio:
         return text
 
     def wait(self, number):
-        """The page of a run after its end."""
-        end = time.monotonic() + PATIENCE
+        """Return the page of a run after its end."""
+        end = time.monotonic() + TIMEOUT
         while '"running":true' in self.page(f"runs/{number}/state"):
             assert time.monotonic() < end
             time.sleep(0.2)
@@ -64,12 +64,12 @@ class Studio:
     def stop(self):
         self.process.send_signal(signal.SIGINT)
         rest = self.process.stdout.read()
-        return self.process.wait(PATIENCE), rest
+        return self.process.wait(TIMEOUT), rest
 
 
 @pytest.fixture(scope="module")
 def start():
-    """Starts a studio in a folder; ends it after the tests of the file."""
+    """Yield a function that starts a studio in a folder; end it after the tests of the file."""
     running = []
 
     def begin(folder, *options):

@@ -29,27 +29,27 @@ def test_field_has_unit_range_help_and_value(schema):
 
 
 def test_choices_come_from_schema(schema):
-    known = fields("delivery_mission", schema)
-    assert known["sensors.gps.preset"].choices[:2] == ("rtk", "standard")
-    assert known["communication.coupling"].choices == ("gauss_seidel", "jacobi")
-    assert known["trajectory.phase.0.release"].choices == ("true", "false")
+    by_key = fields("delivery_mission", schema)
+    assert by_key["sensors.gps.preset"].choices[:2] == ("rtk", "standard")
+    assert by_key["communication.coupling"].choices == ("gauss_seidel", "jacobi")
+    assert by_key["trajectory.phase.0.release"].choices == ("true", "false")
 
 
 def test_segments_of_phases_have_fields_of_their_kind(schema):
-    known = fields("delivery_mission", schema)
-    assert known["trajectory.phase.1.z.rate"].text == "1.0"
-    assert known["trajectory.phase.1.z.rate"].bounds == "above 0"
+    by_key = fields("delivery_mission", schema)
+    assert by_key["trajectory.phase.1.z.rate"].text == "1.0"
+    assert by_key["trajectory.phase.1.z.rate"].bounds == "above 0"
 
 
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))
 def test_every_field_is_key_that_its_scene_takes(scene, schema):
-    known = fields(scene, schema)
-    assert len(known) > 20
-    shell_command = {key: field for key, field in known.items() if field.text}
-    empty = {key: field._replace(text="") for key, field in shell_command.items()}
-    changed, faults = changes(empty.values(), {key: field.text for key, field in shell_command.items()}, ())
+    by_key = fields(scene, schema)
+    assert len(by_key) > 20
+    set_fields = {key: field for key, field in by_key.items() if field.text}
+    empty = {key: field._replace(text="") for key, field in set_fields.items()}
+    changed, faults = changes(empty.values(), {key: field.text for key, field in set_fields.items()}, ())
     assert faults == {}
-    assert len(changed) == len(shell_command)
+    assert len(changed) == len(set_fields)
     load(scene, [change.override for change in changed])
 
 
@@ -59,17 +59,17 @@ def test_tables_that_scene_lacks_can_be_added(schema):
     assert "effects.battery" in names
     assert "effects.gravity" not in names
     added = load("hover", {"effects.random_wind_force": {}})
-    known = {field.key for group in form(added, schema) for field in group.all_fields()}
-    assert "effects.random_wind_force.mean" in known
+    by_key = {field.key for group in form(added, schema) for field in group.all_fields()}
+    assert "effects.random_wind_force.mean" in by_key
 
 
 def test_unchanged_texts_are_no_changes(schema):
-    known = fields("delivery_mission", schema)
-    assert changes(known.values(), {key: field.text for key, field in known.items()}, ()) == ([], {})
+    by_key = fields("delivery_mission", schema)
+    assert changes(by_key.values(), {key: field.text for key, field in by_key.items()}, ()) == ([], {})
 
 
 def test_texts_become_values_of_field(schema):
-    known = fields("delivery_mission", schema)
+    by_key = fields("delivery_mission", schema)
     posted = {
         "run.seed": "2",
         "run.duration": "30",
@@ -78,7 +78,7 @@ def test_texts_become_values_of_field(schema):
         "trajectory.phase.1.z.to": "8",
         "trajectory.phase.0.release": "true",
     }
-    changed, faults = changes(known.values(), posted, ["effects.battery"])
+    changed, faults = changes(by_key.values(), posted, ["effects.battery"])
     assert faults == {}
     assert dict(changed) == {
         "effects.battery": {},
@@ -105,8 +105,8 @@ def test_texts_become_values_of_field(schema):
     ],
 )
 def test_text_of_another_kind_is_fault(schema, key, text, message):
-    known = fields("delivery_mission", schema)
-    assert changes(known.values(), {key: text}, ()) == ([], {key: message})
+    by_key = fields("delivery_mission", schema)
+    assert changes(by_key.values(), {key: text}, ()) == ([], {key: message})
 
 
 def test_all_faults_of_form_are_named_at_once():

@@ -126,7 +126,7 @@ def test_preview_names_command_python_and_faults(studio):
     assert answer["faults"] == {"run.duration": "expected a number above 0 and at most 1e+06 [s], got -1.0"}
 
 
-def test_faulty_form_is_shown_again_with_its_fault(studio):
+def test_faulty_form_is_returned_with_fault(studio):
     status, text, _ = studio.request("scenes/hover/run", {**QUICK, "run.seed": "-3"})
     assert status == 422
     assert 'value="-3"' in text
@@ -152,7 +152,7 @@ def logs(folder):
 
 def test_run_shows_outcome_command_and_report(studio, folder, flown):
     assert "lapwing run hover --set run.seed=2" in flown[1]
-    assert "Change and fly again" in flown[1]
+    assert "Change and run again" in flown[1]
     assert 'class="outcome' in flown[1]
     with LogReader(folder / "recordings" / logs(folder)[1]) as log:
         setup = recorded_setup(log)
@@ -165,7 +165,7 @@ def test_run_shows_outcome_command_and_report(studio, folder, flown):
 
 
 def test_form_of_another_flight_has_changes(studio, flown):
-    link = re.search(r'href="(http://[^"]+|/[^"]+)">Change and fly again', flown[1])[1].replace("&amp;", "&")
+    link = re.search(r'href="(http://[^"]+|/[^"]+)">Change and run again', flown[1])[1].replace("&amp;", "&")
     text = studio.page(link.removeprefix(f"/{studio.token}/"))
     field = text.partition('data-key="run.seed"')[2].partition("</div>")[0]
     assert 'value="2"' in field
@@ -215,7 +215,7 @@ def test_second_run_waits_for_end_of_first(studio):
     number = int(headers["Location"].rpartition("/")[2])
     status, text, _ = studio.request("scenes/hover/run", QUICK)
     assert status == 422
-    assert f"run {number} of hover is under way; stop it first" in text
+    assert f"run {number} of hover is still running; stop it first" in text
     assert studio.request(f"runs/{number}/stop", {})[0] == 303
     studio.wait(number)
 

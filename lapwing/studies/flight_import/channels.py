@@ -1,4 +1,4 @@
-"""Time series of a log whose quantities have clocks of their own, and the recording that they become."""
+"""Time series of a log with separate times for each quantity, and their conversion to a recording."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -10,28 +10,28 @@ from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.flight_import.rotation_arrays import body_rate, continuous, unit
 from lapwing.studies.flight_import.time_alignment import describe
 
-RATE = 100.0  # [Hz] of the recording
-SHORTEST = 1.0  # [s] of a recording
-SPARSEST = 100  # samples of the grid for one of the log
+RATE = 100.0  # [Hz] sampling rate of the recording
+SHORTEST = 1.0  # [s] minimum duration of a recording
+SPARSEST = 100  # largest ratio of samples of the grid to samples of the log
 FLU = np.array([1.0, -1.0, -1.0])  # signs from FRD to FLU, and back
 
 
 @dataclass
 class Channels:
-    """The quantities of one vehicle's log in SI units, world ENU and body FLU; None where the log has none.
+    """Quantities of one vehicle's log in SI units, world ENU and body FLU; None for missing ones.
 
     Attributes:
         attitude: quaternions w, x, y, z, body to world.
-        position: [m] world.
-        velocity: [m/s] world.
-        omega: [rad/s] body.
-        specific_force: [m/s^2] body.
-        duty: shares of full throttle of each motor.
-        battery: [V], and [A] as a second column where measured.
-        setpoint: of position and its derivatives, in the columns of `Recording.setpoint`.
-        attitude_setpoint: [rad] roll, pitch, yaw.
-        readings: of sensors, by the field of `SENSORS` in `write_log`.
-        notes: facts of the import, a line each.
+        position: position [m], world.
+        velocity: velocity [m/s], world.
+        omega: angular velocity [rad/s], body.
+        specific_force: specific force [m/s^2], body.
+        duty: throttle of each motor, 0 to 1.
+        battery: voltage [V], and current [A] as a second column if measured.
+        setpoint: setpoint of position and its derivatives, with the columns of `Recording.setpoint`.
+        attitude_setpoint: setpoint of roll, pitch, yaw [rad].
+        readings: readings of sensors by the keys of `SENSORS` in `write_log`.
+        notes: remarks on the import, a line each.
         unknown: names of topics without a counterpart.
     """
 
@@ -50,16 +50,16 @@ class Channels:
 
 
 def to_recording(path: Path, channels: Channels, motors: str, rates: str) -> Recording:
-    """Sample all quantities at 100 Hz, over the time that rates, motors, attitude and position have in common.
+    """Sample all quantities at 100 Hz, over the common time span of rates, motors, attitude and position.
 
     Args:
-        path: of the log, for messages.
-        channels: of the log.
-        motors: name of the messages that motor outputs would be in.
-        rates: name of the messages that angular rates would be in.
+        path: path of the log, for messages.
+        channels: quantities of the log.
+        motors: names of messages with motor outputs, for messages.
+        rates: names of messages with angular rates, for messages.
 
     Raises:
-        ValueError: no motor outputs, no rates, or too short a flight.
+        ValueError: motor outputs or rates are missing, or the flight is too short.
     """
     if channels.duty is None or len(channels.duty.time) < 2:
         raise ValueError(f"{path}: no motor outputs ({motors}); log them and fly again")
@@ -94,9 +94,9 @@ def to_recording(path: Path, channels: Channels, motors: str, rates: str) -> Rec
     if not np.isfinite(battery).all():
         notes.append("no battery voltage: motor voltages are shares of the full voltage")
     if "attitude" in series:
-        turning = body_rate(quaternion, np.full(len(grid), 1.0 / RATE))
-        notes.append(describe(turning, omega, valid, 1.0 / RATE))
-        check_rate_unit(path, turning, omega, valid)
+        attitude_rate = body_rate(quaternion, np.full(len(grid), 1.0 / RATE))
+        notes.append(describe(attitude_rate, omega, valid, 1.0 / RATE))
+        check_rate_unit(path, attitude_rate, omega, valid)
     finite = np.isfinite(np.column_stack([sampled[name] for name in series if name != "battery"])).all(axis=1)
     faults = {
         "gap in a topic": int((~valid).sum()),
@@ -121,9 +121,9 @@ def check_density(path: Path, samples: float, recorded: int) -> None:
     """Raise ValueError for damaged times, whose uniform grid would need many times the memory of the file.
 
     Args:
-        path: of the log.
-        samples: of the grid.
-        recorded: of the log.
+        path: path of the log.
+        samples: number of samples of the grid.
+        recorded: number of samples of the log.
     """
     if not samples <= SPARSEST * recorded:
         raise ValueError(
@@ -132,28 +132,28 @@ def check_density(path: Path, samples: float, recorded: int) -> None:
 
 
 def _battery(values: np.ndarray | None, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Voltage [V] with dips bridged, and power [W]; NaN where not measured."""
+    """Return the voltage [V] without short dips, and the power [W], shape (n,) each; NaN if not measured."""
     from scipy.ndimage import median_filter
 
-    nothing = np.full(n, np.nan)
+    unmeasured = np.full(n, np.nan)
     if values is None:
-        return nothing, nothing
+        return unmeasured, unmeasured
     volts = median_filter(values[:, 0], 31, mode="nearest")
-    return volts, values[:, 0] * values[:, 1] if values.shape[1] > 1 else nothing
+    return volts, values[:, 0] * values[:, 1] if values.shape[1] > 1 else unmeasured
 
 
-def check_rate_unit(path: Path, turning: np.ndarray, omega: np.ndarray, valid: np.ndarray) -> None:
+def check_rate_unit(path: Path, attitude_rate: np.ndarray, omega: np.ndarray, valid: np.ndarray) -> None:
     """Raise ValueError if the gyroscope [rad/s] seems to be in degrees per second.
 
     Args:
-        path: of the log, for the message.
-        turning: [rad/s] rate of the measured attitude, shape (n, 3).
-        omega: of the gyroscope, shape (n, 3).
+        path: path of the log, for the message.
+        attitude_rate: rate of the measured attitude [rad/s], shape (n, 3).
+        omega: rate of the gyroscope [rad/s], shape (n, 3).
         valid: samples to compare, shape (n,).
     """
     if valid.sum() < RATE / 2:
         return
-    measured, expected = np.nanstd(omega[valid]), np.nanstd(turning[valid])
+    measured, expected = np.nanstd(omega[valid]), np.nanstd(attitude_rate[valid])
     if expected > 0.05 and measured > 15.0 * expected:
         message = f"gyroscope is {measured / expected:.0f} times the rate of the attitude"
         raise ValueError(f"{path}: {message}, deg/s is suspected; set omega.unit in the mapping")

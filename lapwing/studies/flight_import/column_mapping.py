@@ -1,4 +1,4 @@
-"""Mapping files: which column holds which quantity, in which unit and frame."""
+"""Mapping files: columns, units and frames of the quantities in a table."""
 
 import tomllib
 from collections.abc import Collection
@@ -29,26 +29,26 @@ class _Table(BaseModel):
 
 
 class Scalar(_Table):
-    """One column."""
+    """Column of a scalar."""
 
     column: str
     unit: str
-    range: tuple[float, float] | None = None  # SI; readings outside are faults
+    range: tuple[float, float] | None = None  # [SI] valid range; readings outside are faults
     smoothing: float = 0.0  # [s] window of a running median
 
 
 class Vector(_Table):
-    """Three columns of a vector, or four of a quaternion."""
+    """Columns of a vector (three) or a quaternion (four)."""
 
     columns: tuple[str, ...]
     unit: str
-    scale: float = 1.0  # number of units of one count of the columns
+    scale: float = 1.0  # units per count of the columns
     frame: Literal["enu", "ned", "flu", "frd", "enu_flu", "ned_frd"]
-    sign: tuple[int, ...] = ()  # of each column, after the frame; all positive if left out
+    sign: tuple[int, ...] = ()  # signs of the columns in the frame; all positive if omitted
 
 
 class Motors(_Table):
-    """A column for each motor, in the order of the airframe."""
+    """Columns of the motors, in the order of the airframe."""
 
     columns: tuple[str, ...]
     unit: Literal["duty", "V"]
@@ -57,10 +57,10 @@ class Motors(_Table):
 
 
 class Mapping(_Table):
-    """Every quantity that an import knows.
+    """Mapping of all quantities of an import.
 
-    With `partial`, quantities other than time, omega and motors are left out where a file has no columns of theirs.
-    Setpoints always may be left out.
+    With `partial`, quantities other than time, omega and motors are omitted if the file lacks their columns. Setpoints
+    are always optional.
     """
 
     partial: bool = False
@@ -77,11 +77,11 @@ class Mapping(_Table):
 
     @property
     def columns(self) -> list[str]:
-        """Every column named."""
+        """Names of all columns."""
         return [column for columns in self._columns().values() for column in columns]
 
     def within(self, names: Collection[str]) -> "Mapping":
-        """Return the mapping without quantities whose columns are missing and that it can do without."""
+        """Return the mapping without optional quantities whose columns are not among `names`."""
         missing = [key for key, columns in self._columns().items() if not set(columns) <= set(names)]
         optional = set(missing) - {"time", "omega", "motors"} if self.partial else set(missing) & {"setpoint"}
         return self.model_copy(update=dict.fromkeys(optional))
@@ -96,15 +96,15 @@ class Mapping(_Table):
 
 
 def shipped_mappings() -> list[str]:
-    """Return the names of the mappings that ship."""
+    """Return the names of the included mappings."""
     return sorted(f.name.removesuffix(".toml") for f in files(__package__).joinpath("mappings").iterdir())
 
 
 def load_mapping(name: str) -> Mapping:
-    """Read a mapping by the name of one that ships, or by the path of a TOML file.
+    """Read a mapping by the name of an included one, or by the path of a TOML file.
 
     Raises:
-        ValueError: no such mapping, or an invalid one.
+        ValueError: the mapping does not exist or is invalid.
     """
     shipped = shipped_mappings()
     if name in shipped:
@@ -137,5 +137,5 @@ def _check(name: str, mapping: Mapping) -> None:
             raise ValueError(f"--mapping {name}: {key}.columns has {len(table.columns)} names; expected {counts[-1]}")
         other = {"attitude": ("wxyz", "xyzw"), "power": ("W",)}.get(key, ())
         if table.unit not in SCALES and table.unit not in other:
-            known = ", ".join((*SCALES, *other))
-            raise ValueError(f"--mapping {name}: {key}.unit {table.unit!r} is unknown; use one of {known}")
+            units = ", ".join((*SCALES, *other))
+            raise ValueError(f"--mapping {name}: {key}.unit {table.unit!r} is unknown; use one of {units}")

@@ -1,4 +1,4 @@
-"""A recording from the columns of a CSV file and their mapping."""
+"""Recording from the columns of a CSV file and their mapping."""
 
 from pathlib import Path
 
@@ -19,12 +19,12 @@ from lapwing.studies.flight_import.rotation_arrays import (
 )
 from lapwing.studies.flight_import.time_alignment import describe
 
-FASTEST_TURN = 40.0  # [rad/s] between two measured attitudes above which tracking was lost
-FASTEST = 20.0  # [m/s] between two measured positions, as above
-ACCELEROMETER_LIMIT = 16.0 * 9.80665  # [m/s^2] range of the usual accelerometers
-SPIKE = 8.0  # [rad/s] departure of a gyroscope from its running median that is a fault
-FEWEST = 50  # samples of a recording
-NEIGHBOURS = 2  # samples on either side of a fault that interpolation at recording may have touched
+FASTEST_TURN = 40.0  # [rad/s] mean rate between two measured attitudes above which tracking is lost
+FASTEST = 20.0  # [m/s] mean speed between two measured positions above which tracking is lost
+ACCELEROMETER_LIMIT = 16.0 * 9.80665  # [m/s^2] range of common accelerometers
+SPIKE = 8.0  # [rad/s] difference of a gyroscope from its running median above which it is a fault
+FEWEST = 50  # minimum number of samples of a recording
+NEIGHBOURS = 2  # samples on either side of a fault that interpolation may have changed
 
 
 def read_csv_flight(path: Path, mapping: Mapping) -> Recording:
@@ -37,12 +37,12 @@ def read_csv_flight(path: Path, mapping: Mapping) -> Recording:
 
 
 def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> Recording:
-    """Return the recording of columns with one row for each instant.
+    """Return the recording from columns with a common time.
 
     Args:
-        path: of the file, for messages and the flight's name.
+        path: path of the file, for messages and the flight's name.
         table: columns by name, each of shape (n,).
-        mapping: of the columns.
+        mapping: mapping of the columns.
 
     Raises:
         ValueError: a column is missing, time runs backwards, or a unit is wrong.
@@ -66,10 +66,10 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
     }
     channels["attitude"] = _attitude(table, mapping.attitude)
     measured = {key: values for key, values in channels.items() if values is not None}
-    nothing = np.full((len(time), 3), np.nan)
-    position, omega, force = (measured.get(key, nothing) for key in ("position", "omega", "specific_force"))
+    unmeasured = np.full((len(time), 3), np.nan)
+    position, omega, force = (measured.get(key, unmeasured) for key in ("position", "omega", "specific_force"))
     attitude = measured.get("attitude", np.full((len(time), 4), np.nan))
-    turning = body_rate(attitude, step)
+    attitude_rate = body_rate(attitude, step)
     duty, outside = _motors(table, mapping.motors)
     battery, dips = _battery(table, mapping.battery, time)
     slow = median_filter(np.nan_to_num(omega), (5, 1), mode="nearest")
@@ -78,7 +78,7 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
         **{f"{key} not finite": ~np.isfinite(values).all(axis=1) for key, values in measured.items()},
         "motor out of range": outside,
         "battery out of range": dips,
-        "tracking lost": (np.abs(np.nan_to_num(turning)).max(axis=1) > FASTEST_TURN)
+        "tracking lost": (np.abs(np.nan_to_num(attitude_rate)).max(axis=1) > FASTEST_TURN)
         | (np.abs(np.nan_to_num(np.diff(position, axis=0, prepend=position[:1]))).max(axis=1) > FASTEST * step),
         "gyroscope out of range": (np.abs(np.nan_to_num(omega)).max(axis=1) > GYRO_LIMIT)
         | (np.abs(np.nan_to_num(omega) - slow).max(axis=1) > SPIKE),
@@ -89,8 +89,8 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
     interval = float(np.round(np.median(np.diff(time)), 5))
     notes = [f"no {key}: the flight cannot be validated" for key in ("position", "attitude") if key not in measured]
     if "attitude" in measured:
-        check_rate_unit(path, turning, omega, valid)
-        notes.append(describe(turning, omega, valid, interval))
+        check_rate_unit(path, attitude_rate, omega, valid)
+        notes.append(describe(attitude_rate, omega, valid, interval))
     voltage = duty
     if mapping.motors.unit == "duty":
         if np.isfinite(battery).all():
@@ -157,7 +157,7 @@ def _motors(table: dict[str, np.ndarray], spec: Motors) -> tuple[np.ndarray, np.
 
 
 def _battery(table: dict[str, np.ndarray], spec: Scalar | None, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the voltage [V] with invalid readings interpolated, and a mask of them."""
+    """Return the voltage [V] with invalid readings interpolated, and the mask of invalid readings, shape (n,) each."""
     if spec is None:
         return np.full(len(time), np.nan), np.zeros(len(time), bool)
     volts = table[spec.column] * SCALES[spec.unit]
@@ -173,7 +173,7 @@ def _battery(table: dict[str, np.ndarray], spec: Scalar | None, time: np.ndarray
 def _on_grid(
     grid: np.ndarray, time: np.ndarray, channels: tuple[np.ndarray, ...], valid: np.ndarray, power: np.ndarray
 ) -> tuple[tuple[np.ndarray, ...], np.ndarray, np.ndarray]:
-    """Interpolate linearly onto a uniform grid; a sample is valid where both neighbours are, and near."""
+    """Interpolate linearly onto a uniform grid; a sample is valid if both neighbours are valid and close in time."""
 
     def transform(values: np.ndarray) -> np.ndarray:
         if values.ndim == 1:
@@ -181,6 +181,10 @@ def _on_grid(
         return np.column_stack([np.interp(grid, time, column) for column in values.T])
 
     right = np.clip(np.searchsorted(time, grid), 1, len(time) - 1)
-    sound = valid[right] & valid[right - 1] & (time[right] - time[right - 1] <= LONGEST_GAP)
+    is_valid = valid[right] & valid[right - 1] & (time[right] - time[right - 1] <= LONGEST_GAP)
     position, attitude, *rest = channels
-    return (transform(position), unit(transform(continuous(attitude))), *map(transform, rest)), sound, transform(power)
+    return (
+        (transform(position), unit(transform(continuous(attitude))), *map(transform, rest)),
+        is_valid,
+        transform(power),
+    )

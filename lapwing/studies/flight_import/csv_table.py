@@ -11,7 +11,7 @@ import numpy as np
 
 
 def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]:
-    """Return the wanted columns of a CSV file that has them, by name; empty fields are NaN.
+    """Return those of the selected columns that a CSV file has, by name; empty fields are NaN.
 
     Raises:
         ValueError: the file cannot be read, has no header or no rows, or a field is not a number.
@@ -21,15 +21,15 @@ def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]
             names = [name.strip().strip('"') for name in file.readline().split(",")]
             result = [name for name in dict.fromkeys(selected) if name in names]
             if not result:
-                raise ValueError(f"{path}: no known column in its header; check the --mapping")
-            places = [names.index(name) for name in result]
+                raise ValueError(f"{path}: none of the mapped columns in the header; check the --mapping")
+            indices = [names.index(name) for name in result]
             try:
-                warnings.simplefilter("ignore", UserWarning)  # of a file without rows, which is an error below
-                table = np.loadtxt(file, delimiter=",", usecols=places, ndmin=2)
+                warnings.simplefilter("ignore", UserWarning)  # a file without rows is an error below
+                table = np.loadtxt(file, delimiter=",", usecols=indices, ndmin=2)
             except ValueError:
                 table = None
-        if table is None:  # empty fields: slower, but as tolerant as the format allows
-            table = _tolerant(path, places)
+        if table is None:  # empty fields need the slower, tolerant parser
+            table = _read_tolerant(path, indices)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
     except (UnicodeDecodeError, EOFError, zlib.error):
@@ -45,7 +45,7 @@ def _open(path: Path) -> TextIO:
     return path.open(encoding="utf-8")
 
 
-def _tolerant(path: Path, places: list[int]) -> np.ndarray:
+def _read_tolerant(path: Path, indices: list[int]) -> np.ndarray:
     def number(line: int, text: str) -> float:
         text = text.strip().strip('"')
         try:
@@ -58,9 +58,9 @@ def _tolerant(path: Path, places: list[int]) -> np.ndarray:
         next(file)
         for line, row in enumerate(file, start=2):
             fields = row.rstrip("\n").split(",")
-            if len(fields) <= max(places):
+            if len(fields) <= max(indices):
                 if row.strip():
                     raise ValueError(f"{path}:{line}: row is cut short; delete it, or record the flight again")
                 continue
-            rows.append([number(line, fields[k]) for k in places])
-    return np.array(rows).reshape(len(rows), len(places))
+            rows.append([number(line, fields[k]) for k in indices])
+    return np.array(rows).reshape(len(rows), len(indices))

@@ -1,6 +1,6 @@
 """Recordings from ArduPilot's dataflash logs, binary (.bin) or text (.log), read by pymavlink.
 
-ArduPilot's axes are NED and FRD. Which outputs drive motors, and their range of pulses, is in the log's parameters.
+ArduPilot's axes are NED and FRD. The log's parameters define the outputs of motors and their pulse ranges.
 """
 
 import os
@@ -18,7 +18,7 @@ from lapwing.studies.flight_import.recording import Recording, Series, convert
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 FIRST_MOTOR, NINTH_MOTOR = 33, 82  # SERVOn_FUNCTION of motors 1 to 8, and 9 to 12
-PULSE_LOW, PULSE_HIGH = 1000.0, 2000.0  # [us] where the log's parameters name no range
+PULSE_LOW, PULSE_HIGH = 1000.0, 2000.0  # [us] default of the log's parameters
 MILLIGAUSS = 1e-7  # [T]
 INSTANCE = {
     "IMU": "I",
@@ -40,7 +40,7 @@ def read_dataflash_flight(path: Path) -> Recording:
     """Read a dataflash log.
 
     Raises:
-        ValueError: no dataflash log, or a message is missing that a flight needs.
+        ValueError: the file is not a dataflash log, or a required message is missing.
     """
     messages, parameters, unknown = _messages(path)
     channels = Channels(unknown=tuple(sorted(unknown)))
@@ -92,7 +92,7 @@ def _silent() -> Iterator[None]:
 
 
 @contextmanager
-def _opened(kind: type, path: Path) -> Iterator[Any]:
+def _open_reader(kind: type, path: Path) -> Iterator[Any]:
     """Yield a reader of pymavlink, and close its file, also if its constructor fails after opening it."""
     reader: Any = object.__new__(kind)
     try:
@@ -112,7 +112,7 @@ def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, fl
     parameters, unknown = {}, set()
     try:
         kind = DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text
-        with _silent(), _opened(kind, path) as reader:
+        with _silent(), _open_reader(kind, path) as reader:
             while (message := reader.recv_msg()) is not None:
                 name, fields = message.get_type(), message.to_dict()
                 if name == "PARM":

@@ -1,4 +1,4 @@
-"""Recordings from files of any known format."""
+"""Recordings from files of all supported formats."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -11,14 +11,14 @@ FORMATS = ".ulg, .bin, .log, .tlog, .mcap, a rosbag2 folder, .csv and .csv.gz wi
 
 
 def open_flight(path: Path, mapping: str | None = None) -> Recording:
-    """Read a flight, and note if it never leaves the ground. See `FORMATS` for the formats, which the ending names.
+    """Read a flight, and note if it never leaves the ground. The file name's extension selects one of `FORMATS`.
 
     Args:
-        path: of the file; of the folder for a rosbag2.
+        path: path of the file, or of the folder of a rosbag2.
         mapping: name or file of the columns' mapping, for CSV files and logs of the Crazyflie.
 
     Raises:
-        ValueError: unknown format, no mapping for a CSV file, or an invalid file.
+        ValueError: the format is unknown, a CSV file has no mapping, or the file is invalid.
     """
     flight = _read(path, mapping)
     if reason := flight.grounded:
@@ -39,7 +39,9 @@ def _read(path: Path, mapping: str | None) -> Recording:
         raise ValueError(f"{path}: {message}; use the path of a recorded flight")
     if path.name.endswith((".csv", ".csv.gz")):
         if mapping is None:
-            raise ValueError(f"{path}: a CSV file needs --mapping; use a name that ships, or a .toml file")
+            raise ValueError(
+                f"{path}: a CSV file needs --mapping; use the name of an included mapping, or a .toml file"
+            )
         return csv_flight.read_csv_flight(path, load_mapping(mapping))
     ending = path.suffix.lower()
     if ending == ".mcap":

@@ -1,4 +1,4 @@
-"""A recorded flight on a uniform time grid, in SI units, world ENU and body FLU."""
+"""Recorded flight on a uniform time grid, in SI units, world ENU and body FLU."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -6,22 +6,22 @@ from typing import Any, Self
 
 import numpy as np
 
-LONGEST_GAP = 0.035  # [s] between two samples that interpolation bridges
-LONGEST_HOLD = 0.5  # [s] between two messages over which interpolation counts as valid
-GYRO_LIMIT = 35.0  # [rad/s] range of the usual gyroscopes, 2000 deg/s
-LOWEST = 0.3  # [m] above the ground, from which a vehicle is in the air
-RESOLUTION = 1e-6  # [s] of time stamps
-SETPOINT_WIDTH = 11  # columns of a setpoint
+LONGEST_GAP = 0.035  # [s] largest time between two samples for interpolation
+LONGEST_HOLD = 0.5  # [s] largest time between two messages for valid interpolation
+GYRO_LIMIT = 35.0  # [rad/s] range of common gyroscopes, 2000 deg/s
+LOWEST = 0.3  # [m] minimum height of an airborne vehicle
+RESOLUTION = 1e-6  # [s] resolution of time stamps
+SETPOINT_WIDTH = 11  # number of columns of a setpoint
 
 
 @dataclass(frozen=True)
 class Series:
-    """Values at instants.
+    """Time series.
 
     Attributes:
-        time: [s] of the log's clock, increasing, shape (n,).
-        values: shape (n, k).
-        dropped: number of samples left out because their time did not increase.
+        time: times [s] of the log's clock, increasing, shape (n,).
+        values: values, shape (n, k).
+        dropped: number of samples omitted because their time does not increase.
     """
 
     time: np.ndarray
@@ -30,7 +30,7 @@ class Series:
 
     @classmethod
     def of(cls, time: Any, values: Any) -> Self:
-        """Return the samples whose time is finite and later than that of all samples before."""
+        """Return the samples whose time is finite and later than all previous ones."""
         time, values = np.asarray(time, float), np.asarray(values, float)
         values = values.reshape(len(time), -1)
         later = np.isfinite(time) & (
@@ -39,24 +39,24 @@ class Series:
         return cls(time[later], values[later], int((~later).sum()))
 
     def at(self, grid: np.ndarray) -> np.ndarray:
-        """Interpolate linearly, shape (len(grid), k)."""
+        """Return linearly interpolated values at the times `grid` [s], shape (len(grid), k)."""
         return np.column_stack([np.interp(grid, self.time, column) for column in self.values.T])
 
     def latest(self, grid: np.ndarray) -> np.ndarray:
-        """Return the last values before each instant, shape (len(grid), k); NaN if older than `LONGEST_HOLD`."""
+        """Return the latest values at the times `grid` [s], shape (len(grid), k); NaN if older than `LONGEST_HOLD`."""
         row = np.searchsorted(self.time, grid + RESOLUTION, side="right") - 1
         values = self.values[np.maximum(row, 0)].copy()
         values[(row < 0) | (grid - self.time[np.maximum(row, 0)] > LONGEST_HOLD)] = np.nan
         return values
 
     def near(self, grid: np.ndarray) -> np.ndarray:
-        """Return where both neighbours of an instant are at most `LONGEST_HOLD` apart."""
+        """Return True for times of `grid` [s] with neighbours at most `LONGEST_HOLD` apart, shape (len(grid),)."""
         right = np.clip(np.searchsorted(self.time, grid), 1, len(self.time) - 1)
         return np.asarray(self.time[right] - self.time[right - 1] <= LONGEST_HOLD)
 
 
 def convert(source: Series | None, change: Callable[[np.ndarray], np.ndarray]) -> Series | None:
-    """Return a series with converted values, None for None."""
+    """Return a series with converted values, or None for None."""
     return source and replace(source, values=change(source.values))
 
 
@@ -65,24 +65,24 @@ class Recording:
     """One flight of one vehicle; n samples.
 
     Attributes:
-        name: of the flight, the file's name without its endings.
-        interval: [s] between two samples.
-        position: [m] world, shape (n, 3); NaN where not measured.
-        attitude: unit quaternions w, x, y, z, body to world, shape (n, 4); NaN where not measured.
-        velocity: [m/s] world, shape (n, 3).
-        omega: [rad/s] body, shape (n, 3).
-        specific_force: [m/s^2] body, shape (n, 3); NaN where not measured.
-        motor_voltage: [V] applied to each motor, shape (n, rotors).
-        battery_voltage: [V], shape (n,).
-        valid: samples that every channel measured soundly, bool, shape (n,).
-        power: [W] taken from the battery, shape (n,); NaN where not measured.
+        name: name of the flight, the file name without extensions.
+        interval: time between two samples [s].
+        position: position [m], world, shape (n, 3); NaN if not measured.
+        attitude: unit quaternions w, x, y, z, body to world, shape (n, 4); NaN if not measured.
+        velocity: velocity [m/s], world, shape (n, 3).
+        omega: angular velocity [rad/s], body, shape (n, 3).
+        specific_force: specific force [m/s^2], body, shape (n, 3); NaN if not measured.
+        motor_voltage: voltage of each motor [V], shape (n, rotors).
+        battery_voltage: battery voltage [V], shape (n,).
+        valid: True for samples that are valid in all channels, shape (n,).
+        power: power from the battery [W], shape (n,); NaN if not measured.
         setpoint: desired position [m], velocity [m/s] and acceleration [m/s^2] in the world, yaw [rad] and its rate
-            [rad/s], shape (n, 11); NaN where there is none, empty if not recorded.
-        attitude_setpoint: [rad] desired roll, pitch and yaw, shape (n, 3); NaN where there is none, empty if not
+            [rad/s], shape (n, 11); NaN without a setpoint, empty if not recorded.
+        attitude_setpoint: desired roll, pitch and yaw [rad], shape (n, 3); NaN without a setpoint, empty if not
             recorded.
-        faults: number of samples marked invalid by cause.
-        notes: time offset and other facts of the import, a line each.
-        readings: other sensors by name (see `write_log.SENSORS`), at their own rates, as far as the log has them.
+        faults: number of invalid samples by cause.
+        notes: time offset and other remarks on the import, a line each.
+        readings: other sensors of the log by name (see `write_log.SENSORS`), at their rates.
         unknown: names of the log's messages without a counterpart.
     """
 
@@ -113,15 +113,15 @@ class Recording:
         return int(self.motor_voltage.shape[1])
 
     def repeats(self, other: Self) -> bool:
-        """Return True if the measurements are those of another recording, also of the same flight in another format."""
+        """Return True if the measurements equal those of another recording, also if its file has another format."""
         return len(self) == len(other) and all(
-            np.allclose(mine, its, rtol=0.0, atol=1e-9, equal_nan=True)
-            for mine, its in ((self.omega, other.omega), (self.position, other.position))
+            np.allclose(own, others, rtol=0.0, atol=1e-9, equal_nan=True)
+            for own, others in ((self.omega, other.omega), (self.position, other.position))
         )
 
     @property
     def grounded(self) -> str:
-        """Return the reason why the vehicle cannot have left the ground, or ""."""
+        """Reason why the vehicle cannot have left the ground, or ""."""
         if not np.nanmax(self.motor_voltage, initial=0.0) > 0.0:
             return "the motors do not run"
         height = self.position[self.valid & np.isfinite(self.position[:, 2]), 2]
@@ -131,5 +131,5 @@ class Recording:
 
 
 def widen(invalid: np.ndarray, samples: int) -> np.ndarray:
-    """Return the mask with `samples` neighbours on either side of each marked sample marked too."""
+    """Return the mask extended by `samples` neighbours on either side of each True sample."""
     return np.convolve(invalid, np.ones(2 * samples + 1), "same") > 0.5

@@ -1,7 +1,7 @@
 """Recordings from rosbag2 folders (SQLite or MCAP), read by rosbags.
 
-Messages are found by their types: ROS's own (ENU, FLU; REP 103), MAVROS's, and PX4's (NED, FRD). Of several topics of
-one type the one with most messages is taken.
+Messages are selected by type: those of ROS (ENU, FLU; REP 103), MAVROS, and PX4 (NED, FRD). Of several topics of one
+type, the one with most messages is used.
 """
 
 from collections.abc import Callable
@@ -30,7 +30,7 @@ def _odometry(m: Any) -> list[float]:
 
 
 FIELDS: dict[str, Callable[[Any], Any]] = {  # values of each message by type
-    "nav_msgs/msg/Odometry": _odometry,  # its velocity is in body axes
+    "nav_msgs/msg/Odometry": _odometry,  # velocity in body axes
     "geometry_msgs/msg/PoseStamped": lambda m: [*_xyz(m.pose.position), *_wxyz(m.pose.orientation)],
     "sensor_msgs/msg/Imu": lambda m: [*_xyz(m.angular_velocity), *_xyz(m.linear_acceleration)],
     "sensor_msgs/msg/BatteryState": lambda m: [m.voltage, abs(m.current)],
@@ -52,7 +52,7 @@ def read_rosbag_flight(path: Path) -> Recording:
     """Read a rosbag2 folder.
 
     Raises:
-        ValueError: rosbags is not installed, no rosbag2, or a message is missing that a flight needs.
+        ValueError: rosbags is not installed, the folder is not a rosbag2, or a required message is missing.
     """
     series, unknown = _series(path)
     channels = Channels(unknown=unknown)
@@ -113,7 +113,7 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
                 message: Any = bag.deserialize(raw, connection.msgtype)
                 values = FIELDS[connection.msgtype](message)
                 rows.setdefault(connection.msgtype, []).append((_time(message, received), values))
-    except Exception:  # rosbags raises what its parser runs into
+    except Exception:  # rosbags raises exceptions of many types
         raise ValueError(f"{path}: is not a readable rosbag2 folder; expected metadata.yaml and its messages") from None
     try:
         return {k: Series.of([t for t, _ in r], [list(v) for _, v in r]) for k, r in rows.items()}, tuple(unknown)
@@ -122,7 +122,7 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
 
 
 def _time(message: Any, received: int) -> float:
-    """Return the message's own time [s], or that of its reception."""
+    """Return the time stamp of the message [s], or its reception time."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     if stamp is not None and (stamp.sec or stamp.nanosec):
         return float(stamp.sec) + 1e-9 * stamp.nanosec

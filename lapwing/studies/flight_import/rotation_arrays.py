@@ -6,13 +6,13 @@ SMALL = 1e-9  # [rad]
 
 
 def unit(q: np.ndarray) -> np.ndarray:
-    """Return the quaternions with norm 1; NaN where the norm is 0."""
+    """Return the normalised quaternions; NaN where the norm is 0."""
     with np.errstate(invalid="ignore", divide="ignore"):
         return q / np.linalg.norm(q, axis=-1, keepdims=True)
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the products a b."""
+    """Return the quaternion products a b."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     return np.stack(
@@ -53,18 +53,18 @@ def rotate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def body_rate(q: np.ndarray, interval: np.ndarray) -> np.ndarray:
     """Return the mean body rate [rad/s] over the interval [s] before each sample, shape (n, 3); zero at the first."""
-    turned = rotation_vector(product(conjugate(q[:-1]), q[1:])) / interval[1:, None]
-    return np.concatenate([np.zeros((1, 3)), turned])
+    rate = rotation_vector(product(conjugate(q[:-1]), q[1:])) / interval[1:, None]
+    return np.concatenate([np.zeros((1, 3)), rate])
 
 
 def from_ned_frd(q: np.ndarray) -> np.ndarray:
-    """Return attitudes of FRD body axes in NED as those of FLU body axes in ENU."""
+    """Convert attitudes of FRD body axes in NED to those of FLU body axes in ENU."""
     half = np.sqrt(0.5)
     return product(product(np.array([0.0, half, half, 0.0]), q), np.array([0.0, 1.0, 0.0, 0.0]))
 
 
 def from_euler(angles: np.ndarray) -> np.ndarray:
-    """Return the quaternions of roll, pitch and yaw [rad], shape (n, 3), that turn in the order yaw, pitch, roll."""
+    """Return the quaternions of roll, pitch and yaw [rad], shape (n, 3), rotations in the order yaw, pitch, roll."""
     roll, pitch, yaw = (0.5 * angles).T
     cr, sr, cp, sp, cy, sy = (f(a) for a in (roll, pitch, yaw) for f in (np.cos, np.sin))
     return np.column_stack(
@@ -86,11 +86,11 @@ def to_euler(q: np.ndarray) -> np.ndarray:
 
 
 def ned_to_enu(v: np.ndarray) -> np.ndarray:
-    """Return vectors of NED in ENU, shape (n, 3)."""
+    """Convert vectors from NED to ENU, shape (n, 3)."""
     return v[:, [1, 0, 2]] * [1.0, 1.0, -1.0]
 
 
 def continuous(q: np.ndarray) -> np.ndarray:
-    """Return the quaternions with signs that do not jump."""
+    """Return the quaternions with continuous signs."""
     flips = np.cumprod(np.where(np.r_[1.0, np.sum(q[1:] * q[:-1], axis=1)] < 0.0, -1.0, 1.0))
     return q * flips[:, None]

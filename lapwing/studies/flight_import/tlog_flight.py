@@ -1,6 +1,6 @@
 """Recordings from MAVLink telemetry logs (.tlog) of ground stations, read by pymavlink.
 
-Axes are NED and FRD. Messages carry the time since boot; those without take the time at which they were received.
+Axes are NED and FRD. The time is that since boot, or the reception time of messages without it.
 """
 
 from collections import defaultdict
@@ -16,7 +16,7 @@ from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_f
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us]
 STANDARD_GRAVITY = 9.80665
 NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID
-EPOCH = 1e15  # [us] above which a time stamp counts from 1970
+EPOCH = 1e15  # [us] above which a time stamp is Unix time
 USED = {
     "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "RAW_IMU",
     "SERVO_OUTPUT_RAW", "ACTUATOR_OUTPUT_STATUS", "SYS_STATUS", "GPS_RAW_INT", "SCALED_PRESSURE", "DISTANCE_SENSOR",
@@ -27,7 +27,7 @@ def read_tlog_flight(path: Path) -> Recording:
     """Read the messages of the first autopilot in a telemetry log.
 
     Raises:
-        ValueError: no telemetry log, or a message is missing that a flight needs.
+        ValueError: the file is not a telemetry log, or a required message is missing.
     """
     messages, unknown = _messages(path)
     channels = Channels(unknown=tuple(sorted(unknown)))
@@ -79,7 +79,7 @@ def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], set[str]]
     unknown: set[str] = set()
     system = None
     try:
-        log = mavutil.mavlogfile(str(path))  # mavlink_connection scans the file first, and fails on damaged ones
+        log = mavutil.mavlogfile(str(path))  # mavlink_connection would scan the file first, and fail on a damaged one
         while (message := log.recv_msg()) is not None:
             name = message.get_type()
             if name == "HEARTBEAT" and system is None and message.autopilot != NO_AUTOPILOT:
@@ -96,13 +96,13 @@ def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], set[str]]
         raise ValueError(f"{path}: has no messages of an autopilot; expected a telemetry log (.tlog)")
     if system is not None:
         result = {name: [r for r in rows if r[1].get_srcSystem() == system] for name, rows in result.items()}  # type: ignore[assignment]
-    booted = [t - m.time_boot_ms * 1e-3 for rows in result.values() for t, m in rows if hasattr(m, "time_boot_ms")]
-    boot = float(np.median(booted)) if booted else 0.0
+    boot_times = [t - m.time_boot_ms * 1e-3 for rows in result.values() for t, m in rows if hasattr(m, "time_boot_ms")]
+    boot = float(np.median(boot_times)) if boot_times else 0.0
     return {name: [(_time(t - boot, m), m) for t, m in rows] for name, rows in result.items() if rows}, unknown
 
 
 def _time(received: float, message: Any) -> float:
-    """Return the time since boot [s]: the message's own, or that of its reception."""
+    """Return the time since boot [s] from the message, or its reception time."""
     if hasattr(message, "time_boot_ms"):
         return float(message.time_boot_ms) * 1e-3
     stamp = getattr(message, "time_usec", 0)

@@ -1,6 +1,6 @@
 """Recordings from ULog files of PX4, read by pyulog.
 
-PX4's axes are NED and FRD. Motor outputs are PWM pulses or shares of full throttle; they become volts by the battery's.
+PX4's axes are NED and FRD. Motor outputs are PWM pulses or throttles; the battery voltage converts them to volts.
 """
 
 from contextlib import redirect_stderr, redirect_stdout
@@ -34,17 +34,17 @@ def read_ulog_flight(path: Path) -> Recording:
     """Read a ULog file.
 
     Raises:
-        ValueError: no ULog file, or a topic is missing that a flight needs.
+        ValueError: the file is not a ULog file, or a required topic is missing.
     """
     from pyulog import ULog
 
     try:
         _check_definitions(path)
-        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # pyulog prints what it finds damaged
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # pyulog prints messages on damaged data
             log = ULog(str(path))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    except Exception:  # pyulog raises what its parser runs into
+    except Exception:  # pyulog raises exceptions of many types
         raise ValueError(f"{path}: is not a readable ULog file; expected a .ulg file of PX4") from None
     topics: dict[str, dict[str, Any]] = {}
     for data in log.data_list:
@@ -61,20 +61,20 @@ def read_ulog_flight(path: Path) -> Recording:
         time = (data["timestamp"].astype(np.int64) - log.start_timestamp) * 1e-6
         return Series.of(time, np.column_stack([data[f].astype(float) for f in fields]))
 
-    def three(topic: str, field: str) -> Series | None:
+    def vector(topic: str, field: str) -> Series | None:
         return series(topic, *(f"{field}[{k}]" for k in range(3)))
 
     channels.attitude = convert(series("vehicle_attitude", *(f"q[{k}]" for k in range(4))), from_ned_frd)
     channels.position = convert(series("vehicle_local_position", "x", "y", "z"), ned_to_enu)
     channels.velocity = convert(series("vehicle_local_position", "vx", "vy", "vz"), ned_to_enu)
-    rates = three("vehicle_angular_velocity", "xyz") or three("sensor_combined", "gyro_rad")
+    rates = vector("vehicle_angular_velocity", "xyz") or vector("sensor_combined", "gyro_rad")
     channels.omega = convert(rates, lambda v: v * FLU)
-    channels.specific_force = convert(three("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
+    channels.specific_force = convert(vector("sensor_combined", "accelerometer_m_s2"), lambda v: v * FLU)
     channels.battery = series("battery_status", "voltage_v", "current_a")
     channels.duty = _duty(topics, series, channels)
-    channels.setpoint = _setpoint(series, three)
+    channels.setpoint = _setpoint(series, vector)
     channels.attitude_setpoint = _attitude_setpoint(series)
-    channels.readings = _readings(series, three)
+    channels.readings = _readings(series, vector)
     if (status := _status(series)) is not None:
         channels.readings["status"] = status
     return to_recording(
@@ -83,7 +83,7 @@ def read_ulog_flight(path: Path) -> Recording:
 
 
 def _check_definitions(path: Path) -> None:
-    """Raise ValueError if a message before the logged data is cut or of no known type: pyulog may not return then."""
+    """Raise ValueError if a message before the logged data is truncated or of unknown type: pyulog may hang."""
     data, at = path.read_bytes(), HEADER_SIZE
     while at < len(data):
         if at + 3 > len(data):
@@ -117,19 +117,20 @@ def _duty(topics: dict[str, dict[str, Any]], series: Any, channels: Channels) ->
     return Series(source.time, (source.values - PULSE_LOW) / PULSE_SPAN if pulses else source.values, source.dropped)
 
 
-def _setpoint(series: Any, three: Any) -> Series | None:
+def _setpoint(series: Any, vector: Any) -> Series | None:
     """Return desired position, velocity, acceleration, yaw and yaw rate in the columns of `Recording.setpoint`."""
     for topic in ("trajectory_setpoint", "vehicle_local_position_setpoint"):  # single fields until PX4 1.13
-        place = three(topic, "position") or series(topic, "x", "y", "z")
-        speed = three(topic, "velocity") or series(topic, "vx", "vy", "vz")
-        change = three(topic, "acceleration") or series(topic, "acc_x", "acc_y", "acc_z")
-        turn = series(topic, "yaw", "yawspeed")
-        if place is not None and speed is not None and turn is not None:
-            unset = np.full((len(place.time), 3), np.nan)
-            vectors = [ned_to_enu(v) for v in (place.values, speed.values, change.values if change else unset)]
-            yaw, yaw_rate = turn.values.T
+        position = vector(topic, "position") or series(topic, "x", "y", "z")
+        velocity = vector(topic, "velocity") or series(topic, "vx", "vy", "vz")
+        acceleration = vector(topic, "acceleration") or series(topic, "acc_x", "acc_y", "acc_z")
+        heading_ned = series(topic, "yaw", "yawspeed")
+        if position is not None and velocity is not None and heading_ned is not None:
+            unset = np.full((len(position.time), 3), np.nan)
+            accelerations = acceleration.values if acceleration else unset
+            vectors = [ned_to_enu(v) for v in (position.values, velocity.values, accelerations)]
+            yaw, yaw_rate = heading_ned.values.T
             heading = np.arctan2(np.cos(yaw), np.sin(yaw))  # from east, counterclockwise
-            return Series(place.time, np.column_stack([*vectors, heading, -yaw_rate]), place.dropped)
+            return Series(position.time, np.column_stack([*vectors, heading, -yaw_rate]), position.dropped)
     return None
 
 
@@ -144,18 +145,18 @@ def _attitude_setpoint(series: Any) -> Series | None:
 
 
 def _optical_flow(series: Any) -> Series | None:
-    """Return flow and own rate [rad/s] about body x and y, and distance [m]."""
+    """Return the rates of flow and body [rad/s] about body x and y, and the distance [m]."""
     topic = "vehicle_optical_flow"
-    turned = series(topic, "pixel_flow[0]", "pixel_flow[1]", "delta_angle[0]", "delta_angle[1]", "distance_m")
+    flow = series(topic, "pixel_flow[0]", "pixel_flow[1]", "delta_angle[0]", "delta_angle[1]", "distance_m")
     span = series(topic, "integration_timespan_us")
-    if turned is None or span is None:
+    if flow is None or span is None:
         return None
-    rates = turned.values[:, :4] * [1.0, -1.0, 1.0, -1.0] / (span.values * 1e-6)
-    return Series(turned.time, np.column_stack([rates, turned.values[:, 4]]), turned.dropped)
+    rates = flow.values[:, :4] * [1.0, -1.0, 1.0, -1.0] / (span.values * 1e-6)
+    return Series(flow.time, np.column_stack([rates, flow.values[:, 4]]), flow.dropped)
 
 
 def _status(series: Any) -> Series | None:
-    """Return armed, landed, failsafe and navigation state at the times at which one of them is logged."""
+    """Return armed, landed, failsafe and navigation state at all times at which one of them is logged."""
     state = series("vehicle_status", "arming_state", "failsafe", "nav_state")
     if state is None:
         return None
@@ -174,8 +175,8 @@ def _status(series: Any) -> Series | None:
     return Series.of(time, np.column_stack(columns))
 
 
-def _readings(series: Any, three: Any) -> dict[str, Series]:
-    """Sensors, each from the topic that the estimator used where there is one, else from the driver's."""
+def _readings(series: Any, vector: Any) -> dict[str, Series]:
+    """Return the readings of each sensor, from the estimator's topic if the log has it, otherwise from the driver's."""
 
     def scale(source: Series | None, *factors: float) -> Series | None:
         return source and Series(source.time, source.values * factors)
@@ -192,8 +193,8 @@ def _readings(series: Any, three: Any) -> dict[str, Series]:
     driver = series("sensor_baro", "pressure")
     if driver and np.median(driver.values) < HIGHEST_HPA:  # hPa until PX4 1.13
         driver = scale(driver, 100.0)
-    field = three("vehicle_magnetometer", "magnetometer_ga") or series("sensor_mag", "x", "y", "z")
-    field = field or three("sensor_combined", "magnetometer_ga")  # until PX4 1.7
+    field = vector("vehicle_magnetometer", "magnetometer_ga") or series("sensor_mag", "x", "y", "z")
+    field = field or vector("sensor_combined", "magnetometer_ga")  # until PX4 1.7
     raw = [f"{name}[{k}]" for name in ("gyro_rad", "accelerometer_m_s2") for k in range(3)]
     result = {
         "imu": scale(series("sensor_combined", *raw), *FLU, *FLU),

@@ -15,7 +15,7 @@ TIME = "timestamp"  # [us]
 
 
 def is_usd_log(path: Path) -> bool:
-    """Return True if the file begins as such a log does."""
+    """Return True if the file starts with the header of such a log."""
     with path.open("rb") as file:
         start = file.read(3)
     return len(start) == 3 and start[0] == MAGIC and struct.unpack_from("<H", start, 1)[0] in VERSIONS
@@ -28,7 +28,7 @@ def read_usd_log(path: Path) -> dict[str, np.ndarray]:
         ValueError: the file's header or all of its records are damaged.
     """
     data = path.read_bytes()
-    broken = f"{path}: is not a readable log of the Crazyflie; expected the file that its deck wrote"
+    broken = f"{path}: is not a readable log of the Crazyflie; expected a file of its micro SD deck"
     try:
         version, types = struct.unpack_from("<HH", data, 1)
         events, at = {}, 5
@@ -50,7 +50,7 @@ def read_usd_log(path: Path) -> dict[str, np.ndarray]:
     while at + 10 <= len(data):
         (event,) = struct.unpack_from("<H", data, at)
         if event not in events or at + events[event][1].itemsize > len(data):
-            break  # the checksum at the end, or a record that was cut
+            break  # the checksum at the end, or a truncated record
         records[event].append(at)
         at += events[event][1].itemsize
     most = max(records, key=lambda event: len(records[event]), default=None)
@@ -65,7 +65,7 @@ def read_usd_log(path: Path) -> dict[str, np.ndarray]:
 
 
 def _text(data: bytes, at: int) -> tuple[str, int]:
-    """Return the text up to the next zero byte, and the place behind it."""
+    """Return the text up to the next zero byte, and the offset after it."""
     end = data.index(b"\0", at)
     return data[at:end].decode("ascii"), end + 1
 

@@ -1,4 +1,4 @@
-"""Lapwing logs of recordings: the topics of a simulated flight, for the commands that read logs."""
+"""Output of a recording as a Lapwing log, with the topics of a simulated flight."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -58,13 +58,13 @@ MODES = {  # vehicle_status.nav_state of PX4
     13: "terminated", 14: "offboard", 15: "stabilized", 17: "takeoff", 18: "land", 19: "follow", 20: "precision land",
     21: "orbit",
 }  # fmt: skip
-SPINNING = 0.05  # share of the highest motor voltage above which motors count as armed
+SPINNING = 0.05  # motor voltage over its maximum above which motors count as armed
 
 
 SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
-    # topic and message of each sensor's readings: rad/s and m/s^2 in body axes, degrees and metres, pascals, teslas in
-    # body axes, metres, pascals; m/s in the world, rad/s about body x and y of flow and camera and metres;
-    # armed, landed, failsafe, and the navigation state of PX4
+    # topic and message of each sensor; values: imu [rad/s], [m/s^2] body; gps [deg], [m]; gps_velocity [m/s] world;
+    # baro [Pa]; mag [T] body; rangefinder [m]; optical_flow [rad/s] of flow and camera about body x and y, [m];
+    # airspeed [Pa]; status: armed, landed, failsafe, and the navigation state of PX4
     "imu": (
         IMU,
         lambda header, v: Imu(header=header, angular_velocity=Vector3(*v[:3]), linear_acceleration=Vector3(*v[3:])),
@@ -97,14 +97,14 @@ SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
 
 
 def write_log(path: Path, flight: Recording, source: str) -> None:
-    """Write a recording as a log. Invalid samples are left out of the motion's topics, and their number is recorded.
+    """Write a recording as a log. The topics of the motion omit invalid samples; the metadata has their number.
 
     Args:
-        path: of the log.
-        flight: what to write.
-        source: name of the file that it was imported from.
+        path: path of the log.
+        flight: recording.
+        source: name of the imported file.
     """
-    about = {
+    metadata = {
         "scene": flight.name,
         "mode": "imported",
         "vehicle": VEHICLE,
@@ -115,7 +115,7 @@ def write_log(path: Path, flight: Recording, source: str) -> None:
         "unknown_topics": ", ".join(flight.unknown),
     }
     messages = sorted([*_motion(flight), *_readings(flight)], key=lambda entry: entry[0])
-    with LogWriter(path, about, {}) as log:
+    with LogWriter(path, metadata, {}) as log:
         for time_ns, topic, message in messages:
             log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
 
@@ -143,9 +143,9 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
             if "imu" not in flight.readings and np.isfinite(flight.specific_force[k]).all():
                 rates, force = _vector(flight.omega[k]), _vector(flight.specific_force[k])
                 yield time_ns, IMU, Imu(header=header, angular_velocity=rates, linear_acceleration=force)
-            lean = _vector(flight.attitude_setpoint[k]) if len(flight.attitude_setpoint) else UNSET
+            attitude = _vector(flight.attitude_setpoint[k]) if len(flight.attitude_setpoint) else UNSET
             armed = max(volts) > SPINNING * highest
-            yield time_ns, ACTUATORS, Actuators(header, volts, armed, attitude_reference=lean)
+            yield time_ns, ACTUATORS, Actuators(header, volts, armed, attitude_reference=attitude)
             if desired:
                 yield time_ns, SETPOINT, _setpoint(header, flight.setpoint[k].tolist())
         if k % battery_ticks == 0 and math.isfinite(flight.battery_voltage[k]):
@@ -154,7 +154,7 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
 
 
 def _readings(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
-    """Yield (time [ns], topic, message) of the sensors at their own instants."""
+    """Yield (time [ns], topic, message) of the sensors at their sampling times."""
     for name, series in flight.readings.items():
         topic, message = SENSORS[name]
         for time, values in zip(series.time.tolist(), series.values.tolist(), strict=True):

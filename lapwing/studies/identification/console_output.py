@@ -11,7 +11,7 @@ from lapwing.studies.identification.procedure import Identification
 from lapwing.studies.validation.console_output import UNITS
 from lapwing.studies.validation.prediction_metrics import FIELDS
 
-RELATED = 0.8  # correlation of two estimates from which it is printed
+CORRELATED = 0.8  # correlation of two estimates above which it is printed
 
 
 def show(console: Console, identification: Identification) -> None:
@@ -26,13 +26,13 @@ def show(console: Console, identification: Identification) -> None:
     for line in identification.skipped:
         console.print(f"left out: {line}", soft_wrap=True)
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):
-        if abs(fit.correlations[i, j]) > RELATED:
+        if abs(fit.correlations[i, j]) > CORRELATED:
             text = f"correlated: {fit.keys[i]} and {fit.keys[j]}: {fit.correlations[i, j]:+.2f}"
             console.print(text, soft_wrap=True)
     for key in fit.undetermined:
         console.print(f"not determined by these flights: {key}", soft_wrap=True)
-    judged = f"{len(identification.held_out)} held-out flights" if identification.held_out else "the same flights"
-    console.print(f"error after 0.5 s on {judged}, before and after:")
+    test_flights = f"{len(identification.held_out)} held-out flights" if identification.held_out else "the same flights"
+    console.print(f"error after 0.5 s on {test_flights}, before and after:")
     for name, before, after in zip(FIELDS, identification.before, identification.after, strict=True):
         if np.isfinite(before):  # measured by a held-out flight
             console.print(f"  {name.replace('_', ' ')} [{UNITS[name]}]: {before:.3g}, {after:.3g}")

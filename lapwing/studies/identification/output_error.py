@@ -1,8 +1,8 @@
 """Output-error estimation of plant parameters over multi-step windows.
 
-The plant predicts every window from its measured start under the measured commands; the parameters minimise a robust
+The plant predicts each window from its measured start under the measured commands; the parameters minimise a robust
 sum of squared prediction errors. Only the commands inside a window enter the prediction, not the measured response, so
-that the feedback of the autopilot does not bias the estimate the way it biases equation-error regression (Jategaonkar,
+the feedback of the autopilot does not bias the estimate, unlike that of equation-error regression (Jategaonkar,
 Flight Vehicle System Identification, 2015, sections 4 and 9).
 """
 
@@ -22,8 +22,8 @@ from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import Errors, Span, compare, predict_all, window_starts
 
-STEP = 1e-4  # of a scaled parameter, for derivatives
-RANGE = 50.0  # times the start value, and its fraction, within which a positive parameter is sought
+STEP = 1e-4  # step of a scaled parameter for derivatives
+RANGE = 50.0  # largest ratio, and inverse of the smallest, of a positive parameter to its initial value
 HORIZONS = (10, 25, 50)  # samples
 CLUSTER = 1.0  # [s] of flight that counts as one independent observation for standard errors
 TOLERANCE = 1e-8  # of the relative change of loss and parameters; 1e-5 stops a standard error short of the minimum
@@ -44,17 +44,17 @@ class Fit(NamedTuple):
     """Estimated parameters."""
 
     keys: tuple[str, ...]
-    start: np.ndarray  # values before
+    start: np.ndarray  # initial values
     values: np.ndarray
-    standard_errors: np.ndarray  # clustered over spans of flight, not over samples
+    standard_errors: np.ndarray  # with clusters over time spans of flights, not samples
     correlations: np.ndarray  # shape (k, k)
-    cost: float  # robust mean squared residual, over its scale
+    cost: float  # robust mean of squared scaled residuals
     evaluations: int
     undetermined: tuple[str, ...]  # keys that the flights do not determine
 
 
 class OutputError:
-    """The estimation problem: residuals of all windows for any parameter values."""
+    """Estimation problem: residuals of all windows as a function of the parameters."""
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class OutputError:
         memory: TrimMemory = NO_TRIM,
         horizons: tuple[int, ...] = HORIZONS,
     ):
-        """Choose windows with as little overlap as their number allows.
+        """Select windows with minimum overlap.
 
         Args:
             plant: plant of the scene, at the interval of the recordings.
@@ -75,7 +75,7 @@ class OutputError:
             start: initial values.
             windows: approximate number of windows.
             memory: memory of the trim.
-            horizons: [samples] at which errors count.
+            horizons: samples after which errors count.
         """
         self.plant, self.flights, self.keys = plant, list(flights), tuple(keys)
         self.start, self.memory, self.horizons = np.array(start, float), memory, horizons
@@ -92,7 +92,7 @@ class OutputError:
         self._count = sum(len(w.starts) for w in self.windows) * len(horizons) * len(FIELDS) * 3
 
     def _scales(self) -> np.ndarray:
-        """Return the spread of the errors at the initial values, by horizon and field: the units of the residuals."""
+        """Return the spread of the errors at the initial values by horizon and field, the scales of the residuals."""
         residual = self._errors([self.start])[0]
         with np.errstate(invalid="ignore"):
             return np.maximum(np.nanmedian(np.abs(residual), axis=(0, 3)) * 1.4826, 1e-9)
@@ -130,7 +130,7 @@ class OutputError:
         return [values for values in out if values is not None]
 
     def clusters(self) -> np.ndarray:
-        """Return the cluster of each window: flight and span of time."""
+        """Return the index of each window's cluster, which is a flight and a time span."""
         span = round(CLUSTER / self.plant.interval)
         names = np.concatenate([flight * 1_000_000 + starts // span for flight, starts in self.windows])
         return np.unique(names, return_inverse=True)[1]
@@ -144,8 +144,8 @@ class OutputError:
         """Minimise the robust loss.
 
         Args:
-            begin: values to continue from; None: the initial values.
-            most: maximum evaluations of the derivatives.
+            begin: initial values; None: those of the problem.
+            most: maximum number of evaluations of the derivatives.
             report: called after each step with its number, the values, and the cost.
         """
         bounds = np.array([(s / RANGE, s * RANGE) if s > 0.0 else (-np.inf, np.inf) for s in self.start]).T
@@ -154,7 +154,7 @@ class OutputError:
             self.evaluations += 1
             try:
                 return _flat(self.residuals([x * self.scale])[0])
-            except ValueError:  # a step to values that the scene rejects: the solver takes a shorter one
+            except ValueError:  # values that the scene rejects: the solver shortens the step
                 return np.full(self._count, LARGEST)
 
         def jacobian(x: np.ndarray) -> np.ndarray:

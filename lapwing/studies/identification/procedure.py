@@ -1,4 +1,4 @@
-"""Identification of a scene's plant from flights: estimate, check on held-out flights, write an airframe file."""
+"""Identification of a scene's plant from flights: estimation, test on held-out flights, airframe file."""
 
 import hashlib
 import json
@@ -24,19 +24,19 @@ from lapwing.studies.validation.procedure import read_flights
 from lapwing.studies.validation.start_states import TrimMemory, start_states
 from lapwing.studies.validation.windows import compare, predict, window_starts
 
-HELD_OUT = 0.2  # share of the flights that estimation does not see
-HORIZON = (50,)  # samples at which held-out flights are compared
+HELD_OUT = 0.2  # share of the flights that are not used for estimation
+HORIZON = (50,)  # samples after which held-out flights are compared
 
 
 @dataclass(frozen=True)
 class Identification:
-    """Estimated parameters and what they predict."""
+    """Estimated parameters and their prediction errors."""
 
     scene: str
     fit: Fit
-    used: tuple[str, ...]  # names of the flights
-    held_out: tuple[str, ...]
-    skipped: tuple[str, ...]  # a line for each flight that is left out
+    used: tuple[str, ...]  # names of the flights used for estimation
+    held_out: tuple[str, ...]  # names of the flights used for the test
+    skipped: tuple[str, ...]  # a line for each excluded flight
     before: np.ndarray  # mean absolute errors on held-out flights after 50 samples, in the order of the metrics
     after: np.ndarray
 
@@ -51,59 +51,61 @@ def identify(
     windows: int = 1000,
     seed: int = 1,
     progress: Path | None = None,
-    say: Callable[[str, int, int], None] = lambda text, done, total: None,
+    report: Callable[[str, int, int], None] = lambda text, done, total: None,
     most: int = 15,
     horizons: tuple[int, ...] = HORIZONS,
 ) -> Identification:
     """Estimate the free parameters.
 
     Args:
-        scene: the plant, with the start values.
-        paths: flights of one rate.
-        mapping: of raw files.
-        keys: of the scene (numbers), or of `flight_parameters`.
-        memory: of the trim.
-        overrides: of the scene.
-        windows: about how many to fit.
-        seed: of the choice of held-out flights.
-        progress: file that keeps the values after each step; an interrupted estimation continues from it.
-        say: called with what is done, steps done, and steps at most.
-        most: steps at most.
-        horizons: [samples] at which errors count.
+        scene: scene with the plant and the initial values.
+        paths: files of flights with the same rate.
+        mapping: mapping of raw files.
+        keys: numbers of the scene, or keys of `flight_parameters`.
+        memory: time constants of the trim.
+        overrides: overrides of the scene.
+        windows: approximate number of windows.
+        seed: seed of the selection of held-out flights.
+        progress: file for the values after each step, from which an interrupted estimation continues.
+        report: called with a description of the progress, the number of finished steps, and its maximum.
+        most: maximum number of steps.
+        horizons: samples after which errors count.
 
     Raises:
         ValueError: a flight or key is invalid, or no flight leaves the ground.
     """
     base = load_one(scene, overrides)
     start = [start_value(base, key) for key in keys]
-    flights, skipped = read_flights(paths, mapping, say)
-    run = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
-    recordings = list(compress(flights, run))
-    skipped += [f"{r.name}: no valid window in the air" for r, up in zip(flights, run, strict=True) if not up]
+    flights, skipped = read_flights(paths, mapping, report)
+    airborne = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
+    recordings = list(compress(flights, airborne))
+    skipped += [
+        f"{r.name}: no valid window in the air" for r, flies in zip(flights, airborne, strict=True) if not flies
+    ]
     if not recordings:
         raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
-    chosen = _held_out(len(recordings), seed)
-    used = [r for k, r in enumerate(recordings) if k not in chosen]
-    held_out = [r for k, r in enumerate(recordings) if k in chosen]
+    test_indices = _held_out(len(recordings), seed)
+    used = [r for k, r in enumerate(recordings) if k not in test_indices]
+    held_out = [r for k, r in enumerate(recordings) if k in test_indices]
     plant = PlantRows(base, recordings[0].interval)
     problem = OutputError(plant, used, keys, start, windows, memory, horizons)
     stamp = _stamp(base, keys, [r.name for r in used], windows, seed, (memory, horizons))
     begin = _read_progress(progress, stamp)
 
     def store(step: int, values: np.ndarray, cost: float) -> None:
-        say(f"loss {cost:.4g}", step, most)
+        report(f"loss {cost:.4g}", step, most)
         if progress:
             progress.write_text(json.dumps({"stamp": stamp, "values": values.tolist()}), encoding="utf-8")
 
     fit = problem.solve(begin, most, store)
-    judged = held_out or used
-    before = _errors(plant, judged, keys, np.array(start), memory)
-    after = _errors(plant, judged, keys, fit.values, memory)
+    test_flights = held_out or used
+    before = _errors(plant, test_flights, keys, np.array(start), memory)
+    after = _errors(plant, test_flights, keys, fit.values, memory)
     if progress:
         progress.unlink(missing_ok=True)
     name = str(getattr(base, "name", scene))
-    names, judges = tuple(r.name for r in used), tuple(r.name for r in held_out)
-    return Identification(name, fit, names, judges, tuple(skipped), before, after)
+    names, test_names = tuple(r.name for r in used), tuple(r.name for r in held_out)
+    return Identification(name, fit, names, test_names, tuple(skipped), before, after)
 
 
 def write_airframe(
@@ -190,9 +192,9 @@ def _errors(
 ) -> np.ndarray:
     own = {k: float(v) for k, v in zip(keys, values, strict=True)}
     plant.set_parameters([{k: v for k, v in own.items() if not is_flight_parameter(k)}])
-    moved = [apply_flight_parameters(f, {k: v for k, v in own.items() if is_flight_parameter(k)}) for f in flights]
+    corrected = [apply_flight_parameters(f, {k: v for k, v in own.items() if is_flight_parameter(k)}) for f in flights]
     result = []
-    for flight, state in zip(moved, start_states(plant, moved, memory), strict=True):
+    for flight, state in zip(corrected, start_states(plant, corrected, memory), strict=True):
         starts = window_starts(flight, HORIZON[-1], 10)
         predicted = predict(plant, flight, starts, state, HORIZON)
         result.append(magnitudes(compare(flight, starts, HORIZON, predicted))[:, 0])

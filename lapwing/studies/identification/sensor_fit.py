@@ -1,9 +1,9 @@
 """Sensor noise, bias and latency of a recorded flight, as parameters of the sensor models.
 
-White noise is measured by second differences of neighbouring samples, which bias, drift and smooth motion leave alone.
-It is taken where the vehicle rests, if it rests for `SHORTEST_REST`; otherwise in flight, where it contains vibration.
-Slow errors are the largest Allan deviation beyond that of the white noise (IEEE Std 952), latency the shift that fits
-the measured motion best.
+White noise is measured by second differences of samples, which are insensitive to bias, drift and smooth motion. It is
+measured while the vehicle rests, if it rests for `SHORTEST_REST`; otherwise in flight, where it includes vibration.
+Slow errors are the largest Allan deviation beyond that of the white noise (IEEE Std 952). The latency is the time shift
+with the best fit to the measured motion.
 """
 
 import math
@@ -19,16 +19,16 @@ from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.flight_import.rotation_arrays import body_rate
 from lapwing.studies.flight_import.time_alignment import time_offset
 
-SHORTEST_REST = 2.0  # [s] without motor commands that count as rest
-LONG_REST = 100.0  # [s] of rest from which slow errors of the IMU are estimated
-FEWEST = 20  # samples of a sensor
+SHORTEST_REST = 2.0  # [s] minimum time without motor commands that counts as rest
+LONG_REST = 100.0  # [s] minimum rest for the estimation of slow errors of the IMU
+FEWEST = 20  # minimum number of samples of a sensor
 RESTING = 0.02  # share of the highest motor voltage below which the vehicle rests
-MOST_BIAS_G = 0.3  # [g] departure of the specific force from gravity that a bias can explain
-MOST_BIAS_RAD_S = 0.5  # [rad/s] of the gyroscope, the same
-CLEAR = 0.8  # correlation from which a latency is believed
+MOST_BIAS_G = 0.3  # [g] largest difference of the specific force from gravity that a bias can explain
+MOST_BIAS_RAD_S = 0.5  # [rad/s] largest rate of the gyroscope that a bias can explain
+CLEAR = 0.8  # minimum correlation of a significant latency
 LONGEST_LATENCY = 0.5  # [s]
 SIGNIFICANT = 3.3  # standard errors of an Allan variance
-MOVING = 0.2  # [m/s] rms speed from which a latency of positions shows
+MOVING = 0.2  # [m/s] minimum rms speed for the estimation of the latency of positions
 
 
 def fit_all(flights: Sequence[Recording]) -> tuple[dict[str, dict[str, Any]], list[str]]:
@@ -65,10 +65,10 @@ def _median(tables: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
 
 def fit_sensors(flight: Recording) -> tuple[dict[str, dict[str, Any]], list[str]]:
-    """Return the parameters of each sensor that the flight has, and remarks on what it leaves open.
+    """Return the parameters of each sensor in the flight, and remarks on undetermined ones.
 
     Args:
-        flight: with raw sensors in its `readings`, or an IMU in its samples.
+        flight: recording with raw sensors in its `readings`, or an IMU in its samples.
     """
     out: dict[str, dict[str, Any]] = {}
     notes: list[str] = []
@@ -94,10 +94,10 @@ def fit_sensors(flight: Recording) -> tuple[dict[str, dict[str, Any]], list[str]
 
 
 def _imu_of_samples(flight: Recording) -> Series:
-    """Return rate and specific force of the flight's samples: files of columns have the IMU at no rate of its own."""
+    """Return rate and specific force of the flight's samples, for CSV files, in which the IMU has no separate rate."""
     values = np.column_stack([flight.omega, flight.specific_force])
-    sound = flight.valid & np.isfinite(values).all(axis=1)
-    return Series(_grid(flight)[sound], values[sound])
+    usable = flight.valid & np.isfinite(values).all(axis=1)
+    return Series(_grid(flight)[usable], values[usable])
 
 
 def _imu(flight: Recording, s: Series, rest: tuple[float, float] | None, notes: list[str]) -> dict[str, Any]:
@@ -117,11 +117,11 @@ def _imu(flight: Recording, s: Series, rest: tuple[float, float] | None, notes: 
         else:
             notes.append(f"imu: bias instability unknown, needs {LONG_REST:g} s at rest")
     result: dict[str, Any] = {"gyro": gyro, "accelerometer": accelerometer, "rate": _rate(s)}
-    turning = body_rate(flight.attitude, np.full(len(flight), flight.interval))
+    attitude_rate = body_rate(flight.attitude, np.full(len(flight), flight.interval))
     measured = np.column_stack([np.interp(_grid(flight), s.time, c) for c in s.values[:, :3].T])
     if np.isfinite(flight.attitude).all():
-        # the rate of two attitudes is that of the middle between them, half an interval before the sample
-        lag, correlation = time_offset(turning, measured, flight.valid, flight.interval)
+        # the rate from two attitudes is that at the midpoint, half an interval before the sample
+        lag, correlation = time_offset(attitude_rate, measured, flight.valid, flight.interval)
         lag += 0.5 * flight.interval
         if correlation > CLEAR:
             result["latency_samples"] = _samples(lag, result["rate"])
@@ -156,14 +156,14 @@ def _gps(flight: Recording, s: Series, notes: list[str]) -> dict[str, Any]:
 
 def _position_error(flight: Recording, fixes: Series, lag: float) -> np.ndarray:
     """Return fixes minus the measured position at their times of validity, [m] world, shape (n, 3)."""
-    at = fixes.time - lag
-    inside = (at >= 0.0) & (at <= flight.interval * (len(flight) - 1))
-    position = np.column_stack([np.interp(at[inside], _grid(flight), c) for c in flight.position.T])
+    valid_time = fixes.time - lag
+    inside = (valid_time >= 0.0) & (valid_time <= flight.interval * (len(flight) - 1))
+    position = np.column_stack([np.interp(valid_time[inside], _grid(flight), c) for c in flight.position.T])
     return fixes.values[inside] - position
 
 
 def _pressure_error(flight: Recording, s: Series) -> Series:
-    """Pressure [Pa] less a straight line over height."""
+    """Return the pressure [Pa] minus a linear function of height."""
     height = np.interp(s.time, _grid(flight), flight.position[:, 2])
     basis = np.column_stack([np.ones_like(height), height])
     line, *_ = np.linalg.lstsq(basis if np.ptp(height) > 0.1 else basis[:, :1], s.values[:, 0], rcond=None)
@@ -171,7 +171,7 @@ def _pressure_error(flight: Recording, s: Series) -> Series:
 
 
 def _rest(flight: Recording) -> tuple[float, float] | None:
-    """First and last instant [s] of the longest rest, or None. A vehicle that falls or turns over does not rest."""
+    """Return start and end [s] of the longest rest, or None. A vehicle that falls or turns over is not at rest."""
     volts = np.nan_to_num(flight.motor_voltage).max(axis=1)
     off = volts < RESTING * max(volts.max(initial=0.0), 1e-9)
     weight = np.abs(np.linalg.norm(flight.specific_force, axis=1) / STANDARD_GRAVITY - 1.0)
@@ -192,7 +192,7 @@ def _within(s: Series, span: tuple[float, float] | None) -> Series:
 
 
 def _rate(s: Series) -> float:
-    """[Hz], rounded to what data sheets have."""
+    """Return the rate [Hz] with three significant digits, as in data sheets."""
     return float(f"{1.0 / np.median(np.diff(s.time)):.3g}")
 
 
@@ -201,7 +201,7 @@ def _samples(lag: float, rate: float) -> int:
 
 
 def _white(values: np.ndarray) -> float:
-    """Return the standard deviation of the white noise of samples, mean over columns; rounding is taken off."""
+    """Return the standard deviation of the white noise of samples, mean over columns, without that of rounding."""
     second = np.diff(values, n=2, axis=0)
     steps = np.abs(np.diff(values, axis=0))
     resolution = steps[steps > 0.0].min(initial=np.inf)
@@ -210,14 +210,14 @@ def _white(values: np.ndarray) -> float:
 
 
 def _density(s: Series) -> float:
-    """Return the one-sided density of the white noise."""
+    """Return the one-sided spectral density of the white noise, in units of the values per sqrt(Hz)."""
     return _white(s.values) / math.sqrt(0.5 * _rate(s))
 
 
 def _slow(s: Series) -> float:
     """Return the largest Allan deviation beyond that of the white noise, over averages from 1 s to a ninth of the span.
 
-    An excess that white noise alone shows once in some thousand spans counts as none.
+    An excess that white noise alone causes once in about a thousand spans is ignored.
     """
     white, peak, size = _white(s.values), 0.0, max(round(_rate(s)), 2)
     while 9 * size <= len(s.time):

@@ -11,8 +11,8 @@ from lapwing.cosim.log import LogReader
 from lapwing.messages import TYPES
 from lapwing.messages.message_diff import first_difference
 
-AFTER = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)  # [s] at which growth is reported, and at the end
-ABOUT = ("scene", "seed", "setup", "version", "commit")  # of the metadata: why logs may differ
+AFTER = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1000.0, 10000.0)  # [s] times of the reported growth, besides the end
+ABOUT = ("scene", "seed", "setup", "version", "commit")  # metadata that may explain a difference
 
 
 class Growth(NamedTuple):
@@ -20,7 +20,7 @@ class Growth(NamedTuple):
 
     after: float  # [s]
     apart: float  # Euclidean distance of the two values
-    position: float | None  # [m] distance of the true positions then; None where a log has none at that time
+    position: float | None  # [m] distance of the true positions; None if a log has none at that time
 
 
 class Difference(NamedTuple):
@@ -28,21 +28,21 @@ class Difference(NamedTuple):
 
     topic: str
     time_ns: int
-    field: str  # dotted; "" where the message itself is in one log only, or its type is not known
-    values: tuple[Any, Any]  # in the one log and in the other
-    growth: tuple[Growth, ...]  # empty where the field holds no numbers
+    field: str  # dotted name; "" if only one log has the message, or its type is unknown
+    values: tuple[Any, Any]  # values in the two logs
+    growth: tuple[Growth, ...]  # empty if the field is not numeric
 
 
 class Comparison(NamedTuple):
     """Comparison of two logs."""
 
-    about: dict[str, tuple[str, str]]  # what they say of themselves, where that differs
-    only: tuple[tuple[str, ...], tuple[str, ...]]  # topics that one of them has alone
+    about: dict[str, tuple[str, str]]  # differing metadata of the two logs
+    only: tuple[tuple[str, ...], tuple[str, ...]]  # topics that only the first and only the second log has
     first: Difference | None
 
     @property
     def same(self) -> bool:
-        """True if both hold the same deterministic messages."""
+        """True if both logs have the same deterministic messages."""
         return self.first is None and not any(self.only)
 
 
@@ -50,7 +50,7 @@ def compare(one: str | Path, other: str | Path) -> Comparison:
     """Compare the deterministic messages of two logs.
 
     Raises:
-        ValueError: one of them cannot be read, or has another version.
+        ValueError: a log cannot be read, or has another version.
     """
     with LogReader(one) as a, LogReader(other) as b:
         keys = [key for key in ABOUT if a.metadata.get(key) != b.metadata.get(key)]
@@ -65,15 +65,15 @@ def compare(one: str | Path, other: str | Path) -> Comparison:
 def _first(a: LogReader, b: LogReader, topics: set[str]) -> Difference | None:
     types = a.topics()
     one, other = _instants(a, topics), _instants(b, topics)
-    here, there = next(one, None), next(other, None)
-    while here or there:
-        if here == there:
-            here, there = next(one, None), next(other, None)
+    first, second = next(one, None), next(other, None)
+    while first or second:
+        if first == second:
+            first, second = next(one, None), next(other, None)
             continue
-        time_ns = min(instant[0] for instant in (here, there) if instant)
-        text = [instant[1] if instant and instant[0] == time_ns else {} for instant in (here, there)]
-        for topic in {**text[0], **text[1]}:  # in the order of the log
-            payloads = [s.get(topic, []) for s in text]
+        time_ns = min(instant[0] for instant in (first, second) if instant)
+        messages = [instant[1] if instant and instant[0] == time_ns else {} for instant in (first, second)]
+        for topic in {**messages[0], **messages[1]}:  # in the order of the log
+            payloads = [by_topic.get(topic, []) for by_topic in messages]
             if payloads[0] != payloads[1]:
                 return _difference(a, b, topic, types[topic], time_ns, *payloads)
     return None
@@ -82,10 +82,10 @@ def _first(a: LogReader, b: LogReader, topics: set[str]) -> Difference | None:
 def _instants(log: LogReader, topics: set[str]) -> Iterator[tuple[int, dict[str, list[bytes]]]]:
     """Yield each time [ns] with the payloads of each topic."""
     for time_ns, group in groupby(log.messages(topics), key=lambda message: message[2]):
-        text: dict[str, list[bytes]] = {}
+        payloads: dict[str, list[bytes]] = {}
         for topic, _, _, payload in group:
-            text.setdefault(topic, []).append(payload)
-        yield time_ns, text
+            payloads.setdefault(topic, []).append(payload)
+        yield time_ns, payloads
 
 
 def _difference(
@@ -102,13 +102,13 @@ def _difference(
 
 
 def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -> tuple[Growth, ...]:
-    """Return the distance of the vector that holds the field, at times that both logs have."""
+    """Return the growth of the distance of the vector that contains the field, at common times of both logs."""
     times, apart = _distances(a, b, topic, (field.rpartition(".")[0], field))
     if not len(times):
         return ()
     truth = next((name for name in a.topics() if name.endswith("/ground_truth") and name in b.topics()), None)
-    instants, moved = _distances(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
-    position = dict(zip(instants.tolist(), moved.tolist(), strict=True))
+    position_times, distances = _distances(a, b, truth, ("pose.position",)) if truth else (times[:0], apart[:0])
+    position = dict(zip(position_times.tolist(), distances.tolist(), strict=True))
     after = (times - first_ns) * 1e-9
     moments = [seconds for seconds in AFTER if seconds < after[-1]] + [float(after[-1])]
     rows = dict.fromkeys(int(np.searchsorted(after, seconds - 1e-9)) for seconds in moments)
@@ -116,7 +116,7 @@ def _growth(a: LogReader, b: LogReader, topic: str, field: str, first_ns: int) -
 
 
 def _distances(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Return times [ns] and distances (n,) of the first of these fields with numbers in both logs; or empty."""
+    """Return times [ns] and distances, shape (n,), of the first field that is numeric in both logs, or empty."""
     (times_a, one), (times_b, other) = a.history(topic), b.history(topic)
     name = next((name for name in names if name in one and name in other), "")
     values = [np.asarray(columns[name]) if name else np.empty(0, object) for columns in (one, other)]
@@ -126,6 +126,6 @@ def _distances(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -
         or values[0].shape[1:] != values[1].shape[1:]
     ):
         return np.empty(0, np.int64), np.empty(0)
-    times, here, there = np.intersect1d(times_a, times_b, return_indices=True)
-    difference = values[1][there].astype(float) - values[0][here].astype(float)
+    times, rows_a, rows_b = np.intersect1d(times_a, times_b, return_indices=True)
+    difference = values[1][rows_b].astype(float) - values[0][rows_a].astype(float)
     return times, np.linalg.norm(difference.reshape(len(times), -1), axis=1)

@@ -8,38 +8,38 @@ import numpy as np
 from lapwing.cosim.config.provenance import SETUP_FILE
 from lapwing.cosim.log import LogReader
 
-REGULAR = 0.9  # of the intervals between messages that are alike, from which on others are gaps
-LONGER = 1.5  # times the usual interval is a gap
+REGULAR = 0.9  # minimum share of equal intervals between messages of a regular topic
+LONGER = 1.5  # smallest gap, over the usual interval
 
 
 class Topic(NamedTuple):
     """A topic of a log."""
 
     name: str
-    kind: str  # full name of its type
+    kind: str  # full name of the type
     messages: int
-    size: int  # [bytes] of its messages, not compressed
-    rate: float | None  # [Hz], None where its messages come at no regular rate
-    gaps: int  # intervals that are longer than usual
-    longest: float  # [s], the longest of them; 0 where there is none
+    size: int  # [bytes] size of the messages, uncompressed
+    rate: float | None  # [Hz] None for an irregular topic
+    gaps: int  # number of intervals that are longer than usual
+    longest: float  # [s] longest gap; 0 without one
 
 
 class Info(NamedTuple):
     """Summary of a log."""
 
     path: Path
-    size: int  # [bytes] of the file
+    size: int  # [bytes] size of the file
     metadata: dict[str, str]
-    files: tuple[str, ...]  # attached
-    complete: bool  # whether it has its end
-    start: float  # [s] of the first message
-    end: float  # [s] of the last message
+    files: tuple[str, ...]  # names of the attachments
+    complete: bool  # False if the end of the log is missing
+    start: float  # [s] time of the first message
+    end: float  # [s] time of the last message
     topics: tuple[Topic, ...]
-    other_versions: dict[str, str]  # what the type of a topic has otherwise than this version's
+    other_versions: dict[str, str]  # difference of a topic's type from that of this version, by topic
 
     @property
     def missing(self) -> dict[str, str]:
-        """Commands that cannot use the log, with what it lacks for each."""
+        """Missing parts of the log by the command that needs them."""
         result = {}
         if not any(topic.name.endswith("/ground_truth") for topic in self.topics):
             result["report"] = "a topic /NAME/ground_truth"
@@ -56,7 +56,7 @@ def info(path: str | Path) -> Info:
     """Scan a log.
 
     Raises:
-        ValueError: it cannot be read.
+        ValueError: the log cannot be read.
     """
     with LogReader(path) as log:
         times: dict[str, list[int]] = {topic: [] for topic in log.topics()}

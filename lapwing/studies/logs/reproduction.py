@@ -1,8 +1,8 @@
 """Expected reproducibility of a log's digest: versions and processor of the recording and of this machine.
 
-Kernels and resolvers use Lapwing's own elementary functions in plain double arithmetic, so that C library, processor
-and the versions of numba, llvmlite and numpy do not change bits (`make portability`, `make compatibility`). Lapwing's
-own source and modules of the user do.
+Kernels and resolvers use Lapwing's elementary functions in double precision, so results do not depend on C library,
+processor, and versions of numba, llvmlite and numpy (`make portability`, `make compatibility`). They depend on
+Lapwing's source and on the user's modules.
 """
 
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ UNKNOWN = "unknown"
 
 
 class Fact(NamedTuple):
-    """One property of the machine that recorded a log, and of this one."""
+    """Property of the machine that recorded a log, and of this machine."""
 
     name: str
     recorded: str
@@ -22,15 +22,15 @@ class Fact(NamedTuple):
 
 
 def facts(metadata: Mapping[str, str]) -> list[Fact]:
-    """Compare a log's metadata with this machine."""
+    """Return the properties in a log's metadata with those of this machine."""
     here = {"commit": source_commit(), **machine()}
     return [Fact(name, metadata.get(name, UNKNOWN), here[name]) for name in ("commit", *MACHINE)]
 
 
 def expectation(metadata: Mapping[str, str]) -> str:
-    """Return one sentence on whether resimulation is expected to reproduce the recorded digest here."""
+    """Return a sentence on the expected result of resimulation on this machine."""
     if metadata.get("mode") == "imported":
-        return "imported from another program: there is nothing to resimulate"
+        return "imported from another program: resimulation is not possible"
     recorded, here = metadata.get("commit", UNKNOWN), source_commit()
     if UNKNOWN in (recorded, here):
         return "unknown: one of the two commits of Lapwing is not known; resimulate the log"

@@ -1,7 +1,7 @@
-"""The report of a flight: a page whose plots are drawn in the reader's browser, or the same plots on paper.
+"""Report of a flight: a page with interactive plots, or the same plots on paper.
 
-Each plot is a file of `lapwing.studies.report.plots`; adding one is adding a file. It says what is to be seen (`plot`);
-`browser` and `paper` draw it.
+Each file of `lapwing.studies.report.plots` is a plot. It returns a description of the plot (see `plot`), which
+`plotly_figure` draws in a browser and `matplotlib_figure` on paper.
 """
 
 from lapwing.studies.report.write import check_format, write

@@ -14,9 +14,9 @@ def cover(flights: Sequence[FlightData]) -> Cover:
     scenes = [flight.origin.scene for flight in flights]
     names, published = labels(flights), scenes[0].get("published", {})
     many = len(flights) > 1
-    heads = ["RMSE", *(names if many else ["this flight"])]
+    columns = ["RMSE", *(names if many else ["this flight"])]
     if published.get("rmse"):
-        heads.append(published.get("source", "published"))
+        columns.append(published.get("source", "published"))
     rows = [
         (f"{row.axis} [{row.unit}]", *("" if value is None else f"{value:.4f}" for value in row.values))
         for row in accuracy(flights, published.get("rmse", {}))
@@ -32,17 +32,17 @@ def cover(flights: Sequence[FlightData]) -> Cover:
             f"{name}: {flight.outcome}" if many else str(flight.outcome)
             for name, flight in zip(names, flights, strict=True)
         ),
-        tuple(heads),
+        tuple(columns),
         tuple(rows),
         (
-            *((key, _beside(several)) for key, several in values.items()),
+            *((key, _side_by_side(several)) for key, several in values.items()),
             *(
-                ("" if k else "scenes differ in", f"{key}: {_beside(v)}")
+                ("" if k else "scenes differ in", f"{key}: {_side_by_side(v)}")
                 for k, (key, v) in enumerate(differing.items())
             ),
         ),
     )
 
 
-def _beside(values: Sequence[str]) -> str:
+def _side_by_side(values: Sequence[str]) -> str:
     return " | ".join(text or "none" for text in values)

@@ -5,7 +5,7 @@ import numpy as np
 from lapwing.studies.flight_data import AXES, FlightData
 from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
 
-DEGREES = 180.0 / np.pi  # of 1 rad
+DEGREES = 180.0 / np.pi  # [deg] in 1 rad
 
 
 def over(flight: FlightData) -> dict:
@@ -22,7 +22,7 @@ def phases(flight: FlightData) -> list[tuple[str, float, float]]:
 
 
 def runs(t: np.ndarray, values: np.ndarray) -> list[tuple[str, float, float]]:
-    """Return value as text, start and end [s] of each interval of constant value."""
+    """Return the value as text, start and end [s] of each interval of constant value; t and values have shape (n,)."""
     starts = [0, *(np.flatnonzero(values[1:] != values[:-1]) + 1)]
     ends = [*t[starts[1:]], t[-1]]
     return [(str(values[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True)]
@@ -43,21 +43,21 @@ def three_axes(flight: FlightData, first: int, actual: np.ndarray, unit: str, sc
         NotRecordedError: the values are constant.
     """
     if len(actual) > 1 and not np.ptp(actual, axis=0).any():
-        raise NotRecordedError("it never changes")
+        raise NotRecordedError("it is constant")
     t, n, panels = flight.truth.times, len(flight.reference), []
-    followed = bool(flight.armed.any())
+    has_errors = bool(flight.armed.any())
     for row, name in enumerate(AXES[first : first + 3]):
         marks = [Line(t, actual[:, row], "flown", width=1.5)]
         if n:
-            marks.append(reference(t[:n], scale * flight.reference[:, first + row], hidden=followed))
+            marks.append(reference(t[:n], scale * flight.reference[:, first + row], hidden=has_errors))
         panels.append(Panel(tuple(marks), f"{name} [{unit}]", row=row))
-        if followed:
+        if has_errors:
             rmse = scale * flight.rmse[name]
             error = Line(t[:n][flight.armed], scale * flight.errors[name], width=1.0)
             bounds = Level(rmse, "± RMSE"), Level(-rmse, "± RMSE")
             title = f"RMSE {rmse:.4f} {unit}"
             panels.append(Panel((error, *bounds), f"{name} error [{unit}]", title=title, row=row, column=1))
-    if followed:
-        caption += " On the right reference minus truth while the motors are armed."
-    widths = (1.0, 1.0) if followed else (1.0,)
+    if has_errors:
+        caption += " On the right: reference minus truth while the motors are armed."
+    widths = (1.0, 1.0) if has_errors else (1.0,)
     return Plot(tuple(panels), caption, 6.6, (1.0,) * 3, widths, **over(flight))

@@ -1,4 +1,4 @@
-"""Numbers of a flight that matter most, beside their limits."""
+"""Key numbers of a flight with their limits."""
 
 from contextlib import suppress
 from typing import NamedTuple
@@ -10,7 +10,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_events import Event
 from lapwing.studies.outcome import HARD, LANDING_RADIUS
 
-TROUBLE = ("failsafe", "fault", "warning", "battery", "slack")  # kinds of events that a report names first
+TROUBLE = ("failsafe", "fault", "warning", "battery", "slack")  # kinds of events at the top of a report
 
 
 class KeyNumber(NamedTuple):
@@ -19,8 +19,8 @@ class KeyNumber(NamedTuple):
     label: str
     value: float
     unit: str
-    limit: float | None = None  # the largest good value; the least one if `at_least`
-    source: str = ""  # of the limit
+    limit: float | None = None  # largest good value, or the smallest if `at_least`
+    source: str = ""  # source of the limit
     at_least: bool = False
 
     @property
@@ -47,7 +47,7 @@ def key_numbers(flight: FlightData) -> list[KeyNumber]:
     if outcome.target_distance is not None:
         numbers.append(KeyNumber("distance from target", outcome.target_distance, "m", LANDING_RADIUS, "landed there"))
     if use := battery_use(flight):
-        limit = None if use.low is None else 100.0 * use.low
+        limit = None if use.low_threshold is None else 100.0 * use.low_threshold
         left = KeyNumber("battery left at landing", 100.0 * use.charge_left, "%", limit, "warning", at_least=True)
         numbers.append(left._replace(label=f"{left.label}, {use.energy_left:.3g} W h"))
     elif "motor_power" in flight.truth.fields and np.isfinite(flight.truth.motor_power).all():
@@ -57,7 +57,7 @@ def key_numbers(flight: FlightData) -> list[KeyNumber]:
 
 
 def trouble(flight: FlightData) -> list[Event]:
-    """Return the events that went wrong, in order of time, with a crash or a divergence."""
+    """Return the adverse events in order of time, including a crash or a divergence."""
     events, outcome = [event for event in flight.events if event.kind in TROUBLE], flight.outcome
     if outcome.kind in ("crashed", "diverged"):
         events.append(Event(outcome.time, outcome.kind, outcome.how))

@@ -1,4 +1,4 @@
-"""Plots on paper: drawn by matplotlib, as PDF or PNG."""
+"""Plots drawn by matplotlib, as PDF or PNG."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -15,7 +15,7 @@ from matplotlib.image import imsave
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
-from lapwing.studies.report.downsampling import drawn, extremes
+from lapwing.studies.report.downsampling import downsample, extremes
 from lapwing.studies.report.plot import Band, Level, Line, Mark, Panel, Plot, Stretch, cube, lowest
 from lapwing.studies.report.style import DPI, SHADE, WIDTH
 
@@ -38,22 +38,22 @@ _PARAMETERS: dict[Any, Any] = {
     "ytick.color": "#444444",
     "figure.facecolor": "white",
 }
-LEGEND = 130  # letters in the width of a legend, six of each entry for its symbol
-NUMBERS = 14  # along the width of a plot, of five digits each
-STEPS = (1, 2, 2.5, 5, 10)  # between them
+LEGEND = 130  # characters in the width of a legend, including six per entry for its symbol
+NUMBERS = 14  # tick labels of five digits along the width of a plot
+STEPS = (1, 2, 2.5, 5, 10)  # multiples between ticks
 _DASHES: dict[str, Any] = {"solid": "-", "dash": (0, (4, 3)), "dot": (0, (1, 1.5)), "dashdot": (0, (6, 2, 1, 2))}
 _MARKERS = {"": "", "circle": "o", "open": "o", "square": "s", "cross": "X", "diamond": "D", "triangle": "^"}
 
 
 @contextmanager
 def plot_style() -> Iterator[None]:
-    """Draw within this, so that nothing else in the process changes its looks."""
+    """Apply the style of the plots within the context, without an effect on other figures of the process."""
     with matplotlib.rc_context(_PARAMETERS):
         yield
 
 
 def write_png(path: Path, plots: Sequence[Plot]) -> None:
-    """Write all plots below each other in one image."""
+    """Write all plots, one below the other, in one image."""
     with plot_style():
         pictures = []
         for plot in plots:
@@ -63,8 +63,8 @@ def write_png(path: Path, plots: Sequence[Plot]) -> None:
         imsave(path, np.concatenate(pictures), format="png", metadata={"Software": ""})
 
 
-class ShownFigure(Figure):
-    """Figure that a notebook shows without pyplot, which would have to be imported before it."""
+class NotebookFigure(Figure):
+    """Figure that a notebook shows without an import of pyplot."""
 
     def _repr_png_(self) -> bytes:
         with plot_style():
@@ -74,22 +74,22 @@ class ShownFigure(Figure):
 
 
 def figure(plot: Plot) -> Figure:
-    """Return the plot as a figure of `WIDTH`; call and save it within `plot_style`."""
-    figure = ShownFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
+    """Return the plot as a figure of `WIDTH`; call this and save the figure within `plot_style`."""
+    figure = NotebookFigure(figsize=(WIDTH, plot.height), dpi=DPI, layout="constrained")
     draw_plot(plot, figure)
     show_dollars(figure)
     return figure
 
 
 def show_dollars(figure: Figure) -> None:
-    """Draw each "$" of a name as it is, where matplotlib would read a formula; ticks get theirs later."""
+    """Draw each "$" of a name literally instead of as a formula; tick labels do not exist yet."""
     for text in figure.findobj(Text):
         if "$" in text.get_text():
             text.set_parse_math(False)
 
 
 def draw_plot(plot: Plot, figure: Figure | SubFigure) -> None:
-    """Draw a plot into a figure or a part of one; call within `plot_style`."""
+    """Draw a plot into a figure or a subfigure; call within `plot_style`."""
     grid = figure.add_gridspec(
         len(plot.heights), len(plot.widths), height_ratios=plot.heights, width_ratios=plot.widths
     )
@@ -116,7 +116,7 @@ def draw_plot(plot: Plot, figure: Figure | SubFigure) -> None:
 
 
 def _columns(names: Iterable[str]) -> int:
-    """Return the number of columns of a legend, of which a figure's width has room."""
+    """Return the number of columns of a legend that fit in the width of a figure."""
     return max(1, min(6, LEGEND // (max(map(len, names)) + 6)))
 
 
@@ -145,8 +145,8 @@ def _flat(axes: Axes, plot: Plot, panel: Panel) -> None:
         axes.set_yticks(range(len(lanes)), lanes)
         axes.set_ylim(len(lanes) - 0.5, -0.5)
     if panel.note:
-        looks: dict[str, Any] = {"ha": "left", "va": "top", "fontsize": 8, "color": "#555555"}
-        axes.text(0.02, 0.97, panel.note, transform=axes.transAxes, **looks)
+        style: dict[str, Any] = {"ha": "left", "va": "top", "fontsize": 8, "color": "#555555"}
+        axes.text(0.02, 0.97, panel.note, transform=axes.transAxes, **style)
 
 
 def _draw(axes: Axes, mark: Mark, plot: Plot, panel: Panel, lanes: list[str]) -> None:
@@ -163,25 +163,25 @@ def _draw(axes: Axes, mark: Mark, plot: Plot, panel: Panel, lanes: list[str]) ->
         if _fits(mark.text, mark.end - mark.start, plot, panel):
             axes.text((mark.start + mark.end) / 2, lane, mark.text, ha="center", va="center", fontsize=8)
     else:
-        line = drawn(mark, panel.timed)
+        line = downsample(mark, panel.timed)
         if line.fill:
             axes.fill(line.x, line.y, color=line.fill, linewidth=0)
-        axes.plot(line.x, line.y, label=name, **_looks(line))
+        axes.plot(line.x, line.y, label=name, **_line_style(line))
 
 
 def _space(axes: Any, panel: Panel) -> None:
-    for line in (drawn(mark, False) for mark in panel.marks if isinstance(mark, Line)):
-        axes.plot(line.x, line.y, line.z, label=line.name or None, **_looks(line))
+    for line in (downsample(mark, False) for mark in panel.marks if isinstance(mark, Line)):
+        axes.plot(line.x, line.y, line.z, label=line.name or None, **_line_style(line))
     low, high = cube(panel)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     axes.set_box_aspect((1, 1, 1), zoom=0.88)
     axes.set(xlabel=panel.x_label, ylabel=panel.y_label)
-    axes.zaxis.set_rotate_label(False)  # it would stand on its head
+    axes.zaxis.set_rotate_label(False)  # it would be upside down
     axes.set_zlabel(panel.z_label, rotation=90)
     axes.view_init(elev=24, azim=-128)
 
 
-def _looks(line: Line) -> dict[str, Any]:
+def _line_style(line: Line) -> dict[str, Any]:
     return {
         "color": line.colour,
         "linewidth": line.width,
@@ -200,13 +200,13 @@ def _over_time(axes: Axes, plot: Plot, panel: Panel) -> None:
         if index % 2:
             axes.axvspan(start, end, color=SHADE, linewidth=0, zorder=0)
         if panel.row == 0 and not panel.title and _fits(name, end - start, plot, panel):
-            looks: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 8, "color": "#555555"}
-            axes.text((start + end) / 2, 1.02, name, transform=axes.get_xaxis_transform(), **looks)
+            style: dict[str, Any] = {"ha": "center", "va": "bottom", "fontsize": 8, "color": "#555555"}
+            axes.text((start + end) / 2, 1.02, name, transform=axes.get_xaxis_transform(), **style)
     axes.set_xlim(span)
     axes.grid(visible=False, axis="x")
 
 
-def _fits(text: str, lasts: float, plot: Plot, panel: Panel) -> bool:
-    """Return True if a text fits over an interval of time: about 115 letters a figure."""
-    start, end = plot.span or (0.0, lasts)
-    return len(text) <= 115 * panel.columns / len(plot.widths) * lasts / (end - start)
+def _fits(text: str, duration: float, plot: Plot, panel: Panel) -> bool:
+    """Return True if a text fits over a duration, at about 115 characters per figure width."""
+    start, end = plot.span or (0.0, duration)
+    return len(text) <= 115 * panel.columns / len(plot.widths) * duration / (end - start)

@@ -1,4 +1,4 @@
-"""Two flights in one plot: the second in other colours, its names with the flight's own."""
+"""Overlay of two flights in one plot, with different colours and the flights' names in the legend."""
 
 import re
 from itertools import takewhile
@@ -8,16 +8,16 @@ import numpy as np
 from lapwing.studies.report.plot import Band, Line, Mark, Panel, Plot, Stretch
 from lapwing.studies.report.style import BOUND, COLOURS, FLOWN
 
-# Colours of the first and of the second flight, by those of one alone; what is not here keeps its colour.
+# Colours of the first and of the second flight by those in the plot of one flight; other colours are unchanged.
 FIRST = {BOUND: FLOWN}
 SECOND = {FLOWN: BOUND, **dict(zip(COLOURS[1:4], ("#7A5200", "#66C2A5", "#7B3F61"), strict=True))}
-LANE = 0.32  # [inch] of a timeline
+LANE = 0.32  # [inch] height of a timeline's lane
 
 
 def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
-    """Return two plots in one; a panel of the first alone is kept, one of the second alone is named but not drawn."""
+    """Return two plots in one. Panels of the first alone are kept, those of the second alone are only named."""
     others = {_key(panel): panel for panel in second.panels}
-    panels, apart, named = [], _apart(first, second), (_colours_in_legend(first), _colours_in_legend(second))
+    panels, apart, named = [], _differing_names(first, second), (_colours_in_legend(first), _colours_in_legend(second))
     for panel in first.panels:
         other = others.pop(_key(panel), None)
         panels.append(panel if other is None else _both(panel, other, labels, named, apart))
@@ -27,9 +27,9 @@ def overlay(first: Plot, second: Plot, labels: tuple[str, str]) -> Plot:
     if any(" / " in panel.title and " / " not in own.title for panel, own in zip(panels, first.panels, strict=True)):
         caption += f" Above the panels: {labels[0]} / {labels[1]}."
     if first.phases:
-        caption += f" Phases are those of {labels[0]}."
+        caption += f" The phases are those of {labels[0]}."
     if others:
-        caption += f" Only in {labels[1]}, and not shown: {', '.join(p.y_label for p in others.values())}."
+        caption += f" Only in {labels[1]}, not shown: {', '.join(p.y_label for p in others.values())}."
     added = sum(len(_lanes(panel)) for panel in panels) - sum(len(_lanes(panel)) for panel in first.panels)
     height = max(first.height, second.height) + LANE * added
     return first._replace(panels=tuple(panels), span=span, caption=caption, height=height)
@@ -40,13 +40,13 @@ def _key(panel: Panel) -> tuple:
 
 
 def _colours_in_legend(plot: Plot) -> set[str]:
-    """Return the colours of solid lines that the legend of a plot names."""
+    """Return the colours of the solid lines in the legend of a plot."""
     lines = [mark for panel in plot.panels for mark in panel.marks if isinstance(mark, Line)]
     return {line.colour for line in lines if line.name and line.dash == "solid"}
 
 
-def _apart(first: Plot, second: Plot) -> set[str]:
-    """Return the names of marks that differ between the flights in any panel, so that the legend has each by flight."""
+def _differing_names(first: Plot, second: Plot) -> set[str]:
+    """Return the names of marks that differ between the flights in any panel, which the legend lists per flight."""
     others = {_key(panel): panel.marks for panel in second.panels}
     pairs = [(panel.marks, others[_key(panel)]) for panel in first.panels if _key(panel) in others]
     both = [*pairs, *((b, a) for a, b in pairs)]
@@ -70,7 +70,7 @@ def _both(
 
 
 def _texts(one: str, other: str, labels: tuple[str, str], between: str) -> str:
-    """Return two texts in one: what they begin with once, "RMSE 0.12 m / 0.15 m"; otherwise each with its flight."""
+    """Return two texts in one: with a common beginning "RMSE 0.12 m / 0.15 m", otherwise each with its flight."""
     if one == other:
         return one
     first, second = one.split(" "), other.split(" ")
@@ -81,7 +81,7 @@ def _texts(one: str, other: str, labels: tuple[str, str], between: str) -> str:
 
 
 def _captions(one: str, other: str, labels: tuple[str, str]) -> str:
-    """Return two captions in one: sentences of both first, then those of each flight."""
+    """Return two captions in one: first the common sentences, then those of each flight."""
     first, second = (re.split(r"(?<=\.) ", text) for text in (one, other))
     parts = [sentence for sentence in first if sentence in second]
     for label, own, others in ((labels[0], first, second), (labels[1], second, first)):
@@ -91,7 +91,7 @@ def _captions(one: str, other: str, labels: tuple[str, str]) -> str:
 
 
 def _same(one: Mark, other: Mark) -> bool:
-    """Return True if two marks show the same: limits, or a reference that both followed."""
+    """Return True if two marks are equal, such as limits or a common reference."""
     return type(one) is type(other) and all(
         np.array_equal(a, b) if isinstance(a, np.ndarray) and isinstance(b, np.ndarray) else a is b or a == b
         for a, b in zip(one, other, strict=True)

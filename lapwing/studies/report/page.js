@@ -1,32 +1,32 @@
-// Draws each plot when it comes near the window, and shows the same stretch of time in all of them.
+// Draws each plot when it is near the viewport, and links the time ranges of all plots.
 (() => {
   const config = { responsive: true, displaylogo: false, scrollZoom: false, toImageButtonOptions: { format: "svg" } };
   Object.assign(config, { modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], displayModeBar: matchMedia("(hover: hover)").matches && "hover" });
   const NARROW = 600; // [pixel] width below which a plot has one column
   const dark = DARK_COLOURS;
-  const AROUND = [5, 10]; // [s] before and after an event that is chosen
-  const linked = []; // plots over time that have been drawn: {box, axis}
-  const unit = Number(document.body.dataset.seconds || 1); // in a unit of the plots' time
-  let range = null; // of time, as somebody has chosen it
+  const AROUND = [5, 10]; // [s] shown before and after a selected event
+  const linked = []; // drawn plots over time: {box, axis}
+  const unit = Number(document.body.dataset.seconds || 1); // [s] unit of the plots' time
+  let range = null; // time range selected by the user
 
   function follow(plot, changed) {
-    const wanted = plot.box.layout[plot.axis].range;
+    const selected = plot.box.layout[plot.axis].range;
     if (!Object.keys(changed).some((key) => plot.timed.some((axis) => key.startsWith(`${axis}.`)))) return;
-    if (range && wanted[0] === range[0] && wanted[1] === range[1]) return; // this plot has only followed
-    range = wanted.slice();
+    if (range && selected[0] === range[0] && selected[1] === range[1]) return; // a linked plot
+    range = selected.slice();
     for (const other of linked) {
       if (other !== plot) Plotly.relayout(other.box, { [`${other.axis}.range`]: range.slice() });
     }
   }
 
-  // Numbers in 16-bit steps of their range: see _array of plotly_traces.py. Typed arrays of plotly.js stay.
-  function numbers(given) {
-    if (given?.steps === undefined) return given;
-    const bytes = Uint8Array.from(atob(given.steps), (c) => c.charCodeAt(0)), count = bytes.length / 2;
+  // Numbers in 16-bit steps of their range: see _array of plotly_traces.py. Typed arrays of plotly.js are unchanged.
+  function numbers(encoded) {
+    if (encoded?.steps === undefined) return encoded;
+    const bytes = Uint8Array.from(atob(encoded.steps), (c) => c.charCodeAt(0)), count = bytes.length / 2;
     let n = 0;
     return Float64Array.from({ length: count }, (_, k) => {
-      n = ((n + bytes[k] + 256 * bytes[k + count]) << 16) >> 16; // as 16-bit numbers overflow
-      return n === -32768 ? NaN : given.low + (n + 32767) * given.step;
+      n = ((n + bytes[k] + 256 * bytes[k + count]) << 16) >> 16; // 16-bit overflow
+      return n === -32768 ? NaN : encoded.low + (n + 32767) * encoded.step;
     });
   }
 
@@ -41,7 +41,7 @@
   }
   scheme.addEventListener("change", () => location.reload());
 
-  // On a phone the columns of a plot are below each other.
+  // On a phone the columns of a plot are stacked.
   function stack(layout, { height, top, domains }) {
     Object.assign(layout, { height, margin: { ...layout.margin, l: 56, r: 6, t: top } });
     layout.annotations = layout.annotations.filter(({ name }) => name !== "wide");
@@ -68,9 +68,9 @@
     box.on("plotly_hover", ({ xvals }) => seek(xvals[0] * unit));
   }
 
-  // A closed section is not near the window, and is drawn when it opens.
+  // A plot in a closed section is drawn when the section opens.
   const figures = [...document.querySelectorAll("figure.plot")];
-  const texts = new Map(); // of figures that are unpacked: a page that is printed cannot wait for them
+  const texts = new Map(); // unpacked in advance, since printing cannot wait
   figures.forEach(async (figure) => texts.set(figure, await unpacked(figure.querySelector("script"))));
   const near = new IntersectionObserver(
     (entries) => entries.filter((entry) => entry.isIntersecting).forEach((entry) => draw(entry.target)),
@@ -78,9 +78,9 @@
   );
   figures.forEach((figure) => near.observe(figure));
 
-  // The 3D view is a page of its own in a frame; both sides tell each other the time.
+  // The 3D view is a page in a frame; the two pages exchange the time by messages.
   const space = document.querySelector("#space .space");
-  let frame = null, pending = null; // [s] time for a 3D view that is closed or not drawn yet
+  let frame = null, pending = null; // [s] time for a 3D view that is closed or not yet drawn
   function seek(time) {
     if (space?.dataset.time === undefined) pending = time;
     else frame.contentWindow.postMessage({ lapwing: "seek", time }, "*");
@@ -89,7 +89,7 @@
     const place = box.getBoundingClientRect();
     return box.offsetParent && place.bottom > 0 && place.top < innerHeight;
   }
-  function hover(time) { // the cursor of the plots that can be seen
+  function hover(time) { // moves the cursor of the visible plots
     for (const plot of linked.filter(visible)) Plotly.Fx.hover(plot.box, { xval: time / unit }, plot.panels, true);
   }
   function show() {
@@ -107,11 +107,11 @@
       else seek(pending);
       pending = null;
     });
-    const details = space.closest("details"); // it is heavy: without a GPU it would hold up the plots
+    const details = space.closest("details"); // loaded on demand: without a GPU it would delay the plots
     details.addEventListener("toggle", () => details.open && show());
   }
 
-  // A click on the time of an event shows its surroundings in all plots, and moves the 3D view there.
+  // A click on the time of an event shows that time in all plots and in the 3D view.
   document.addEventListener("click", ({ target }) => {
     const time = Number(target.closest?.("button[data-time]")?.dataset.time ?? NaN);
     if (Number.isNaN(time)) return;

@@ -1,4 +1,4 @@
-"""The report as a page for a browser: what the flight came to, and the plots; one file that needs no network."""
+"""Report as an HTML page: outcome and plots, in one file that works offline."""
 
 import json
 from collections.abc import Iterable, Sequence
@@ -16,14 +16,14 @@ from lapwing.studies.report.sections import Section, labels, long, sections
 from lapwing.studies.report.style import DARK
 from lapwing.studies.tracking import unit_and_factor
 
-OPEN = ("timeline", "position")  # sections that are open at first
-LOOKS = {"landed": "good", "completed": "good"}  # by kind of outcome; "bad" for all others
+OPEN = ("timeline", "position")  # sections that are initially open
+CSS_CLASSES = {"landed": "good", "completed": "good"}  # by kind of outcome; "bad" for all others
 _HERE = Path(__file__).parent
 _TEMPLATES = Environment(loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True)
 
 
 class Accuracy(NamedTuple):
-    """A line of the table of errors: of each flight, and what is published; None where nothing is."""
+    """Row of the table of errors: a value for each flight, then the published one; None if missing."""
 
     axis: str
     unit: str
@@ -31,22 +31,25 @@ class Accuracy(NamedTuple):
 
 
 def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
-    """Return the page of one flight, or of two laid over each other, with the 3D view if `view3d`."""
+    """Return the page of one flight, or of an overlay of two, with the 3D view if `view3d`."""
     scenes = [flight.origin.scene for flight in flights]
     published = scenes[0].get("published", {})
     names = labels(flights)
     tables = [facts(flight) for flight in flights]
     others = flights[0].others if len(flights) == 1 else ()
-    drawn = sections(flights)  # one by one, each when the page comes to it
-    heads = list(names) if len(flights) > 1 else ["this flight"]
+    section_iterator = sections(flights)  # each is drawn when the template reaches it
+    columns = list(names) if len(flights) > 1 else ["this flight"]
     return render(
         "flight.html",
         name=" and ".join(names) if len(flights) > 1 else flights[0].metadata.get("scene") or names[0],
-        others=[(LOOKS.get(other.outcome.kind, "bad"), f"{other.vehicle}: {other.outcome}") for other in others],
+        others=[(CSS_CLASSES.get(other.outcome.kind, "bad"), f"{other.vehicle}: {other.outcome}") for other in others],
         title=" · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
         labels=names if len(flights) > 1 else (),
         outcomes=[
-            (LOOKS.get(flight.outcome.kind, "bad"), f"{flight.vehicle}: {flight.outcome}" if others else flight.outcome)
+            (
+                CSS_CLASSES.get(flight.outcome.kind, "bad"),
+                f"{flight.vehicle}: {flight.outcome}" if others else flight.outcome,
+            )
             for flight in flights
         ],
         unmet=[unmet_criteria(flight) for flight in flights],
@@ -57,25 +60,25 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
         facts={key: [one.get(key, "") for one in tables] for key in dict.fromkeys(k for one in tables for k in one)},
         differences=differences(*scenes) if len(scenes) == 2 else {},
         accuracy=accuracy(flights, published.get("rmse", {})),
-        heads=heads + ([published.get("source", "published")] if published.get("rmse") else []),
-        map=next(drawn),
-        sections=drawn,
+        columns=columns + ([published.get("source", "published")] if published.get("rmse") else []),
+        map=next(section_iterator),
+        sections=section_iterator,
         open=OPEN,
         seconds=3600 if long(flights) else 1,
-        space=_space(flights, names) if view3d else "",
-        no_space="" if view3d else _without_view(flights),
+        view3d=_view3d_page(flights, names) if view3d else "",
+        no_view3d="" if view3d else _view3d_hint(flights),
     )
 
 
-def _space(flights: Sequence[FlightData], names: Sequence[str]) -> str:
-    """Return the page of the 3D view as JSON text that is safe within an HTML element."""
+def _view3d_page(flights: Sequence[FlightData], names: Sequence[str]) -> str:
+    """Return the page of the 3D view as JSON text, escaped for an HTML element."""
     from lapwing.studies.view3d.recording import page
 
     return json.dumps(page(flights, names)).replace("<", "\\u003c")
 
 
-def _without_view(flights: Sequence[FlightData]) -> str:
-    """Return how to get the 3D view that this page lacks."""
+def _view3d_hint(flights: Sequence[FlightData]) -> str:
+    """Return the command that shows the 3D view, or the reason why it is unavailable."""
     from lapwing.studies.view3d import MISSING, available
 
     source = flights[0].origin.source if flights[0].origin.recorded else "LOG"
@@ -83,10 +86,10 @@ def _without_view(flights: Sequence[FlightData]) -> str:
 
 
 def render(template: str, sections: Iterable[Section], **values: Any) -> str:
-    """Return the page of a template of this folder, with the script that draws its plots.
+    """Return the page of a template of this folder, including plotly.js.
 
     Raises:
-        ValueError: the script is not installed.
+        ValueError: plotly is not installed.
     """
     code = (_HERE / "page.js").read_text(encoding="utf-8").replace("DARK_COLOURS", json.dumps(DARK))
     library = gzip_base64(remove_unused_traces(script()))
@@ -94,7 +97,7 @@ def render(template: str, sections: Iterable[Section], **values: Any) -> str:
 
 
 def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list[Accuracy]:
-    """Return the root-mean-square error of each axis [m], [°] with the published one; empty without a reference."""
+    """Return the root-mean-square errors of each axis [m], [°] and the published ones; empty without a reference."""
     if not any(flight.rmse for flight in flights):
         return []
     rows = []

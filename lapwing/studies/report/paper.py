@@ -17,11 +17,11 @@ from lapwing.studies.report.style import QUIET, TEXT, WIDTH
 
 PAGE = (8.27, 11.69)  # [inch] A4
 MARGIN = 0.6  # [inch]
-INNER = (PAGE[0] - 2.0 * MARGIN, PAGE[1] - 2.0 * MARGIN - 0.2)  # [inch] without the page number
-SCALE = INNER[0] / WIDTH  # of a plot's height
-HEADING = 0.35  # [inch] of a plot's title
-FONT = 7.5  # [point] in plots
-LETTERS = 110  # of a line of text
+INNER = (PAGE[0] - 2.0 * MARGIN, PAGE[1] - 2.0 * MARGIN - 0.2)  # [inch] area without margins and page number
+SCALE = INNER[0] / WIDTH  # scale of a plot's height
+HEADING = 0.35  # [inch] height of a plot's title
+FONT = 7.5  # [point] font size in plots
+LETTERS = 110  # characters in a line of text
 
 
 class Cover(NamedTuple):
@@ -30,7 +30,7 @@ class Cover(NamedTuple):
     title: str
     lead: str
     outcomes: tuple[str, ...]
-    heads: tuple[str, ...] = ()  # of the table's columns, the first one of the rows' names
+    columns: tuple[str, ...] = ()  # headers of the table; the first column has the names of the rows
     rows: tuple[tuple[str, ...], ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
 
@@ -43,18 +43,18 @@ class Titled(NamedTuple):
 
 
 def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
-    """Write the cover and as many plots on each page as fit; pages have one size and are numbered."""
+    """Write the cover, then as many plots per page as fit, on numbered pages of equal size."""
     packed = _paginate(plots)
     with (
         plot_style(),
         rc_context({"font.size": FONT, "axes.titlesize": FONT}),
         PdfPages(path, metadata={"CreationDate": None}) as out,
     ):
-        for number, drawn in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
+        for number, sheet in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
             text = f"{cover.title} · page {number} of {1 + len(packed)}"
-            drawn.text(1.0 - MARGIN / PAGE[0], 0.5 * MARGIN / PAGE[1], text, ha="right", fontsize=7, color=QUIET)
-            show_dollars(drawn)
-            out.savefig(drawn)
+            sheet.text(1.0 - MARGIN / PAGE[0], 0.5 * MARGIN / PAGE[1], text, ha="right", fontsize=7, color=QUIET)
+            show_dollars(sheet)
+            out.savefig(sheet)
 
 
 def _paginate(plots: Iterable[Titled]) -> list[list[Titled]]:
@@ -111,7 +111,7 @@ def _cover(cover: Cover) -> Figure:
         write(outcome, 11)
     if cover.rows:
         y -= line
-        for k, row in enumerate((cover.heads, *cover.rows)):
+        for k, row in enumerate((cover.columns, *cover.rows)):
             weight = "bold" if k == 0 else "normal"
             for column, text in enumerate(row):
                 x = left + (0.0 if column == 0 else 0.12 + 0.16 * column)

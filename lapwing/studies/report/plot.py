@@ -9,19 +9,19 @@ from lapwing.studies.report.style import BOUND, FLOWN, REFERENCE
 
 
 class Line(NamedTuple):
-    """A curve, or points; x and y have shape (n,), NaN interrupts it. In a panel in space z is its height."""
+    """A curve or points; x, y and, in a panel in space, z have shape (n,). NaN interrupts a curve."""
 
     x: np.ndarray
     y: np.ndarray
-    name: str = ""  # in the legend; "": not there
+    name: str = ""  # name in the legend; "": no entry
     colour: str = FLOWN
     width: float = 1.3  # [point]
     dash: str = "solid"  # or "dash", "dot", "dashdot"
     marker: str = ""  # or "circle", "open", "square", "cross", "diamond", "triangle"
-    size: float = 5.0  # [point] of the marker
-    joined: bool = True  # False: markers alone
+    size: float = 5.0  # [point] size of the marker
+    joined: bool = True  # False: only markers
     fill: str = ""  # colour inside of a closed line
-    hidden: bool = False  # in a browser: until a click on its name in the legend
+    hidden: bool = False  # in a browser: hidden until a click on its name in the legend
     z: np.ndarray | None = None
 
 
@@ -36,7 +36,7 @@ class Band(NamedTuple):
 
 
 class Level(NamedTuple):
-    """A horizontal line through the whole panel: a limit, a mean."""
+    """A horizontal line across the panel: a limit, a mean."""
 
     y: float
     name: str = ""
@@ -63,21 +63,21 @@ class Panel(NamedTuple):
 
     marks: tuple[Mark, ...]
     y_label: str = ""
-    x_label: str = ""  # of a panel over time: given by the plot
-    z_label: str = ""  # given: a panel in space
+    x_label: str = ""  # set by the plot for a panel over time
+    z_label: str = ""  # not empty for a panel in space
     title: str = ""
-    note: str = ""  # in its upper left corner
+    note: str = ""  # text in the upper left corner
     row: int = 0
     column: int = 0
-    rows: int = 1  # of the grid that it covers
-    columns: int = 1
+    rows: int = 1  # number of rows of the grid that it covers
+    columns: int = 1  # number of columns of the grid that it covers
     timed: bool = True  # x is the simulation time [s]
     log_x: bool = False
     log_y: bool = False
     equal: bool = False  # one scale for x and y
     x_range: tuple[float, float] | None = None
-    y_range: tuple[float, float] | None = None  # what is cut off by it the caption says
-    x_ticks: tuple[str, ...] = ()  # what stands at x = 0, 1, 2, ... in the place of numbers
+    y_range: tuple[float, float] | None = None  # the caption mentions values outside
+    x_ticks: tuple[str, ...] = ()  # texts at x = 0, 1, 2, ... instead of numbers
 
 
 class Plot(NamedTuple):
@@ -85,26 +85,26 @@ class Plot(NamedTuple):
 
     panels: tuple[Panel, ...]
     caption: str
-    height: float  # [inch] of the whole
-    heights: tuple[float, ...] = (1.0,)  # of the rows, relative
-    widths: tuple[float, ...] = (1.0,)  # of the columns, relative
-    span: tuple[float, float] | None = None  # [s] that panels over time show
-    phases: tuple[tuple[str, float, float], ...] = ()  # name, start, end [s], shaded in turn in panels over time
-    unit: str = "s"  # of time
+    height: float  # [inch] height of the plot
+    heights: tuple[float, ...] = (1.0,)  # relative heights of the rows
+    widths: tuple[float, ...] = (1.0,)  # relative widths of the columns
+    span: tuple[float, float] | None = None  # [s] range of panels over time
+    phases: tuple[tuple[str, float, float], ...] = ()  # name, start, end [s]; every other one is shaded over time
+    unit: str = "s"  # unit of time
 
 
 class NotRecordedError(Exception):
-    """A plot cannot be drawn from this log; the text says what is missing."""
+    """A plot cannot be drawn from this log; the text is the reason."""
 
 
-def column(panels: Iterable[Panel], height: float = 1.7, **looks: object) -> dict:
-    """Return panels over time one below the other, `height` [inch] each, as arguments of a `Plot`."""
+def column(panels: Iterable[Panel], height: float = 1.7, **options: object) -> dict:
+    """Return panels over time, one below the other with `height` [inch] each, as arguments of a `Plot`."""
     placed = tuple(panel._replace(row=row) for row, panel in enumerate(panels))
-    return {"panels": placed, "height": 0.9 + height * len(placed), "heights": (1.0,) * len(placed), **looks}
+    return {"panels": placed, "height": 0.9 + height * len(placed), "heights": (1.0,) * len(placed), **options}
 
 
 def reference(x: np.ndarray, y: np.ndarray, hidden: bool = False, name: str = "reference") -> Line:
-    """Return the dashed line by which a reference is drawn; x and y have shape (n,)."""
+    """Return the dashed line of a reference; x and y have shape (n,)."""
     return Line(x, y, name, REFERENCE, 1.1, "dash", hidden=hidden)
 
 
@@ -123,7 +123,7 @@ def in_hours(plot: Plot) -> Plot:
 
 
 def lowest(plot: Plot) -> set[int]:
-    """Return the indices of the lowest panels, which label x."""
+    """Return the indices of the lowest panels, which have labels of x."""
     ends = [(p.row + p.rows, p.column, p.column + p.columns) for p in plot.panels]
     return {
         i
@@ -133,7 +133,7 @@ def lowest(plot: Plot) -> set[int]:
 
 
 def cube(panel: Panel) -> tuple[np.ndarray, np.ndarray]:
-    """Return the lower and upper corner, shape (3,) each, of the cube in which a panel in space is drawn to scale."""
+    """Return the lower and upper corner, shape (3,) each, of the cube that bounds a panel in space drawn to scale."""
     lines = [m for m in panel.marks if isinstance(m, Line) and m.z is not None]
     points = np.column_stack([np.concatenate([getattr(line, axis) for line in lines]) for axis in ("x", "y", "z")])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)

@@ -1,4 +1,4 @@
-"""Plots in a browser: the figures of plotly.js as JSON."""
+"""Plots in a browser: figures of plotly.js as JSON."""
 
 import json
 from typing import Any
@@ -9,27 +9,27 @@ from lapwing.studies.report.plot import Panel, Plot, Stretch, lowest
 from lapwing.studies.report.plotly_traces import in_legend, text_of, traces
 from lapwing.studies.report.style import SHADE, TEXT
 
-PIXELS = 100  # an inch on the page
+PIXELS = 100  # per inch on the page
 _GAP_X, _GAP_Y = 78.0, 26.0  # [pixel] between panels, for the labels of the right one and the title of the lower one
-_GAP_X_LABEL = 30.0  # [pixel] more below a panel that names its own x
-_PAGE = 900.0  # [pixel] typical width of the panels together
-_NARROW = 300.0  # [pixel] of a phone
-_LETTER, _SYMBOL = 6.6, 48.0  # [pixel] wide in a legend
-_FIRST_LINE, _LINE = 22, 28  # [pixel] of a legend: the first line and each further one
-_WIDE = "wide"  # name of an annotation that a phone has no room for
-_MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; above see _top
+_GAP_X_LABEL = 30.0  # [pixel] additional gap below a panel with a label of x
+_PAGE = 900.0  # [pixel] typical total width of the panels
+_NARROW = 300.0  # [pixel] width of the panels on a phone
+_LETTER, _SYMBOL = 6.6, 48.0  # [pixel] width of a character and of a symbol in a legend
+_FIRST_LINE, _LINE = 22, 28  # [pixel] height of the first line and of each further line of a legend
+_WIDE = "wide"  # name of an annotation that is too wide for a phone
+_MARGIN = {"l": 68, "r": 12, "b": 44}  # [pixel]; see _top for the upper one
 _FONT = {"family": "system-ui, sans-serif", "size": 12, "color": TEXT}
 _GRID = {"gridcolor": "#E3E7EA", "linecolor": "#888888", "zerolinecolor": "#C5CBD0", "ticks": "outside", "ticklen": 4}
-_NUMBERS = {"exponentformat": "power", "minexponent": 4}  # 0.0002, where plotly would write 200 with a prefix
+_NUMBERS = {"exponentformat": "power", "minexponent": 4}  # 0.0002 instead of plotly's 200 with a prefix
 
 
 def to_json(plot: Plot) -> str:
-    """Return the figure of a plot: `{"data", "layout", "timed"}`, safe within an HTML element."""
+    """Return the `figure` of a plot as JSON text, escaped for an HTML element."""
     return json.dumps(figure(plot), separators=(",", ":")).replace("<", "\\u003c")
 
 
 def figure(plot: Plot) -> dict[str, Any]:
-    """Return data and layout of a plot; "timed" names its time axes, which the page links."""
+    """Return "data" and "layout" of a plot, its time axes "timed", which the page links, and the "narrow" layout."""
     data: list[dict] = []
     layout: dict[str, Any] = {
         "height": round(plot.height * PIXELS),
@@ -63,7 +63,7 @@ def figure(plot: Plot) -> dict[str, Any]:
 
 
 def _narrow(plot: Plot) -> dict[str, Any]:
-    """Return height and top margin [pixel] and vertical domains by axis number for a page one column wide."""
+    """Return height and top margin [pixel] and vertical domains by axis number for a page with one column."""
     inner = plot.height * PIXELS - _top(plot) - _MARGIN["b"]
     order = sorted(range(len(plot.panels)), key=lambda i: (plot.panels[i].row, plot.panels[i].column))
     heights = {}
@@ -88,7 +88,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
     y: dict[str, Any] = {"domain": domains[1], "anchor": f"x{number}", "hoverformat": ".5~g", **_NUMBERS, **_GRID}
     y["title"] = {"text": text_of(panel.y_label), "standoff": 6}
     if panel.y_label and domains[0][0] == 0.0:
-        y["automargin"] = True  # numbers of many digits would reach below the label
+        y["automargin"] = True  # numbers with many digits would overlap the label
     x["title"] = {"text": text_of(panel.x_label), "standoff": 4}
     if panel.log_x:
         x |= {"type": "log", "dtick": 1}
@@ -145,7 +145,7 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
 def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
     """Shade every other phase, and name the phases above the panels of the first row if there is room."""
     span = plot.span or (0.0, 1.0)
-    room = 130 * panel.columns / len(plot.widths) / (span[1] - span[0])  # letters a second
+    room = 130 * panel.columns / len(plot.widths) / (span[1] - span[0])  # [1/s] characters per time
     narrow_room = 45 / (span[1] - span[0])
     for index, (name, start, end) in enumerate(plot.phases):
         if index % 2:
@@ -154,16 +154,16 @@ def _phases(layout: dict, plot: Plot, panel: Panel, number: str) -> None:
             layout["shapes"].append(shape)
         if panel.row == 0 and not panel.title and len(name) <= room * (end - start):
             middle: dict[str, Any] = {"xref": f"x{number}", "yref": f"y{number} domain", "x": (start + end) / 2, "y": 1}
-            looks: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#555555"}}
+            style: dict[str, Any] = {"showarrow": False, "yanchor": "bottom", "font": {"size": 10, "color": "#555555"}}
             too_long = len(name) > narrow_room * (end - start)
-            layout["annotations"].append({**middle, **looks, "text": text_of(name), "name": _WIDE if too_long else ""})
+            layout["annotations"].append({**middle, **style, "text": text_of(name), "name": _WIDE if too_long else ""})
 
 
 def _domains(plot: Plot, panel: Panel) -> tuple[list[float], list[float]]:
-    """Return the part of the figure that a panel covers, from the left and from below."""
+    """Return the horizontal and vertical domain of a panel, as shares of the figure."""
     inner = plot.height * PIXELS - _top(plot) - _MARGIN["b"]
-    own = any(not p.timed for p in plot.panels)
-    gap_y = _GAP_Y + (_GAP_X_LABEL if own and len(plot.heights) > 1 else 0.0)
+    has_x_labels = any(not p.timed for p in plot.panels)
+    gap_y = _GAP_Y + (_GAP_X_LABEL if has_x_labels and len(plot.heights) > 1 else 0.0)
     x = _share(plot.widths, _GAP_X / _PAGE, panel.column, panel.columns)
     top = _share(plot.heights, gap_y / inner, panel.row, panel.rows)
     return x, [1.0 - top[1], 1.0 - top[0]]

@@ -1,8 +1,8 @@
-"""The script of plotly.js from its Python package, reduced to what the plots of this project need.
+"""The script of plotly.js from its Python package, reduced to the trace types of this project.
 
-The package carries one script with about fifty kinds of traces and a map engine, 4.8 MB. It is a sequence of modules,
-`var NAME=W((exports,module)=>{...})`, which esbuild has bundled; the last one registers the kinds of traces. A page
-gets the modules that the kinds it draws refer to, directly or through others: 1.2 MB.
+The script of the package has about fifty trace types and a map engine, 4.8 MB. It is a sequence of modules,
+`var NAME=W((exports,module)=>{...})`, bundled by esbuild; the last one registers the trace types. A page contains the
+modules that its trace types refer to, directly or indirectly: 1.2 MB.
 """
 
 import base64
@@ -11,14 +11,14 @@ import re
 from importlib.util import find_spec
 from pathlib import Path
 
-TRACES = ("scatter", "bar")  # kinds that `plotly_traces` makes
+TRACES = ("scatter", "bar")  # trace types of `plotly_traces`
 _MODULE = re.compile(r"(?:^|[;\n}])(var ([\w$]+)=W\()")
 _REGISTER = re.compile(
     r"\.register\(\[((?:[\w$]+\(\),?)+)\]\);[\w$]+\.exports=[\w$]+\}\);(?=return ([\w$]+)\(\);\}\)\(\);)"
 )
 _KIND = re.compile(r'moduleType:"trace",name:"(\w+)"')
 _ALIAS = re.compile(r'var [\w$]+=W\(\([\w$,]+\)=>\{"use strict";[\w$]+\.exports=([\w$]+)\(\)\}\);?')
-_INNER = re.compile(r"([\w$]+)=(?:Ea\(|\{\};Fp\()")  # modules of the newer kind, beside one of the older
+_INNER = re.compile(r"([\w$]+)=(?:Ea\(|\{\};Fp\()")  # modules in ECMAScript style within one in CommonJS style
 _NAME = re.compile(r"[\w$]+")
 
 
@@ -33,11 +33,11 @@ def script() -> str:
         path = Path(folder) / "package_data" / "plotly.min.js"
         if path.exists():
             return path.read_text(encoding="utf-8")
-    raise ValueError("the report needs plotly's script, which is not there: pip install plotly")
+    raise ValueError("the report needs plotly.js, which is missing; pip install plotly")
 
 
 def remove_unused_traces(text: str, traces: tuple[str, ...] = TRACES) -> str:
-    """Return plotly.js with these kinds of traces only; unchanged if it is not bundled as described above."""
+    """Return plotly.js with these trace types only; unchanged if it is not bundled as described above."""
     starts = [(match.start(1), match[2]) for match in _MODULE.finditer(text)]
     register = _REGISTER.search(text)
     if not starts or register is None or register[2] != starts[-1][1]:
@@ -45,7 +45,7 @@ def remove_unused_traces(text: str, traces: tuple[str, ...] = TRACES) -> str:
     first, last = starts[0][0], register.end()
     ends = [start for start, _ in starts[1:]] + [last]
     bodies = {name: text[start:end] for (start, name), end in zip(starts, ends, strict=True)}
-    # The core registers scatter itself.
+    # The core registers scatter.
     names = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in traces]
     entry = register[2]
     bodies[entry] = bodies[entry].replace(register[1], ",".join(f"{name}()" for name in names))
@@ -62,7 +62,7 @@ def remove_unused_traces(text: str, traces: tuple[str, ...] = TRACES) -> str:
 
 
 def _kind(name: str, bodies: dict[str, str]) -> str:
-    """Return the kind of traces of a registered module, which may only refer to another; "" for all others."""
+    """Return the trace type of a registered module or of the module that it is an alias of; "" for all others."""
     if match := _KIND.search(bodies.get(name, "")):
         return match[1]
     alias = _ALIAS.fullmatch(bodies.get(name, ""))

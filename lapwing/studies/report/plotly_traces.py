@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.studies.report.downsampling import drawn, extremes
+from lapwing.studies.report.downsampling import downsample, extremes
 from lapwing.studies.report.plot import Band, Level, Line, Mark, Panel, Plot, Stretch
 
-_POINT = 96.0 / 72.0  # [pixel]
-FEW = 8  # numbers that are written as text
-STEPS = 32767  # from the middle of a range to its ends
+_POINT = 96.0 / 72.0  # [pixel] in a typographic point
+FEW = 8  # largest number of values that are written as text
+STEPS = 32767  # quantisation steps from the centre of a range to its ends
 _SYMBOLS = {"circle": "circle", "open": "circle-open", "square": "square", "cross": "x", "diamond": "diamond"}
 _SYMBOLS |= {"triangle": "triangle-up"}
 
 
 def traces(mark: Mark, plot: Plot, panel: Panel) -> list[dict[str, Any]]:
-    """Return a mark as one trace, a band as two, without their axes."""
+    """Return the traces of a mark without their axes: two of a band, one of any other mark."""
     if isinstance(mark, Level):
         return [_level(mark, plot, panel)]
     if isinstance(mark, Stretch):
@@ -25,11 +25,11 @@ def traces(mark: Mark, plot: Plot, panel: Panel) -> list[dict[str, Any]]:
     if isinstance(mark, Band):
         rows = extremes(mark.high)
         exact = (panel.log_x, panel.log_y)
-        looks = {"type": "scatter", "mode": "lines", "line": {"width": 0, "color": mark.colour}, "hoverinfo": "skip"}
+        style = {"type": "scatter", "mode": "lines", "line": {"width": 0, "color": mark.colour}, "hoverinfo": "skip"}
         x = _array(mark.x[rows], exact[0])
-        low = {**looks, "x": x, "y": _array(mark.low[rows], exact[1]), "name": text_of(mark.name), "showlegend": False}
+        low = {**style, "x": x, "y": _array(mark.low[rows], exact[1]), "name": text_of(mark.name), "showlegend": False}
         filled = {"fill": "tonexty", "fillcolor": _pale(mark.colour), "name": text_of(mark.name)}
-        return [low, {**looks, "x": x, "y": _array(mark.high[rows], exact[1]), **filled}]
+        return [low, {**style, "x": x, "y": _array(mark.high[rows], exact[1]), **filled}]
     return [_line(mark, panel)]
 
 
@@ -45,7 +45,7 @@ def in_legend(trace: dict, named: set[tuple]) -> None:
 
 
 def _line(mark: Line, panel: Panel) -> dict:
-    line = drawn(mark, panel.timed)
+    line = downsample(mark, panel.timed)
     modes = [mode for mode, is_on in (("lines", line.joined), ("markers", line.marker)) if is_on]
     trace: dict[str, Any] = {
         "type": "scatter",
@@ -72,21 +72,21 @@ def _level(mark: Level, plot: Plot, panel: Panel) -> dict:
     lines = [m for m in panel.marks if isinstance(m, Line) and len(m.x)]
     ends = [f(m.x) for m in lines for f in (np.nanmin, np.nanmax)] or [0.0, 1.0]
     low, high = plot.span if plot.span and panel.timed else panel.x_range or (min(ends), max(ends))
-    looks = {"color": mark.colour, "width": round(mark.width * _POINT, 2), "dash": mark.dash}
+    style = {"color": mark.colour, "width": round(mark.width * _POINT, 2), "dash": mark.dash}
     x, y = [float(low), float(high)], [mark.y, mark.y]
     return {
         "type": "scatter",
         "mode": "lines",
         "x": x,
         "y": y,
-        "line": looks,
+        "line": style,
         "name": text_of(mark.name),
         "hoverinfo": "skip",
     }
 
 
 def _bar(mark: Stretch) -> dict:
-    lasted = f"{mark.start:.2f} to {mark.end:.2f}"
+    interval = f"{mark.start:.2f} to {mark.end:.2f}"
     return {
         "type": "bar",
         "orientation": "h",
@@ -99,7 +99,7 @@ def _bar(mark: Stretch) -> dict:
         "textangle": 0,
         "marker": {"color": _pale(mark.colour, 0.45), "line": {"color": "#FFFFFF", "width": 1}},
         "textfont": {"color": "#222222"},
-        "hovertemplate": f"%{{y}}: %{{text}}<br>{lasted}<extra></extra>",
+        "hovertemplate": f"%{{y}}: %{{text}}<br>{interval}<extra></extra>",
     }
 
 
@@ -109,14 +109,14 @@ def _pale(colour: str, opacity: float = 0.16) -> str:
 
 
 def _array(values: np.ndarray, log: bool = False, shown: tuple[float, float] | None = None) -> Any:
-    """Return numbers for page.js: few as they are, many as 16-bit steps of their range; NaN is the lowest.
+    """Return numbers for page.js: a few as text, many as 16-bit steps of their range; NaN is the lowest step.
 
-    The steps are differences from the one before, all low bytes before all high ones, base64: they compress well.
+    Each step is the difference from the previous one; all low bytes precede all high bytes, which compresses well.
 
     Args:
         values: numbers, shape (n,).
-        log: the axis is logarithmic, for which equal steps are too coarse: single precision instead.
-        shown: range that the axis shows, if narrower than that of the values, which then get single precision too.
+        log: True for a logarithmic axis: equal steps are too coarse, so the numbers have single precision.
+        shown: range of the axis; if it is much narrower than that of the values, they have single precision, too.
     """
     finite = np.isfinite(values)
     if len(values) <= FEW:
@@ -133,5 +133,5 @@ def _array(values: np.ndarray, log: bool = False, shown: tuple[float, float] | N
 
 
 def text_of(text: str) -> str:
-    """Return a text escaped for plotly.js, which would read < and & as markup."""
+    """Return a text escaped for plotly.js, which reads < and & as markup."""
     return html.escape(text, quote=False).replace("\n", "<br>")

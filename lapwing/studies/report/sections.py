@@ -1,4 +1,4 @@
-"""The sections of a report: every plot that a log has the topics for, and a line for each of the others."""
+"""Sections of a report: the plots for which a log has the topics, and a line for each of the others."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -12,11 +12,11 @@ from lapwing.studies.report.plot import NotRecordedError, Plot, in_hours
 from lapwing.studies.report.plotly_figure import to_json
 from lapwing.studies.report.plotly_script import gzip_base64
 
-LONG = 3 * 3600.0  # [s] from which on time is told in hours
+LONG = 3 * 3600.0  # [s] duration above which time is in hours
 
 
 class Section(NamedTuple):
-    """A plot on the page, or why there is none."""
+    """A plot on the page, or the reason for its absence."""
 
     name: str
     title: str
@@ -25,14 +25,14 @@ class Section(NamedTuple):
 
     @property
     def packed(self) -> str:
-        """The plot for a browser."""
+        """Figure of the plot, compressed for the page."""
         return gzip_base64(to_json(self.plot)) if self.plot else ""
 
 
 def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
-    """Yield all plots of the vehicles' models, of one flight or of two overlaid.
+    """Yield all plots of the vehicles' models, of one flight or of an overlay of two.
 
-    They are drawn on demand, since each holds all samples that it shows.
+    They are drawn on demand, since each holds all its samples.
     """
     models = {flight.origin.scene.get("vehicle", {}).get("model", "rigid_body") for flight in flights}
     selected = [module for module in plots.modules() if models & set(getattr(module, "MODELS", models))]
@@ -42,7 +42,7 @@ def sections(flights: Sequence[FlightData]) -> Iterator[Section]:
 
 
 def labels(flights: Sequence[FlightData]) -> tuple[str, ...]:
-    """Return names that distinguish the flights: their own, or those of their logs, with folders if these are equal."""
+    """Return distinct names of the flights: their own, or those of their logs, with folders if these are equal."""
     own = tuple(flight.name for flight in flights)
     if all(own) and len(set(own)) == len(own):
         return own

@@ -1,12 +1,12 @@
-"""Colours and sizes of every plot, in a browser and on paper."""
+"""Colours and sizes of all plots, in a browser and on paper."""
 
-STEERED = ("rigid_body", "multibody", "slung_load")  # the models of vehicles that an autopilot flies
+STEERED = ("rigid_body", "multibody", "slung_load")  # vehicle models with an autopilot
 
-WIDTH = 10.0  # [inch] of every figure; the page shows 100 pixels an inch
+WIDTH = 10.0  # [inch] of all figures; 100 pixels per inch on the page
 DPI = 125
-POINTS = 1000  # of a line at most: extremes at every second pixel of the page
+POINTS = 1000  # largest number in a line: extremes at every second pixel of the page
 
-# Okabe and Ito's palette: told apart also without red-green vision.
+# Palette of Okabe and Ito, which is safe for colour-blind readers.
 FLOWN = "#0072B2"
 REFERENCE = "#333333"
 BOUND = "#D55E00"
@@ -16,10 +16,10 @@ SHADE = "#F1F3F5"
 QUIET = "#9AA5AF"
 TEXT = "#333333"
 
-# Colours of a page on a dark ground, by those on a light one; what is not here is legible on both.
+# Colours on a dark background by those on a light one; all others are legible on both.
 DARK = {
     "#FFFFFF": "#1D232A",
-    TEXT: "#D6DCE2",  # REFERENCE, too
+    TEXT: "#D6DCE2",  # same as REFERENCE
     "#222222": "#F0F3F6",
     "#555555": "#A9B3BD",
     "#666666": "#8F99A3",

@@ -1,4 +1,4 @@
-"""Writes a report in the format of the file's ending."""
+"""Output of a report in the format of the file name's extension."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -10,15 +10,15 @@ FORMATS = (".html", ".pdf", ".png")
 
 
 def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool = False) -> Path:
-    """Write the report of a flight, or of two laid over each other; return its path.
+    """Write the report of a flight, or of an overlay of two; return its path.
 
     Args:
-        flights: one or two.
+        flights: one or two flights.
         target: .html for a page in a browser, .pdf with a cover and numbered A4 pages, .png with all plots.
-        view3d: put the 3D view into the page, if viser is installed.
+        view3d: True to include the 3D view in the page, if viser is installed.
 
     Raises:
-        ValueError: the report cannot be written, or the file's name has another ending.
+        ValueError: the report cannot be written, or the file name has another extension.
     """
     flight_list = [flights] if isinstance(flights, FlightData) else list(flights)
     check_format(target)
@@ -31,25 +31,25 @@ def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool
         else:
             from lapwing.studies.report.sections import sections
 
-            drawn = (section for section in sections(flight_list) if section.plot)
+            drawable = (section for section in sections(flight_list) if section.plot)
             if target.suffix == ".pdf":
                 from lapwing.studies.report.flight_cover import cover
                 from lapwing.studies.report.paper import Titled, write_pdf
 
-                write_pdf(target, cover(flight_list), [Titled(s.title, s.plot) for s in drawn if s.plot])
+                write_pdf(target, cover(flight_list), [Titled(s.title, s.plot) for s in drawable if s.plot])
             else:
                 from lapwing.studies.report.matplotlib_figure import write_png
 
-                write_png(target, [s.plot for s in drawn if s.plot])
+                write_png(target, [s.plot for s in drawable if s.plot])
     except OSError as fault:
         with suppress(OSError):
-            target.unlink(missing_ok=True)  # no half of one
+            target.unlink(missing_ok=True)  # no partial file
         raise ValueError(f"{target}: cannot write the report: {fault.strerror or fault}") from None
     return target
 
 
 def check_format(target: Path) -> None:
-    """Check the ending of a report's name.
+    """Check the extension of a report's file name.
 
     Raises:
         ValueError: the format is unknown.

@@ -14,11 +14,11 @@ UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True
 
 
 def show(console: Console, validation: Validation) -> None:
-    """Print the errors beside the baselines, and what was left out."""
+    """Print the errors, those of the baselines, and the skipped flights."""
     extent = f"{validation.windows} windows, {len(validation.flights)} flights"
     heads, rows = error_table(validation)
     console.print(f"{validation.scene}: mean absolute prediction error, {extent}", soft_wrap=True)
-    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
+    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # fits in 80 columns
     for k, head in enumerate(heads):
         table.add_column(
             head.replace(" ", "\n") if k > 1 else head, justify="left" if k == 1 else "right", no_wrap=True
@@ -42,9 +42,9 @@ def show(console: Console, validation: Validation) -> None:
 
 
 def error_table(validation: Validation) -> tuple[list[str], list[list[str]]]:
-    """Return heads and rows of the mean errors: a row for each horizon and measured quantity, one number in a cell.
+    """Return headers and rows of the mean errors: a row for each horizon and measured quantity, one number per cell.
 
-    The plant's 95 % interval has columns of its own, which fewer than three flights lack.
+    The plant's 95 % interval has separate columns, which need at least three flights.
     """
     shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(validation.plant[0][k].mean)]
     interval = any(math.isfinite(metric.low) for metrics in validation.plant for metric in metrics)
@@ -62,7 +62,7 @@ def error_table(validation: Validation) -> tuple[list[str], list[list[str]]]:
 
 
 def closed_loop_line(flight: ClosedLoop) -> str:
-    """Return one line on a flight of recorded setpoints."""
+    """Return a line on a closed-loop simulation."""
     return (
         f"closed loop: {flight.name}: {flight.difference:.3g} m from the recorded flight over {flight.time[-1]:.1f} s; "
         f"tracking error {flight.tracking_error(flight.simulated):.3g} m, "
@@ -71,5 +71,5 @@ def closed_loop_line(flight: ClosedLoop) -> str:
 
 
 def plain(value: float) -> str:
-    """Return the value as text; a dash if it is not finite."""
+    """Return the value as text, or a dash if it is non-finite."""
     return f"{value:.3g}" if math.isfinite(value) else "-"

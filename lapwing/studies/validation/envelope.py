@@ -10,13 +10,13 @@ from lapwing.studies.validation.prediction_metrics import magnitudes
 from lapwing.studies.validation.procedure import FlightErrors, Validation
 
 BINS = 10
-FEWEST = 30  # windows of a bin
-SEGMENT = 256  # samples of a spectrum's segment
+FEWEST = 30  # minimum number of windows in a bin
+SEGMENT = 256  # samples per segment of a spectrum
 CHANNELS = ("x", "y", "z")
 
 
 class Trend(NamedTuple):
-    """Mean errors at the last horizon over one quantity."""
+    """Mean errors at the last horizon by bins of one quantity."""
 
     label: str
     centres: np.ndarray  # shape (bins,)
@@ -41,8 +41,8 @@ def trends(validation: Validation) -> list[Trend]:
     }
     errors = np.concatenate([magnitudes(f.plant)[:, -1] for f in validation.flights])
     out = []
-    for label, of in quantities.items():
-        values = np.concatenate([of(f) for f in validation.flights])
+    for label, quantity in quantities.items():
+        values = np.concatenate([quantity(f) for f in validation.flights])
         if not np.isfinite(values).all() or np.ptp(values) == 0.0:
             continue
         low, high = np.quantile(values, [0.005, 0.995])
@@ -50,7 +50,7 @@ def trends(validation: Validation) -> list[Trend]:
         index = np.digitize(values, edges) - 1
         bins = [k for k in range(BINS) if (index == k).sum() >= FEWEST]
         if bins:
-            with np.errstate(invalid="ignore"):  # quantities that were not measured are NaN
+            with np.errstate(invalid="ignore"):  # unmeasured quantities are NaN
                 sums = [np.nansum(errors[index == k], axis=0) for k in bins]
                 means = np.array(sums) / [np.isfinite(errors[index == k]).sum(axis=0) for k in bins]
             out.append(Trend(label, 0.5 * (edges[:-1] + edges[1:])[bins], means))
@@ -71,7 +71,7 @@ def residual_spectra(validation: Validation) -> tuple[np.ndarray, np.ndarray]:
 
 
 def explanations(validation: Validation) -> list[Explanation]:
-    """Return the fraction of the residual accelerations that each candidate alone explains, the best first."""
+    """Return the share of the residual accelerations' variance that each single candidate explains, best first."""
     candidates = {
         "body velocity (drag, rotor drag)": lambda f, v: v,
         "velocity squared (fuselage drag)": lambda f, v: v * np.linalg.norm(v, axis=1, keepdims=True),
@@ -86,11 +86,11 @@ def explanations(validation: Validation) -> list[Explanation]:
     residual = np.clip(residual, *np.quantile(residual, [0.01, 0.99], axis=0))
     owner = np.repeat(np.arange(len(validation.flights)), [len(f.starts) for f in validation.flights])
     out = []
-    for cause, of in candidates.items():
+    for cause, regressor in candidates.items():
         parts = []
         for flight in validation.flights:
             back = conjugate(flight.recording.attitude[flight.starts])
-            parts.append(of(flight, rotate(back, flight.recording.velocity[flight.starts])))
+            parts.append(regressor(flight, rotate(back, flight.recording.velocity[flight.starts])))
         matrix = np.concatenate(parts)
         if not matrix.shape[1]:
             matrix = np.eye(len(validation.flights))[owner]
@@ -108,5 +108,5 @@ def _share(matrix: np.ndarray, target: np.ndarray) -> float:
     centred = target - target.mean(axis=0)
     matrix = matrix - matrix.mean(axis=0)
     gain = np.linalg.lstsq(matrix, centred, rcond=None)[0]
-    left = ((centred - matrix @ gain) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
-    return float(100.0 * (1.0 - left.mean()))
+    unexplained = ((centred - matrix @ gain) ** 2).sum(axis=0) / np.maximum((centred**2).sum(axis=0), 1e-300)
+    return float(100.0 * (1.0 - unexplained.mean()))

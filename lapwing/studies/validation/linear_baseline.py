@@ -1,7 +1,7 @@
 """Best linear prediction: a regression from the start state and the commands of the window to the change of state.
 
-It knows no physics. What it predicts better than the plant is in the data, and missing in the model. Its coefficients
-come from the other flights: each flight is predicted by a fit that has not seen it.
+It uses no physical model. Where it predicts better than the plant, the model misses an effect that is in the data. Each
+flight is predicted by coefficients fitted to the other flights.
 """
 
 from itertools import pairwise
@@ -12,14 +12,14 @@ from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
 from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
-SLICE = 5  # samples of commands that one regressor averages
-RIDGE = 1e-3  # of the number of windows, on standardised regressors
-SMALLEST = 1e-6  # spread of a regressor, SI, below which it counts as constant
+SLICE = 5  # samples of commands averaged by one regressor
+RIDGE = 1e-3  # ridge parameter over the number of windows, for standardised regressors
+SMALLEST = 1e-6  # [SI] standard deviation of a regressor below which it counts as constant
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tuple[int, ...]) -> list[Errors]:
-    """Return the errors of the linear prediction of each flight, fitted to the other flights (to itself if alone)."""
+    """Return the errors of the linear prediction of each flight by a fit to the others (one flight: to itself)."""
     regressors = [_regressors(f, s, horizons[-1]) for f, s in zip(flights, starts, strict=True)]
     targets = [_targets(f, s, horizons) for f, s in zip(flights, starts, strict=True)]
     spread = np.concatenate(regressors).std(axis=0)
@@ -30,9 +30,9 @@ def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tup
     whole, whole_product, count = moments.sum(axis=0), sum(products), sum(map(len, starts))
     out = []
     for k, (flight, s) in enumerate(zip(flights, starts, strict=True)):
-        alone = len(flights) == 1
-        moment = whole if alone else whole - moments[k]
-        right = whole_product if alone else whole_product - products[k]
+        is_single = len(flights) == 1
+        moment = whole if is_single else whole - moments[k]
+        right = whole_product if is_single else whole_product - products[k]
         gain = np.linalg.solve(moment + RIDGE * count * np.eye(len(moment)), right)
         change = (regressors[k] @ gain).reshape(len(s), len(horizons), 12)
         out.append(compare(flight, s, horizons, _predict(flight, s, horizons, change)))
@@ -42,9 +42,9 @@ def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tup
 def _regressors(flight: Recording, starts: np.ndarray, longest: int) -> np.ndarray:
     back = conjugate(flight.attitude[starts])
     state = [flight.omega[starts], rotate(back, flight.velocity[starts]), rotate(back, np.tile(UP, (len(starts), 1)))]
-    push = np.concatenate([np.zeros((1, flight.rotors)), np.cumsum(flight.motor_voltage**2, axis=0)])
+    thrust = np.concatenate([np.zeros((1, flight.rotors)), np.cumsum(flight.motor_voltage**2, axis=0)])
     edges = np.arange(-2 * SLICE, longest + 1, SLICE)
-    commands = [(push[starts + b] - push[starts + a]) / SLICE for a, b in pairwise(edges)]
+    commands = [(thrust[starts + b] - thrust[starts + a]) / SLICE for a, b in pairwise(edges)]
     return np.column_stack([*state, *commands, np.ones(len(starts))])
 
 

@@ -1,4 +1,4 @@
-"""Electrical power of many vehicles side by side."""
+"""Electrical power of a batch of vehicles."""
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -10,14 +10,14 @@ from lapwing.kernels import kernel
 
 @kernel
 def electrical_power(like, memory, columns, out, first, last):
-    """Write the power [W] that the motors of each member take under its last voltages.
+    """Write the power [W] of the motors of each member at its last voltages.
 
     Args:
-        like: a Member of `lapwing.dynamics.simd_batch`.
-        memory: of its blocks, flat.
-        columns: of a block.
-        out: shape (members,); written.
-        first: block.
+        like: prototype, a Member of `lapwing.dynamics.simd_batch`.
+        memory: blocks of the batch, flat.
+        columns: number of columns of a block.
+        out: result, shape (members,).
+        first: first block.
         last: block after the last.
     """
     for m in range(first * WIDTH, last * WIDTH):

@@ -1,4 +1,4 @@
-"""The compiled plant of a scene, stepped for many start states and parameter sets at once by the batch executor."""
+"""Compiled plant of a scene, stepped for many start states and parameter sets at once by the batch executor."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -19,7 +19,7 @@ from lapwing.services.plant.resolve import resolve
 from lapwing.services.plant.schema import Solver
 from lapwing.services.scene_resolver import load_one
 
-LONGEST_STEP = 0.01  # [s] of the integrator
+LONGEST_STEP = 0.01  # [s] largest integrator step
 FORCE, TORQUE = "effects.body_wrench.force", "effects.body_wrench.torque"
 LANES = simd_batch.WIDTH
 MOTION = 13  # columns of position, attitude, velocity and omega
@@ -29,12 +29,12 @@ class PlantRows:
     """A scene's plant with one tick per sample of a recording.
 
     Attributes:
-        interval: [s] of a tick.
+        interval: duration of a tick [s].
         rotors: number of rotors.
         motion: number of columns of the motion: position, attitude, velocity, omega, rotor speeds.
-        rows: a fresh plant for each parameter set, shape (sets, columns).
-        mass: [kg] of each parameter set, shape (sets,).
-        inertia: [kg m^2] of each parameter set, shape (sets, 3, 3).
+        rows: initial plant for each parameter set, shape (sets, columns).
+        mass: mass for each parameter set [kg], shape (sets,).
+        inertia: inertia for each parameter set [kg m^2], shape (sets, 3, 3).
     """
 
     def __init__(
@@ -47,14 +47,14 @@ class PlantRows:
         """Resolve the scene once for each parameter set.
 
         Args:
-            scene: path, name, or a loaded scene; its model is a single rigid body.
-            interval: [s] between two samples; the plant's tick.
-            overrides: of the scene, for every parameter set.
+            scene: path or name of a scene, or a loaded scene, whose model is a single rigid body.
+            interval: time between two samples, the plant's tick [s].
+            overrides: overrides of the scene, for all parameter sets.
             sets: values by dotted key, for each parameter set.
 
         Raises:
             SceneError: the scene is invalid or of another model.
-            ValueError: the interval is no fraction of a second.
+            ValueError: a second is not a whole number of intervals.
         """
         rate = round(1.0 / interval)
         if abs(rate * interval - 1.0) > 1e-6:
@@ -70,17 +70,17 @@ class PlantRows:
         self.rotors = len(self.like.voltage)
         self._pool = ThreadPoolExecutor(cpu_count())
         base = pack_row(self.like)
-        moved = [self._row({FORCE: [1.0, 0.0, 0.0]}), self._row({TORQUE: [1.0, 0.0, 0.0]})]
-        columns = [int(np.flatnonzero(row != base)[0]) for row in moved]
+        perturbed = [self._row({FORCE: [1.0, 0.0, 0.0]}), self._row({TORQUE: [1.0, 0.0, 0.0]})]
+        columns = [int(np.flatnonzero(row != base)[0]) for row in perturbed]
         self._force, self._torque = (slice(c, c + 3) for c in columns)
         self.set_parameters(sets)
 
     def set_parameters(self, sets: Sequence[Mapping[str, Any]]) -> None:
         """Resolve the scene for other parameter sets."""
-        made = [self._build(values) for values in sets]
-        self.rows = np.array([row for row, _, _ in made])
-        self.mass = np.array([mass for _, mass, _ in made])
-        self.inertia = np.array([inertia for _, _, inertia in made])
+        plants = [self._build(values) for values in sets]
+        self.rows = np.array([row for row, _, _ in plants])
+        self.mass = np.array([mass for _, mass, _ in plants])
+        self.inertia = np.array([inertia for _, _, inertia in plants])
 
     @property
     def speed_per_volt(self) -> float:
@@ -88,7 +88,7 @@ class PlantRows:
         return float(self.like.parameters.layout.speed_per_volt)
 
     def start(self, sets: np.ndarray) -> np.ndarray:
-        """Return blocks of fresh vehicles of the parameter sets with these indices, shape (blocks, columns, lanes)."""
+        """Return blocks of initial vehicles for indices of parameter sets, shape (blocks, columns, lanes)."""
         count = -(-len(sets) // LANES) * LANES
         padded = np.concatenate([sets, np.full(count - len(sets), sets[-1] if len(sets) else 0)])
         return np.ascontiguousarray(self.rows[padded].reshape(-1, LANES, self.rows.shape[1]).transpose(0, 2, 1))
@@ -123,8 +123,8 @@ class PlantRows:
         """Advance all vehicles by several ticks; return motion and rotor speeds after each, shape (ticks, n, columns).
 
         Args:
-            blocks: of `start`; changed.
-            voltage: [V] of the motors, shape (ticks, n, rotors).
+            blocks: blocks from `start`, modified in place.
+            voltage: motor voltages [V], shape (ticks, n, rotors).
             motions: position, attitude, velocity and omega to set before each tick, shape (ticks, n, 13).
         """
         ticks, n, _ = voltage.shape
@@ -162,8 +162,8 @@ class PlantRows:
         return _plant(self._scene(values))
 
     def _scene(self, values: Mapping[str, Any]) -> Scene:
-        """Return the scene with the recording's clock, which its sensors and its autopilot need not divide."""
-        scene = load_one(self._base, _whole_lists(self._base, values))
+        """Return the scene with all rates set to that of the recording."""
+        scene = load_one(self._base, _complete_lists(self._base, values))
         rates = {name: self._rate for name in Rates.model_fields if getattr(scene[Rates], name) is not None}
         return (
             scene.replaced(scene[Communication].model_copy(update={"rate": self._rate}))
@@ -198,8 +198,8 @@ def _with_wrench(scene: Scene) -> Scene:
     return load_one(scene, {FORCE: [0.0, 0.0, 0.0]})
 
 
-def _whole_lists(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace elements of an airframe's list, which its file may leave out, by the whole list."""
+def _complete_lists(scene: Scene, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace elements of an airframe's list, which its file may omit, by the entire list."""
     out: dict[str, Any] = {}
     for key, value in values.items():
         prefix, _, element = key.rpartition(".")

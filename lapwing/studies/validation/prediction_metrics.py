@@ -9,7 +9,7 @@ from lapwing.studies.flight_import.rotation_arrays import from_vector, product
 from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
 FIELDS = ("position", "velocity", "attitude", "rate", "specific_force", "power")
-RESAMPLES = 2000  # of the bootstrap over flights
+RESAMPLES = 2000  # number of bootstrap samples over flights
 CONFIDENCE = 95.0  # [%]
 
 
@@ -22,9 +22,9 @@ class Metric(NamedTuple):
 
 
 def magnitudes(errors: Errors) -> np.ndarray:
-    """Return the absolute errors of each window: the angle of attitude, of vectors the mean over axes.
+    """Return the absolute errors of each window: angle of the attitude, mean over axes of vectors.
 
-    Shape (n, h, 6), in the order of FIELDS; specific force and power are NaN where they were not measured.
+    The shape is (n, h, 6), in the order of FIELDS; unmeasured specific force and power are NaN.
     """
     means = [np.abs(getattr(errors, name)).mean(axis=-1) for name in ("position", "velocity")]
     angle = np.linalg.norm(errors.attitude, axis=-1)
@@ -33,13 +33,13 @@ def magnitudes(errors: Errors) -> np.ndarray:
 
 
 def pool_flights(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]:
-    """Return the mean over all windows by horizon and field, and its interval by resampling whole flights.
+    """Return the mean over all windows by horizon and field, and its confidence interval by a bootstrap over flights.
 
-    Windows of one flight are not independent; flights are. Intervals of fewer than three flights are NaN.
+    Flights are independent, windows of one flight are not. Intervals of fewer than three flights are NaN.
 
     Args:
         flights: magnitudes of each flight, shape (n, h, fields).
-        seed: of the resampling.
+        seed: seed of the bootstrap.
     """
     total = np.array([np.nansum(f, axis=0) for f in flights])
     count = np.array([np.isfinite(f).sum(axis=0) for f in flights])
@@ -60,7 +60,7 @@ def pool_flights(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]
 
 
 def constant_velocity(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...]) -> Errors:
-    """Return the errors of a prediction with the measured velocity, body rate and power held."""
+    """Return the errors of a prediction with constant velocity, body rate and power."""
     time = np.array(horizons) * flight.interval
     shape = (len(starts), len(horizons))
     predicted = np.zeros((*shape, WIDTH))

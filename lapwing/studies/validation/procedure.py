@@ -25,7 +25,7 @@ class FlightErrors:
     """Prediction errors of one flight."""
 
     recording: Recording
-    starts: np.ndarray  # samples at which windows begin
+    starts: np.ndarray  # first samples of the windows
     plant: Errors
     states: StartStates
 
@@ -35,11 +35,11 @@ class Validation:
     """Prediction errors of a scene's plant over flights."""
 
     scene: str
-    interval: float  # [s] of a step
+    interval: float  # [s] duration of a step
     horizons: tuple[int, ...]  # [steps]
     memory: TrimMemory
     flights: tuple[FlightErrors, ...]
-    skipped: tuple[str, ...]  # a line for each flight that is left out, or not flown in closed loop
+    skipped: tuple[str, ...]  # a line for each flight that is excluded, or not simulated in closed loop
     plant: list[list[Metric]]  # by horizon and field
     baselines: dict[str, list[list[Metric]]]
     closed_loop: tuple[ClosedLoop, ...] = ()
@@ -59,25 +59,25 @@ def validate(
     memory: TrimMemory = USUAL_TRIM,
     stride: int = STRIDE,
     closed_loop: bool = False,
-    say: Callable[[str, int, int], None] = lambda text, done, total: None,
+    report: Callable[[str, int, int], None] = lambda text, done, total: None,
 ) -> Validation:
-    """Predict every window of every flight, and compare.
+    """Predict all windows of all flights, and compare them with the measurements.
 
     Args:
-        scene: the vehicle's plant.
-        paths: flights, all sampled at one rate.
-        mapping: of raw files, as `open_flight`.
-        horizons: [steps] at which to compare, ascending.
-        overrides: of the scene.
-        memory: of the trim.
+        scene: scene with the vehicle's plant.
+        paths: files of flights, all with the same sampling rate.
+        mapping: mapping of raw files, see `open_flight`.
+        horizons: steps after which to compare, ascending.
+        overrides: overrides of the scene.
+        memory: time constants of the trim.
         stride: samples between the starts of two windows.
-        closed_loop: fly the recorded setpoints with the scene's autopilot, too.
-        say: called with what is done, the number of flights done, and their number.
+        closed_loop: True to simulate the recorded setpoints with the scene's autopilot, too.
+        report: called with a description of the progress, the number of finished flights, and the total.
 
     Raises:
         ValueError: a flight cannot be read, none has a window in the air, or rates or rotors differ.
     """
-    recordings, skipped = read_flights(paths, mapping, say)
+    recordings, skipped = read_flights(paths, mapping, report)
     interval = recordings[0].interval
     used, starts = [], []
     for recording in recordings:
@@ -95,19 +95,19 @@ def validate(
             raise ValueError(
                 f"{recording.name}: {recording.rotors} motors, the scene has {plant.rotors}; map the others"
             )
-    say("start states", 0, len(used))
+    report("start states", 0, len(used))
     states = start_states(plant, used, memory)
     flights = []
     for k, (recording, s, state) in enumerate(zip(used, starts, states, strict=True)):
-        say(recording.name, k, len(used))
+        report(recording.name, k, len(used))
         errors = compare(recording, s, horizons, predict(plant, recording, s, state, horizons))
         flights.append(FlightErrors(recording, s, errors, state))
-    say("baselines", len(used), len(used))
+    report("baselines", len(used), len(used))
     constant = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
     baselines = {"constant_velocity": constant, "linear_fit": linear_fit(used, starts, horizons)}
     loops = []
     for k, recording in enumerate(used if closed_loop else []):
-        say(f"closed loop: {recording.name}", k, len(used))
+        report(f"closed loop: {recording.name}", k, len(used))
         loop = fly_setpoints(scene, recording, overrides)
         if loop is None:
             skipped.append(f"{recording.name}: no setpoints in the air to fly in closed loop")
@@ -121,11 +121,11 @@ def validate(
 
 
 def read_flights(
-    paths: Sequence[Path], mapping: str | None, say: Callable[[str, int, int], None]
+    paths: Sequence[Path], mapping: str | None, report: Callable[[str, int, int], None]
 ) -> tuple[list[Recording], list[str]]:
-    """Read flights of one rate. Return them, and a line for each file that repeats the flight of an earlier one.
+    """Read flights with the same rate; return them, and a line for each file that repeats an earlier flight.
 
-    A repeated flight would narrow the confidence intervals, and be used both to estimate and to check an estimate.
+    A repeated flight would narrow the confidence intervals, and could be used both to estimate and to test.
 
     Raises:
         ValueError: a flight cannot be read, or its rate differs from the first one's.
@@ -133,7 +133,7 @@ def read_flights(
     recordings: list[Recording] = []
     repeated = []
     for k, path in enumerate(paths):
-        say(f"reading {path.name}", k, len(paths))
+        report(f"reading {path.name}", k, len(paths))
         recording = open_flight(path, mapping)
         if original := next((other.name for other in recordings if recording.repeats(other)), None):
             repeated.append(f"{recording.name}: the same flight as {original}")
@@ -141,7 +141,7 @@ def read_flights(
         recordings.append(recording)
         if abs(recording.interval - recordings[0].interval) > 1e-6:
             rates = f"{1.0 / recording.interval:g} Hz, others {1.0 / recordings[0].interval:g} Hz"
-            raise ValueError(f"{path}: sampled at {rates}; validate them apart")
+            raise ValueError(f"{path}: sampled at {rates}; validate them separately")
     return recordings, repeated
 
 

@@ -26,10 +26,10 @@ def write(path: Path, validation: Validation) -> None:
         Section("spectra", "Spectra of the residuals", _spectra(validation)),
     ]
     if validation.closed_loop:
-        sections.append(Section("closed-loop", "Closed loop: the recorded setpoints, flown", _closed_loop(validation)))
+        sections.append(Section("closed-loop", "Closed loop with the recorded setpoints", _closed_loop(validation)))
     lead = (
         f"{validation.windows} windows of {len(validation.flights)} flights. Each starts from the measured state and "
-        f"is fed the measured motor commands. Trim from the past {validation.memory.force:g} s (force) and "
+        f"uses the measured motor commands. Trim from the past {validation.memory.force:g} s (force) and "
         f"{validation.memory.torque:g} s (torque)."
     )
     page = render(
@@ -41,16 +41,16 @@ def write(path: Path, validation: Validation) -> None:
 
 
 def _outcome(validation: Validation) -> str:
-    """Return the errors of the plant after the longest horizon, beside those of the best baseline."""
+    """Return a text on the errors of the plant after the longest horizon, with that of the best baseline."""
     position, attitude = (FIELDS.index(name) for name in ("position", "attitude"))
     plant = validation.plant[-1]
     best = {name: rows[-1][position].mean for name, rows in validation.baselines.items()}
     name = min(best, key=lambda key: best[key]) if best else ""
-    beside = f"; {name.replace('_', ' ')}: {best[name]:.3g} m" if name else ""
+    baseline = f"; {name.replace('_', ' ')}: {best[name]:.3g} m" if name else ""
     return (
         f"Mean error of the plant after {validation.horizons[-1] * validation.interval:g} s: "
         f"{plant[position].mean:.3g} m, "
-        f"{np.degrees(plant[attitude].mean):.3g}°{beside}"
+        f"{np.degrees(plant[attitude].mean):.3g}°{baseline}"
     )
 
 
@@ -73,7 +73,7 @@ def _loops(validation: Validation) -> list[Rows]:
     if not validation.closed_loop:
         return []
     table = Rows(
-        "Closed loop", "flight", "duration [s]", "simulated less recorded [m]", "tracking error, simulated [m]",
+        "Closed loop", "flight", "duration [s]", "simulated minus recorded [m]", "tracking error, simulated [m]",
         "tracking error, recorded [m]",
     )  # fmt: skip
     for c in validation.closed_loop:
@@ -95,15 +95,15 @@ def _flights(validation: Validation) -> Rows:
 
 def _envelope(validation: Validation, after: float) -> Plot:
     panels = []
-    every = trends(validation)
-    for column, trend in enumerate(every):
+    all_trends = trends(validation)
+    for column, trend in enumerate(all_trends):
         for row, name in enumerate(SHOWN):
             line = Line(trend.centres, trend.errors[:, FIELDS.index(name)], marker="circle")
             label = f"{name} [{UNITS[name]}]" if column == 0 else ""
             low = trend.label if row == len(SHOWN) - 1 else ""
             panels.append(Panel((line,), label, low, row=row, column=column, timed=False))
     caption = f"Mean absolute error after {after:g} s by the state at the start of the window."
-    return Plot(tuple(panels), caption, 8.0, (1.0,) * len(SHOWN), (1.0,) * max(len(every), 1))
+    return Plot(tuple(panels), caption, 8.0, (1.0,) * len(SHOWN), (1.0,) * max(len(all_trends), 1))
 
 
 def _closed_loop(validation: Validation) -> Plot:
@@ -119,7 +119,7 @@ def _closed_loop(validation: Validation) -> Plot:
             label = f"{axis} [m]" if column == 0 else ""
             low = f"{c.name}: time [s]" if row == len(CHANNELS) - 1 else ""
             panels.append(Panel(lines, label, low, row=row, column=column, timed=False))
-    caption = f"Setpoints of a recording, flown by the scene's vehicle and autopilot; {len(flights)} flights."
+    caption = f"Setpoints of a recording, simulated with the scene's vehicle and autopilot; {len(flights)} flights."
     return Plot(tuple(panels), caption, 7.0, (1.0,) * len(CHANNELS), (1.0,) * len(flights))
 
 
@@ -132,5 +132,5 @@ def _spectra(validation: Validation) -> Plot:
             for k, axis in enumerate(CHANNELS)
         )
         panels.append(Panel(lines, label, "frequency [Hz]", row=row, timed=False, log_x=True, log_y=True))
-    caption = "Measured less predicted acceleration over one sample, without trim. A flat spectrum is noise."
+    caption = "Measured minus predicted acceleration over one sample, without trim. A flat spectrum is noise."
     return Plot(tuple(panels), caption, 5.0, (1.0, 1.0))

@@ -9,18 +9,18 @@ from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, rotate
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 
-PIECE = 400  # samples of a piece of a flight; pieces are stepped side by side
-WARM_UP = 100  # samples before a piece in which the rotor speeds settle
-GROUNDED = 0.1  # [m] height below which a sample is lifted, so that contact is not computed for nothing
-LIFT = 10.0  # [m]
-CHUNK = 50  # samples stepped at once
+PIECE = 400  # samples per piece of a flight; pieces are stepped in parallel
+WARM_UP = 100  # samples before a piece during which the rotor speeds settle
+GROUNDED = 0.1  # [m] height below which a sample is raised, to avoid the cost of ground contact
+LIFT = 10.0  # [m] height by which such a sample is raised
+CHUNK = 50  # samples per call of the batch executor
 
 
 class TrimMemory(NamedTuple):
-    """Memory length of the trim."""
+    """Time constants of the trim."""
 
     force: float = 0.15  # [s] time constant of the mean of past residual forces; 0: no trim
-    torque: float = 10.0  # [s] the same of residual torques
+    torque: float = 10.0  # [s] time constant for residual torques
 
 
 NO_TRIM = TrimMemory(0.0, 0.0)
@@ -28,24 +28,24 @@ USUAL_TRIM = TrimMemory()
 
 
 class StartStates(NamedTuple):
-    """Initial data of a window besides the measured motion, for every sample of a flight and every parameter set."""
+    """Initial data of a window, except the measured motion, for all samples of a flight and all parameter sets."""
 
     rotor_speed: np.ndarray  # [rad/s], shape (sets, n, rotors)
-    force: np.ndarray  # [N] body, trim by the samples up to this one, shape (sets, n, 3)
-    torque: np.ndarray  # [N m] body, the same
-    residual: np.ndarray  # [m/s^2] and [rad/s^2] body, measured less predicted over the next tick, shape (sets, n, 6)
+    force: np.ndarray  # [N] body, trim from the samples up to this one, shape (sets, n, 3)
+    torque: np.ndarray  # [N m] body, trim likewise, shape (sets, n, 3)
+    residual: np.ndarray  # [m/s^2] and [rad/s^2] body, measured minus predicted over the next tick, shape (sets, n, 6)
 
 
 def start_states(plant: PlantRows, flights: list[Recording], memory: TrimMemory) -> list[StartStates]:
-    """Step the plant along each flight, its motion reset to the measured one at every sample.
+    """Step the plant along each flight, with its motion reset to the measured one at each sample.
 
-    A residual belongs to the tick after its sample and needs the sample after that. So the trim at a sample uses the
-    residuals of earlier ticks only, and nothing measured later.
+    A residual belongs to the tick after its sample and needs the next sample. So the trim at a sample only uses the
+    residuals of earlier ticks, without later measurements.
 
     Args:
-        plant: with its parameter sets.
-        flights: sampled at the plant's tick.
-        memory: of the trim.
+        plant: plant with its parameter sets.
+        flights: recordings sampled at the plant's tick.
+        memory: time constants of the trim.
     """
     pieces = [(f, s) for f, flight in enumerate(flights) for s in range(0, len(flight), PIECE)]
     sets, lanes = len(plant.rows), len(pieces)
@@ -66,21 +66,21 @@ def start_states(plant: PlantRows, flights: list[Recording], memory: TrimMemory)
     plant.write(blocks, slice(MOTION, MOTION + plant.rotors), rotors)
     longest = min(PIECE, int(length.max()))
     for low in range(-WARM_UP, longest, CHUNK):
-        place = first + np.arange(low, min(low + CHUNK, longest))[:, None]
-        at = offset + np.clip(place, 0, length - 1)
-        every = np.tile(at, (1, sets))
-        trace = plant.advance_along(blocks, padded[1][every], padded[0][every])
+        sample = first + np.arange(low, min(low + CHUNK, longest))[:, None]
+        rows = offset + np.clip(sample, 0, length - 1)
+        all_rows = np.tile(rows, (1, sets))
+        trace = plant.advance_along(blocks, padded[1][all_rows], padded[0][all_rows])
         before = np.concatenate([rotors[None], trace[:-1, :, MOTION:]])
         rotors = trace[-1, :, MOTION:]
-        tick, lane = np.nonzero((place >= first) & (place < length))
-        row = at[tick, lane]
+        tick, lane = np.nonzero((sample >= first) & (sample < length))
+        row = rows[tick, lane]
         for k in range(sets):
             speed[k, row] = before[tick, k * lanes + lane]
             after[k, row] = trace[tick, k * lanes + lane, 7:MOTION]
     out, start = [], 0
-    for flight, moved in zip(flights, motion, strict=True):
+    for flight, own_motion in zip(flights, motion, strict=True):
         span = slice(start, start := start + len(flight))
-        out.append(_trim(plant, flight, moved, speed[:, span], after[:, span], memory))
+        out.append(_trim(plant, flight, own_motion, speed[:, span], after[:, span], memory))
     return out
 
 
@@ -100,17 +100,17 @@ def _trim(
     change = (motion[1:, 7:] - after[:, :-1]) / interval
     residual[:, :-1, :3] = rotate(np.broadcast_to(conjugate(motion[:-1, 3:7]), (*change.shape[:2], 4)), change[..., :3])
     residual[:, :-1, 3:] = change[..., 3:]
-    sound = np.r_[flight.valid[:-1] & flight.valid[1:], False]
-    weight = np.r_[0.0, sound[:-1]]
+    usable = np.r_[flight.valid[:-1] & flight.valid[1:], False]
+    weight = np.r_[0.0, usable[:-1]]
     past = np.concatenate([np.zeros((len(after), 1, 6)), residual[:, :-1]], axis=1) * weight[:, None]
     trim = np.empty_like(past)
     for part, constant in ((slice(0, 3), memory.force), (slice(3, 6), memory.torque)):
         if constant <= 0.0:
             trim[..., part] = 0.0
             continue
-        keep = np.exp(-interval / constant)
-        total = lfilter([1.0], [1.0, -keep], past[..., part], axis=1)
-        count = lfilter([1.0], [1.0, -keep], weight)
+        decay = np.exp(-interval / constant)
+        total = lfilter([1.0], [1.0, -decay], past[..., part], axis=1)
+        count = lfilter([1.0], [1.0, -decay], weight)
         trim[..., part] = total / np.maximum(count, 1.0)[:, None]
     force = trim[..., :3] * plant.mass[:, None, None]
     torque = np.einsum("sij,snj->sni", plant.inertia, trim[..., 3:])

@@ -1,4 +1,4 @@
-"""Prediction windows: where they begin, and what the plant predicts over them."""
+"""Prediction windows of recordings, and the plant's prediction over them."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -11,27 +11,27 @@ from lapwing.studies.flight_import.rotation_arrays import conjugate, product, ro
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 from lapwing.studies.validation.start_states import StartStates
 
-PAST = 20  # samples before a window that must be valid, for the rotor speeds and the trim
+PAST = 20  # number of samples before a window that must be valid, for rotor speeds and trim
 POWER, WIDTH = MOTION + 3, MOTION + 4  # column of the power, and number of columns, of a prediction
-BATCH = 16_384  # windows stepped at once
+BATCH = 16_384  # windows per batch
 
 
 class Errors(NamedTuple):
-    """Predicted less measured at each horizon; h horizons."""
+    """Predicted minus measured values of n windows at h horizons."""
 
     position: np.ndarray  # [m] world, shape (n, h, 3)
     velocity: np.ndarray  # [m/s] world, shape (n, h, 3)
     attitude: np.ndarray  # [rad] rotation vector from the measured to the predicted body, shape (n, h, 3)
     rate: np.ndarray  # [rad/s] body, shape (n, h, 3)
     specific_force: np.ndarray  # [m/s^2] body, mean over the last tick, shape (n, h, 3); NaN where not measured
-    power: np.ndarray  # [W] taken by the motors, shape (n, h, 1); NaN where not measured
+    power: np.ndarray  # [W] electrical power of the motors, shape (n, h, 1); NaN where not measured
 
 
 def window_starts(flight: Recording, longest: int, stride: int, lowest: float = LOWEST) -> np.ndarray:
-    """Return the samples at which a window can begin: valid and in the air from the past to its end."""
+    """Return the possible first samples of windows: valid and airborne from `PAST` samples before to the end."""
     height = flight.position[:, 2]
-    sound = flight.valid & (height > lowest) & (flight.motor_voltage.max(axis=1) > 0.0)
-    count = np.concatenate([[0], np.cumsum(~sound)])
+    usable = flight.valid & (height > lowest) & (flight.motor_voltage.max(axis=1) > 0.0)
+    count = np.concatenate([[0], np.cumsum(~usable)])
     starts = np.arange(PAST, len(flight) - longest, stride)
     return starts[count[starts + longest + 1] == count[starts - PAST]]
 
@@ -48,7 +48,7 @@ def predict(
 
     Returns:
         Position, attitude, velocity and omega at each horizon, the acceleration of the last tick [m/s^2] world, and the
-        power [W], NaN unless a flight has measured it; shape (n, h, 17).
+        power [W], NaN if no flight has measured it; shape (n, h, 17).
     """
     return predict_all(plant, [flight], [Span(0, starts, parameter_set)], [states], horizons)[0]
 
@@ -68,22 +68,22 @@ def predict_all(
     states: Sequence[StartStates],
     horizons: tuple[int, ...],
 ) -> list[np.ndarray]:
-    """Predict windows of many flights and parameter sets side by side. See `predict` for what each span returns.
+    """Predict windows of many flights and parameter sets in parallel. See `predict` for the result of each span.
 
     Args:
-        plant: with its parameter sets.
+        plant: plant with its parameter sets.
         flights: recordings.
-        spans: which windows of which flight with which parameter set.
-        states: of each flight.
-        horizons: [samples] ascending.
+        spans: windows to predict, with flight and parameter set.
+        states: start states of each flight.
+        horizons: samples after which to predict, ascending.
     """
     flight = np.concatenate([np.full(len(s.starts), s.flight) for s in spans])
-    chosen = np.concatenate([np.full(len(s.starts), s.parameter_set) for s in spans])
+    set_index = np.concatenate([np.full(len(s.starts), s.parameter_set) for s in spans])
     start = np.concatenate([s.starts for s in spans])
     first = np.concatenate([[0], np.cumsum([len(r) for r in flights])])
     measured = np.concatenate([np.column_stack([r.position, r.attitude, r.velocity, r.omega]) for r in flights])
     volts = np.concatenate([r.motor_voltage for r in flights])
-    at = first[flight] + start
+    first_rows = first[flight] + start
     speed, force, torque = (
         np.concatenate([getattr(s, name) for s in states], axis=1) for name in ("rotor_speed", "force", "torque")
     )
@@ -92,7 +92,7 @@ def predict_all(
     powered = any(np.isfinite(r.power).any() for r in flights)
     for low in range(0, len(start), BATCH):
         part = slice(low, low + BATCH)
-        rows, sets = at[part], chosen[part]
+        rows, sets = first_rows[part], set_index[part]
         blocks = plant.start(sets)
         plant.write(blocks, slice(0, MOTION), measured[rows])
         plant.write(blocks, slice(MOTION, MOTION + plant.rotors), speed[sets, rows])
@@ -111,7 +111,7 @@ def predict_all(
 
 
 def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], predicted: np.ndarray) -> Errors:
-    """Return predicted less measured."""
+    """Return predicted minus measured values."""
     at = starts[:, None] + np.array(horizons)
     attitude = product(conjugate(flight.attitude[at]), predicted[..., 3:7])
     upward = np.array([0.0, 0.0, 9.80665])

@@ -1,6 +1,6 @@
-"""Flights in space: shaded bodies, ground, trails and arrows in a viser scene, recorded in a page or live.
+"""3D view of flights: shaded bodies, ground, trails and arrows in a viser scene, recorded in a page or live.
 
-viser is imported only where a view is made; it comes with the extra `view3d`.
+viser is an optional dependency, the extra `view3d`, and is imported on use.
 """
 
 import importlib.util

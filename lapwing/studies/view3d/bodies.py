@@ -1,4 +1,4 @@
-"""Moving bodies of a flight: poses by time, solids, rotors, and the lines that join bodies."""
+"""Moving bodies of a flight: poses over time, solids, rotors, and links between bodies."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -12,16 +12,16 @@ LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
 
 
 class Rotor(NamedTuple):
-    """A propeller that turns about z of its body's frame."""
+    """A propeller that spins about z of its body's frame."""
 
-    hub: np.ndarray  # (3,) [m]
+    hub: np.ndarray  # [m] position in the frame of the body, shape (3,)
     radius: float  # [m]
-    angle: np.ndarray | None = None  # [rad] at the times of the truth (n,); None: the body itself turns
-    thrust: np.ndarray | None = None  # [N] at the times of the truth (n,)
+    angle: np.ndarray | None = None  # [rad] at the times of the truth, shape (n,); None: the body itself spins
+    thrust: np.ndarray | None = None  # [N] at the times of the truth, shape (n,)
 
 
 class Body(NamedTuple):
-    """A body that moves as a whole."""
+    """A rigid body."""
 
     name: str
     times: np.ndarray  # [s], shape (n,)
@@ -29,16 +29,16 @@ class Body(NamedTuple):
     orientation: np.ndarray  # body to world, x, y, z, w, shape (n, 4)
     solids: tuple[Solid, ...] = ()
     rotors: tuple[Rotor, ...] = ()
-    force: np.ndarray | None = None  # of contacts or joints, world [N], shape (n, 3)
+    force: np.ndarray | None = None  # force of contacts or joints, world [N], shape (n, 3)
 
 
 class Link(NamedTuple):
-    """A line between two bodies: a rigid link, or a cable, which sags while the second body feels no force."""
+    """A line between two bodies: a rigid link, or a cable, which sags while no force acts on the second body."""
 
     first: int  # index of the body
-    second: int
-    hook: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m] in the frame of the first; ends at the second's origin
-    length: float = 0.0  # [m] of a cable without tension; 0 for a rigid link
+    second: int  # index of the body at whose origin the line ends
+    hook: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [m] start of the line, frame of the first body
+    length: float = 0.0  # [m] unstretched length of a cable; 0 for a rigid link
 
 
 class Motion(NamedTuple):
@@ -54,8 +54,8 @@ def body_of_truth(flight: FlightData, solids: Sequence[Solid], rotors: Sequence[
     return Body(flight.vehicle, truth.times, truth.position, truth.orientation, tuple(solids), tuple(rotors))
 
 
-def recorded_bodies(flight: FlightData, looks: Sequence[tuple[Sequence[Solid], Sequence[Rotor]]]) -> tuple[Body, ...]:
-    """Return the bodies of the topic `body_states` in its order, with solids and rotors of each."""
+def recorded_bodies(flight: FlightData, shapes: Sequence[tuple[Sequence[Solid], Sequence[Rotor]]]) -> tuple[Body, ...]:
+    """Return the bodies of the topic `body_states` in its order, with the solids and rotors of each in `shapes`."""
     states = flight.topic("body_states")
     names = states.name[0]
     return tuple(
@@ -68,5 +68,5 @@ def recorded_bodies(flight: FlightData, looks: Sequence[tuple[Sequence[Solid], S
             tuple(rotors),
             states.force[:, k],
         )
-        for k, (solids, rotors) in enumerate(looks)
+        for k, (solids, rotors) in enumerate(shapes)
     )

@@ -1,34 +1,34 @@
-// Camera modes and a link to the time of an enclosing page, in a page of viser's client.
+// Camera modes, and synchronisation of the time with an enclosing page, in a page of viser's client.
 (() => {
   const facts = window.lapwing;
   const looks = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
-  Object.defineProperty(window, "__VISER_EMBED_CONFIG__", { get: () => looks, set() {} }); // a recording sets its own
+  Object.defineProperty(window, "__VISER_EMBED_CONFIG__", { get: () => looks, set() {} }); // overrides the configuration of a recording
 
-  // A renderer without a graphics processor gets cheaper pictures: see `simplify`.
+  // A software renderer draws simplified images: see `simplify`.
   const probe = document.createElement("canvas").getContext("webgl2");
   const device = probe?.getExtension("WEBGL_debug_renderer_info");
   const slow = /swiftshader|llvmpipe|softpipe|basic render/i.test(device ? probe.getParameter(device.UNMASKED_RENDERER_WEBGL) : "");
-  const smooth = location.hash === "#smooth"; // asked for by pictures, which take the time
+  const smooth = location.hash === "#smooth"; // set for images, which need not be drawn in real time
   probe?.getExtension("WEBGL_lose_context")?.loseContext();
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
     return context.call(this, kind, slow && kind === "webgl2" ? { ...options, antialias: smooth } : options);
   };
 
-  // The player draws its bar at 120 Hz, more often than a recording or a screen changes.
+  // The player updates its bar at 120 Hz, faster than recordings and screens.
   const every = window.setInterval;
   window.setInterval = (run, period, ...rest) => every(run, period < 10 ? 1000 / (slow ? 30 : 60) : period, ...rest);
 
   const view = { mode: "follow", vehicle: 0, fresh: true, time: null };
   window.lapwingView = view;
-  const client = () => window.__viserMutable; // the scene of viser's client, which it shows to its own tests
+  const client = () => window.__viserMutable; // scene of viser's client, exposed for its tests
   const state = () => client()?.scene?.__r3f?.root.getState();
 
   const PARTS = { body: "0 [^/]*", label: "0 [^/]*/label", trail: "trail", reference: "reference/body", estimate: "estimate/body" };
-  const names = {}, missed = {}; // of nodes; when there was none [ms]
-  function nameOf(part, number) { // of a node of a vehicle, which begins with its number
+  const names = {}, missed = {}; // names of nodes; times of failed searches [ms]
+  function nameOf(part, number) { // name of a vehicle's node, which starts with the vehicle's number
     const nodes = client().nodeRefFromName, key = part + number, now = performance.now();
-    if (!nodes[names[key]] && !(view.ready && now < missed[key] + 500)) { // a search takes all names
+    if (!nodes[names[key]] && !(view.ready && now < missed[key] + 500)) { // a search scans all names
       const shape = new RegExp(`^/${number} [^/]*/${PARTS[part]}$`);
       names[key] = Object.keys(nodes).find((name) => shape.test(name));
       if (!names[key]) missed[key] = now;
@@ -38,13 +38,13 @@
   const node = (part, number) => client().nodeRefFromName[nameOf(part, number)];
   const isPlaced = (number) => client()?.nodePoseData[nameOf("body", number)]?.poseUpdateState === "updated";
   function pose() {
-    const one = node("body", view.vehicle);
-    one.updateWorldMatrix(true, false);
-    const m = one.matrixWorld.elements;
+    const body = node("body", view.vehicle);
+    body.updateWorldMatrix(true, false);
+    const m = body.matrixWorld.elements;
     return { place: [m[12], m[13], m[14]], ahead: [m[0], m[1], m[2]], up: [m[8], m[9], m[10]] };
   }
 
-  function showTrails() { // what has been flown of each trail, whose points are evenly spaced in time
+  function showTrails() { // shows the part of each trail up to the current time; its points have equal time steps
     if (!facts.span) return;
     const share = (view.time - facts.span[0]) / (facts.span[1] - facts.span[0]);
     facts.names.forEach((_, k) => node("trail", k)?.traverse(({ geometry }) => {
@@ -53,31 +53,31 @@
     }));
   }
 
-  function thinGhosts() { // a faint ghost does not hide the translucent parts of the vehicle behind it
+  function thinGhosts() { // keeps faint ghosts from hiding translucent parts of the vehicle behind them
     facts.names.forEach((_, k) => ["reference", "estimate"].forEach((part) => node(part, k)?.traverse(({ material }) => {
       if (material) material.depthWrite = false;
     })));
   }
 
-  function showNames({ camera, size }) { // those that no nearer one covers
+  function showNames({ camera, size }) { // shows the labels that no nearer label covers
     const tree = window.__viserSceneTree?.getState(), boxes = [];
     const labels = facts.names.map((text, k) => {
       const name = nameOf("label", k), body = node("body", k), place = client().nodePoseData[name]?.position;
       if (!body || !place || !tree?.[name]) return null;
-      const at = camera.position.clone().set(...place).applyMatrix4(body.matrixWorld), far = at.distanceTo(camera.position);
+      const at = camera.position.clone().set(...place).applyMatrix4(body.matrixWorld), distance = at.distanceTo(camera.position);
       at.project(camera);
       const x = (0.5 + 0.5 * at.x) * size.width, y = (0.5 - 0.5 * at.y) * size.height;
-      return { entry: tree[name], far, left: x, top: y, right: x + 6 * text.length + 8, bottom: y + 18 };
+      return { entry: tree[name], distance, left: x, top: y, right: x + 6 * text.length + 8, bottom: y + 18 };
     });
-    for (const { entry, far, ...box } of labels.filter(Boolean).sort((one, other) => one.far - other.far)) {
+    for (const { entry, distance, ...box } of labels.filter(Boolean).sort((a, b) => a.distance - b.distance)) {
       const free = boxes.every((b) => box.right < b.left || b.right < box.left || box.bottom < b.top || b.bottom < box.top);
       if (free) boxes.push(box);
       entry.effectiveVisibility = free;
     }
   }
 
-  function simplify(now, at) { // one small shadow around the vehicle that is followed, in the place of three
-    const lights = now.scene.children.filter((one) => one.isDirectionalLight && one.castShadow);
+  function simplify(now, at) { // uses one small shadow around the selected vehicle instead of three
+    const lights = now.scene.children.filter((child) => child.isDirectionalLight && child.castShadow);
     if (!lights.length) return;
     const [light, ...others] = lights, half = 3 * facts.size, height = 200;
     for (const other of others) {
@@ -89,36 +89,36 @@
     light.shadow.around = at.place;
     if (fresh) {
       if (!smooth) now.gl.shadowMap.type = 0; // a hard edge
-      const update = light.shadow.updateMatrices; // three.js calls it before it draws the map
-      light.shadow.updateMatrices = function (one) {
+      const update = light.shadow.updateMatrices; // called by three.js before it draws the shadow map
+      light.shadow.updateMatrices = function (source) {
         const [x, y, z] = this.around, { camera } = this, toward = camera.position.clone();
         toward.set(0.2, 1, 0.2).normalize().multiplyScalar(0.5 * height);
-        one.matrixWorld.makeTranslation(x - toward.x, y + toward.y, z - toward.z);
-        one.target.matrixWorld.makeTranslation(x, y, z);
+        source.matrixWorld.makeTranslation(x - toward.x, y + toward.y, z - toward.z);
+        source.target.matrixWorld.makeTranslation(x, y, z);
         Object.assign(camera, { left: -half, right: half, bottom: -half, top: half, near: 0.1, far: height });
         camera.updateProjectionMatrix();
-        update.call(this, one);
+        update.call(this, source);
       };
     }
   }
 
-  let seen = "", placed = "", changed = 0; // what was drawn last, and when it became so [ms]
+  let drawn = "", placed = "", changed = 0; // keys of the last drawn and placed state, time of the last change [ms]
   function follow() {
     const now = state();
     const bodies = now?.controls ? facts.names.map((_, k) => node("body", k)) : [null];
     const at = facts.names.every((_, k) => bodies[k]?.parent && (isPlaced(k) || !view.fresh)) && pose();
     if (at) {
       const next = `${view.time},${now.camera.matrixWorld.elements}`, elsewhere = `${view.mode},${at.place},${at.ahead},${at.up}`;
-      if (next !== seen) {
+      if (next !== drawn) {
         changed = performance.now();
         showTrails();
         thinGhosts();
         showNames(now);
         view.changed?.();
       }
-      seen = next;
+      drawn = next;
       if (slow) simplify(now, at);
-      if (slow && !smooth && !view.filming) { // a quarter of the pixels while the picture moves, sharp once it stands still
+      if (slow && !smooth && !view.filming) { // a quarter of the pixels during motion
         const ratio = devicePixelRatio * (performance.now() - changed < 1500 ? 0.5 : 1);
         if (now.viewport.dpr !== ratio) now.setDpr(ratio);
       }
@@ -127,7 +127,7 @@
         if (view.mode === "onboard") {
           const [a, b, c] = at.ahead, [u, v, w] = at.up, up = 0.35 * size, back = 0.9 * size;
           controls.setLookAt(x + up * u - back * a, y + up * v - back * b, z + up * w - back * c, x + 20 * a, y + 20 * b, z + 20 * c, false);
-        } else if (view.fresh) { // so far away that a fleet is in the picture
+        } else if (view.fresh) { // far enough for a fleet to be in view
           const spread = Math.max(...bodies.map((other) => other.position.distanceTo(bodies[view.vehicle].position)));
           const far = view.place ? size : Math.max(size, Math.min(0.6 * spread, 5 * size));
           const usual = view.mode === "top" ? [0, 14, 0.01] : [1.5, 0.75, 1.9];
@@ -156,7 +156,7 @@
     requestAnimationFrame(steer);
   }
 
-  view.seek = (time) => { // by the number field of the player, as a user would
+  view.seek = (time) => { // through the number field of the player
     const field = document.querySelector("input:not([type=checkbox])");
     if (!field) return;
     Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(field, String(Math.max(0, time - facts.start)));
@@ -166,31 +166,31 @@
     if (source === parent && data?.lapwing === "seek") view.seek(Number(data.time));
   });
 
-  view.camera = () => { // place and target in the axes of three.js, whose y is up
+  view.camera = () => { // position and target in three.js axes, y up
     const { camera, controls } = state(), { x, y, z } = controls.getTarget(camera.position.clone());
     return { place: camera.position.toArray(), target: [x, y, z] };
   };
   view.redraw = () => state().invalidate();
-  view.frames = () => state().gl.info.render.frame; // that have been drawn
+  view.frames = () => state().gl.info.render.frame; // number of drawn frames
   view.look = (mode, vehicle = view.vehicle, place = null) => Object.assign(view, { mode, vehicle, place, fresh: true });
-  const { port1: asked, port2: answered } = new MessageChannel(), waiting = [];
-  answered.onmessage = () => waiting.shift()();
-  const turn = () => new Promise((done) => { // of the event loop, without the 4 ms of a timer
+  const { port1: requests, port2: replies } = new MessageChannel(), waiting = [];
+  replies.onmessage = () => waiting.shift()();
+  const turn = () => new Promise((done) => { // yields to the event loop, without the 4 ms of a timer
     waiting.push(done);
-    asked.postMessage(0);
+    requests.postMessage(0);
   });
-  view.film = async (times, kind, quality) => { // pictures at times [s], as data URLs; the page stands still from now on
+  view.film = async (times, kind, quality) => { // images at times [s], as data URLs; the page is frozen from now on
     const now = state(), canvas = now.gl.domElement, { render } = now.gl, pictures = [];
     if (!view.filming) {
       view.filming = true;
       now.setFrameloop("never");
       document.getElementById("lapwing").remove();
-      canvas.style.visibility = "hidden"; // the page need not be put together
-      view.seek(facts.start + 1e6); // the player stops, also before it is sent to where it already is
+      canvas.style.visibility = "hidden"; // no compositing needed
+      view.seek(facts.start + 1e6); // stops the player, even if it is already at the first time
       await turn();
     }
-    const pass = (drawn) => {
-      now.gl.render = drawn ? render : () => {};
+    const pass = (isDrawn) => {
+      now.gl.render = isDrawn ? render : () => {};
       state().advance(performance.now() / 1000);
     };
     for (const time of times) {
@@ -199,16 +199,16 @@
         await turn();
         follow();
       }
-      pass(false); // viser handles the messages of this time
-      await turn(); // its page takes them over
-      pass(false); // and moves the bodies
-      if (canvas.width !== innerWidth || canvas.height !== innerHeight) { // with a play bar, or made coarser by viser
+      pass(false); // viser processes the messages of this time
+      await turn(); // its page updates its state
+      pass(false); // moves the bodies
+      if (canvas.width !== innerWidth || canvas.height !== innerHeight) { // due to a play bar or to viser's lower resolution
         now.setDpr(1);
         now.setSize(innerWidth, innerHeight);
       }
       follow();
       pass(true);
-      pictures.push(canvas.toDataURL(kind, quality)); // toBlob would wait for the page to be idle
+      pictures.push(canvas.toDataURL(kind, quality)); // toBlob would wait for an idle page
     }
     return pictures;
   };

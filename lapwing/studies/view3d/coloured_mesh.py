@@ -1,4 +1,4 @@
-"""Opaque solids of several colours as one binary glTF, which is one draw call."""
+"""Opaque solids of several colours as one binary glTF, drawn in one call."""
 
 import json
 from collections.abc import Sequence
@@ -12,20 +12,20 @@ VERTICES, FACES = 34962, 34963  # targets of buffer views
 
 
 def coloured_mesh(solids: Sequence[Solid]) -> bytes:
-    """Return a binary glTF 2.0 of solids, with a colour at each vertex; the viewer shades it flat without normals."""
+    """Return a binary glTF 2.0 of solids with vertex colours; without normals, the viewer uses flat shading."""
     vertices, faces = join_meshes(solids)
-    place = vertices.astype("<f4")
+    positions = vertices.astype("<f4")
     colours = np.concatenate([np.tile(linear(solid.colour), (len(solid.vertices), 1)) for solid in solids])
-    chunks = [part.tobytes() for part in (place, colours.astype("<u2"), faces.astype("<u4"))]
+    chunks = [part.tobytes() for part in (positions, colours.astype("<u2"), faces.astype("<u4"))]
     offsets = np.cumsum([0, *(len(chunk) for chunk in chunks)])
     views = [
         {"buffer": 0, "byteOffset": int(offset), "byteLength": len(chunk), "target": target}
         for offset, chunk, target in zip(offsets, chunks, (VERTICES, VERTICES, FACES), strict=False)
     ]
-    low, high = place.min(axis=0).tolist(), place.max(axis=0).tolist()
+    low, high = positions.min(axis=0).tolist(), positions.max(axis=0).tolist()
     accessors = [
-        {"bufferView": 0, "componentType": FLOAT, "count": len(place), "type": "VEC3", "min": low, "max": high},
-        {"bufferView": 1, "componentType": USHORT, "count": len(place), "type": "VEC4", "normalized": True},
+        {"bufferView": 0, "componentType": FLOAT, "count": len(positions), "type": "VEC3", "min": low, "max": high},
+        {"bufferView": 1, "componentType": USHORT, "count": len(positions), "type": "VEC4", "normalized": True},
         {"bufferView": 2, "componentType": UINT, "count": int(faces.size), "type": "SCALAR"},
     ]
     attributes = {"POSITION": 0, "COLOR_0": 1}
@@ -48,7 +48,7 @@ def coloured_mesh(solids: Sequence[Solid]) -> bytes:
 
 
 def linear(colour: str) -> np.ndarray:
-    """Return linear red, green, blue and opacity 1 of an sRGB colour "#RRGGBB" as shares of 65535, shape (4,)."""
+    """Return linear red, green, blue and opacity 1 of an sRGB colour "#RRGGBB" scaled to 65535, shape (4,)."""
     values = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)]) / 255.0
     shares = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
     return np.round(65535.0 * np.append(shares, 1.0))

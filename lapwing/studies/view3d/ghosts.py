@@ -1,4 +1,4 @@
-"""Translucent copies of a vehicle's body: where it should be, and where its estimator believes that it is."""
+"""Translucent copies of a vehicle's body at its reference pose and at its estimated pose."""
 
 from typing import Any
 
@@ -8,12 +8,12 @@ from lapwing.studies.view3d.bodies import Body
 from lapwing.studies.view3d.solids import Solid, join_meshes, raise_point, rod
 from lapwing.studies.view3d.surroundings import add_solid
 
-OPACITY, STEP = 0.4, 0.1  # greatest, and by which it changes
-HIDDEN, FULL = 0.05, 0.35  # distances from the body itself, in sizes of the body
+OPACITY, STEP = 0.4, 0.1  # largest opacity, and its quantisation
+HIDDEN, FULL = 0.05, 0.35  # distances from the body, over its size, up to which and from which opacity is constant
 
 
 class Ghost:
-    """A copy of a body in one colour and one draw call. It fades out where it would cover the body itself."""
+    """Copy of a body in one colour and one draw call, which fades out close to the body."""
 
     def __init__(self, scene: Any, body: Body, colour: str, name: str):
         """Add the nodes, hidden."""
@@ -30,16 +30,22 @@ class Ghost:
         self._size = float(np.linalg.norm(vertices, axis=1).max())
         self._mesh = add_solid(scene, f"{name}/body", Solid(vertices, faces, colour, OPACITY), visible=False)
 
-    def show(self, place: np.ndarray, attitude: np.ndarray, own: np.ndarray, own_attitude: np.ndarray) -> None:
-        """Move the ghost to a place [m] and attitude w, x, y, z, and fade it by its distance from those of the body.
+    def show(self, position: np.ndarray, attitude: np.ndarray, own: np.ndarray, own_attitude: np.ndarray) -> None:
+        """Move the ghost to a pose, and set its opacity by the distance from the body.
 
-        A place or attitude that is not a number, as before the first setpoint of a recorded flight, hides the ghost.
+        Args:
+            position: position of the ghost [m], world, shape (3,).
+            attitude: attitude of the ghost, w, x, y, z, shape (4,).
+            own: position of the body [m], world, shape (3,).
+            own_attitude: attitude of the body, w, x, y, z, shape (4,).
+
+        A pose with NaN, as before the first setpoint of a recorded flight, hides the ghost.
         """
         if self._mesh is None:
             return
-        turn = 2.0 * np.arccos(np.clip(abs(float(attitude @ own_attitude)), 0.0, 1.0))
-        apart = float(np.linalg.norm(place - own)) / self._size + turn
-        share = np.clip((apart - HIDDEN) / (FULL - HIDDEN), 0.0, 1.0) if np.isfinite(apart) else 0.0
+        angle = 2.0 * np.arccos(np.clip(abs(float(attitude @ own_attitude)), 0.0, 1.0))
+        distance = float(np.linalg.norm(position - own)) / self._size + angle
+        share = np.clip((distance - HIDDEN) / (FULL - HIDDEN), 0.0, 1.0) if np.isfinite(distance) else 0.0
         opacity = round(STEP * round(OPACITY * share / STEP), 2)
         if opacity != self._opacity:
             if (opacity > 0.0) != (self._opacity > 0.0):
@@ -48,4 +54,4 @@ class Ghost:
                 self._mesh.opacity = opacity
             self._opacity = opacity
         if opacity > 0.0:
-            self._mesh.position, self._mesh.wxyz = tuple(place.tolist()), tuple(attitude.tolist())
+            self._mesh.position, self._mesh.wxyz = tuple(position.tolist()), tuple(attitude.tolist())

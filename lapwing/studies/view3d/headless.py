@@ -1,4 +1,4 @@
-"""A page in headless Chromium, controlled over a pipe in the browser's own protocol: no driver is needed."""
+"""A page in headless Chromium, controlled over a pipe by the DevTools protocol, without a driver."""
 
 import base64
 import json
@@ -10,24 +10,34 @@ from pathlib import Path
 from typing import Any, Self
 
 PROGRAMS = ("chromium", "chromium-browser", "google-chrome")
-ENDED = "the headless browser has ended unexpectedly; try again with fewer programs beside it"
+ENDED = "the headless browser has ended unexpectedly; try again with fewer programs running"
 PROGRAM = next(filter(None, map(shutil.which, PROGRAMS)), None)
-# The system's OpenGL, whose software renderer is twice as fast as the browser's own, which is used where there is none.
-# The browser's own pipe is at descriptors 3 and 4.
+# OpenGL of the system, whose software renderer is twice as fast as that of the browser, the fallback.
+# The DevTools pipe is at descriptors 3 and 4.
 START = 'exec "$0" --headless=new --no-sandbox --disable-dev-shm-usage --use-angle=gl-egl \
 --ignore-gpu-blocklist --enable-unsafe-swiftshader \
 --remote-debugging-pipe --user-data-dir="$1" about:blank 3<&{reading} 4>&{writing}'
 
 
 class BrowserError(ValueError):
-    """The browser has ended, or a script of its page has failed."""
+    """Error of the browser: it has ended, or a script of its page has failed."""
 
 
 class Browser:
-    """A context manager; `errors` are the exceptions and error lines of the page's console."""
+    """Headless browser with one page, a context manager.
+
+    Attributes:
+        errors: exceptions and error lines of the page's console.
+    """
 
     def __init__(self, page: Path | str, profile: Path | None = None, size: tuple[int, int] | None = None):
-        """Create a browser for a page, by default with a profile that is deleted; `size` of the window [pixel]."""
+        """Create a browser.
+
+        Args:
+            page: path or address of the page.
+            profile: folder of the browser's profile; None: a temporary one.
+            size: width and height of the window [pixel]; None: the default.
+        """
         self.errors: list[str] = []
         self._page, self._size, self._number, self._rest = page, size, 0, b""
         self._temporary = tempfile.TemporaryDirectory(ignore_cleanup_errors=True) if profile is None else None
@@ -63,7 +73,7 @@ class Browser:
             self._temporary.cleanup()
 
     def run(self, body: str) -> Any:
-        """Run the body of an asynchronous function in the page; return its result. Raise BrowserError if it fails."""
+        """Run the body of an asynchronous function in the page; return its value. Raise BrowserError if it fails."""
         arguments = {"expression": f"(async () => {{{body}}})()", "awaitPromise": True, "returnByValue": True}
         result = self.call("Runtime.evaluate", **arguments)
         if fault := result.get("exceptionDetails"):
@@ -76,7 +86,7 @@ class Browser:
         return base64.b64decode(self.call("Page.captureScreenshot", format="png", optimizeForSpeed=True)["data"])
 
     def call(self, method: str, **parameters: Any) -> Any:
-        """Call a method of the browser's protocol; return its result."""
+        """Call a method of the DevTools protocol and return its result."""
         self._number += 1
         message = {"id": self._number, "method": method, "params": parameters}
         if self._session:
@@ -86,14 +96,14 @@ class Browser:
         except BrokenPipeError:
             raise BrowserError(ENDED) from None
         while True:
-            answer = self._next()
-            if answer.get("id") == self._number:
-                if "error" in answer:
-                    raise BrowserError(f"{method} of the browser: {answer['error'].get('message', '')}")
-                return answer["result"]
-            self._note(answer)
+            reply = self._next_message()
+            if reply.get("id") == self._number:
+                if "error" in reply:
+                    raise BrowserError(f"{method} of the browser: {reply['error'].get('message', '')}")
+                return reply["result"]
+            self._record_errors(reply)
 
-    def _next(self) -> Any:
+    def _next_message(self) -> Any:
         while b"\0" not in self._rest:
             part = os.read(self._from, 1 << 16)
             if not part:
@@ -102,7 +112,7 @@ class Browser:
         text, self._rest = self._rest.split(b"\0", 1)
         return json.loads(text)
 
-    def _note(self, event: Any) -> None:
+    def _record_errors(self, event: Any) -> None:
         method, result = event.get("method"), event.get("params", {})
         if method == "Runtime.exceptionThrown":
             self.errors.append(str(result["exceptionDetails"]))

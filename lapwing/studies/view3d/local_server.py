@@ -1,4 +1,4 @@
-"""viser's server on this machine only: behind a secret path, for pages of its own address."""
+"""viser's server, restricted to this machine, a secret path and its own origin."""
 
 import contextlib
 import http
@@ -11,18 +11,18 @@ from unittest import mock
 
 from lapwing.studies.local_pages import ADDRESS, hosts, refusal
 
-_LOCK = threading.Lock()  # one server starts at a time: the guard is put in while it starts
+_LOCK = threading.Lock()  # one server starts at a time: the guard is installed by a patch during the start
 
 
 @contextlib.contextmanager
-def run_server(token: str = "", changed: Callable[[str], str] | None = None) -> Iterator[Any]:
+def run_server(token: str = "", transform: Callable[[str], str] | None = None) -> Iterator[Any]:
     """Run a viser server until the end of the context.
 
-    viser binds a port but has no secret and accepts every origin, so requests pass a guard before they reach it.
+    viser has no authentication and accepts every origin, so a guard filters the requests.
 
     Args:
-        token: first part of the path of every request that is answered; "" answers none.
-        changed: turns the client's page into the one that is served.
+        token: required first part of the path of a request; "" rejects all requests.
+        transform: returns the page to serve from that of viser's client.
     """
     with _LOCK:
         _mute_viser()
@@ -30,11 +30,11 @@ def run_server(token: str = "", changed: Callable[[str], str] | None = None) -> 
         import websockets.asyncio.server as sockets
 
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # it logs each rejected request
-        guard = Guard(token, changed)
+        guard = Guard(token, transform)
         original = sockets.serve
 
         def add_guard(*arguments: Any, **options: Any) -> Any:
-            guard.answer = options["process_request"]
+            guard.handler = options["process_request"]
             return original(*arguments, **{**options, "process_request": guard})
 
         with mock.patch.object(sockets, "serve", add_guard), mock.patch("rich.print", _silent):
@@ -52,7 +52,7 @@ def _silent(*_: Any) -> None:
 
 @cache
 def _mute_viser() -> None:
-    """Drop viser's message that it has stopped: on a busy machine its thread prints it after `stop` has returned."""
+    """Suppress viser's messages, such as the one that its thread may print after `stop` has returned."""
     import rich
 
     original = rich.print
@@ -65,33 +65,33 @@ def _mute_viser() -> None:
 
 
 class Guard:
-    """Answers requests in the place of viser's own function: only with the secret, the host and the origin."""
+    """Filter of requests before viser's handler: it requires the secret, the host and the origin."""
 
-    def __init__(self, token: str, changed: Callable[[str], str] | None):
-        self._token, self._changed = token, changed
+    def __init__(self, token: str, transform: Callable[[str], str] | None):
+        self._token, self._transform = token, transform
         self.hosts: set[str] = set()
-        self.answer: Any = None
+        self.handler: Any = None
 
-    def refused(self, path: str, headers: Any) -> http.HTTPStatus | None:
-        """Return the status of a rejection, or None if the request may pass."""
+    def rejection(self, path: str, headers: Any) -> http.HTTPStatus | None:
+        """Return the status of a rejection, or None if the request is accepted."""
         return refusal(path, headers.get("Host"), headers.get_all("Origin") or [], self._token, self.hosts)
 
     def __call__(self, connection: Any, request: Any) -> Any:
-        """Answer a request; None lets a websocket connect."""
-        if (status := self.refused(request.path, request.headers)) is not None:
+        """Return the response to a request, or None to accept a websocket."""
+        if (status := self.rejection(request.path, request.headers)) is not None:
             return connection.respond(status, status.phrase + "\n")
         request.path = "/" + request.path.lstrip("/").partition("/")[2]
         if request.headers.get("Upgrade", "").lower() == "websocket":
             return None
         if "Accept-Encoding" in request.headers:
-            del request.headers["Accept-Encoding"]  # the page is changed as text
-        response = self.answer(connection, request)
+            del request.headers["Accept-Encoding"]  # the page is transformed as text
+        response = self.handler(connection, request)
         if (
-            self._changed is not None
+            self._transform is not None
             and response is not None
             and request.path.partition("?")[0] in ("/", "/index.html")
         ):
-            response.body = self._changed(response.body.decode()).encode()
+            response.body = self._transform(response.body.decode()).encode()
             del response.headers["Content-Length"]  # an assignment would add a second one
             response.headers["Content-Length"] = str(len(response.body))
         if response is not None:

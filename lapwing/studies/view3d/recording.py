@@ -1,4 +1,4 @@
-"""Flights recorded as one page of viser's player, which needs no network."""
+"""Recording of flights as one page of viser's player, which works offline."""
 
 import json
 from collections.abc import Sequence
@@ -16,19 +16,19 @@ from lapwing.studies.view3d.scans import BUDGET
 from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
 from lapwing.studies.view3d.surroundings import add_surroundings
 
-RATE = 30.0  # [1/s] frames of a recording
-FRAMES = 2000  # of a recording at most; a longer one has fewer a second
-FLEET_FRAMES = 24000  # of all vehicles together
-POINTS = 1500  # of a trail
+RATE = 30.0  # [1/s] frame rate of a recording
+FRAMES = 2000  # largest number of frames of a recording; the rate of a longer one is lower
+FLEET_FRAMES = 24000  # largest number of frames times vehicles
+POINTS = 1500  # largest number of points of a trail
 
 
 def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray | None = None) -> str:
-    """Return the page of a flight with its fleet, or of flights that are compared.
+    """Return the page of a flight with its fleet, or of a comparison of flights.
 
     Args:
-        flights: one flight; or several, of which all but the first are drawn translucent.
-        names: their names, as they are shown.
-        times: of the frames [s], shape (k,), rising; None: `RATE` frames a second of the whole flights.
+        flights: one flight, or several to compare; all but the first are translucent.
+        names: display names of the flights.
+        times: times of the frames [s], shape (k,), ascending; None: `RATE` frames per second of the entire flights.
 
     Raises:
         ValueError: viser is not installed.
@@ -44,7 +44,7 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
         colours = [COLOURS[order.index(name) % len(COLOURS)] for name in titles]
     if times is None:
         times = _frame_times(shown)
-    with run_server() as server, server.atomic():  # no client is connected, so nothing has to be sent
+    with run_server() as server, server.atomic():  # sends nothing: no client is connected
         add_surroundings(server.scene, shown[0])
         vehicles = [
             Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0, named=len(shown) > 1)
@@ -75,11 +75,11 @@ def _frame_times(shown: Sequence[FlightData]) -> np.ndarray:
 def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle], times: np.ndarray) -> Any:
     """Record all frames; return the recording, the error [m] at the end of the colour scale, and the trails' span [s].
 
-    A trail is one line, of which the page shows the part that has been flown: each line is a draw call.
+    A trail is one line, one draw call, of which the page shows the part up to the current time.
     """
-    whole = _frame_times(shown)
-    along = np.linspace(whole[0], whole[-1], min(POINTS, len(whole)))
-    paths = [sample(flight, vehicle.motion, along) for flight, vehicle in zip(shown, vehicles, strict=True)]
+    all_times = _frame_times(shown)
+    trail_times = np.linspace(all_times[0], all_times[-1], min(POINTS, len(all_times)))
+    paths = [sample(flight, vehicle.motion, trail_times) for flight, vehicle in zip(shown, vehicles, strict=True)]
     errors = [path.error for path in paths if path.error is not None]
     most = float(max(np.quantile(error, 0.995) for error in errors)) if errors else 0.0
     for vehicle, path in zip(vehicles, paths, strict=True):
@@ -96,16 +96,16 @@ def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle
             vehicle.show(result, k)
         if k + 1 < len(times):
             recording.insert_sleep(float(times[k + 1] - times[k]))
-    return recording, most, (float(whole[0]), float(whole[-1]))
+    return recording, most, (float(all_times[0]), float(all_times[-1]))
 
 
 def with_bridge(html: str, facts: dict[str, Any]) -> str:
     """Return a page of viser's client with the camera and time controls of this project.
 
     Args:
-        html: the page.
-        facts: names and colours of the vehicles, the size of the largest [m], start [s], largest error [m], "live",
-            and of a recording "span", the times of the first and the last point of the trails [s].
+        html: page of viser's client.
+        facts: "names" and "colours" of the vehicles, "size" of the largest [m], "start" [s], largest "error" [m],
+            "live"; for a recording "span", the times of the first and the last point of the trails [s].
     """
     code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in ("bridge.js", "toolbar.js"))
     text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")

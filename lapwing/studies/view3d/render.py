@@ -1,4 +1,4 @@
-"""Pictures and films of the 3D view, drawn by a headless browser."""
+"""Images and videos of the 3D view, rendered by a headless browser."""
 
 import base64
 import io
@@ -15,11 +15,11 @@ from lapwing.studies.view3d import require
 from lapwing.studies.view3d.headless import Browser
 
 FORMATS = (".mp4", ".webp", ".gif", ".png")
-QUALITY = 80  # of WebP, 0 to 100
-JPEG = 0.95  # quality of the pictures that the browser hands over, 0 to 1
-BATCH = 16  # pictures of one call of the browser
+QUALITY = 80  # quality of WebP, 0 to 100
+JPEG = 0.95  # quality of the images from the browser, 0 to 1
+BATCH = 16  # images per call of the browser
 CAMERAS = ("follow", "orbit", "top", "onboard")
-SMALLEST, LARGEST = 64, 3840  # [pixel]
+SMALLEST, LARGEST = 64, 3840  # [pixel] limits of width and height
 START = """
 const until = async (holds) => {
   for (let k = 0; k < 2400 && !holds(); k++) await new Promise((done) => setTimeout(done, 50));
@@ -30,15 +30,17 @@ await until(() => window.lapwingView?.ready);
 
 
 class Shot(NamedTuple):
-    """A film from `start` to `stop` [s], or a picture at `start`."""
+    """Settings of a video from `start` to `stop`, or of an image at `start`."""
 
-    start: float | None = None  # None: of the whole flight; of a picture its middle
-    stop: float | None = None
-    rate: float = 20.0  # [1/s] pictures of a film
-    speed: float = 1.0  # simulated seconds in a second of the film
+    start: float | None = None  # [s] None: start of the flight; for an image its middle
+    stop: float | None = None  # [s] None: end of the flight
+    rate: float = 20.0  # [1/s] frame rate of the video
+    speed: float = 1.0  # simulation time over video time
     camera: str = "follow"
     size: tuple[int, int] = (960, 540)  # [pixel]
-    place: tuple[float, float, float] | None = None  # of the camera from the vehicle, in its sizes; None: as usual
+    place: tuple[float, float, float] | None = (
+        None  # camera position relative to the vehicle, over its size; None: that of `camera`
+    )
 
 
 def check(target: Path, shot: Shot) -> None:
@@ -74,17 +76,17 @@ def render(
     shot: Shot,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
-    """Write a picture or a film of flights; return its path.
+    """Write an image or a video of flights; return its path.
 
     Args:
-        flights: one, or several of which all but the first are translucent.
-        names: their names.
-        target: .png, .gif, .webp or .mp4.
+        flights: one flight, or several to compare; all but the first are translucent.
+        names: display names of the flights.
+        target: path with the extension .png, .gif, .webp or .mp4.
         shot: times, camera and size.
-        progress: called with the pictures done and their count.
+        progress: called with the number of finished images and the total.
 
     Raises:
-        ValueError: no browser, viser is missing, a time outside of the flight, or the file cannot be written.
+        ValueError: the browser or viser is missing, a time is outside the flight, or the file cannot be written.
     """
     require()
     check(target, shot)
@@ -93,7 +95,7 @@ def render(
     times = _times(flights[0], target, shot)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "view.html"
-        shown = times if len(times) > 1 else times + np.array([0.0, 1.0])  # the player needs a length
+        shown = times if len(times) > 1 else times + np.array([0.0, 1.0])  # the player needs a duration
         path.write_text(page(flights, names, shown), encoding="utf-8")
         address = path.resolve().as_uri() + ("" if target.suffix == ".mp4" else "#smooth")
         with Browser(address, size=shot.size) as browser:
@@ -124,15 +126,15 @@ def _pictures(browser: Browser, times: np.ndarray, lossless: bool, progress: Any
 
     kind, quality = ("png", 1.0) if lossless else ("jpeg", JPEG)
     for k in range(0, len(times), BATCH):
-        some = times[k : k + BATCH].tolist()
-        for address in browser.run(f"return lapwingView.film({some}, 'image/{kind}', {quality});"):
+        batch = times[k : k + BATCH].tolist()
+        for address in browser.run(f"return lapwingView.film({batch}, 'image/{kind}', {quality});"):
             picture = Image.open(io.BytesIO(base64.b64decode(address.partition(",")[2]))).convert("RGB")
             yield picture
-        progress(k + len(some), len(times))
+        progress(k + len(batch), len(times))
 
 
 def write_film(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
-    """Write pictures of PIL as a film, or the first one as a picture."""
+    """Write PIL images as a video, or the first one as an image."""
     if target.suffix == ".mp4":
         import imageio_ffmpeg
 
@@ -151,7 +153,7 @@ def write_film(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
     if target.suffix == ".webp":
         first.save(target, append_images=pictures, quality=QUALITY, method=3, **timing)
         return
-    rest = (picture.quantize(128, dither=0) for picture in pictures)  # each has its own colours
+    rest = (picture.quantize(128, dither=0) for picture in pictures)  # each with an individual palette
     first.quantize(128, dither=0).save(target, append_images=rest, **timing)
 
 

@@ -1,4 +1,4 @@
-"""Poses, rotors, arrows and ghosts of a flight at given times, as arrays."""
+"""Poses, rotors, arrows and ghosts of a flight, sampled at k times."""
 
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from lapwing.studies.view3d.scans import Scans, scans
 
 
 class BodySamples(NamedTuple):
-    """One body at k times."""
+    """Samples of one body at k times."""
 
     position: np.ndarray  # (k, 3) [m] world
     orientation: np.ndarray  # (k, 4) w, x, y, z
@@ -22,7 +22,7 @@ class BodySamples(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """One vehicle at k times."""
+    """Samples of one vehicle at k times."""
 
     times: np.ndarray  # (k,) [s]
     bodies: list[BodySamples]
@@ -40,9 +40,9 @@ class Samples(NamedTuple):
 
 
 def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 0) -> Samples:
-    """Return all that is drawn of a flight at `times` [s], shape (k,), rising.
+    """Return the data of the 3D view of a flight at `times` [s], shape (k,), ascending.
 
-    `points` is the count of all points of a scanning instrument; 0 leaves scans out.
+    `points` limits the total number of points of a scanning instrument; 0 omits scans.
     """
     truth = flight.truth
     rows = nearest(truth.times, times)
@@ -53,12 +53,12 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 
         last = np.minimum(rows, len(flight.reference) - 1)
         desired, attitude = flight.reference[last, :3], from_angles(flight.reference[last, 3:])
         error = np.linalg.norm(path - desired, axis=1)
-    estimate = believed = std = None
+    estimate = estimate_attitude = std = None
     if flight.has("estimate"):
         view = flight.topic("estimate")
         own = nearest(view.times, times)
         estimate, std = view.position[own], view.position_std[own]
-        believed = round_to_grid(view.orientation[own][:, [3, 0, 1, 2]])
+        estimate_attitude = round_to_grid(view.orientation[own][:, [3, 0, 1, 2]])
     contacts = forces = None
     if flight.has("contact_forces"):
         view = flight.topic("contact_forces")
@@ -67,23 +67,35 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 
     bodies = [_body(body, times, rows) for body in motion.bodies]
     distances, clouds = beams(flight, times), scans(flight, times, points) if points else []
     return Samples(
-        times, bodies, wind, desired, attitude, estimate, believed, std, contacts, forces, error, distances, clouds
+        times,
+        bodies,
+        wind,
+        desired,
+        attitude,
+        estimate,
+        estimate_attitude,
+        std,
+        contacts,
+        forces,
+        error,
+        distances,
+        clouds,
     )
 
 
 def _body(body: Body, times: np.ndarray, rows: np.ndarray) -> BodySamples:
     own = nearest(body.times, times)
-    place = np.column_stack([np.interp(times, body.times, along) for along in body.position.T])
+    position = np.column_stack([np.interp(times, body.times, values) for values in body.position.T])
     angles = _columns([rotor.angle for rotor in body.rotors], rows)
     thrusts = _columns([rotor.thrust for rotor in body.rotors], rows)
     angles = None if angles is None else round_angle(angles)
     force = body.force[own] if body.force is not None and np.any(body.force) else None
     return BodySamples(
-        round_to_grid(place), round_to_grid(body.orientation[own][:, [3, 0, 1, 2]]), angles, thrusts, force
+        round_to_grid(position), round_to_grid(body.orientation[own][:, [3, 0, 1, 2]]), angles, thrusts, force
     )
 
 
 def _columns(values: list[np.ndarray | None], rows: np.ndarray) -> np.ndarray | None:
-    """Return rows of values side by side, shape (k, columns); None where one is missing, or there are none."""
-    known = [value[rows] for value in values if value is not None]
-    return np.column_stack(known) if known and len(known) == len(values) else None
+    """Return rows of values side by side, shape (k, columns), or None if one is missing or the list is empty."""
+    columns = [value[rows] for value in values if value is not None]
+    return np.column_stack(columns) if columns and len(columns) == len(values) else None

@@ -1,28 +1,28 @@
-"""Rows of samples by time, and rounded quaternions, which keep a recording small."""
+"""Indices of samples by time, and rounded quaternions, which compress well in a recording."""
 
 from typing import Any
 
 import numpy as np
 
-GRID = 2048.0  # positions and quaternions are rounded to 1 / GRID, so that a recording is small
-TURNS = 48  # angles of a drawn propeller in a turn
+GRID = 2048.0  # positions and quaternions are rounded to 1 / GRID, which keeps a recording small
+ANGLES = 48  # number of angles of a drawn propeller in a revolution
 NEAR_ZERO = 1e-9
 
 
-def nearest(known: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return the index of the last known time at or before each of `times`, at least 0."""
-    return (np.searchsorted(known, np.asarray(times) + 1e-9, side="right") - 1).clip(0, len(known) - 1)
+def nearest(sample_times: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return the index of the last of `sample_times` [s] at or before each of `times` [s], at least 0."""
+    return (np.searchsorted(sample_times, np.asarray(times) + 1e-9, side="right") - 1).clip(0, len(sample_times) - 1)
 
 
 def from_angles(angles: np.ndarray) -> np.ndarray:
-    """Return quaternions w, x, y, z of roll, pitch, yaw [rad], shape (k, 3); shape (k, 4)."""
+    """Return quaternions w, x, y, z, shape (k, 4), of roll, pitch, yaw [rad], shape (k, 3)."""
     (a, b, c), (d, e, f) = np.cos(0.5 * angles.T), np.sin(0.5 * angles.T)
     parts = (a * b * c + d * e * f, d * b * c - a * e * f, a * e * c + d * b * f, a * b * f - d * e * c)
     return round_to_grid(np.column_stack(parts))
 
 
 def along(direction: np.ndarray) -> np.ndarray:
-    """Return quaternions w, x, y, z that turn z into each direction, shape (k, 4); none for vectors near zero."""
+    """Return quaternions w, x, y, z, shape (k, 4), that rotate z to each direction; identity for vectors near zero."""
     length = np.linalg.norm(direction, axis=1)
     unit = np.where(length[:, None] > NEAR_ZERO, direction / np.maximum(length, NEAR_ZERO)[:, None], (0.0, 0.0, 1.0))
     w, x, y = 1.0 + unit[:, 2], -unit[:, 1], unit[:, 0]
@@ -32,9 +32,9 @@ def along(direction: np.ndarray) -> np.ndarray:
 
 
 def round_angle(angle: np.ndarray) -> np.ndarray:
-    """Return angles [rad] rounded to a share of a turn."""
-    step = 2.0 * np.pi / TURNS
-    return np.remainder(np.round(angle / step), TURNS) * step
+    """Return angles [rad] rounded to 1 / ANGLES of a revolution."""
+    step = 2.0 * np.pi / ANGLES
+    return np.remainder(np.round(angle / step), ANGLES) * step
 
 
 def round_to_grid(values: Any) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Points where the rays of scanning lidars and depth cameras met a surface, of the latest scan at each time."""
+"""Point clouds of lidars and depth cameras: the latest scan at each time."""
 
 from collections.abc import Callable, Iterator
 from itertools import chain, pairwise
@@ -16,31 +16,31 @@ from lapwing.services.sensors.registry import parameters
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d.sampling import nearest, rotate
 
-BUDGET = 150_000  # points of all scans of an instrument in a recording, 6 bytes each
-MOST, FEWEST = 2500, 64  # points of one scan
-PERIOD = 0.2  # [s] between the scans of a long recording
-SIZE = 0.035  # [m] of a drawn point
+BUDGET = 150_000  # largest total number of points of an instrument in a recording, 6 bytes each
+MOST, FEWEST = 2500, 64  # limits of the number of points per scan
+PERIOD = 0.2  # [s] minimum time between the scans of a long recording
+SIZE = 0.035  # [m] size of a drawn point
 
 
 class Scans(NamedTuple):
     """Scans of one instrument."""
 
     name: str
-    latest: np.ndarray  # (k,) rows of the scans at the k times; -1 before the first
+    latest: np.ndarray  # (k,) index of the latest scan at each of k times; -1 before the first
     times: np.ndarray  # (m,) [s]
     origins: np.ndarray  # (m, 3) [m] world position of the vehicle
-    points: list[np.ndarray]  # of each scan (n, 3) [m] from its origin, in axes of the world
+    points: list[np.ndarray]  # points of each scan (n, 3) [m] relative to its origin, world axes
 
 
 def scans(flight: FlightData, times: np.ndarray, budget: int = BUDGET) -> list[Scans]:
-    """Return the scans of a flight that are the latest at `times` [s], shape (k,), rising, thinned to few points.
+    """Return the latest scans of a flight at `times`, with reduced numbers of points.
 
-    A recorded flight that was read without these topics takes them from its log, image by image.
+    Topics missing in a recorded flight are read from its log, message by message.
 
     Args:
         flight: the flight.
-        times: of frames.
-        budget: points of all scans of an instrument; at least `FEWEST` of each scan are kept.
+        times: times of the frames [s], shape (k,), ascending.
+        budget: largest total number of points of an instrument; each scan has at least `FEWEST`.
 
     Raises:
         ValueError: the log cannot be read.
@@ -49,17 +49,17 @@ def scans(flight: FlightData, times: np.ndarray, budget: int = BUDGET) -> list[S
     for name, topics in INSTRUMENTS.items():
         try:
             p = parameters(name, tables[name], 1.0) if name in tables else None
-        except ConfigError:  # of a log of another version
+        except ConfigError:  # the log is of another version
             p = None
         if p is None:
             continue
         period = max(1.0 / p.rate, PERIOD if len(times) > budget // MOST else 0.0)
         most = int(np.clip(budget // min(len(times), round(np.ptp(times) / period) + 1), FEWEST, MOST))
         for topic, in_body in topics.items():
-            known = _select(_messages(flight, topic), times, period)
-            at = [(time, in_body(p, history(topic.message, [payload]))) for time, payload in known]
-            if at:
-                result.append(_in_world(name, flight, times, at, most))
+            selected = _select(_messages(flight, topic), times, period)
+            clouds = [(time, in_body(p, history(topic.message, [payload]))) for time, payload in selected]
+            if clouds:
+                result.append(_in_world(name, flight, times, clouds, most))
     return result
 
 
@@ -77,7 +77,7 @@ def _messages(flight: FlightData, topic: Topic) -> Iterator[tuple[float, bytes]]
 
 
 def _select(messages: Iterator[tuple[float, bytes]], times: np.ndarray, period: float) -> Iterator[tuple[float, bytes]]:
-    """Yield the messages that are the latest at one of `times`, at least `period` [s] apart."""
+    """Yield the messages that are the latest at one of `times` [s], at least `period` [s] apart."""
     last = -np.inf
     for (time, payload), (after, _) in pairwise(chain(messages, [(np.inf, b"")])):
         first, stop = np.searchsorted(times, (time - 1e-9, after - 1e-9))
@@ -86,51 +86,53 @@ def _select(messages: Iterator[tuple[float, bytes]], times: np.ndarray, period: 
             last = time
 
 
-def _in_world(name: str, flight: FlightData, times: np.ndarray, at: list[tuple[float, np.ndarray]], most: int) -> Scans:
-    """Turn the points of scans, by time [s], into axes of the world; keep at most `most` of each."""
-    known = np.array([time for time, _ in at])
-    rows = nearest(flight.truth.times, known)
+def _in_world(
+    name: str, flight: FlightData, times: np.ndarray, clouds: list[tuple[float, np.ndarray]], most: int
+) -> Scans:
+    """Return scans from point clouds (time [s], points in the body frame [m]), with at most `most` points of each."""
+    scan_times = np.array([time for time, _ in clouds])
+    rows = nearest(flight.truth.times, scan_times)
     points = []
-    for row, (_, body) in zip(rows, at, strict=True):
+    for row, (_, body) in zip(rows, clouds, strict=True):
         hits = body[np.isfinite(body).all(axis=1)]
         if len(hits) > most:
             hits = hits[np.linspace(0, len(hits) - 1, most).astype(int)]
         points.append(rotate(flight.truth.orientation[row][[3, 0, 1, 2]], hits).astype(np.float32))
-    latest = np.searchsorted(known, times + 1e-9, side="right") - 1
-    return Scans(name, latest, known, flight.truth.position[rows], points)
+    latest = np.searchsorted(scan_times, times + 1e-9, side="right") - 1
+    return Scans(name, latest, scan_times, flight.truth.position[rows], points)
 
 
-def _of_laser_scan(p: Any, columns: Any) -> np.ndarray:
+def _laser_scan_points(p: Any, columns: Any) -> np.ndarray:
     ranges, elevation = columns["ranges"][0].astype(float), np.radians(p.elevation_min_deg)
     angle, level = azimuths(p), np.cos(elevation)
-    away = np.column_stack([level * np.cos(angle), level * np.sin(angle), np.full(len(angle), np.sin(elevation))])
-    return _along(away, ranges, p.position)
+    rays = np.column_stack([level * np.cos(angle), level * np.sin(angle), np.full(len(angle), np.sin(elevation))])
+    return _along(rays, ranges, p.position)
 
 
-def _of_cloud(p: Any, columns: Any) -> np.ndarray:
+def _cloud_points(p: Any, columns: Any) -> np.ndarray:
     return np.ascontiguousarray(columns["data"][0]).view("<f4").reshape(-1, 3).astype(float)
 
 
-def _of_depth(p: Any, columns: Any) -> np.ndarray:
-    away, cosines = pixels(p)
+def _depth_points(p: Any, columns: Any) -> np.ndarray:
+    rays, cosines = pixels(p)
     depth = np.ascontiguousarray(columns["data"][0]).view("<f4").astype(float)
-    return _along(away, depth / cosines, p.position)
+    return _along(rays, depth / cosines, p.position)
 
 
-def _along(away: np.ndarray, distance: np.ndarray, origin: Any) -> np.ndarray:
-    """Return points along rays (n, 3), body; not finite where nothing was met."""
-    met = np.where(np.isfinite(distance), distance, np.nan)
-    return away * met[:, None] + np.asarray(origin, float)
+def _along(rays: np.ndarray, distance: np.ndarray, origin: Any) -> np.ndarray:
+    """Return points [m] on rays (n, 3), body frame, at distances [m], shape (n,); non-finite without an echo."""
+    length = np.where(np.isfinite(distance), distance, np.nan)
+    return rays * length[:, None] + np.asarray(origin, float)
 
 
 INSTRUMENTS: dict[str, dict[Topic, Callable[[Any, Any], np.ndarray]]] = {
-    "lidar": {LASER_SCAN: _of_laser_scan, POINT_CLOUD: _of_cloud},
-    "depth_camera": {DEPTH_IMAGE: _of_depth},
+    "lidar": {LASER_SCAN: _laser_scan_points, POINT_CLOUD: _cloud_points},
+    "depth_camera": {DEPTH_IMAGE: _depth_points},
 }
 
 
 class ScanPoints:
-    """Node with the points of the latest scan of one instrument."""
+    """Node for the points of the latest scan of one instrument."""
 
     def __init__(self, scene: Any, colour: tuple[int, int, int], name: str):
         """Add the node, hidden."""
@@ -146,7 +148,7 @@ class ScanPoints:
         self._time, self._shown = -np.inf, False
 
     def show(self, scans: Scans, k: int) -> None:
-        """Show the scan that is the latest at the k-th time; hide the points if it met nothing."""
+        """Show the latest scan at the k-th time; hide the points if it has none."""
         row = int(scans.latest[k])
         if row < 0 or scans.times[row] == self._time:
             return

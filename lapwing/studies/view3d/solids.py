@@ -1,13 +1,13 @@
-"""Triangles of simple solids: boxes, and profiles that are turned about an axis."""
+"""Triangle meshes of simple solids: boxes and solids of revolution."""
 
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-SIDES = 24  # of a solid of revolution
-THIN = 10  # sides of a thin one
-TIP = 1e-9  # [m] largest radius of a ring that is a point
+SIDES = 24  # number of sides of a solid of revolution
+THIN = 10  # number of sides of a thin one
+TIP = 1e-9  # [m] largest radius of a ring that counts as a point
 _CORNERS = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 _SQUARES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))  # seen from outside
 _BOX = np.array([face for a, b, c, d in _SQUARES for face in ((a, b, c), (a, c, d))])
@@ -17,22 +17,22 @@ Point = Sequence[float] | np.ndarray  # (3,) [m]
 
 
 class Solid(NamedTuple):
-    """Triangles of one colour in the frame of their body; counterclockwise seen from outside."""
+    """Mesh of one colour in the frame of its body; triangles are counterclockwise seen from outside."""
 
     vertices: np.ndarray  # (n, 3) [m]
-    faces: np.ndarray  # (m, 3) rows of `vertices`
+    faces: np.ndarray  # (m, 3) indices of `vertices`
     colour: str  # "#RRGGBB"
     opacity: float = 1.0
-    open: bool = False  # seen from both sides; a translucent one is drawn twice
+    open: bool = False  # visible from both sides; a translucent mesh is drawn twice
 
 
 def box(centre: Point, size: Point, colour: str, opacity: float = 1.0) -> Solid:
-    """Return a box by its centre and its edges along x, y, z [m]."""
+    """Return a box with a centre and edges along x, y, z [m]."""
     return Solid(_CORNERS * np.asarray(size, float) + np.asarray(centre, float), _BOX, colour, opacity)
 
 
 def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:
-    """Return a cylinder between two points; empty if they coincide."""
+    """Return a cylinder between two points with a radius [m]; empty if the points coincide."""
     axis = np.subtract(stop, start).astype(float)
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
@@ -46,19 +46,19 @@ def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 
 
 
 def ball(centre: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:
-    """Return a sphere."""
+    """Return a sphere with a centre and a radius [m]."""
     angle = np.linspace(-0.5 * np.pi, 0.5 * np.pi, sides // 2 + 1)
     solid = solid_of_revolution(radius * np.column_stack([np.cos(angle), np.sin(angle)]), colour, opacity, sides)
     return solid._replace(vertices=solid.vertices + np.asarray(centre, float))
 
 
 def raise_point(point: Point, height: float) -> np.ndarray:
-    """Return a point that is higher by `height` [m]."""
+    """Return the point raised by `height` [m]."""
     return np.asarray(point, float) + np.array([0.0, 0.0, height])
 
 
 def arrow(colour: str, radius: float, opacity: float = 1.0) -> Solid:
-    """Return an arrow of length 1 from the origin along z."""
+    """Return an arrow of length 1 m from the origin along z."""
     head = 2.5 * radius
     return solid_of_revolution(
         [(0.0, 0.0), (radius, 0.0), (radius, 0.8), (head, 0.8), (0.0, 1.0)], colour, opacity, THIN
@@ -68,7 +68,7 @@ def arrow(colour: str, radius: float, opacity: float = 1.0) -> Solid:
 def solid_of_revolution(
     profile: Sequence[Sequence[float]] | np.ndarray, colour: str, opacity: float = 1.0, sides: int = SIDES
 ) -> Solid:
-    """Return the solid that a profile makes about z; its rows are distance from z and height [m], from below."""
+    """Return the solid of revolution of a profile about z; its rows are radius and height [m] in ascending order."""
     rings = np.asarray(profile, float)
     angle = 2.0 * np.pi * np.arange(sides) / sides
     radius, height = rings[:, :1], np.repeat(rings[:, 1:], sides, axis=1)
@@ -77,7 +77,7 @@ def solid_of_revolution(
     faces = []
     for i in range(len(rings) - 1):
         low, high = sides * i, sides * (i + 1)
-        if abs(rings[i, 0]) > TIP:  # else a ring is a point, and its triangles have no area
+        if abs(rings[i, 0]) > TIP:  # otherwise the ring is a point, and its triangles have no area
             faces.append(np.column_stack([low + k, low + n, high + n]))
         if abs(rings[i + 1, 0]) > TIP:
             faces.append(np.column_stack([low + k, high + n, high + k]))
@@ -97,7 +97,7 @@ def merge(solids: Iterable[Solid]) -> list[Solid]:
 
 
 def join_meshes(solids: Sequence[Solid]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices and faces of solids as those of one."""
+    """Return the joint vertices and faces of solids."""
     starts = np.cumsum([0, *(len(solid.vertices) for solid in solids[:-1])])
     faces = [solid.faces + start for solid, start in zip(solids, starts, strict=True)]
     return np.concatenate([solid.vertices for solid in solids]), np.concatenate(faces)

@@ -26,15 +26,15 @@ GHOSTS = {"reference": DESIRED, "estimate": ESTIMATE}
 SCAN_COLOURS = {"lidar": BOUND, "depth_camera": "#882255"}
 FLOWN_WIDTH, DESIRED_WIDTH, CABLE_WIDTH = 4.0, 2.0, 2.5  # [pixel]
 WIND_SCALE = 0.12  # [m] of arrow for 1 m/s
-SIGMAS = 3.0  # of the drawn ellipsoid
-EVERY = 3  # frames between two changes of an arrow
+SIGMAS = 3.0  # standard deviations of the drawn ellipsoid
+EVERY = 3  # frames between two updates of an arrow
 _ELLIPSOID = ball((0.0, 0.0, 0.0), 1.0, ESTIMATE, 0.3)
-# Ends of the colour scale of a trail, from no error to the largest: dark blue to yellow, told apart by lightness too.
+# Colour scale of a trail, from no error to the largest, distinct in hue and lightness.
 SCALE = np.array([(0, 76, 140), (0, 142, 170), (86, 180, 110), (222, 186, 40), (224, 110, 20)], float)
 
 
 class Vehicle:
-    """One vehicle: its bodies, arrows and ghosts."""
+    """Nodes of one vehicle: its bodies, arrows and ghosts."""
 
     def __init__(
         self,
@@ -64,18 +64,18 @@ class Vehicle:
 
     def _add_body(self, node: str, body: Body, ghost: bool) -> None:
         self._frames.append(self._scene.add_frame(node, show_axes=False))
-        looks = [s._replace(colour=self.colour, opacity=0.45) if ghost else s for s in body.solids]
-        opaque = merge(solid for solid in looks if solid.opacity >= 1.0)
+        solids = [s._replace(colour=self.colour, opacity=0.45) if ghost else s for s in body.solids]
+        opaque = merge(solid for solid in solids if solid.opacity >= 1.0)
         if len(opaque) > 1:
             self._scene.add_glb(f"{node}/body", coloured_mesh(opaque))
-        for k, solid in enumerate(merge(solid for solid in looks if len(opaque) < 2 or solid.opacity < 1.0)):
+        for k, solid in enumerate(merge(solid for solid in solids if len(opaque) < 2 or solid.opacity < 1.0)):
             add_solid(self._scene, f"{node}/solid {k}", solid)
         scale = 0.0 if ghost else self._per_newton
         rotors = Rotors(self._scene, node, body.rotors, self.colour, scale) if body.rotors else None
         self._rotors.append(rotors)
 
     def _thrust_scale(self) -> float:
-        """Return the length of a thrust arrow for 1 N: two radii at the mean thrust."""
+        """Return the length of a thrust arrow for 1 N [m]: 1.6 radii at the mean thrust."""
         result = [
             (r.thrust[r.thrust > 0.0], r.radius) for b in self.motion.bodies for r in b.rotors if r.thrust is not None
         ]
@@ -92,18 +92,18 @@ class Vehicle:
         return self._optional[name]
 
     def show(self, samples: Samples, k: int) -> None:
-        """Move all nodes to the k-th of the samples."""
+        """Move all nodes to the k-th sample."""
         for frame, rotors, body in zip(self._frames, self._rotors, samples.bodies, strict=True):
             self._set(frame, "position", body.position[k])
             self._set(frame, "wxyz", body.orientation[k])
             if rotors is not None and body.angles is not None:
-                rotors.turn(body.angles[k])
+                rotors.set_angles(body.angles[k])
             if rotors is not None and body.thrusts is not None and k % EVERY == 0:
-                rotors.push(body.thrusts[k])
-        place = samples.bodies[0].position[k]
+                rotors.set_thrusts(body.thrusts[k])
+        position = samples.bodies[0].position[k]
         if samples.wind is not None:
             node = self._node("wind", lambda name: self._arrow(name, WIND, 0.035 * self._size))
-            self._point(node, raise_point(place, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
+            self._point(node, raise_point(position, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
         self._show_ghosts(samples, k)
         self._show_forces(samples, k)
         for beam in samples.beams:
@@ -118,7 +118,7 @@ class Vehicle:
             self._show_link(link, samples, k)
 
     def _show_ghosts(self, samples: Samples, k: int) -> None:
-        """Show bodies where the vehicle should be and where it is believed to be, and the ellipsoid of its position."""
+        """Show the ghosts of reference and estimate, and the error ellipsoid of the estimated position."""
         body = samples.bodies[0]
         own = (body.position[k], body.orientation[k])
         for name, places, attitudes in (
@@ -166,7 +166,7 @@ class Vehicle:
             self._lengthen(handle, scale * float(np.linalg.norm(vector)))
 
     def _set(self, handle: Any, field: str, value: Any) -> None:
-        """Set a property unless it has that value: a recording holds changes only."""
+        """Set a property if its value differs: a recording stores changes only."""
         plain = value if isinstance(value, bool) else tuple(float(v) for v in value)
         if self._sent.get((handle.name, field)) != plain:
             self._sent[handle.name, field] = plain
@@ -175,7 +175,14 @@ class Vehicle:
     def trail(
         self, path: np.ndarray, error: np.ndarray | None, most: float, name: str = "trail", line: Any = None
     ) -> Any:
-        """Add the flown path, shape (n, 3) [m], coloured by the error [m] up to `most`, or set it in a line of before.
+        """Add a line of the path, or set the path in an existing `line`.
+
+        Args:
+            path: positions [m], world, shape (n, 3).
+            error: error at each position [m] for the colours, shape (n,); None: the colour of the vehicle.
+            most: error [m] at the end of the colour scale.
+            name: name of the node below that of the vehicle.
+            line: handle of an existing line; None: add one.
 
         Returns:
             The handle of the line.
@@ -205,22 +212,22 @@ def add_shaders(scene: Any) -> None:
     _lines(scene, "/speck line", np.array([[[0.0, 0.0, 0.0], [0.0, 0.0, 1e-4]]], np.float32), BLADE, CABLE_WIDTH)
 
 
-def reach(moved: Motion) -> float:
+def reach(motion: Motion) -> float:
     """Return the size of the first body [m]: the distance of its farthest point or rotor tip, at least 0.1 m."""
-    body = moved.bodies[0]
+    body = motion.bodies[0]
     tips = [float(np.linalg.norm(rotor.hub)) + rotor.radius for rotor in body.rotors]
     corners = [float(np.linalg.norm(solid.vertices, axis=1).max()) for solid in body.solids if len(solid.vertices)]
     return max([0.1, *tips, *corners])
 
 
 def error_colours(share: np.ndarray) -> np.ndarray:
-    """Return red, green, blue of errors as shares of the largest, shape (n, 3) uint8."""
-    at = np.linspace(0.0, 1.0, len(SCALE))
-    return np.column_stack([np.interp(share.clip(0.0, 1.0), at, SCALE[:, i]) for i in range(3)]).astype(np.uint8)
+    """Return red, green, blue, shape (n, 3) uint8, of errors relative to the largest, shape (n,)."""
+    grid = np.linspace(0.0, 1.0, len(SCALE))
+    return np.column_stack([np.interp(share.clip(0.0, 1.0), grid, SCALE[:, i]) for i in range(3)]).astype(np.uint8)
 
 
 def vehicle_colours(count: int, compared: bool) -> Sequence[str]:
-    """Return colours of flights that are compared; of a fleet see `lapwing.studies.report.style`."""
+    """Return the colours of compared flights, or of a single one; see `lapwing.studies.report.style` for a fleet."""
     return (FLOWN, BOUND)[:count] if compared else (FLOWN,) * count
 
 

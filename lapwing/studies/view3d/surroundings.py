@@ -1,4 +1,4 @@
-"""Ground, terrain, obstacles, fences and flight plan of a scene in space."""
+"""Ground, terrain, obstacles, fences and flight plan of a scene in the 3D view."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -16,11 +16,11 @@ from lapwing.studies.view3d.solids import Solid, ball, box, merge, rod
 SKY = ((126, 170, 205), (226, 236, 242))  # red, green, blue at the top and at the horizon
 SOIL, LINE, WIDE_LINE = (214, 219, 215), (190, 197, 193), (160, 168, 164)
 OBSTACLE, EARTH = "#AEB9C2", "#B9C2B4"
-DAYLIGHT = 2.4  # from the sky, beside the sun
-POINTS = 81  # of the terrain along each side
-EVERY, LIFT = 8, 0.02  # points of the terrain between two lines on it, and their height above it [m]
-MARGIN = 30.0  # [m] of terrain around the flight
-FENCE_HEIGHT = 12.0  # [m] of the drawn walls
+DAYLIGHT = 2.4  # intensity of the light from the sky, in addition to the sun
+POINTS = 81  # points of the terrain along each side
+EVERY, LIFT = 8, 0.02  # points of the terrain between two grid lines; [m] height of the lines above it
+MARGIN = 30.0  # [m] width of the terrain around the flight
+FENCE_HEIGHT = 12.0  # [m] height of the drawn walls
 
 
 def add_ground(scene: Any, low: float) -> None:
@@ -29,7 +29,7 @@ def add_ground(scene: Any, low: float) -> None:
     scene.world_axes.visible = False
     share = np.linspace(0.0, 1.0, 128)[:, None, None] ** 0.8
     sky = (1.0 - share) * np.array(SKY[0]) + share * np.array(SKY[1])
-    scene.configure_environment_map(None)  # it would light the same, for half of the time of a picture
+    scene.configure_environment_map(None)  # it would give the same light for half of the rendering time
     scene.add_light_hemisphere("/daylight", sky_color=(235, 243, 255), ground_color=(190, 186, 178), intensity=DAYLIGHT)
     scene.set_background_image(np.repeat(sky, 8, axis=1).astype(np.uint8), format="png")
     scene.add_grid(
@@ -60,7 +60,7 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
     if not isinstance(relief, Level):
         relief_solid = _relief(relief, flight.truth.position)
         low = float(relief_solid.vertices[:, 2].min()) - 0.05
-        # A thin surface would cast a pattern of shadows on itself.
+        # a thin surface would cast a pattern of shadows on itself
         add_solid(scene, "/surroundings/relief", relief_solid, cast_shadow=False)
         lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))
         scene.add_line_segments("/surroundings/lines", lines, WIDE_LINE, thickness=1.0, thickness_units="screen")
@@ -71,7 +71,7 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
 
 
 def add_solid(scene: Any, name: str, solid: Solid, **options: Any) -> Any:
-    """Add the triangles of a solid; return the handle."""
+    """Add the mesh of a solid and return its handle."""
     opaque = solid.opacity >= 1.0
     return scene.add_mesh_simple(
         name,
@@ -94,14 +94,14 @@ def _obstacles(terrain: Terrain) -> Iterator[Solid]:
     for block in terrain.box:
         solid = box((0.0, 0.0, 0.5 * block.top), (*block.size, max(abs(block.top), 0.01)), OBSTACLE)
         c, s = np.cos(block.heading), np.sin(block.heading)
-        turned = solid.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-        yield solid._replace(vertices=turned + np.array([*block.position, 0.0]))
+        rotated = solid.vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        yield solid._replace(vertices=rotated + np.array([*block.position, 0.0]))
     for post in terrain.cylinder:
         yield rod((*post.position, 0.0), (*post.position, post.top), post.radius, OBSTACLE)
 
 
 def _relief(relief: Any, path: np.ndarray) -> Solid:
-    """Return the surface of the ground around a path."""
+    """Return the surface of the ground around a path [m], shape (n, 3)."""
     low, high = path[:, :2].min(axis=0) - MARGIN, path[:, :2].max(axis=0) + MARGIN
     x, y = (np.linspace(low[i], high[i], POINTS) for i in (0, 1))
     heights = np.array([[surface(relief, float(a), float(b))[0] for a in x] for b in y])
@@ -114,15 +114,15 @@ def _relief(relief: Any, path: np.ndarray) -> Solid:
 
 
 def _relief_lines(points: np.ndarray) -> np.ndarray:
-    """Return the segments of a grid that lies on the surface at points (rows, columns, 3), shape (n, 2, 3)."""
+    """Return the segments [m] of a grid on the surface at points (rows, columns, 3), shape (n, 2, 3)."""
     raised = points + np.array([0.0, 0.0, LIFT])
     lines = (raised[::EVERY], raised[:, ::EVERY].swapaxes(0, 1))
-    pairs = [np.stack([some[:, :-1], some[:, 1:]], axis=2).reshape(-1, 2, 3) for some in lines]
+    pairs = [np.stack([grid[:, :-1], grid[:, 1:]], axis=2).reshape(-1, 2, 3) for grid in lines]
     return np.concatenate(pairs).astype(np.float32)
 
 
 def _fence(flight: FlightData) -> Iterator[Solid]:
-    """Yield translucent walls: orange where the vehicle must stay out, green where it must stay in."""
+    """Yield translucent walls: orange for exclusion, green for inclusion."""
     for shape in fence_shapes(flight):
         corners, count = shape.corners, len(shape.corners)
         vertices = np.concatenate([np.column_stack([corners, np.full(count, z)]) for z in (0.0, FENCE_HEIGHT)])
@@ -133,6 +133,6 @@ def _fence(flight: FlightData) -> Iterator[Solid]:
 
 def _plan(flight: FlightData) -> Iterator[Solid]:
     """Yield the waypoints of the plan as balls on thin posts."""
-    for place in waypoints(flight):
-        yield ball(place, 0.15, BOUND)
-        yield rod((place[0], place[1], 0.0), place, 0.02, QUIET)
+    for point in waypoints(flight):
+        yield ball(point, 0.15, BOUND)
+        yield rod((point[0], point[1], 0.0), point, 0.02, QUIET)

@@ -2,7 +2,7 @@
 (() => {
   const facts = window.lapwing, view = window.lapwingView;
 
-  // What can be hidden: nodes by name, as viser's own panel hides them.
+  // Layers that can be hidden: patterns of node names, hidden as in viser's panel.
   const LAYERS = { reference: "reference", estimate: "estimate", sensors: "(sonar|rangefinder|lidar|depth_camera)", wind: "wind" };
   const TINTS = { reference: "#4a5560", estimate: "#cc79a7", sensors: "#e69f00", wind: "#56b4e9" };
   const hidden = new Set(); // names of layers
@@ -10,7 +10,7 @@
     const shape = new RegExp(`^/\\d+ [^/]*/([^/]*/)?${LAYERS[layer]}$`), tree = window.__viserSceneTree?.getState() ?? {};
     return Object.keys(tree).filter((name) => shape.test(name)).map((name) => tree[name]);
   }
-  view.changed = () => { // a live scene gets new nodes
+  view.changed = () => { // a live scene may have new nodes
     for (const layer of hidden) for (const node of nodesOf(layer)) node.overrideVisibility = false;
   };
   view.show = (layer, shown) => {
@@ -37,12 +37,12 @@
     return menu;
   }
 
-  function select(name, options, chosen) {
+  function select(name, options, onSelect) {
     const box = document.createElement("select");
     box.name = name;
     box.title = name;
     options.forEach((text, k) => box.add(new Option(text, k)));
-    box.onchange = () => chosen(Number(box.value));
+    box.onchange = () => onSelect(Number(box.value));
     return box;
   }
   addEventListener("DOMContentLoaded", () => {

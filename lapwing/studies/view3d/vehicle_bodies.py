@@ -1,4 +1,4 @@
-"""Bodies of every vehicle model, from the scene of a flight."""
+"""Bodies of each vehicle model, from the scene of a flight."""
 
 from collections.abc import Callable
 from typing import Any
@@ -12,14 +12,14 @@ from lapwing.studies.view3d.bodies import LEVEL, Body, Link, Motion, Rotor, body
 from lapwing.studies.view3d.solids import THIN, Solid, ball, box, merge, raise_point, rod
 
 FRAME, MOTOR, LEG, FRONT, PAYLOAD, HULL = "#3A4149", "#14181C", "#6B757E", "#E69F00", "#B9834B", "#C3CAD1"
-DENSITY = 400.0  # [kg/m^3] of a payload or load, which fixes the size of its box
+DENSITY = 400.0  # [kg/m^3] density of a payload or load, which defines the size of its box
 GAP = 0.03  # [m] between arms and payload
-CARRIER_ARM, CARRIED_EDGE = 0.2, 0.12  # [m] the scene of a cooperative load has masses only
-SATELLITE = 1.0  # [m] longest edge of a gyrostat, whose mass is not in the scene
+CARRIER_ARM, CARRIED_EDGE = 0.2, 0.12  # [m] for a cooperative load, whose scene has masses only
+SATELLITE = 1.0  # [m] longest edge of a gyrostat, whose scene has no dimensions
 
 
 def motion(flight: FlightData) -> Motion:
-    """Return the moving bodies of a flight in the shape of its vehicle model, otherwise three axes."""
+    """Return the moving bodies of a flight in the shape of its vehicle model, by default three axes."""
     model = flight.origin.scene.get("vehicle", {}).get("model", "rigid_body")
     result = MODELS[model](flight) if model in MODELS else None
     if result is not None:
@@ -33,12 +33,14 @@ def _axes(length: float, radius: float) -> list[Solid]:
 
 
 def _multirotor(flight: FlightData) -> Motion | None:
-    """Return the airframe as one body, or its recorded bodies, and what hangs on it."""
+    """Return the airframe as one body, or its recorded bodies, and a slung load."""
     scene = flight.origin.scene
     airframe = scene.get("airframe", {})
     if "rotors" not in airframe:
         return None
-    centre = np.array(airframe.get("mass", {}).get("centre", (0.0, 0.0, 0.0)))  # the truth is of the centre of mass
+    centre = np.array(
+        airframe.get("mass", {}).get("centre", (0.0, 0.0, 0.0))
+    )  # the true position is that of the centre of mass
     hubs = np.array(airframe["rotors"]["position"]) - centre
     radius = 0.5 * airframe.get("propeller", {}).get("diameter", 0.8 * float(np.linalg.norm(hubs[0])))
     solids = _hull(scene, centre) or _airframe(airframe, hubs, centre, radius)
@@ -56,7 +58,7 @@ def _multirotor(flight: FlightData) -> Motion | None:
 
 
 def _hull(scene: dict[str, Any], centre: np.ndarray) -> list[Solid]:
-    """Return the mesh that the airframe names, measured from the centre of mass; empty without one."""
+    """Return the airframe's mesh relative to the centre of mass; empty without one."""
     if (name := scene["airframe"].get("mesh")) is None:
         return []
     mesh = unpack(scene[Meshes.TABLE][name])
@@ -64,19 +66,21 @@ def _hull(scene: dict[str, Any], centre: np.ndarray) -> list[Solid]:
 
 
 def _airframe(airframe: dict[str, Any], hubs: np.ndarray, origin: np.ndarray, radius: float) -> list[Solid]:
-    """Return centre plate, arms, motors, feet and payload; hubs are measured from the centre of mass `origin`."""
+    """Return centre plate, arms, motors, feet and payload; `hubs` are relative to the centre of mass `origin` [m]."""
     centre, reach = hubs.mean(axis=0), float(np.linalg.norm(hubs - hubs.mean(axis=0), axis=1).max())
     thick, front = 0.045 * reach, float((hubs - centre)[:, 0].max())
     plate = np.array([0.0, 0.0, 0.5 * thick])
-    nose = centre + np.array([0.3 * reach, 0.0, thick])  # where x points
+    nose = centre + np.array([0.3 * reach, 0.0, thick])  # in the direction of x
     solids = [
         rod(centre - plate, centre + plate, 0.3 * reach, FRAME),
         box(raise_point(centre, 1.6 * thick), (0.42 * reach, 0.22 * reach, 2.2 * thick), LEG),  # battery
         box(nose, (0.1 * reach, 0.12 * reach, 1.6 * thick), FRONT),
     ]
     for hub in hubs:
-        ahead = hub[0] - centre[0] > 0.3 * front
-        solids.append(rod(centre, raise_point(hub, -0.4 * thick), 0.5 * thick, FRONT if ahead else FRAME, sides=THIN))
+        is_front = hub[0] - centre[0] > 0.3 * front
+        solids.append(
+            rod(centre, raise_point(hub, -0.4 * thick), 0.5 * thick, FRONT if is_front else FRAME, sides=THIN)
+        )
         solids.append(rod(raise_point(hub, -thick), raise_point(hub, 0.2 * thick), 0.14 * radius, MOTOR))
     for foot in np.array(airframe.get("contact", {}).get("feet", ())).reshape(-1, 3) - origin:
         top = centre + 0.75 * (np.array([foot[0], foot[1], centre[2]]) - centre)
@@ -93,8 +97,7 @@ def _rotors(flight: FlightData, airframe: dict[str, Any], hubs: np.ndarray, radi
     """Return the propellers with their angles [rad] and thrusts [N] at the times of the truth."""
     count, truth = len(hubs), flight.truth
     spins = [-1.0 if way == "cw" else 1.0 for way in airframe["rotors"].get("spin_direction", ["ccw"] * count)]
-    known = truth.rotor_speed.ndim == 2 and truth.rotor_speed.shape[1] == count
-    if not known:
+    if truth.rotor_speed.ndim != 2 or truth.rotor_speed.shape[1] != count:
         return [Rotor(hub, radius, np.zeros(len(truth))) for hub in hubs]
     step = np.diff(truth.times, prepend=truth.times[0])
     angles = np.cumsum(truth.rotor_speed * step[:, None], axis=0).T
@@ -106,22 +109,22 @@ def _rotors(flight: FlightData, airframe: dict[str, Any], hubs: np.ndarray, radi
 
 
 def _cross(arm: float, hubs: np.ndarray) -> list[Solid]:
-    """Return two crossed arms with motors; the first hub is ahead where it lies on x."""
+    """Return two crossed arms with motors; the first hub is marked as the front."""
     solids = [rod((0.0,) * 3, hub, 0.03 * arm, FRONT if k == 0 else FRAME) for k, hub in enumerate(hubs)]
     solids += [rod(raise_point(hub, -0.06 * arm), raise_point(hub, 0.02 * arm), 0.08 * arm, MOTOR) for hub in hubs]
     return merge([*solids, box((0.0,) * 3, (0.3 * arm, 0.3 * arm, 0.15 * arm), LEG)])
 
 
 def _os4(flight: FlightData) -> Motion:
-    """Return rotors ahead, right, behind and left, numbered as in the source; the log has no rotor angles."""
+    """Return rotors in front, right, rear and left, numbered as in the source; the log has no rotor angles."""
     arm = flight.origin.scene["os4"]["arm"]
     hubs = arm * np.array([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)])
-    still = np.zeros(len(flight.truth))
-    return Motion((body_of_truth(flight, _cross(arm, hubs), [Rotor(hub, 0.6 * arm, still) for hub in hubs]),))
+    angles = np.zeros(len(flight.truth))
+    return Motion((body_of_truth(flight, _cross(arm, hubs), [Rotor(hub, 0.6 * arm, angles) for hub in hubs]),))
 
 
 def _cooperative_load(flight: FlightData) -> Motion | None:
-    """Return the load as a box, the quadrotors as crosses, a rigid link to each."""
+    """Return the load as a box and the quadrotors as crosses, with a rigid link to each."""
     if not flight.has("body_states"):
         return None
     count = flight.topic("body_states").position.shape[1] - 1
@@ -141,7 +144,7 @@ def _gyrostat(flight: FlightData) -> Motion:
 
 
 def _unloading_motion(flight: FlightData) -> Motion | None:
-    """Return pack, door, rollers and the crate that holds them."""
+    """Return pack, door, rollers and crate."""
     if not flight.has("body_states"):
         return None
     crate, states = flight.origin.scene["unloading"], flight.topic("body_states")
@@ -149,9 +152,9 @@ def _unloading_motion(flight: FlightData) -> Motion | None:
     across = np.array((0.0, half, 0.0))
     door = [box((0.0, 0.0, length / 2.0), (0.01, 2.0 * half, length), BOUND)]
     roller = ([rod(-across, across, crate["roller_radius"], QUIET)], ())
-    looks: list[Any] = [([box((0.0,) * 3, crate["pack_size"], FLOWN)], ()), (door, ())]
-    looks += [*[roller] * (count - 3), ((), ())]
-    return Motion((*recorded_bodies(flight, looks), _crate(crate, states.times)))
+    shapes: list[Any] = [([box((0.0,) * 3, crate["pack_size"], FLOWN)], ()), (door, ())]
+    shapes += [*[roller] * (count - 3), ((), ())]
+    return Motion((*recorded_bodies(flight, shapes), _crate(crate, states.times)))
 
 
 def _crate(crate: dict[str, Any], times: np.ndarray) -> Body:
@@ -162,8 +165,8 @@ def _crate(crate: dict[str, Any], times: np.ndarray) -> Body:
     corners = [hinge, hinge + back, hinge + back + up]
     edges = [(corners[k] + side * across, corners[k + 1] + side * across) for k in (0, 1) for side in (-1.0, 1.0)]
     edges += [(corner - across, corner + across) for corner in corners]
-    still, level = np.zeros((len(times), 3)), np.tile(LEVEL, (len(times), 1))
-    return Body("crate", times, still, level, tuple(merge(rod(a, b, 0.01, FRAME) for a, b in edges)))
+    origin, level = np.zeros((len(times), 3)), np.tile(LEVEL, (len(times), 1))
+    return Body("crate", times, origin, level, tuple(merge(rod(a, b, 0.01, FRAME) for a, b in edges)))
 
 
 MODELS: dict[str, Callable[[FlightData], Motion | None]] = {

@@ -1,18 +1,18 @@
-"""The 3D view of a flight as a value: shown by a notebook, or saved as a page."""
+"""3D view of a flight for a notebook or a file."""
 
 import html
 from pathlib import Path
 
 
 class View:
-    """A page with the 3D view of one or more flights, which needs no network."""
+    """Page with the 3D view of one or more flights, which works offline."""
 
     def __init__(self, page: str, height: int):
-        """Create from the text of the page and the height of a notebook cell [pixel]."""
+        """Create from the HTML text of the page and the height in a notebook [pixel]."""
         self.page, self._height = page, height
 
     def save(self, path: str | Path) -> Path:
-        """Write the page; return its path. Raises ValueError if it cannot be written."""
+        """Write the page and return its path. Raise ValueError if it cannot be written."""
         try:
             Path(path).write_text(self.page, encoding="utf-8")
         except OSError as fault:

@@ -40,7 +40,7 @@ def begin_campaign(path, **changes):
 def complete(tmp_path_factory):
     """Return a complete campaign, flown in this process, and its digest."""
     folder, first = begin_campaign(tmp_path_factory.mktemp("campaign") / "one")
-    campaign(folder, first, workers.here)
+    campaign(folder, first, workers.run_here)
     return folder, folder.finish(csv=True)
 
 
@@ -67,7 +67,7 @@ def test_row_has_drawn_values_and_end_state(complete):
 
 def test_interrupted_campaign_continues_with_other_workers(complete, tmp_path):
     folder, first = begin_campaign(tmp_path / "c")
-    campaign(folder, first, workers.here, shards=range(0, len(folder.shards), 2))
+    campaign(folder, first, workers.run_here, shards=range(0, len(folder.shards), 2))
     (tmp_path / "c" / "shards" / ".00001.csv.77").write_text("half written")
     assert len(folder.missing()) == len(folder.shards) // 2
     counts = []
@@ -182,9 +182,9 @@ def test_end_at_interval_width_is_independent_of_workers(tmp_path):
     counts = []
 
     def backwards(call, tasks):
-        yield from reversed(list(workers.here(call, tasks)))
+        yield from reversed(list(workers.run_here(call, tasks)))
 
-    for run_tasks in (workers.here, backwards):
+    for run_tasks in (workers.run_here, backwards):
         folder, first = begin_campaign(tmp_path / run_tasks.__name__)
         counts.append(campaign(folder, first, run_tasks, half_width=0.2))
         assert counts[-1].failure.half_width <= 0.2
@@ -198,7 +198,7 @@ def test_runs_beyond_interval_width_are_kept(tmp_path):
         yield from ()
 
     folder, first = begin_campaign(tmp_path / "all")
-    whole = campaign(folder, first, workers.here)
+    whole = campaign(folder, first, workers.run_here)
     digest = folder.finish()
     shortened = campaign(folder, first, no_workers, half_width=0.2)
     assert shortened.runs < RUNS
@@ -274,7 +274,7 @@ def test_report_json_and_repeated_run(complete, tmp_path, monkeypatch):
 def test_comparison_pairs_runs(complete, tmp_path):
     folder, _ = complete
     other, first = begin_campaign(tmp_path / "heavier", overrides=(*SHORT, "autopilot.gains=paper"))
-    campaign(other, first, workers.here)
+    campaign(other, first, workers.run_here)
     code, output = run_lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
     assert "different: overrides\n" in output
@@ -291,7 +291,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
     assert width < 0.5 * Results(folder)["energy"].std()  # both have the same drawn masses
     assert run_lapwing("compare", folder.path, tmp_path)[0] == 2
     laid_out, first = begin_campaign(tmp_path / "laid_out", design="lhs")
-    campaign(laid_out, first, workers.here)
+    campaign(laid_out, first, workers.run_here)
     drawn_keys = [f"{key} (different values)" for key in sorted(VARY)]
     assert compare(folder.path, laid_out.path).differing == ["design", *drawn_keys]
 

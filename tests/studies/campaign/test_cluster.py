@@ -25,7 +25,7 @@ def test_killed_and_late_workers_do_not_change_results(tmp_path):
     new_plan = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
     first = reference(*first_setup(new_plan))
     local, folder = (begin(tmp_path / name, new_plan, manifest(new_plan, first)) for name in ("alone", "cluster"))
-    campaign(local, first, workers.here)
+    campaign(local, first, workers.run_here)
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
         distributed.Client(cluster, set_as_default=False) as client,

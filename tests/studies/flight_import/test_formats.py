@@ -1,4 +1,4 @@
-"""Flights written in the format of each autopilot, by an encoding of their own, come back as the same recording."""
+"""Import of flights in the format of each autopilot, from files of independent writers."""
 
 import subprocess
 import sys
@@ -173,7 +173,7 @@ def test_damaged_file_is_rejected_in_one_line(tmp_path, name, content):
 def test_telemetry_log_may_end_within_a_message(tmp_path, flight):
     WRITERS["f.tlog"](tmp_path / "f.tlog", flight)
     whole = (tmp_path / "f.tlog").read_bytes()
-    vibration = b"\xfd\x20\x00\x00\x00\x01\x01\xf1\x00\x00"  # the header of a message that the log has nowhere else
+    vibration = b"\xfd\x20\x00\x00\x00\x01\x01\xf1\x00\x00"  # header of an unknown message
     (tmp_path / "f.tlog").write_bytes(whole + whole[:8] + vibration + bytes(8))
     assert len(open_flight(tmp_path / "f.tlog")) >= SAMPLES - 2
 

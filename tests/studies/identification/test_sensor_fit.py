@@ -1,4 +1,4 @@
-"""Sensors of simulated flights, whose parameters are known, come back."""
+"""Estimation of known sensor parameters from simulated flights."""
 
 import subprocess
 import sys
@@ -20,7 +20,7 @@ INTERVAL, SECONDS = 0.01, 300.0
 
 @pytest.fixture(scope="module")
 def flight():
-    """Rest for 150 s, then circles, with sensors whose errors are drawn here."""
+    """Rest for 150 s, then circles, with random sensor errors."""
     draw = np.random.default_rng(1)
     t = INTERVAL * np.arange(round(SECONDS / INTERVAL))
     moving = np.clip((t - 150.0) / 5.0, 0.0, 1.0)

@@ -74,7 +74,7 @@ def test_command_overlays_closed_loop(log, tmp_path):
     assert "closed loop: flown" in done.stdout
     (flight,) = json.loads(out.read_text())["closed_loop"]
     assert flight["difference"] < 0.05
-    assert "the recorded setpoints, flown" in page_text(page)
+    assert "Closed loop with the recorded setpoints" in page_text(page)
 
 
 @pytest.mark.parametrize("scene", ["delivery_mission", "crazyflie_21", "px4_quad", "betaflight_quad", "ardupilot_quad"])

@@ -1,10 +1,9 @@
-"""The plots of the report: one file each, found by scanning this folder.
+"""Plots of the report: one file for each, discovered in this folder.
 
-A plot file has `ORDER` (its place on the page), `TITLE`, `NEEDS` (the vehicle's topics that it cannot do without), and
-`draw(flight)`, which returns a `lapwing.studies.report.plot.Plot`, or raises NotRecordedError with what is missing
-in the log.
-A plot that says something of certain models of vehicles only names them in `MODELS`;
-one of all vehicles of a fleet has `FLEET = True`, and is left out where there is only one.
+A plot file has `ORDER` (its position on the page), `TITLE`, `NEEDS` (required topics of the vehicle), and
+`draw(flight)`, which returns a `lapwing.studies.report.plot.Plot`, or raises NotRecordedError with a text on the
+missing data. A plot for certain vehicle models lists them in `MODELS`; a plot of all vehicles of a fleet has
+`FLEET = True`, and is omitted for a single vehicle.
 """
 
 from types import ModuleType

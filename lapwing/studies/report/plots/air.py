@@ -11,7 +11,7 @@ ORDER = 80
 TITLE = "Air: wind and density"
 NEEDS = ("ground_truth",)
 MODELS = STEERED
-SECOND = 1.0  # [s] over which the wind is averaged: turbulence of each tick would hide all else
+AVERAGE = 1.0  # [s] averaging time of the wind, to smooth the turbulence
 
 
 def draw(flight: FlightData) -> Plot:
@@ -24,18 +24,18 @@ def draw(flight: FlightData) -> Plot:
         panels.append(Panel(_wind(t, wind), "wind [m/s]"))
     if density.any():
         panels.append(Panel((Line(t, density),), "density [kg/m³]"))
-    note = f" Wind: mean over {SECOND:g} s, and its range within that time (shaded)." if wind.any() else ""
-    note = note or " The log has no velocity of the wind."
+    note = f" Wind: mean over {AVERAGE:g} s, and its range within that time (shaded)." if wind.any() else ""
+    note = note or " The log has no wind."
     return Plot(
-        caption=f"Velocity of the air in the world frame (ENU) and its density where the vehicle is.{note}",
+        caption=f"Velocity of the air in the world frame (ENU), and its density, at the vehicle.{note}",
         **column(panels, 1.9, **over(flight)),
     )
 
 
 def _wind(times: np.ndarray, wind: np.ndarray) -> tuple[Mark, ...]:
-    """Return mean and range of the wind [m/s], shape (n, 3), over each SECOND."""
-    place = np.floor((times - times[0]) / SECOND).astype(int)
-    starts = np.flatnonzero(np.diff(place, prepend=-1))
+    """Return lines of the mean and bands of the range over each AVERAGE of the wind [m/s], shape (n, 3)."""
+    interval = np.floor((times - times[0]) / AVERAGE).astype(int)
+    starts = np.flatnonzero(np.diff(interval, prepend=-1))
     counts = np.diff(np.append(starts, len(times)))
     middle = np.add.reduceat(times, starts) / counts
     low, high = np.minimum.reduceat(wind, starts), np.maximum.reduceat(wind, starts)

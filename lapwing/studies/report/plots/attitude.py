@@ -1,4 +1,4 @@
-"""Roll, pitch, yaw over time, and how far they are from what was asked (the paper's Figure 23)."""
+"""Roll, pitch, yaw and their errors over time (the paper's Figure 23)."""
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import DEGREES, three_axes
@@ -13,5 +13,5 @@ def draw(flight: FlightData) -> Plot:
     """Plot each angle in a row."""
     caption = "Attitude as roll, pitch and yaw."
     if len(flight.reference):
-        caption += " The reference of roll and pitch is what the inner loops follow; that of yaw is the setpoint."
+        caption += " The references of roll and pitch are those of the inner loops; that of yaw is the setpoint."
     return three_axes(flight, 3, DEGREES * flight.truth.attitude, "°", DEGREES, caption)

@@ -16,11 +16,11 @@ def draw(flight: FlightData) -> Plot:
     """Plot each quantity in a panel, with the limits of charge and voltage."""
     use = battery_use(flight)
     if use is None:
-        raise NotRecordedError("the scene models no battery; [effects.battery] or [effects.battery_thevenin] does")
+        raise NotRecordedError("the scene has no battery model; use [effects.battery] or [effects.battery_thevenin]")
     t = use.times
     charge: list[Mark] = [Line(t, 100.0 * use.charge)]
-    if use.low is not None:
-        charge.append(Level(100.0 * use.low, "low-battery warning", BOUND, "dash"))
+    if use.low_threshold is not None:
+        charge.append(Level(100.0 * use.low_threshold, "low-battery warning", BOUND, "dash"))
     voltage: list[Mark] = [Line(t, use.voltage)]
     if use.cutoff is not None:
         voltage.append(Level(use.cutoff, "cut-off", BOUND, "dot"))
@@ -29,6 +29,6 @@ def draw(flight: FlightData) -> Plot:
         Panel(tuple(voltage), "voltage [V]"),
         Panel((Line(t, use.current),), "current [A]"),
         Panel((Line(t, use.voltage * use.current),), "power [W]"),
-        Panel((Line(t, use.drawn),), "energy drawn [W h]"),
+        Panel((Line(t, use.energy_drawn),), "energy drawn [W h]"),
     )
-    return Plot(caption=f"The pack under load. {use}", **column(panels, 1.35, **over(flight)))
+    return Plot(caption=f"Battery pack under load. {use}", **column(panels, 1.35, **over(flight)))

@@ -21,24 +21,24 @@ def draw(flight: FlightData) -> Plot:
     """Plot errors of position, velocity (world frame) and attitude (rotation vector, body frame), a row per axis."""
     error, sigma = errors(flight), deviations(flight.estimate)
     if not sigma.any():
-        raise NotRecordedError("the estimate states no uncertainty (it is the truth)")
+        raise NotRecordedError("the estimate has no standard deviations (it is the truth)")
     inside = np.mean(np.abs(error) <= 3 * sigma)
     t, panels, cut = flight.estimate.stamps, [], 0
     for column, (quantity, unit, scale) in enumerate(_COLUMNS):
         for row, name in enumerate("xyz"):
-            off, bound = (scale * values[:, 3 * column + row] for values in (error, 3 * sigma))
-            # A touch-down's short peak must not flatten the flight: the scale leaves out 3 % of the samples.
-            half = 1.3 * max(np.quantile(np.abs(off), 0.97), np.quantile(bound, 0.95), 1e-12)
-            largest = np.abs(off).max()
-            cut += int(np.sum(np.abs(off) > half))
-            beyond = f"max {largest:.2g}" + (" ▲" if largest > half else "")
-            marks = Band(t, -bound, bound, "3 sigma"), Line(t, off, "estimate minus truth", width=1.0)
+            deviation, bound = (scale * values[:, 3 * column + row] for values in (error, 3 * sigma))
+            # The scale excludes 3 % of the samples, so that a short peak at touch-down does not flatten the flight.
+            half = 1.3 * max(np.quantile(np.abs(deviation), 0.97), np.quantile(bound, 0.95), 1e-12)
+            largest = np.abs(deviation).max()
+            cut += int(np.sum(np.abs(deviation) > half))
+            title = f"max {largest:.2g}" + (" ▲" if largest > half else "")
+            marks = Band(t, -bound, bound, "3 sigma"), Line(t, deviation, "estimate minus truth", width=1.0)
             label = f"{quantity} {name} [{unit}]"
-            panels.append(Panel(marks, label, title=beyond, row=row, column=column, y_range=(-half, half)))
-    note = f"{cut} samples lie beyond the scales of their panels (▲)" if cut else "Nothing lies beyond the scales"
+            panels.append(Panel(marks, label, title=title, row=row, column=column, y_range=(-half, half)))
+    note = f"{cut} samples exceed the scales of their panels (▲)" if cut else "No sample exceeds the scales"
     caption = (
-        "Estimate minus truth at the estimate's own time, within three standard deviations as the estimator says "
-        f"(shaded); {100 * inside:.1f} % of the errors lie inside. {note}. "
+        "Estimate minus truth at the time of the estimate, and three standard deviations of the estimator (shaded); "
+        f"{100 * inside:.1f} % of the errors lie within them. {note}. "
         "Attitude as rotation vector in the body frame. " + refusals(flight)
     )
     return Plot(tuple(panels), caption, 6.6, (1.0,) * 3, (1.0,) * 3, **over(flight))
@@ -50,21 +50,21 @@ def deviations(estimate: TopicView) -> np.ndarray:
 
 
 def errors(flight: FlightData) -> np.ndarray:
-    """Estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
-    from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
+    """Return estimate minus truth [m], [m/s], [rad], shape (n, 9); the attitude's is log(R_true^T R_estimate)."""
+    from scipy.spatial.transform import Rotation  # imported on use: it takes 0.2 s
 
     stamps, own = flight.truth.stamps, flight.estimate.stamps
     later = np.searchsorted(stamps, own).clip(1, len(stamps) - 1)
     nearer = stamps[later] - own > own - stamps[later - 1]
-    at = later - nearer
+    rows = later - nearer
     both = flight.truth, flight.estimate
     true, estimated = (np.hstack([view.position, view.velocity]) for view in both)
     R_true, R_estimate = (Rotation.from_quat(view.orientation) for view in both)
-    return np.column_stack([estimated - true[at], (R_true[at].inv() * R_estimate).as_rotvec()])
+    return np.column_stack([estimated - true[rows], (R_true[rows].inv() * R_estimate).as_rotvec()])
 
 
 def refusals(flight: FlightData) -> str:
-    """Return the share of rejected measurements of each source as a sentence."""
+    """Return the number of rejected measurements of each source as a sentence."""
     count = Counter(source for sources in flight.estimate.rejected_sources for source in sources)
-    note = ", ".join(f"{source} {times}" for source, times in count.most_common())
+    note = ", ".join(f"{source} {number}" for source, number in count.most_common())
     return f"Measurements rejected: {note or 'none'}."

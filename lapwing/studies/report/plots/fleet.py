@@ -1,4 +1,4 @@
-"""The paths of all vehicles of a fleet from above, and how near they come to one another."""
+"""Paths of all vehicles of a fleet from above, and their minimum separation."""
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.plot import Level, Line, Panel, Plot
@@ -22,9 +22,9 @@ def draw(flight: FlightData) -> Plot:
         marks.append(Line(x[-1:], y[-1:], colour=colour, marker="square", size=7.0, joined=False))
     plan = Panel(tuple(marks), "y north [m]", "x east [m]", timed=False, equal=True)
     least, pair = least_over_time(flight.fleet), nearest(flight.fleet)
-    over = (Line(flight.truth.times[: len(least)], least), Level(pair.distance))
-    apart = Panel(over, "least distance of two [m]", column=1)
+    marks_over_time = (Line(flight.truth.times[: len(least)], least), Level(pair.distance))
+    separation = Panel(marks_over_time, "minimum separation [m]", column=1)
     caption = (
-        f"All vehicles from above, north up (left; open: start, square: end), and the least distance of two. {pair}."
+        f"All vehicles from above, north up (left; open: start, square: end), and their minimum separation. {pair}."
     )
-    return Plot((plan, apart), caption, 4.9, (1.0,), (1.0, 1.0))
+    return Plot((plan, separation), caption, 4.9, (1.0,), (1.0, 1.0))

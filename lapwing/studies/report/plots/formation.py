@@ -1,4 +1,4 @@
-"""Quadrotors that carry a load: how well it follows its path, how the links hang, and the view from the side."""
+"""Quadrotors with a common load: error of the load from its path, angles of the links, thrusts, and side view."""
 
 from typing import Any
 
@@ -13,52 +13,57 @@ ORDER = 35
 TITLE = "Load, links and quadrotors"
 NEEDS = ("ground_truth", "body_states", "rotor_wrench")
 MODELS = ("cooperative_load",)
-INSTANTS = 11  # pictures of the links
+INSTANTS = 11  # number of times at which the side view shows the links
 
 
 def draw(flight: FlightData) -> Plot:
     """Plot three panels over time on the left, the side view on the right."""
     t = flight.times("body_states")
-    places = flight.topic("body_states").position
+    position = flight.topic("body_states").position
     desired = _desired_path(flight, t)
-    error = np.linalg.norm(places[:, 0] - desired, axis=1)
-    links = places[:, :1] - places[:, 1:]
+    error = np.linalg.norm(position[:, 0] - desired, axis=1)
+    links = position[:, :1] - position[:, 1:]
     angle = np.degrees(np.arctan2(links[..., 0], -links[..., 2]))
     thrust = flight.topic("rotor_wrench").thrust
     panels = (
         Panel((Line(t, np.where(error > 0.0, error, np.nan), colour=BOUND),), "load error [m]", log_y=True),
         Panel(_each(t, angle), "link from vertical [°]", row=1),
         Panel(_each(flight.times("rotor_wrench"), thrust), "thrust [N]", row=2),
-        side(places, desired),
+        side_view(position, desired),
     )
     caption = (
         "Distance of the load from its path, the links' angles in the x-z plane and the thrusts; on the right the "
-        f"whole from the side at {INSTANTS} instants. At the end the load is {error[-1]:.2g} m from its path."
+        f"side view at {INSTANTS} times. The final distance of the load from its path is {error[-1]:.2g} m."
     )
     return Plot(panels, caption, 7.2, (1.0,) * 3, (1.2, 1.0), **over(flight))
 
 
-def side(places: np.ndarray, desired: np.ndarray) -> Panel:
-    """Return the panel of the load's path and the links in the xz plane."""
+def side_view(position: np.ndarray, desired: np.ndarray) -> Panel:
+    """Return the panel of the load's path and the links in the xz plane.
+
+    Args:
+        position: positions of the load and the quadrotors [m], shape (n, 1 + k, 3).
+        desired: desired path of the load [m], shape (n, 3).
+    """
     marks = [
-        Line(places[:, 0, 0], places[:, 0, 2], "load", BOUND),
-        reference(desired[:, 0], desired[:, 2], name="wanted path"),
+        Line(position[:, 0, 0], position[:, 0, 2], "load", BOUND),
+        reference(desired[:, 0], desired[:, 2], name="desired path"),
     ]
-    some = places[np.linspace(0, len(places) - 1, INSTANTS).astype(int)]
-    for i in range(places.shape[1] - 1):
-        quad, colour = some[:, 1 + i], COLOURS[i % len(COLOURS)]
-        gap = np.full(len(some), np.nan)
-        x = np.column_stack([quad[:, 0], some[:, 0, 0], gap]).ravel()
-        z = np.column_stack([quad[:, 2], some[:, 0, 2], gap]).ravel()
+    sampled = position[np.linspace(0, len(position) - 1, INSTANTS).astype(int)]
+    for i in range(position.shape[1] - 1):
+        quad, colour = sampled[:, 1 + i], COLOURS[i % len(COLOURS)]
+        gap = np.full(len(sampled), np.nan)
+        x = np.column_stack([quad[:, 0], sampled[:, 0, 0], gap]).ravel()
+        z = np.column_stack([quad[:, 2], sampled[:, 0, 2], gap]).ravel()
         marks.append(Line(x, z, colour=colour, width=0.7))
         marks.append(Line(quad[:, 0], quad[:, 2], f"quadrotor {i + 1}", colour, marker="square", joined=False))
-    place: dict[str, Any] = {"row": 0, "column": 1, "rows": 3}
-    return Panel(tuple(marks), "z up [m]", "x [m]", timed=False, equal=True, **place)
+    cell: dict[str, Any] = {"row": 0, "column": 1, "rows": 3}
+    return Panel(tuple(marks), "z up [m]", "x [m]", timed=False, equal=True, **cell)
 
 
 def _each(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
-    """Return a line for each quadrotor of values of shape (n, quadrotors)."""
-    return tuple(Line(t, of_one, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, of_one in enumerate(values.T))
+    """Return a line for each column of values, shape (n, quadrotors)."""
+    return tuple(Line(t, column, f"quadrotor {i + 1}", COLOURS[i % len(COLOURS)]) for i, column in enumerate(values.T))
 
 
 def _desired_path(flight: FlightData, t: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""The flight from above: path, reference, plan, fence, obstacles, wind, and where something happened."""
+"""Map of the flight: path, reference, plan, fence, obstacles, wind, and positions of adverse events."""
 
 from collections.abc import Iterator
 
@@ -13,25 +13,25 @@ from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QU
 ORDER = -10
 TITLE = "Mission map"
 NEEDS = ("ground_truth",)
-ARROW = 0.16  # length of the wind's arrow, as a part of the map
-HEAD = 0.25  # of the arrow's head, as a part of its length
-FENCE = 4.0  # times the extent of the flight: a larger fence does not widen the map
-LEAST = 2.0  # [m] extent of a map, so that a hover does not show noise as a path
+ARROW = 0.16  # length of the wind arrow, relative to the map
+HEAD = 0.25  # length of the arrow's head, relative to the arrow
+FENCE = 4.0  # largest extent of a fence that widens the map, relative to the flight
+LEAST = 2.0  # [m] minimum extent of the map, so that a hover does not show noise as a path
 
 
 def draw(flight: FlightData) -> Plot:
     """Plot the plan view, north up."""
     x, y, _ = flight.truth.position.T
     if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
-        raise NotRecordedError("it never leaves its place")
+        raise NotRecordedError("the position is constant")
     name, colour = "flown", FLOWN
     if len(flight.fleet) > 1:
         name, colour = flight.vehicle, COLOURS[list(flight.fleet).index(flight.vehicle) % len(COLOURS)]
     marks = [*_obstacles(flight), Line(x, y, name, colour, width=2.2)]
     if len(flight.reference):
         marks.append(reference(*flight.reference.T[:2]))
-    if len(places := waypoints(flight)):
-        east, north, _ = places.T
+    if len(points := waypoints(flight)):
+        east, north, _ = points.T
         marks.append(Line(east, north, "plan", COLOURS[3], 1.0, "dot", marker="open", size=6.0))
     marks.append(Line(x[:1], y[:1], "start", AXIS_COLOURS[2], marker="open", size=9.0, joined=False))
     marks.append(Line(x[-1:], y[-1:], "end", AXIS_COLOURS[2], marker="square", size=8.0, joined=False))
@@ -41,11 +41,11 @@ def draw(flight: FlightData) -> Plot:
     fence = list(_fence(flight))
     caption = ""
     if fence:
-        wide = _extent([*marks, *fence])
-        if (wide[1] - wide[0]).max() <= FENCE * (high - low).max():
-            low, high = wide
+        fence_low, fence_high = _extent([*marks, *fence])
+        if (fence_high - fence_low).max() <= FENCE * (high - low).max():
+            low, high = fence_low, fence_high
         else:
-            caption = "The fence reaches beyond this map; zoom out to see all of it."
+            caption = "The fence extends beyond this map; zoom out to see all of it."
     marks += [*fence, *_wind(flight, low, high)]
     panel = Panel(tuple(marks), "y north [m]", "x east [m]", timed=False, equal=True)
     panel = panel._replace(x_range=(float(low[0]), float(high[0])), y_range=(float(low[1]), float(high[1])))
@@ -61,7 +61,7 @@ def _others(flight: FlightData) -> Iterator[Line]:
 
 
 def _extent(lines: list[Line]) -> tuple[np.ndarray, np.ndarray]:
-    """Return the south-west and north-east corner around lines, with a margin [m], shape (2,) each."""
+    """Return the south-west and north-east corner around lines with a margin [m], shape (2,) each."""
     points = np.concatenate([np.column_stack([line.x, line.y]) for line in lines])
     low, high = np.nanmin(points, axis=0), np.nanmax(points, axis=0)
     middle, half = 0.5 * (low + high), np.maximum(0.6 * (high - low), 0.5 * LEAST)
@@ -69,15 +69,15 @@ def _extent(lines: list[Line]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _events(flight: FlightData) -> Iterator[Line]:
-    """Yield a line of markers for each kind of event that went wrong, at the places of the vehicle."""
+    """Yield a line of markers for each kind of adverse event, at the positions of the vehicle."""
     t, position = flight.truth.times, flight.truth.position
     times: dict[str, list[float]] = {}
     for event in trouble(flight):
         times.setdefault(event.kind, []).append(event.time)
-    for index, (kind, when) in enumerate(times.items()):
-        at = np.searchsorted(t, when).clip(max=len(t) - 1)
+    for index, (kind, event_times) in enumerate(times.items()):
+        rows = np.searchsorted(t, event_times).clip(max=len(t) - 1)
         marker = ("cross", "diamond", "triangle", "circle")[index % 4]
-        yield Line(position[at, 0], position[at, 1], kind, BOUND, marker=marker, size=9.0, joined=False)
+        yield Line(position[rows, 0], position[rows, 1], kind, BOUND, marker=marker, size=9.0, joined=False)
 
 
 def _fence(flight: FlightData) -> Iterator[Line]:

@@ -13,11 +13,11 @@ ORDER = 50
 TITLE = "Motors: speed, voltage and power"
 NEEDS = ("ground_truth",)
 MODELS = STEERED
-RPM = 60.0 / (2.0 * np.pi)  # of 1 rad/s
+RPM = 60.0 / (2.0 * np.pi)  # [rpm] in 1 rad/s
 
 
 def draw(flight: FlightData) -> Plot:
-    """Plot each quantity in a panel, each motor as a line."""
+    """Plot each quantity in a panel, with a line for each motor."""
     truth, t = flight.truth, flight.truth.times
     if truth.rotor_speed.shape[-1] == 0:
         raise NotRecordedError("the vehicle has no motors")
@@ -30,37 +30,35 @@ def draw(flight: FlightData) -> Plot:
     marks, note = limits(flight)
     panels[1] = panels[1]._replace(marks=panels[1].marks + marks)
     energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / WATT_HOUR
-    caption = f"Speed of each propeller, voltage and power of its motor. All motors take {energy:.1f} W h. "
+    caption = f"Speed of each propeller, voltage and power of its motor. All motors consume {energy:.1f} W h. "
     return Plot(caption=caption + note, **column(panels, 2.2, **over(flight)))
 
 
 def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
-    """Return a line for each motor of values of shape (n, motors)."""
-    return tuple(
-        Line(t, of_motor, f"motor {k + 1}", COLOURS[k % len(COLOURS)], 1.0) for k, of_motor in enumerate(values.T)
-    )
+    """Return a line for each column of values, shape (n, motors)."""
+    return tuple(Line(t, column, f"motor {k + 1}", COLOURS[k % len(COLOURS)], 1.0) for k, column in enumerate(values.T))
 
 
 def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
     """Return the voltage limits, the intervals at a limit, and a sentence on them."""
     highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
     if highest is None:
-        return (), "The log does not say what limits the voltage."
+        return (), "The log has no voltage limit."
     levels = Level(0.0, "limits", BOUND, "dot"), Level(highest, "limits", BOUND, "dot")
     if not len(flight.armed):
         return levels, f"Limits of the voltage: 0 and {highest:g} V."
     t, saturated = flight.truth.times[: len(flight.armed)], saturation(flight.truth, flight.armed, highest)
     if not saturated.lasted:
-        return levels, f"No motor is at a limit of its voltage (0 and {highest:g} V) in the air."
-    marks = (*_stretches(t, saturated.low, 0.0), *_stretches(t, saturated.high, highest))
+        return levels, f"No motor reaches a voltage limit (0 or {highest:g} V) in the air."
+    marks = (*_limit_lines(t, saturated.low, 0.0), *_limit_lines(t, saturated.high, highest))
     return (*levels, *marks), (
-        f"Marked: a motor is at a limit of its voltage (0 or {highest:g} V) in the air, in all for "
+        f"Marked: a motor is at a voltage limit (0 or {highest:g} V) in the air, in total for "
         f"{saturated.lasted:.2f} s, {100.0 * saturated.share(saturated.lasted):.2g} % of that time."
     )
 
 
-def _stretches(t: np.ndarray, at_limit: np.ndarray, limit: float) -> tuple[Line, ...]:
-    """Return at most one line along the limit: start, end and a gap for each interval with a motor there."""
+def _limit_lines(t: np.ndarray, at_limit: np.ndarray, limit: float) -> tuple[Line, ...]:
+    """Return a line along the limit with a segment for each interval with a motor there; empty without one."""
     any_motor = np.concatenate([[False], at_limit.any(axis=1), [False]])
     edges = np.flatnonzero(any_motor[1:] != any_motor[:-1])
     if not len(edges):

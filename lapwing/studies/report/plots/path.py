@@ -1,4 +1,4 @@
-"""The path seen from two sides; the mission map shows it from above."""
+"""Path from two sides; the mission map shows it from above."""
 
 import numpy as np
 
@@ -13,14 +13,14 @@ NEEDS = ("ground_truth",)
 def draw(flight: FlightData) -> Plot:
     """Plot the views from the south and from the east."""
     if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
-        raise NotRecordedError("it never leaves its place")
-    beside = " beside the reference" if len(flight.reference) else ""
-    caption = f"The flown path{beside} from the south (left) and from the east (right)."
+        raise NotRecordedError("the position is constant")
+    reference_text = " and its reference" if len(flight.reference) else ""
+    caption = f"Path{reference_text} from the south (left) and from the east (right)."
     return Plot(tuple(side(flight, axis)._replace(column=axis) for axis in (0, 1)), caption, 3.6, (1.0,), (1.0, 1.0))
 
 
 def space(flight: FlightData) -> Panel:
-    """Return the panel of the path in space; the three axes have one scale."""
+    """Return the panel of the path in space, with equal scales of the three axes."""
     x, y, z = flight.truth.position.T
     marks = [Line(x, y, "flown", width=2.0, z=z)]
     if len(flight.reference):
@@ -30,7 +30,7 @@ def space(flight: FlightData) -> Panel:
 
 
 def side(flight: FlightData, axis: int) -> Panel:
-    """Return the height over x east (axis 0) or y north (axis 1)."""
+    """Return the panel of the height over x east (axis 0) or y north (axis 1)."""
     marks = [Line(flight.truth.position[:, axis], flight.truth.position[:, 2], "flown", width=2.0)]
     if len(flight.reference):
         marks.append(reference(flight.reference[:, axis], flight.reference[:, 2]))

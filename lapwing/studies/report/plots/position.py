@@ -1,4 +1,4 @@
-"""Position over time, and how far it is from what was asked (the paper's Figure 22)."""
+"""Position and its error over time (the paper's Figure 22)."""
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import three_axes
@@ -10,6 +10,6 @@ NEEDS = ("ground_truth",)
 
 
 def draw(flight: FlightData) -> Plot:
-    """Plot each axis of the world frame in a row."""
-    caption = "Position of the body frame in the world frame (ENU), from home."
+    """Plot each axis of the world frame in a separate row."""
+    caption = "Position of the body frame in the world frame (ENU), relative to home."
     return three_axes(flight, 0, flight.truth.position, "m", 1.0, caption)

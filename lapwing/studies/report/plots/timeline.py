@@ -10,32 +10,34 @@ from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QU
 ORDER = 0
 TITLE = "Timeline"
 NEEDS = ("ground_truth", "status")
-BATTERY = ("", "low", "critical", "nearly empty")  # as of Status.battery_warning
-MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of events that have no lane of their own
-WIDTH = 0.004  # of the whole time, of an instant
+BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
+MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of events shown as instants
+WIDTH = 0.004  # width of an instant, relative to the time span
 
 
 def draw(flight: FlightData) -> Plot:
-    """Plot a lane for each state or event; lanes without content are named only."""
+    """Plot a lane for each state or event; empty lanes are only named."""
     status, t = flight.status, flight.status.times
     warning = np.array(BATTERY)[status.battery_warning.clip(max=len(BATTERY) - 1)]
     failed = np.where(status.failed_motor > 0, np.char.add("motor ", status.failed_motor.astype(str)), "")
     lanes = {
         "phase": (phases(flight), FLOWN),
         "mode": (runs(t, status.mode), AXIS_COLOURS[2]),
-        "armed": (runs(t, _where(status.armed, "armed")), AXIS_COLOURS[1]),
-        "landed": (runs(t, _where(status.landed, "landed")), QUIET),
-        "failsafe": (runs(t, _where(status.failsafe, "failsafe")), BOUND),
+        "armed": (runs(t, _label_where(status.armed, "armed")), AXIS_COLOURS[1]),
+        "landed": (runs(t, _label_where(status.landed, "landed")), QUIET),
+        "failsafe": (runs(t, _label_where(status.failsafe, "failsafe")), BOUND),
         "motor failed": (runs(t, failed), BOUND),
         "battery": (runs(t, warning), BOUND),
         "status text": (runs(t, status.text), COLOURS[3]),
         **{kind: (_instants(flight, kind), colour) for kind, colour in MARKED.items()},
     }
-    all_lanes = {lane: ([run for run in stretches if run[0]], colour) for lane, (stretches, colour) in lanes.items()}
-    bars = tuple(Stretch(lane, s, e, text, colour) for lane, (some, colour) in all_lanes.items() for text, s, e in some)
-    never = [lane for lane, (some, _) in all_lanes.items() if not some]
-    note = f" None in this flight: {', '.join(never)}." if never else ""
-    shown = max(len(all_lanes) - len(never), 1)
+    all_lanes = {lane: ([run for run in intervals if run[0]], colour) for lane, (intervals, colour) in lanes.items()}
+    bars = tuple(
+        Stretch(lane, s, e, text, colour) for lane, (entries, colour) in all_lanes.items() for text, s, e in entries
+    )
+    empty = [lane for lane, (entries, _) in all_lanes.items() if not entries]
+    note = f" None in this flight: {', '.join(empty)}." if empty else ""
+    shown = max(len(all_lanes) - len(empty), 1)
     return Plot(
         (Panel(bars),),
         f"State of the autopilot ({len(t)} messages) and events.{note}",
@@ -44,11 +46,11 @@ def draw(flight: FlightData) -> Plot:
     )
 
 
-def _where(flags: np.ndarray, text: str) -> np.ndarray:
+def _label_where(flags: np.ndarray, text: str) -> np.ndarray:
     return np.where(flags, text, "")
 
 
 def _instants(flight: FlightData, kind: str) -> list[tuple[str, float, float]]:
-    """Return events of a kind as intervals just wide enough to be visible."""
+    """Return events of a kind as intervals (text, start, end) that are just wide enough to be visible."""
     first, last = over(flight)["span"]
     return [(e.text, e.time, min(last, e.time + WIDTH * (last - first))) for e in flight.events if e.kind == kind]

@@ -1,4 +1,4 @@
-"""The unloading of the pack: its displacements (the paper's Figure 28), the door, the forces, and how it looks."""
+"""Unloading of the pack: its displacements (the paper's Figure 28), door, forces, and side views."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ ORDER = 5
 TITLE = "Unloading"
 NEEDS = ("ground_truth", "body_states")
 MODELS = ("unloading",)
-INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # pictures, as parts of the time until the pack is taken
+INSTANTS = (0.0, 0.16, 0.24, 0.27, 0.3, 0.5)  # times of the side views, over twice the time of the pickup
 
 
 def draw(flight: FlightData) -> Plot:
@@ -24,10 +24,10 @@ def draw(flight: FlightData) -> Plot:
     turn = np.array([_pitch(q) for q in np.moveaxis(bodies.orientation[:, :2], 1, 0)]).T
     force = np.linalg.norm(bodies.force, axis=2)
     door = turn[:, 1] - crate["tilt_deg"]
-    until = t <= crate["pickup"]
+    before = t <= crate["pickup"]
     rows = (("longitudinal [m]", place[:, 0, 0]), ("vertical [m]", place[:, 0, 2]), ("angular [°]", turn[:, 0]))
     panels = [
-        Panel((Line(t[until], values[until]),), label, row=i, columns=2) for i, (label, values) in enumerate(rows)
+        Panel((Line(t[before], values[before]),), label, row=i, columns=2) for i, (label, values) in enumerate(rows)
     ]
     panels.append(Panel((Line(t, door, colour=BOUND),), "door [°]", row=0, column=2))
     forces = zip(
@@ -38,18 +38,18 @@ def draw(flight: FlightData) -> Plot:
     for i, part in enumerate(INSTANTS):
         k = int(np.searchsorted(t, part * crate["pickup"] * 2.0 if part < 0.5 else crate["pickup"] - 0.1))
         k = min(k, len(t) - 1)
-        panels.append(picture(crate, place[k], turn[k])._replace(title=f"{t[k]:.2f} s", row=3 + i // 3, column=i % 3))
-    shut = t[until.sum() :][np.abs(door[until.sum() :]) < 1.0]
-    after = f"{shut[0] - crate['pickup']:.2f} s after it is taken the door is shut" if len(shut) else "it stays open"
+        panels.append(side_view(crate, place[k], turn[k])._replace(title=f"{t[k]:.2f} s", row=3 + i // 3, column=i % 3))
+    shut = t[before.sum() :][np.abs(door[before.sum() :]) < 1.0]
+    note = f"the door is shut {shut[0] - crate['pickup']:.2f} s after pickup" if len(shut) else "the door stays open"
     caption = (
-        "Displacements of the pack's middle until it is taken (longitudinal, vertical, angular as in the paper's "
-        f"Figure 28), the door's angle from shut, the contact forces on the pack, and the crate from the side; {after}."
+        "Displacements of the pack's centre until pickup (longitudinal, vertical, angular as in the paper's "
+        f"Figure 28), the door's angle from shut, the contact forces on the pack, and the crate from the side; {note}."
     )
     return Plot(tuple(panels), caption, 10.4, (1.0, 1.0, 1.0, 1.25, 1.25), (1.0,) * 3, **over(flight))
 
 
-def picture(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:
-    """Return the panel of crate, rollers, door and pack from the side."""
+def side_view(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:
+    """Return the side view of crate and bodies at positions [m], (bodies, 3), and angles [deg], (bodies,)."""
     length, _, height = crate["pack_size"]
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]) * (length / 2, height / 2)
     pack = place[0, [0, 2]] + corners @ _matrix(turn[0]).T
@@ -75,19 +75,19 @@ def picture(crate: dict, place: np.ndarray, turn: np.ndarray) -> Panel:
     return Panel(marks, "z [m]", "x [m]", timed=False, equal=True, **ranges)
 
 
-def _outline(points: np.ndarray, **looks: Any) -> Line:
+def _outline(points: np.ndarray, **style: Any) -> Line:
     """Return a line through points (x, z), shape (n, 2)."""
-    return Line(points[:, 0], points[:, 1], **looks)
+    return Line(points[:, 0], points[:, 1], **style)
 
 
 def _matrix(degrees: float) -> np.ndarray:
-    """Return the rotation of (x, z) about y."""
+    """Return the matrix of the rotation of (x, z) about y by an angle [deg]."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array([(c, s), (-s, c)])
 
 
 def _pitch(xyzw: np.ndarray) -> np.ndarray:
-    """Return the angle about y [degrees] of attitudes that rotate about y only."""
-    from scipy.spatial.transform import Rotation  # 0.2 s, which only reports that draw this wait for
+    """Return the angles about y [deg], shape (n,), of quaternions of rotations about y only, shape (n, 4)."""
+    from scipy.spatial.transform import Rotation  # imported on use: it takes 0.2 s
 
     return np.degrees(Rotation.from_quat(xyzw).as_rotvec()[:, 1])

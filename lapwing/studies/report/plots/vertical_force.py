@@ -1,4 +1,4 @@
-"""Net vertical force and rotor speeds of a quadrotor that nobody steers (the source's Figure 10)."""
+"""Net vertical force and rotor speeds of an uncontrolled quadrotor (the source's Figure 10)."""
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
@@ -10,7 +10,7 @@ ORDER = 25
 TITLE = "Net vertical force and rotor speeds"
 NEEDS = ("ground_truth",)
 MODELS = ("os4",)
-DASHES = ("solid", "dash", "dot", "dashdot")  # rotors of one speed lie on each other
+DASHES = ("solid", "dash", "dot", "dashdot")  # lines of rotors with equal speed coincide
 
 
 def draw(flight: FlightData) -> Plot:
