@@ -2,8 +2,8 @@
 
 A method file has `ORDER`, `ON_MANIFOLD` (does a step keep manifold leaves on the manifold to round-off?), a class
 `Method` that names it in compiled code, and a compiled `step(rate, p, t, x, h)` that returns the state at t + h, where
-`rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Three
-more if they apply:
+`rate(p, t, x)` gives the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p. Four
+more if they apply: `increment`, what a step adds to the numbers of x before it is brought back onto the manifold;
 `EVALUATIONS` of the rate in a step where their number is fixed, `FLAT_ORDER`, the order without curvature where that is
 higher, and `incompatibility(p, x)` of a method that is not for every system.
 """
@@ -13,6 +13,15 @@ from typing import Any
 
 from lapwing.dynamics import discovery
 from lapwing.dynamics.integrators._adaptive import integrate_adaptive
+from lapwing.dynamics.integrators._compensated import (
+    CompensatedSum,
+    CompensatedSummation,
+    add,
+    exact,
+    extrapolate,
+    rounded,
+    value_of,
+)
 from lapwing.dynamics.integrators._fixed_step import RATES, integrate_fixed, rate, record, step
 from lapwing.dynamics.integrators._pieces import BREAKPOINTS
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
@@ -22,9 +31,14 @@ __all__ = [
     "BREAKPOINTS",
     "RATES",
     "SHORTEST",
+    "CompensatedSum",
+    "CompensatedSummation",
     "StepDoubling",
+    "add",
     "check_start",
     "compatible_methods",
+    "exact",
+    "extrapolate",
     "get",
     "incompatibility",
     "integrate_adaptive",
@@ -34,10 +48,12 @@ __all__ = [
     "not_finite",
     "rate",
     "record",
+    "rounded",
     "shorter",
     "simulate",
     "solve",
     "step",
+    "value_of",
 ]
 
 
